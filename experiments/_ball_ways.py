@@ -75,42 +75,32 @@ class Deadline(jb.dynamics.AbstractSection):
 def ours(problem: Problem, rtol: float) -> Run:
     """Steps end at switches, tangents are in the norm; the error is told by two more solves."""
 
-    def run() -> Answer:
-        fine, loose = (_linearised(problem, each) for each in (rtol, 10.0 * rtol))
-        other = _linearised(problem, rtol, solver="rodas5p")
-        return with_estimate(fine, loose=loose, other=other)
+    def linearised(rtol: float, solver: str = "rodas4") -> Answer:
+        start = tuple(jnp.asarray(value) for value in (problem.height, 0.0, 0.0))
+        found = jb.gait.linearise_return_map(
+            Ball(problem.g, problem.K, problem.c, problem.duration),
+            start,
+            rtol=rtol,
+            tangent_rtol=rtol,
+            parameters=problem.parameters[1:],
+            section=Deadline(),
+            system=Bouncing(damped=problem.c != 0.0),
+            solver=solver,
+            engine="lanes",
+        )
+        jacobian = np.asarray(found.jacobian)[:2]
+        by_height = problem.height * jacobian[:, :1]
+        return Answer(found.recurring[:2], np.hstack([by_height, jacobian[:, 3:]]))
 
-    return run
-
-
-def _linearised(problem: Problem, rtol: float, *, solver: str = "rodas4") -> Answer:
-    start = tuple(jnp.asarray(value) for value in (problem.height, 0.0, 0.0))
-    names = problem.parameters[1:]
-    found = jb.gait.linearise_return_map(
-        Ball(problem.g, problem.K, problem.c, problem.duration),
-        start,
-        rtol=rtol,
-        tangent_rtol=rtol,
-        parameters=names,
-        section=Deadline(),
-        system=Bouncing(damped=problem.c != 0.0),
-        solver=solver,
-        engine="lanes",
-    )
-    jacobian = np.asarray(found.jacobian)[:2]
-    by_height = problem.height * jacobian[:, :1]
-    return Answer(found.recurring[:2], np.hstack([by_height, jacobian[:, 3:]]))
-
-
-def _numbers(problem: Problem) -> jax.Array:
-    return jnp.asarray([getattr(problem, name) for name in problem.parameters])
+    return with_estimate(linearised, rtol)
 
 
 def differentiate(final: Callable[[Problem, Any], jax.Array], problem: Problem) -> Run:
     """A function of the parameters with its forward-mode derivatives, compiled once."""
+    numbers = jnp.asarray([getattr(problem, name) for name in problem.parameters])
 
     def of_logarithms(logarithms: jax.Array) -> jax.Array:
-        values = _numbers(problem) * jnp.exp(logarithms)
+        values = numbers * jnp.exp(logarithms)
         return final(problem, dict(zip(problem.parameters, values, strict=True)))
 
     def both(logarithms: jax.Array) -> tuple[jax.Array, jax.Array]:
@@ -162,15 +152,11 @@ def by_semi_implicit_euler(problem: Problem, dt: float) -> Run:
     return differentiate(final, problem)
 
 
-KVAERNO = diffrax.Kvaerno5(
-    root_finder=diffrax.with_stepsize_controller_tols(optx.Chord)(),
-)
-
-
+KVAERNO5 = diffrax.Kvaerno5(root_finder=diffrax.with_stepsize_controller_tols(optx.Chord)())
 TOLERANCES, TIME_STEPS = (1e-4, 1e-6, 1e-8), (1e-3, 1e-4, 1e-5)
 OUR_WAYS = (
     Way("jaxbiped", "rtol", TOLERANCES, ours),
     Way("diffrax Tsit5", "rtol", TOLERANCES, lambda p, s: by_diffrax(p, diffrax.Tsit5(), s)),
-    Way("diffrax Kvaerno5", "rtol", TOLERANCES, lambda p, s: by_diffrax(p, KVAERNO, s)),
+    Way("diffrax Kvaerno5", "rtol", TOLERANCES, lambda p, s: by_diffrax(p, KVAERNO5, s)),
     Way("semi-implicit Euler in JAX", "dt", TIME_STEPS, by_semi_implicit_euler),
 )

@@ -4,9 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 import _basin_slice
-import numpy as np
+from _scenes import rigid_seed
 from _timing import seconds_of
-from reference.compliant import START
 
 import jaxbiped as jb
 
@@ -21,9 +20,7 @@ def rolling_on(scene: jb.RigidScene, states: jb.dynamics.RigidState) -> jb.dynam
 
 def labelling_of(model: str, **options: Any) -> jb.Labelling:
     """Of the seed's walker, "compliant" or "rigid"."""
-    seed = jb.seed_scene()
-    rigid = jb.RigidScene(walker=seed.walker, ground=seed.ground)
-    return jb.labelling(rigid if model == "rigid" else seed, **options)
+    return jb.labelling(rigid_seed() if model == "rigid" else jb.seed_scene(), **options)
 
 
 def starts_of(scene: Any, count: int) -> jb.starts.Sample:
@@ -34,18 +31,12 @@ def starts_of(scene: Any, count: int) -> jb.starts.Sample:
     return jb.starts.sample(scene, bounds, count, method="uniform")
 
 
-def swept(labelling: jb.Labelling, count: int, chunk: int = 16384) -> Callable[[], Any]:
-    """A sweep in memory, to be run and timed."""
-    starts = starts_of(labelling.scene, count)
-    return lambda: jb.sweep(labelling, starts, chunk=chunk, look_for_gaits=False)
+def swept(labelling: jb.Labelling, count: int, **options: Any) -> Callable[[], Any]:
+    """A sweep of starts, to be run and timed; in memory unless a store is given."""
+    starts, how = starts_of(labelling.scene, count), {"chunk": 16384} | options
+    return lambda: jb.sweep(labelling, starts, look_for_gaits=False, **how)
 
 
 def least_seconds(work: dict[Any, Callable[[], Any]], rounds: int) -> dict[Any, float]:
     """Least seconds of runs that take turns."""
     return seconds_of(work, rounds, warm=False, statistic=min)
-
-
-def perturbed(count: int) -> np.ndarray:
-    """Starts about the seed's (n, 8), every number off by about a thousandth of itself."""
-    noise = np.random.default_rng(0).standard_normal((count, 8))
-    return START * (1.0 + 1e-3 * noise)

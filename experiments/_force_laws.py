@@ -1,8 +1,5 @@
 """A law of contact in the seed's walk: its cost, its gait, and whether it suits."""
 
-from typing import Any, NamedTuple
-
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,7 +7,6 @@ from _timing import seconds_of
 
 import jaxbiped as jb
 
-SLOPE = 0.02
 SEED = {"normal": "ristow-schafer", "friction": "bengisu-akay"}
 DURATION = 2.0
 """What a walk is judged and timed by [s]."""
@@ -39,49 +35,17 @@ CRITERIA = {
     "care",
 }
 """What a verdict is derived from, in this order."""
+MEASURES = {
+    "period_s": "period",
+    "step_length_m": "step_length",
+    "speed_m_s": "speed",
+    "peak_normal_N": "peak_normal",
+    "spectral_radius": "spectral_radius",
+}
+"""Measures of a gait by their names here and in `jb.gait.Measures`."""
 
 
-class Findings(NamedTuple):
-    """What is measured of one law; SI units.
-
-    `measures`: of the gait, by `found_by` a search, or a settled walk where that found none; None
-    where there is no gait. `walked_period_difference`: of the two ways, as a share. Extremes are
-    over the ends of the solver's steps of the walk from the seed's start: `least_total_N` of both
-    feet together is above zero unless the walker leaves the ground.
-    """
-
-    outcome: str
-    end_s: float
-    attempted_steps: int
-    wall_ms: float
-    search: str
-    found_by: str | None
-    measures: dict[str, float | None] | None
-    unit_multiplier_error: float | None
-    walked_period_difference: float | None
-    force_jumps_at_touchdown: bool
-    largest_penetration_m: float
-    least_normal_N: float  # noqa: N815 (newton)
-    most_normal_N: float  # noqa: N815
-    least_total_N: float  # noqa: N815
-    most_friction_over_load: float
-
-
-def scene_with(laws: dict[str, str], slope: float = SLOPE) -> jb.Scene:
-    """The seed's scene with its normal law or its friction replaced by one of a name, like it."""
-    scene = jb.seed_scene(slope=slope)
-    normal, friction = scene.normal, scene.friction
-    if laws.get("normal", SEED["normal"]) != SEED["normal"]:
-        own = dict(K=normal.K, c=normal.c, n=normal.n)
-        mass, g = scene.walker.total_mass, scene.ground.g
-        normal = jb.laws.normal_law_like(laws["normal"], **own, mass=mass, g=g)
-    if laws.get("friction", SEED["friction"]) != SEED["friction"]:
-        own = {name: getattr(friction, name) for name in ("mu_static", "mu_kinetic", "v0", "xi")}
-        friction = jb.laws.friction_law_like(laws["friction"], **own)
-    return eqx.tree_at(lambda each: (each.normal, each.friction), scene, (normal, friction))
-
-
-def extremes(scene: jb.Scene, state: jb.State) -> dict[str, Any]:
+def extremes(scene, state):
     """Loads and depths of both feet, for the `extremes` of a simulation."""
     both, forces = jb.dynamics.feet(scene, state), jb.dynamics.foot_forces(scene, state)
     normal = [force.normal for force in forces]
@@ -102,22 +66,20 @@ def extremes(scene: jb.Scene, state: jb.State) -> dict[str, Any]:
     }
 
 
-def walk(scene: jb.Scene, state: Any, duration: float) -> jb.CompiledSimulation:
+def walk(scene, state, duration):
     """A walk by lanes, ready to run: heel strikes and extremes. One program for every duration."""
-    request = jb.Simulation.prepare(
-        scene,
-        state,
-        duration=duration,
-        save=jb.HeelStrike(),
-        extremes=extremes,
-        max_solver_steps=MOST_STEPS,
-        engine="lanes",
-    )
-    return request.compile()
+    how = dict(save=jb.HeelStrike(), extremes=extremes, max_solver_steps=MOST_STEPS)
+    return jb.Simulation.prepare(scene, state, duration=duration, engine="lanes", **how).compile()
 
 
-def findings(scene: jb.Scene, repeats: int) -> Findings:
-    """Walks, times and searches one scene."""
+def findings(scene, repeats):
+    """What is measured of one law; SI units.
+
+    `measures`: of the gait, by `found_by` a search, or a settled walk where that found none; None
+    where there is no gait. `walked_period_difference`: of the two ways, as a share. Extremes are
+    over the ends of the solver's steps of the walk from the seed's start: `least_total_N` of both
+    feet together is above zero unless the walker leaves the ground.
+    """
     run = walk(scene, jb.seed_state(), DURATION)
     first = run()
     walks = first.outcome is jb.Ending.WALKING
@@ -125,38 +87,28 @@ def findings(scene: jb.Scene, repeats: int) -> Findings:
     gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
     found = gait.outcome is jb.gait.Search.FOUND
     searched = {name: float(getattr(gait.measures, key)) for name, key in MEASURES.items()}
-    period = walked["period_s"] if walked else None
+    both = found and walked
     low, high = first.lowest, first.highest
-    return Findings(
-        outcome=str(first.outcome),
-        end_s=DURATION if walks else end_time(scene),
-        attempted_steps=int(first.attempted),
-        wall_ms=1e3 * seconds_of({0: run}, repeats, warm=False)[0],
-        search=str(gait.outcome) if found else f"{gait.outcome}, last walk: {gait.walk_outcome}",
-        found_by="search" if found else ("walk" if walked else None),
-        measures=searched if found else walked,
-        unit_multiplier_error=float(gait.unit_multiplier_error) if found else None,
-        walked_period_difference=period / searched["period_s"] - 1 if found and period else None,
-        force_jumps_at_touchdown=scene.normal.jumps_at_touchdown,
-        largest_penetration_m=float(high["depth"]),
-        least_normal_N=float(low["least"]),
-        most_normal_N=float(high["most"]),
-        least_total_N=float(low["total"]),
-        most_friction_over_load=float(high["ratio"]),
-    )
+    return {
+        "outcome": str(first.outcome),
+        "end_s": DURATION if walks else end_time(scene),
+        "attempted_steps": int(first.attempted),
+        "wall_ms": 1e3 * seconds_of({0: run}, repeats, warm=False)[0],
+        "search": str(gait.outcome) + ("" if found else f", last walk: {gait.walk_outcome}"),
+        "found_by": "search" if found else ("walk" if walked else None),
+        "measures": searched if found else walked,
+        "unit_multiplier_error": float(gait.unit_multiplier_error) if found else None,
+        "walked_period_difference": walked["period_s"] / searched["period_s"] - 1 if both else None,
+        "force_jumps_at_touchdown": scene.normal.jumps_at_touchdown,
+        "largest_penetration_m": float(high["depth"]),
+        "least_normal_N": float(low["least"]),
+        "most_normal_N": float(high["most"]),
+        "least_total_N": float(low["total"]),
+        "most_friction_over_load": float(high["ratio"]),
+    }
 
 
-MEASURES = {
-    "period_s": "period",
-    "step_length_m": "step_length",
-    "speed_m_s": "speed",
-    "peak_normal_N": "peak_normal",
-    "spectral_radius": "spectral_radius",
-}
-"""Measures of a gait by their names here and in `jb.gait.Measures`."""
-
-
-def settled(scene: jb.Scene) -> dict[str, float | None] | None:
+def settled(scene):
     """The gait that a long walk settles on, None where it does not; no spectral radius."""
     long = walk(scene, jb.seed_state(), SETTLING)()
     strikes = long.arrivals
@@ -179,15 +131,15 @@ def settled(scene: jb.Scene) -> dict[str, float | None] | None:
     }
 
 
-def end_time(scene: jb.Scene) -> float:
+def end_time(scene):
     """When a walk from the seed's start ends [s]."""
     walk = jb.simulate(scene, jb.seed_state(), duration=DURATION, save="end", engine="lanes")
     return float(walk.t[-1])
 
 
-def deviations(found: Findings, seed: Findings) -> dict[str, float | None]:
+def deviations(found, seed):
     """Of every measure from the seed's, as a share; None where there is none."""
-    own, its = found.measures or {}, seed.measures or {}
+    own, its = found["measures"] or {}, seed["measures"] or {}
     pairs = {name: (own.get(name), its.get(name)) for name in MEASURES}
     return {
         name: None if value is None or ours is None else value / ours - 1.0
@@ -195,24 +147,25 @@ def deviations(found: Findings, seed: Findings) -> dict[str, float | None]:
     }
 
 
-def verdict(found: Findings, seed: Findings, mu_static: float) -> str:
+def verdict(found, seed, mu_static):
     """Whether a law suits, by `CRITERIA`."""
-    if found.outcome != str(jb.Ending.WALKING):
-        return f"does not suit: {found.outcome} at {found.end_s:.3f} s"
-    if found.least_normal_N < 0.0:
-        return f"does not suit: the ground pulls with {-found.least_normal_N:.3g} N"
-    if found.measures is None:
+    if found["outcome"] != str(jb.Ending.WALKING):
+        return f"does not suit: {found['outcome']} at {found['end_s']:.3f} s"
+    if found["least_normal_N"] < 0.0:
+        return f"does not suit: the ground pulls with {-found['least_normal_N']:.3g} N"
+    if found["measures"] is None:
         return "does not suit: it settles on no gait"
-    error, cost = found.unit_multiplier_error, found.attempted_steps / seed.attempted_steps
+    error = found["unit_multiplier_error"]
+    cost = found["attempted_steps"] / seed["attempted_steps"]
     cares = []
-    if found.force_jumps_at_touchdown:
+    if found["force_jumps_at_touchdown"]:
         cares.append("its force jumps at touchdown")
     if error is None:
-        cares.append(f"no derivatives (gait search: {found.search.partition(', ')[0]})")
+        cares.append(f"no derivatives (gait search: {found['search'].partition(', ')[0]})")
     elif not error < TRUSTED:
         cares.append(f"multipliers not to be trusted (unit one off by {error:.1e})")
-    if found.most_friction_over_load > GRIP * mu_static:
-        cares.append(f"friction up to {found.most_friction_over_load:.3g} of the load")
+    if found["most_friction_over_load"] > GRIP * mu_static:
+        cares.append(f"friction up to {found['most_friction_over_load']:.3g} of the load")
     if cost > COSTLY:
         cares.append(f"{cost:.1f} times the seed's steps")
     return "suits with care: " + "; ".join(cares) if cares else "suits"

@@ -1,6 +1,6 @@
 """Motions densely sampled by lanes, and the footsteps in them."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,7 +17,10 @@ SHOWN = 2000
 
 
 class Motion(NamedTuple):
-    """A motion at times t (n,) [s]: kinetic energy (n,); for each leg rows (2, n). SI units."""
+    """A motion at times t (n,) [s]: kinetic energy (n,); for each leg rows (2, n). SI units.
+
+    Of one foot from its heel strike to the next, times are since the strike, and rows (n,).
+    """
 
     t: np.ndarray
     kinetic: np.ndarray
@@ -29,35 +32,17 @@ class Motion(NamedTuple):
     outcome: str
 
 
-class Stance(NamedTuple):
-    """A foot from its heel strike to the next one, at times t (m,) since the strike [s]."""
-
-    t: np.ndarray
-    depth: np.ndarray
-    normal: np.ndarray
-    tangential: np.ndarray
-    slip: np.ndarray
-
-
-class Strike(NamedTuple):
-    """A heel strike: its place among the times, its leg (0 or 1), its angle [rad]."""
-
-    place: int
-    leg: int
-    angle: float
-
-
-def motion(scene: jb.Scene, duration: float) -> Motion:
+def motion(scene, duration):
     """From the seed's start, until it ends."""
-    options: dict[str, Any] = dict(rtol=RTOL, save=jnp.linspace(0.0, duration, COUNT))
-    walk = jb.simulate(scene, jb.seed_state(), duration=duration, engine="lanes", **options)
+    how = dict(rtol=RTOL, save=jnp.linspace(0.0, duration, COUNT), engine="lanes")
+    walk = jb.simulate(scene, jb.seed_state(), duration=duration, **how)
     saved = np.isfinite(np.asarray(walk.t))
     rows = {name: np.asarray(row)[..., saved] for name, row in _rows(scene, walk.state).items()}
     return Motion(t=np.asarray(walk.t)[saved], outcome=str(walk.outcome), **rows)
 
 
 @eqx.filter_jit
-def _rows(scene: jb.Scene, state: Any) -> dict[str, Any]:
+def _rows(scene, state):
     both, forces = jb.dynamics.feet(scene, state), jb.dynamics.foot_forces(scene, state)
     nothing = jnp.zeros_like(state.theta_1)
     tangential = [nothing if each.tangential is None else each.tangential for each in forces]
@@ -71,38 +56,38 @@ def _rows(scene: jb.Scene, state: Any) -> dict[str, Any]:
     }
 
 
-def strikes(found: Motion) -> list[Strike]:
-    """Where the leg ahead begins to carry, the other one having struck before."""
+def strikes(found):
+    """Places and legs (0 or 1) where the leg ahead begins to carry, the other having struck."""
     loaded = found.normal > 0.0
     begins = ~loaded[:, :-1] & loaded[:, 1:] & (found.angle[:, 1:] > 0.0)
     last, struck = int(np.argmax(loaded[:, 0])), []
-    for place in np.flatnonzero(begins.any(axis=0)) + 1:
+    for place in map(int, np.flatnonzero(begins.any(axis=0)) + 1):
         leg = 1 - last
         if begins[leg, place - 1]:
-            struck.append(Strike(int(place), leg, float(found.angle[leg, place])))
+            struck.append((place, leg))
             last = leg
     return struck
 
 
-def first_stance(found: Motion) -> Stance | None:
-    """From the first heel strike to the second or to the end; None without a strike."""
+def first_stance(found):
+    """One foot from the first heel strike to the second or to the end; None without a strike."""
     struck = strikes(found)
     if not struck:
         return None
-    begin, leg = struck[0].place, struck[0].leg
-    size = (struck[1].place if len(struck) > 1 else len(found.t)) - begin
+    begin, leg = struck[0]
+    size = (struck[1][0] if len(struck) > 1 else len(found.t)) - begin
     logarithmic = np.geomspace(1, size - 1, SHOWN).astype(int)
     shown = np.unique(np.concatenate([np.linspace(0, size - 1, SHOWN).astype(int), logarithmic]))
     places = begin + shown
-    names = ("depth", "normal", "tangential", "slip")
+    names = ("angle", "depth", "normal", "tangential", "slip")
     rows = {name: getattr(found, name)[leg, places] for name in names}
     # The foot touched between the last time without a load and the first with one.
     touched = 0.5 * (found.t[begin - 1] + found.t[begin])
-    return Stance(t=found.t[places] - touched, **rows)
+    return found._replace(t=found.t[places] - touched, kinetic=found.kinetic[places], **rows)
 
 
-def largest(found: Motion, rows: np.ndarray) -> list[float]:
+def largest(found, rows):
     """Largest value in rows (2, n) from each heel strike to the next or to the end."""
-    places = [strike.place for strike in strikes(found)]
+    places = [place for place, _ in strikes(found)]
     ends = [*places[1:], len(found.t)]
     return [float(rows[:, a:b].max()) for a, b in zip(places, ends, strict=True)]

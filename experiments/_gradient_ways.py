@@ -5,17 +5,20 @@ logarithms of the parameters, and what it says about their error (None where it 
 """
 
 import importlib.util
-import time
 from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from jaxbiped.trade import work_of
+
 NOT_INSTALLED, OTHER_LAW = "not installed", "its contact has another law"
 OVERFLOWED = "derivatives overflow"
-ENOUGH = 3.0
-"""Runs that took so long together [s] are not repeated again."""
+PACKAGES = (
+    "jaxbiped", "jax", "diffrax", "scipy", "casadi", "mujoco-mjx", "brax", "warp-lang", "newton",
+)  # fmt: skip
 
 
 class Answer(NamedTuple):
@@ -66,14 +69,20 @@ def relative_error(rows: Any, truth: Any) -> float:
     return float(np.max(np.abs(rows - truth) / np.max(np.abs(truth), axis=1, keepdims=True)))
 
 
-def with_estimate(fine: Answer, *, loose: Answer, other: Answer) -> Answer:
+def with_estimate(linearised: Callable[..., Answer], rtol: float) -> Run:
     """An answer that says the changes of its gradient by two witnesses together.
 
-    `loose` is by a ten times looser tolerance; `other` by another method, and counts twice. A sum,
-    as in the bars of gaits: either may agree by chance.
+    One is by a ten times looser tolerance; the other by another method, and counts twice. A sum, as
+    in the bars of gaits: either may agree by chance.
     """
-    first, second = (relative_error(each.gradient, fine.gradient) for each in (loose, other))
-    return fine._replace(said=first + 2.0 * second)
+
+    def run() -> Answer:
+        fine, loose = linearised(rtol), linearised(10.0 * rtol)
+        other = linearised(rtol, solver="rodas5p")
+        first, second = (relative_error(each.gradient, fine.gradient) for each in (loose, other))
+        return fine._replace(said=first + 2.0 * second)
+
+    return run
 
 
 def row_of(
@@ -93,11 +102,10 @@ def row_of(
     if not way.installed:
         return named | {"outcome": NOT_INSTALLED}
     try:
-        run = way.prepare(given, value)
-        answer = run()
-        spent = _work(run, repeats)
+        answer, work = work_of(way.prepare(given, value), repeats)
     except RuntimeError as error:
         return named | {"outcome": f"raised {type(error).__name__}"}
+    spent = {"seconds": work.seconds, "cpu_s": work.cpu_s}
     scale = np.maximum(np.abs(truth.state), least)
     off = float(np.max(np.abs(np.asarray(answer.state) - truth.state) / scale))
     if not np.all(np.isfinite(answer.gradient)):
@@ -107,17 +115,6 @@ def row_of(
     return named | found | {"said": answer.said} | spent
 
 
-def _work(run: Run, repeats: int) -> dict[str, float]:
-    """Median times, compiled before: by the clock, and of all threads."""
-    spans: list[tuple[float, float]] = []
-    while not spans or (len(spans) < repeats and sum(wall for wall, _ in spans) < ENOUGH):
-        began, before = time.perf_counter(), time.process_time()
-        run()
-        spans.append((time.perf_counter() - began, time.process_time() - before))
-    seconds, cpu = (float(np.median([span[k] for span in spans])) for k in range(2))
-    return {"seconds": seconds, "cpu_s": cpu}
-
-
 def draw_way(ax: Axes, name: str, rows: list[dict[str, Any]], **look: Any) -> None:
     """A way's errors of the gradient over those of the state, and what it says of them."""
     states, gradients = ([row[key] for row in rows] for key in ("state_error", "gradient_error"))
@@ -125,3 +122,15 @@ def draw_way(ax: Axes, name: str, rows: list[dict[str, Any]], **look: Any) -> No
     if rows[0]["said"] is not None:
         said = [row["said"] for row in rows]
         ax.loglog(states, said, "v:", color=line.get_color(), label=f"{name}: what it says")
+
+
+def versions() -> dict[str, str | None]:
+    """Versions of the tools that can be asked; None where one is not installed."""
+    return {name: _version(name) for name in PACKAGES}
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None

@@ -13,8 +13,7 @@ import numpy as np
 
 import jaxbiped as jb
 
-STARTS, FOOTSTEPS = 48, 60
-LONG = 300
+STARTS, FOOTSTEPS, LONG = 48, 60, 300
 CYCLES = (1, 2, 3, 4, 6, 8)
 """Lengths [footsteps] of cycles that are told apart."""
 _SETTLED = 1e-7
@@ -36,7 +35,7 @@ class Settled(NamedTuple):
     state: Any
 
 
-def settled(scene: Any, near: list[Any], *, seed: int) -> Settled:
+def settled(scene, near, *, seed):
     """Where walks from rolling starts, and from states `near` by, settle."""
     starts = jb.gait.rolling_starts(scene, STARTS, spread=0.5, seed=seed)
     for i, state in enumerate(near[-4:]):
@@ -46,17 +45,14 @@ def settled(scene: Any, near: list[Any], *, seed: int) -> Settled:
     if not len(walking):
         return Settled(-1, float("nan"), None)
     durations = np.diff(np.asarray(times)[walking, -9:], axis=1)
-    open_ = [_openness(each) for each in durations]
+    # How far each is from repeating itself after one footstep, or after two, or four.
+    open_ = [min(abs(row[-1] / row[-1 - k] - 1.0) for k in (1, 2, 4)) for row in durations]
     best = walking[int(np.argmin(open_))]
     start = jax.tree.map(lambda leaf: leaf[best][None], states)
     times, states, counts = _walked(scene, start, LONG, 3e-9)
     if int(counts[0]) < LONG:
         return Settled(-1, float("nan"), None)
-    state = jax.tree.map(lambda leaf: leaf[0], states)
-    return _cycle(np.asarray(times)[0], state)
-
-
-def _cycle(times: np.ndarray, state: Any) -> Settled:
+    times, state = np.asarray(times)[0], jax.tree.map(lambda leaf: leaf[0], states)
     for cycle in CYCLES:
         last, before = times[-1] - times[-1 - cycle], times[-1 - cycle] - times[-1 - 2 * cycle]
         if abs(last / before - 1.0) < _SETTLED:
@@ -64,37 +60,25 @@ def _cycle(times: np.ndarray, state: Any) -> Settled:
     return Settled(0, float("nan"), state)
 
 
-def _openness(durations: np.ndarray) -> float:
-    """How far a walk is from repeating itself after one footstep, or after two, or four."""
-    return min(abs(durations[-1] / durations[-1 - k] - 1.0) for k in (1, 2, 4))
-
-
 @eqx.filter_jit
-def _walked(scene: Any, starts: Any, footsteps: int, rtol: float) -> Any:
+def _walked(scene, starts, footsteps, rtol):
     """Times of the arrivals, the last state with leg 2 standing, and how many there were."""
 
-    def compliant(start: Any) -> Any:
-        walk = jb.simulate(
-            scene,
-            start,
-            footsteps=footsteps + 1,
-            rtol=rtol,
-            save=jb.MidStance(),
-            max_arrivals=footsteps,
-            max_solver_steps=1_000_000,
-            engine="lanes",
-        )
-        at = walk.arrivals
+    def walk(start):
+        if isinstance(scene, jb.RigidScene):
+            how = dict(footsteps=footsteps, rtol=1e-11, max_arrivals=footsteps)
+            return jb.rigid_walk(scene, start, **how).arrivals
+        how = dict(footsteps=footsteps + 1, save=jb.MidStance(), max_arrivals=footsteps)
+        how |= dict(rtol=rtol, max_solver_steps=1_000_000, engine="lanes")
+        return jb.simulate(scene, start, **how).arrivals
+
+    def one(start):
+        at = walk(start)
         last = jax.tree.map(lambda leaf: leaf[-1], at.state)
-        stands = jnp.abs(last.theta_1) < jnp.abs(last.theta_2)
-        last = jax.tree.map(
-            lambda a, b: jnp.where(stands, a, b), jb.dynamics.exchange_legs(last), last
-        )
+        if not isinstance(scene, jb.RigidScene):
+            stands = jnp.abs(last.theta_1) < jnp.abs(last.theta_2)
+            other = jb.dynamics.exchange_legs(last)
+            last = jax.tree.map(lambda a, b: jnp.where(stands, a, b), other, last)
         return at.t, last._replace(hip_x=0.0 * last.hip_x), at.total
 
-    def rigid(start: Any) -> Any:
-        walk = jb.rigid_walk(scene, start, footsteps=footsteps, rtol=1e-11, max_arrivals=footsteps)
-        last = jax.tree.map(lambda leaf: leaf[-1], walk.arrivals.state)
-        return walk.arrivals.t, last._replace(hip_x=0.0 * last.hip_x), walk.arrivals.total
-
-    return jax.vmap(rigid if isinstance(scene, jb.RigidScene) else compliant)(starts)
+    return jax.vmap(one)(starts)

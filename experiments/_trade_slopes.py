@@ -3,25 +3,25 @@
 import functools
 import math
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import _casadi
-import diffrax
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-from _trade_store import Case, Store
+from _final_slopes import slopes_and_end
+from _trade_store import Case, Store, not_installed
 from _trade_walks import tolerances, walk_of
 from reference.compliant import SEED, numbers
 from reference.scipy_solves import final_of
 
 import jaxbiped as jb
-from jaxbiped.trade import Row, Truth, failed_row, row_of, work_of
+from jaxbiped.trade import Row, Truth, row_of, work_of
 
 FINEST, INDEPENDENT = 1e-11, 1e-12
 STEP, REFERENCE_STEP = 1e-4, 3e-3
 """Of central differences, by the logarithm of a parameter."""
+WAYS = (
+    *(("rodas4p", "lanes"), ("rodas5p", "lanes"), ("rodas4", "lanes")),
+    *(("rodas4p", "xla"), ("kvaerno5", "xla")),
+)
 
 
 def cases(store: Store, quick: bool) -> Iterator[Case]:
@@ -30,7 +30,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     duration, units = walk.duration, walk.units()[:, None]
 
     def truth() -> Truth:
-        def references() -> tuple[Any, Any]:
+        def references():
             ours = by_jacobian("rodas5p", "lanes", duration, FINEST)() / units
             return {"slopes": ours}, {"slopes": independent_slopes(duration) / units}
 
@@ -43,77 +43,46 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
 
         return Case("slopes", way, f"rtol={rtol:g}", measure)
 
-    ways = (
-        *(("rodas4p", "lanes"), ("rodas5p", "lanes"), ("rodas4", "lanes")),
-        *(("rodas4p", "xla"), ("kvaerno5", "xla")),
-    )
-    for solver, engine in ways[: 1 if quick else None]:
+    for solver, engine in WAYS[: 1 if quick else None]:
         name = f"{solver} by {engine}" + (", steps for the state alone" if engine == "xla" else "")
         for rtol in tolerances(quick, -3, -8):
             yield case(name, rtol, functools.partial(by_jacobian, solver, engine, duration, rtol))
     for rtol in tolerances(quick, -5, -10):
         yield case("SciPy LSODA, differences", rtol, functools.partial(differences, duration, rtol))
     if not _casadi.is_installed():
-        missing = functools.partial(failed_row, "CasADi CVODES", "rtol=1e-6", "not installed")
-        yield Case("slopes", "CasADi CVODES", "rtol=1e-6", missing)
+        yield not_installed("slopes", "CasADi CVODES")
         return
     for rtol in tolerances(quick, -3, -9):
         yield case("CasADi CVODES", rtol, functools.partial(by_casadi, duration, rtol))
 
 
-def by_jacobian(solver: str, engine: str, duration: float, rtol: float) -> Callable[[], np.ndarray]:
+def by_jacobian(solver, engine, duration, rtol):
     """Forward derivatives (8, 3) of a walk: by lanes with steps that heed them."""
-    slopes, zeros = jacobian_of(solver, engine, duration), [jnp.asarray(0.0)] * 3
-    return lambda: np.stack(slopes(zeros, jnp.asarray(rtol)), axis=1)
+    run = slopes_and_end(duration, solver=solver, engine=engine, atol=None)
+    return lambda: run(rtol)[0]
 
 
-@functools.cache
-def jacobian_of(solver: str, engine: str, duration: float) -> Callable[..., Any]:
-    """The compiled derivative by the logarithms of K, c and ξ, at any tolerance."""
-    scene, state = jb.seed_scene(), jb.seed_state()
-    leaves = (scene.normal.K, scene.normal.c, scene.friction.xi)
-
-    def final(logs: Any, rtol: Any) -> Any:
-        moved = [leaf * jnp.exp(log) for leaf, log in zip(leaves, logs, strict=True)]
-        new = eqx.tree_at(lambda s: (s.normal.K, s.normal.c, s.friction.xi), scene, moved)
-        how: dict[str, Any] = dict(solver=solver, rtol=rtol, save="end", engine=engine)
-        if engine == "xla":
-            how["adjoint"] = diffrax.ForwardMode()
-        return jnp.stack(jb.simulate(new, state, duration=duration, **how).final)
-
-    return jax.jit(jax.jacfwd(final))
-
-
-def by_casadi(duration: float, rtol: float) -> Callable[[], np.ndarray]:
+def by_casadi(duration, rtol):
     run = _casadi.sensitivities(duration, rtol)
     return lambda: run()[1]
 
 
-def differences(duration: float, rtol: float) -> Callable[[], np.ndarray]:
+def differences(duration, rtol):
     """Central differences of second order."""
-
-    def run() -> np.ndarray:
-        columns = [
-            (_moved("LSODA", duration, rtol, k, STEP) - _moved("LSODA", duration, rtol, k, -STEP))
-            / (2 * STEP)
-            for k in range(3)
-        ]
-        return np.stack(columns, axis=1)
-
-    return run
+    at = functools.partial(_moved, "LSODA", duration, rtol)
+    return lambda: np.stack([(at(k, STEP) - at(k, -STEP)) / (2 * STEP) for k in range(3)], axis=1)
 
 
-def independent_slopes(duration: float) -> np.ndarray:
+def independent_slopes(duration):
     """Central differences of fourth order of Radau's walks at 1e-12."""
-    columns = []
+    columns, h = [], REFERENCE_STEP
     for k in range(3):
         at = functools.partial(_moved, "Radau", duration, INDEPENDENT, k)
-        h = REFERENCE_STEP
         columns.append((8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h))
     return np.stack(columns, axis=1)
 
 
-def _moved(method: str, duration: float, rtol: float, k: int, step: float) -> np.ndarray:
+def _moved(method, duration, rtol, k, step):
     """The final state with one of K, c and ξ moved by a step of its logarithm."""
     name = ("K", "c", "xi")[k]
     moved = numbers(**{name: SEED[name] * math.exp(step)})

@@ -5,12 +5,10 @@ impact. Writes basin_simplest.png: above in the plane of stance angle and rate, 
 the rate that leads upright, so that the thin area can be seen.
 """
 
-from typing import Any
-
-import _basin_thin
 import _simplest
 import numpy as np
-from _options import Options, parse
+from _experiment import Options, experiment
+from _scenes import simplest_walker
 
 import jaxbiped as jb
 from jaxbiped import plot
@@ -22,95 +20,131 @@ TOLERANCES = {"draft": 1e-4, "balanced": 1e-6}
 DRAWN, QUICK_DRAWN = 400, 100
 CHECKED, QUICK_CHECKED = 300, 40
 """Starts that SciPy walks too, at each slope."""
+THETA, RATE = (0.0, 0.6), (-0.6, 0.0)
+"""Stance angle [rad] and its rate [√(g/l)] just after a strike."""
+OFF = (-0.015, 0.005)
+"""The rate's difference from that of the walker which comes to rest upright, in the strip."""
+FOOTSTEPS = 60
+WALKING = int(jb.basins.Label.WALKING)
 
 
-def main() -> None:
-    options = parse(__doc__ or "")
-    sides = QUICK_SIDES if options.quick else SIDES
-    checked = QUICK_CHECKED if options.quick else CHECKED
-    found = {f"{slope:g}": basin_of(options, slope, sides, checked) for slope in SLOPES}
-    picture = draw(options, QUICK_DRAWN if options.quick else DRAWN)
-    options.finish({"slopes": found, "picture": picture})
+@experiment
+def main(options: Options):
+    sides, checked = options.sized(SIDES, QUICK_SIDES), options.sized(CHECKED, QUICK_CHECKED)
+    found = {f"{slope:g}": basin_of(slope, sides, checked) for slope in SLOPES}
+    return {"slopes": found, "picture": draw(options, options.sized(DRAWN, QUICK_DRAWN))}
 
 
-def basin_of(options: Options, slope: float, sides: tuple[int, ...], checked: int) -> Any:
-    """Fractions, reach and the independent check at a slope, said as they are found."""
-    labellings = {
-        name: _basin_thin.labelling_of(slope, rtol=rtol) for name, rtol in TOLERANCES.items()
-    }
-    best = labellings["balanced"]
-    gait = _simplest.fixed_point(slope)
-    apart = float(np.max(np.abs(best.family.rows[0][0].point[[1, 3]] - gait)))
-    options.say(f"slope {slope:g}: gait at {gait.round(6)}, {apart:.0e} from the equations' own")
-    rows = []
-    for name, labelling in labellings.items():
-        for side in sides:
-            part = _basin_thin.fractions_of(labelling, side)
-            rows.append({"accuracy": name, "side": side, **vars(part)})
-    options.table(rows, accuracy="", side="d", estimate=".3%", low=".3%", high=".3%")
-    reach = _basin_thin.reach(best, gait)
-    for way, each in reach.items():
-        options.say(f"from the gait, {way:<8} {each['distance']:.5f}, then {each['label']}")
-    check = _basin_thin.compared(best, slope, checked)
-    options.say(
-        f"of {check['starts']} starts {check['walking']} walk, {check['walking_independently']} by "
-        f"SciPy; {check['disagree']} disagree\n"
-    )
+def basin_of(slope, sides, checked):
+    """Fractions, reach and the independent check at a slope."""
+    labellings = {name: labelling_of(slope, rtol=rtol) for name, rtol in TOLERANCES.items()}
+    best, gait = labellings["balanced"], _simplest.fixed_point(slope)
+    rows = [
+        {"accuracy": name, "side": side, **vars(fraction_of(labelling, side))}
+        for name, labelling in labellings.items()
+        for side in sides
+    ]
     return {
         "gait": gait.tolist(),
-        "gait_off": apart,
+        "gait_off": float(np.max(np.abs(best.family.rows[0][0].point[[1, 3]] - gait))),
         "fractions": rows,
-        "intervals_overlap": overlap(rows),
-        "reach": reach,
-        "check": check,
+        # They have a value in common.
+        "intervals_overlap": max(row["low"] for row in rows) <= min(row["high"] for row in rows),
+        "reach": reach(best, gait),
+        "check": compared(best, slope, checked),
     }
 
 
-def overlap(rows: list[dict[str, Any]]) -> bool:
-    """Whether all the intervals have a value in common."""
-    return max(row["low"] for row in rows) <= min(row["high"] for row in rows)
+def just_struck(scene, states):
+    """Both feet on the ground, and the swing leg's rate from the impact."""
+    theta, rate = states.theta_2, states.omega_2
+    return states._replace(theta_1=-theta, omega_1=rate * np.cos(2.0 * theta))
 
 
-def draw(options: Options, side: int) -> str:
+def labelling_of(slope, **options):
+    """A labelling that knows the gait, found from the published equations' own."""
+    theta, rate = _simplest.fixed_point(slope)
+    scene = simplest_walker(slope)
+    guess = just_struck(scene, jb.dynamics.RigidState(0.0, -theta, theta, rate, rate))
+    return jb.labelling(scene, guess=guess, footsteps=FOOTSTEPS, **options)
+
+
+def labels_at(labelling):
+    """A function that labels points (n, 2): stance angle and rate just after a strike."""
+    return jb.label_at(labelling, ("theta_stance", "omega_stance"), follow=just_struck)
+
+
+def fraction_of(labelling, side):
+    """Fraction of a grid over the whole square that walks, with its interval."""
+
+    def middles(low, high):
+        return low + (high - low) * (np.arange(side) + 0.5) / side
+
+    values = {"omega_stance": middles(*RATE), "theta_stance": middles(*THETA)}
+    starts = jb.starts.grid(labelling.scene, values, follow=just_struck)
+    walks = jb.sweep(labelling, starts, look_for_gaits=False)["label"].values == WALKING
+    low, high = jb.basins.wilson_interval(walks.sum(), walks.size)
+    return jb.basins.Fraction(float(walks.mean()), float(low), float(high), int(walks.sum()))
+
+
+def reach(labelling, gait):
+    """How far the basin reaches from the gait each way along each axis, by bisection."""
+    found = {}
+    for k, name in enumerate(("angle", "rate")):
+        for sign, way in ((1.0, "+"), (-1.0, "-")):
+            push = jb.basins.minimal_fatal_shock(
+                labels_at(labelling), gait, scales=np.ones(2), max_distance=0.5, tolerance=1e-6,
+                directions=np.eye(2)[k : k + 1] * sign, steps=2000, improved=0,
+            )  # fmt: skip
+            label = str(jb.basins.Label(push.label))
+            found[f"{name} {way}"] = {"distance": push.distance, "label": label}
+    return found
+
+
+def compared(labelling, slope, count):
+    """Whether starts in the strip walk, by the labels and by SciPy on the published equations."""
+    spread = np.random.default_rng(0).random((count, 2))
+    theta = 0.05 + 0.4 * spread[:, 0]
+    off = OFF[0] + (OFF[1] - OFF[0]) * spread[:, 1]
+    points = np.stack([theta, upright(theta, slope) + off], axis=1)
+    ours, gait = labels_at(labelling)(points) == WALKING, _simplest.fixed_point(slope)
+    theirs = [_simplest.walks(point, gait, slope, footsteps=FOOTSTEPS) for point in points]
+    return {
+        "starts": count,
+        "walking": int(ours.sum()),
+        "walking_independently": int(np.sum(theirs)),
+        "disagree": int(np.sum(ours != theirs)),
+    }
+
+
+def upright(theta, slope):
+    """The rate with which the hip just reaches the top of its arc, by its energy."""
+    return -np.sqrt(2.0 * (1.0 - np.cos(theta - slope)))
+
+
+def draw(options, side):
     figure = new_figure(13.0, 7.6)
     grid = figure.subplots(2, 2)
-    for column, slope in enumerate(SLOPES):
-        labelling = _basin_thin.labelling_of(slope)
-        gait = _simplest.fixed_point(slope)
-        draw_plane(grid[0, column], labelling, slope, gait, side)
-        draw_strip(grid[1, column], labelling, slope, gait, side)
+    theta, rate, off = (np.linspace(*ends, side) for ends in (THETA, RATE, OFF))
+    for (plane, strip), slope in zip(grid.T, SLOPES, strict=True):
+        label, gait = labels_at(labelling_of(slope)), _simplest.fixed_point(slope)
+
+        def codes(angle, rate, label=label):
+            return label(np.stack([angle.ravel(), rate.ravel()], axis=1)).reshape(side, side)
+
+        plot.basin(
+            codes(*np.meshgrid(theta, rate)), theta, rate, ax=plane, mark=(gait[0], gait[1]),
+            names=("stance angle, θ", "its rate, θ̇"), units=("rad", "√(g/l)"),
+            title=f"Just after a strike, slope {slope:g} rad",
+        )  # fmt: skip
+        angle, beside = np.meshgrid(theta, off)
+        plot.basin(
+            codes(angle, upright(angle, slope) + beside), theta, 1e3 * off, ax=strip,
+            mark=(gait[0], 1e3 * float(gait[1] - upright(gait[:1], slope)[0])),
+            names=("stance angle, θ", "θ̇ less the rate that leads upright"),
+            units=("rad", "10⁻³ √(g/l)"), title="The same, about the rate that leads upright",
+        )  # fmt: skip
     return options.save(figure, "basin_simplest.png")
-
-
-def draw_plane(ax: Any, labelling: jb.Labelling, slope: float, gait: np.ndarray, side: int) -> None:
-    theta, rate = (np.linspace(*ends, side) for ends in (_basin_thin.THETA, _basin_thin.RATE))
-    points = np.stack([each.ravel() for each in np.meshgrid(theta, rate)], axis=1)
-    codes = _basin_thin.labels_at(labelling)(points).reshape(side, side)
-    plot.basin(
-        codes,
-        theta,
-        rate,
-        names=("stance angle, θ", "its rate, θ̇"),
-        units=("rad", "√(g/l)"),
-        mark=(gait[0], gait[1]),
-        title=f"Just after a strike, slope {slope:g} rad",
-        ax=ax,
-    )
-
-
-def draw_strip(ax: Any, labelling: jb.Labelling, slope: float, gait: np.ndarray, side: int) -> None:
-    theta, off, codes = _basin_thin.strip(labelling, slope, side)
-    mark = float(gait[1] - _basin_thin.upright(gait[:1], slope)[0])
-    plot.basin(
-        codes,
-        theta,
-        1e3 * off,
-        names=("stance angle, θ", "θ̇ less the rate that leads upright"),
-        units=("rad", "10⁻³ √(g/l)"),
-        mark=(gait[0], 1e3 * mark),
-        title="The same, about the rate that leads upright",
-        ax=ax,
-    )
 
 
 if __name__ == "__main__":

@@ -5,217 +5,148 @@ Baumgarte's a and b and of the penalty's A, ω and ζ; and each method's time be
 one's, for one walk and in a batch.
 """
 
-from typing import Any
+import json
+import subprocess
+import sys
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from _held import (
-    COLOURS,
-    FLOOR,
-    MARKERS,
-    Integrator,
-    compared,
-    relative_costs,
-    say_costs,
-    truth_of,
-)
-from _options import Options, parse
+from _constraint_runs import FLOOR, METHODS, Integrator, relative_costs, truth_of
+from _experiment import Options, by, experiment
+from _pictures import COLOURS, MARKERS, label
 
 import jaxbiped as jb
-from jaxbiped.plot.style import dress, new_figure
+from jaxbiped.plot.style import new_figure
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 STEPS = (1e-4, 1e-5, 1e-6)
-COSTED = Integrator("rodas4", rtol=1e-6)
 DURATION, QUICK_DURATION = 1.0, 0.1
+COUNT, QUICK_COUNT = 9, 3
+"""Values of each constant in a map."""
+MAPS = {
+    "baumgarte": (("a (1/s)", (-1.0, 5.0)), ("b (1/s)", (-1.0, 5.0)),
+                  lambda a, b: jb.constraints.Baumgarte(a=a, b=b)),
+    "penalty": (("A (kg)", (1.0, 11.0)), ("ω (1/s)", (-1.0, 4.0)),
+                lambda A, omega: jb.constraints.Penalty(A=A, omega=omega)),
+    "damping": (("ζ", (-2.0, 2.0)), ("ω (1/s)", (-1.0, 4.0)),
+                lambda zeta, omega: jb.constraints.Penalty(omega=omega, zeta=zeta)),
+}  # fmt: skip
+"""Constants in rows and in columns, with the exponents of ten between which they lie."""
+COSTED = Integrator("rodas4", rtol=1e-6), dict(single=2.0, batch=0.4408, count=1024, turns=7)
+QUICK_COSTED = Integrator("euler", dt=1e-5), dict(single=2e-3, batch=2e-4, count=8, turns=3)
 
 
-def main() -> None:
-    options = parse(__doc__ or "")
-    scene, quick = jb.seed_scene(), options.quick
-    duration = QUICK_DURATION if quick else DURATION
-    methods = ("standard", "index1") if quick else tuple(jb.constraints.CONSTRAINT_METHODS)
-    integrators = [
-        *([] if quick else [Integrator("rodas4", rtol=rtol) for rtol in TOLERANCES]),
-        *[Integrator("euler", dt=dt) for dt in STEPS[: 2 if quick else 3]],
-        *([] if quick else [Integrator("runge2", dt=dt) for dt in STEPS]),
-    ]
-    runs = compared(methods, integrators, duration)
-    count = 3 if quick else 9
-    maps = {"baumgarte": baumgarte_map(scene, duration, count, quick)}
-    if not quick:
-        maps["penalty"] = penalty_map(scene, duration, count, quick)
-        maps["damping"] = damping_map(scene, duration, count, quick)
-    costs = costs_of(scene, methods, quick)
-    say(options, runs, maps, costs)
-    pictures = [draw_trade(options, runs), draw_maps(options, maps)]
-    options.finish(
-        {
-            "duration_s": duration,
-            "runs": runs,
-            "maps": maps,
-            "costs": costs,
-            "pictures": pictures,
-        }
-    )
+@experiment
+def main(options: Options):
+    scene, duration = jb.seed_scene(), options.sized(DURATION, QUICK_DURATION)
+    methods = options.sized(METHODS, ("standard", "index1"))
+    rosenbrock = [f"rodas4:{rtol!r}" for rtol in TOLERANCES]
+    euler, runge = ([f"{name}:dt={dt!r}" for dt in STEPS] for name in ("euler", "runge2"))
+    runs = compared(methods, options.sized([*rosenbrock, *euler, *runge], euler[:2]), duration)
+    names = options.sized(list(MAPS), ["baumgarte"])
+    maps = {name: mapped(options, scene, duration, *MAPS[name]) for name in names}
+    how, size = options.sized(COSTED, QUICK_COSTED)
+    return {
+        "duration_s": duration,
+        "runs": runs,
+        "maps": maps,
+        "least_errors": {name: least_error(found) for name, found in maps.items()},
+        "costs": relative_costs(scene, methods, how, **size),
+        "pictures": [draw_trade(options, runs), draw_maps(options, maps)],
+    }
 
 
-def costs_of(scene: jb.Scene, methods: tuple[str, ...], quick: bool) -> dict[str, Any]:
-    if quick:
-        how, size = Integrator("euler", dt=1e-5), dict(single=2e-3, batch=2e-4, count=8, turns=3)
-    else:
-        how, size = COSTED, dict(single=2.0, batch=0.4408, count=1024, turns=7)
-    return relative_costs(scene, methods, how, **size)  # type: ignore[arg-type]
+def compared(methods, integrators, duration):
+    """The runs of `jaxbiped constraints`; an error that is no number is None."""
+    command = [sys.executable, "-m", "jaxbiped", "constraints", "--json", "-", "--repeats", "1"]
+    command += ["--duration", repr(duration), "--methods", *methods, "--integrators", *integrators]
+    found = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True)
+    return json.loads(found.stdout)["runs"]
 
 
-def finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
-
-
-def mapped(
-    scene: jb.Scene, methods: Any, shape: tuple[int, int], duration: float, quick: bool
-) -> dict[str, Any]:
-    """Violation, error and steps for a batch of methods of one kind, each entry a list of rows."""
+def mapped(options, scene, duration, rows, columns, method):
+    """Violation, error and steps over two constants of a method, each entry a list of rows."""
     truth = jnp.asarray(truth_of(scene, duration))
-    how: dict[str, Any] = dict(solver="euler", dt=1e-5) if quick else dict(rtol=1e-6)
+    how = options.sized(dict(rtol=1e-6), dict(solver="euler", dt=1e-5))
+    how |= dict(save="end", watch=(), extremes=jb.dynamics.violation, max_solver_steps=1 << 16)
+    row, column = (
+        np.logspace(*ends, options.sized(COUNT, QUICK_COUNT)) for _, ends in (rows, columns)
+    )
+    pairs = [jnp.asarray(each.ravel()) for each in np.meshgrid(row, column, indexing="ij")]
 
     @eqx.filter_jit
-    def every(methods: Any) -> Any:
-        def one(method: Any) -> Any:
-            held = jb.RedundantScene(scene, method)
-            walk = jb.simulate(
-                held,
-                jb.seed_state(),
-                duration=duration,
-                save="end",
-                watch=(),
-                extremes=jb.dynamics.violation,
-                max_solver_steps=1 << 16,
-                **how,
-            )
-            end = jb.dynamics.minimal_state(held, jax.tree.map(lambda leaf: leaf[0], walk.state))
-            error = jnp.max(jnp.abs(jnp.stack(list(end)) - truth))
-            return walk.highest.position, error, walk.attempted, walk.ending
+    @jax.vmap
+    def every(method):
+        held = jb.RedundantScene(scene, method)
+        walk = jb.simulate(held, jb.seed_state(), duration=duration, **how)
+        end = jb.dynamics.minimal_state(held, jax.tree.map(lambda leaf: leaf[0], walk.state))
+        error = jnp.max(jnp.abs(jnp.stack(list(end)) - truth))
+        return walk.highest.position, error, walk.attempted, walk.ending
 
-        return jax.vmap(one)(methods)
-
-    position, error, steps, ending = (np.asarray(leaf).reshape(shape) for leaf in every(methods))
+    shape = (len(row), len(column))
+    found = (np.asarray(leaf).reshape(shape) for leaf in every(jax.vmap(method)(*pairs)))
+    position, error, steps, ending = found
     good = (ending == 0) & np.isfinite(error)
+
+    def told(values):
+        known = good & np.isfinite(values)
+        return np.where(known, values.astype(object), None).tolist()
+
     return {
-        "max_violation_m": [[finite(v) for v in row] for row in np.where(good, position, np.nan)],
-        "state_error": [[finite(v) for v in row] for row in np.where(good, error, np.nan)],
-        "steps": steps.tolist(),
+        "rows": rows[0], "columns": columns[0], "row": row.tolist(), "column": column.tolist(),
+        "max_violation_m": told(position), "state_error": told(error), "steps": steps.tolist(),
         "failed": (~good).tolist(),
-    }
+    }  # fmt: skip
 
 
-def baumgarte_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> dict[str, Any]:
-    values = np.logspace(-1.0, 5.0, count)
-    a, b = (jnp.asarray(x.ravel()) for x in np.meshgrid(values, values, indexing="ij"))
-    methods = jax.vmap(lambda a, b: jb.constraints.Baumgarte(a=a, b=b))(a, b)
-    found = mapped(scene, methods, (count, count), duration, quick)
-    return {"rows": "a (1/s)", "columns": "b (1/s)", "row": values.tolist()} | {
-        "column": values.tolist(),
-        **found,
-    }
+def least_error(found):
+    """Where a map has its least error, and how many runs failed."""
+    error = np.array(found["state_error"], dtype=float)
+    if not np.isfinite(error).any():
+        return {"failed": error.size}
+    i, j = np.unravel_index(np.nanargmin(error), error.shape)
+    at = {found["rows"]: found["row"][i], found["columns"]: found["column"][j]}
+    return {"error": float(error[i, j]), "failed": int(np.sum(found["failed"])), **at}
 
 
-def penalty_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> dict[str, Any]:
-    penalties, rates = np.logspace(1.0, 11.0, count), np.logspace(-1.0, 4.0, count)
-    A, omega = (jnp.asarray(x.ravel()) for x in np.meshgrid(penalties, rates, indexing="ij"))
-    methods = jax.vmap(lambda A, omega: jb.constraints.Penalty(A=A, omega=omega))(A, omega)
-    found = mapped(scene, methods, (count, count), duration, quick)
-    return {"rows": "A (kg)", "columns": "ω (1/s)", "row": penalties.tolist()} | {
-        "column": rates.tolist(),
-        **found,
-    }
-
-
-def damping_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> dict[str, Any]:
-    dampings, rates = np.logspace(-2.0, 2.0, count), np.logspace(-1.0, 4.0, count)
-    zeta, omega = (jnp.asarray(x.ravel()) for x in np.meshgrid(dampings, rates, indexing="ij"))
-    methods = jax.vmap(lambda zeta, omega: jb.constraints.Penalty(omega=omega, zeta=zeta))(
-        zeta, omega
-    )
-    found = mapped(scene, methods, (count, count), duration, quick)
-    return {"rows": "ζ", "columns": "ω (1/s)", "row": dampings.tolist()} | {
-        "column": rates.tolist(),
-        **found,
-    }
-
-
-def say(
-    options: Options, runs: list[dict[str, Any]], maps: dict[str, Any], costs: dict[str, Any]
-) -> None:
-    options.table(
-        runs, method="", integrator="", rtol_or_dt=".0e", ending="", max_violation_m=".1e",
-        state_error=".1e", steps="d", wall_s_run=".3f",
-    )  # fmt: skip
-    for name, found in maps.items():
-        error = np.array(found["state_error"], dtype=float)
-        if np.isfinite(error).any():
-            i, j = np.unravel_index(np.nanargmin(error), error.shape)
-            options.say(
-                f"{name}: least error {error[i, j]:.1e} at {found['rows']} = "
-                f"{found['row'][i]:.3g}, {found['columns']} = {found['column'][j]:.3g}; "
-                f"{int(np.sum(found['failed']))} of {error.size} failed"
-            )
-    say_costs(options, costs)
-
-
-def draw_trade(options: Options, runs: list[dict[str, Any]]) -> str:
-    integrators = list(dict.fromkeys(run["integrator"] for run in runs))
-    figure = new_figure(3.6 * max(len(integrators), 2), 3.8)
-    axes = figure.subplots(1, len(integrators), sharey=True, squeeze=False)[0]
-    names = list(jb.constraints.CONSTRAINT_METHODS)
-    for ax, integrator in zip(axes, integrators, strict=True):
-        for method in dict.fromkeys(run["method"] for run in runs):
-            mine = [r for r in runs if (r["method"], r["integrator"]) == (method, integrator)]
-            mine = [r for r in mine if r["state_error"] is not None]
-            k = names.index(method)
-            ax.plot(
-                [r["wall_s_run"] for r in mine],
-                [r["state_error"] for r in mine],
-                marker=MARKERS[k],
-                color=COLOURS[k],
-                label=method,
-                linewidth=0.9,
-                markersize=5,
-            )
-        ax.set_xscale("log")
-        ax.set_yscale("log")
-        dress(ax, integrator, "time of a run (s)", "")
+def draw_trade(options, runs):
+    groups = by("integrator", runs)
+    figure = new_figure(3.6 * max(len(groups), 2), 3.8)
+    axes = figure.subplots(1, len(groups), sharey=True, squeeze=False)[0]
+    for ax, (integrator, own) in zip(axes, groups.items(), strict=True):
+        for method, mine in by("method", own).items():
+            k = METHODS.index(method)
+            mine = [run for run in mine if run["state_error"] is not None]
+            points = [run["wall_s_run"] for run in mine], [run["state_error"] for run in mine]
+            look = dict(marker=MARKERS[k], color=COLOURS[k], linewidth=0.9, markersize=5)
+            ax.plot(*points, label=method, **look)
+        label(ax, "time of a run (s)", "", integrator, log="xy")
     axes[0].set_ylabel("error of the state (SI)")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    named = axes[0].get_legend_handles_labels()
+    figure.legend(*named, loc="outside lower center", ncols=4, frameon=False)
     return options.save(figure, "trade.png")
 
 
-def edges_of(values: list[float]) -> np.ndarray:
+def edges_of(values):
     """Edges half way between values, on a logarithmic axis."""
     logs = np.log10(values)
     half = 0.5 * (logs[1] - logs[0])
-    return np.asarray(10.0 ** np.append(logs - half, logs[-1] + half))
+    return 10.0 ** np.append(logs - half, logs[-1] + half)
 
 
-def draw_maps(options: Options, maps: dict[str, Any]) -> str:
+def draw_maps(options, maps):
     shown = {"max_violation_m": "largest violation (m)", "state_error": "error of the state (SI)"}
     figure = new_figure(3.9 * len(maps), 6.4)
     axes = figure.subplots(2, len(maps), squeeze=False)
-    for column, (name, found) in enumerate(maps.items()):
-        for row, (key, title) in enumerate(shown.items()):
-            ax = axes[row, column]
+    for column, (name, found) in zip(axes.T, maps.items(), strict=True):
+        for ax, (key, title) in zip(column, shown.items(), strict=True):
             values = np.log10(np.maximum(np.array(found[key], dtype=float), FLOOR))
-            edges = (edges_of(found["column"]), edges_of(found["row"]))
+            edges = edges_of(found["column"]), edges_of(found["row"])
             image = ax.pcolormesh(*edges, values, cmap="viridis")
             ax.set_facecolor("#BBBBBB")  # where a run failed
-            ax.set_xscale("log")
-            ax.set_yscale("log")
-            ax.set_xlabel(found["columns"])
-            ax.set_ylabel(found["rows"])
-            ax.set_title(name, loc="left", fontsize="medium")
+            label(ax, found["columns"], found["rows"], name, log="xy")
             figure.colorbar(image, ax=ax, label=f"log10, {title}")
     return options.save(figure, "constants.png")
 

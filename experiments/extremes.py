@@ -5,83 +5,81 @@ The check are equations of motion written anew, solved by SciPy's LSODA at two t
 digits where these leave too much doubt.
 """
 
-from collections.abc import Sequence
-from typing import Any
-
-import matplotlib.pyplot as plt
 import numpy as np
-from _options import Options, parse
+from _experiment import Options, by, experiment
 from extreme_cases.catalogue import RANGES, catalogue
 from extreme_cases.gaits import GaitJudge, gaits
-from extreme_cases.grazing import Grazing, grazing
+from extreme_cases.grazing import grazing
 from extreme_cases.store import by_group, counts, reasons, study
 from extreme_cases.verdict import VERDICTS, judge
+
+from jaxbiped.plot.style import new_figure
 
 COLOURS = ("tab:green", "tab:blue", "tab:gray", "tab:red", "tab:orange")
 WITHIN = 1e-2
 """Relative error of a derivative at a graze from which it is wrong."""
+UNITS = {
+    "K": "[N/mⁿ]", "c": "[N s/m²]", "n": "[–]", "v0": "[m/s]", "xi": "[s/m]", "mu": "[–]",
+    "slope": "[rad]", "hip mass": "[kg]", "mass": "[kg]", "inertia": "[of the seed's]", "r": "[m]",
+    "d": "[m]", "size": "[of the seed's]", "g": "[m/s²]",
+}  # fmt: skip
 
 
-def main() -> None:
-    options = parse("Simulations and gaits at the extremes, held against equations written anew.")
+@experiment
+def main(options: Options):
     store = options.path("extremes.jsonl")
     cases = catalogue(quick=options.quick)
     rows = study(cases, judge, store=store)
     of_gaits = GaitJudge()
     found = study(list(gaits(quick=options.quick)), of_gaits, store=store, follow=of_gaits.follow)
-    compared = [row for row in found if row["multipliers"] is not None]
     told = [row for row in rows if row["told"] is not None and row["verdict"] == "accurate"]
-    swept = grazing(each=4, laws=1) if options.quick else grazing()
-    numbers = {
+    errors = {
+        name: [row[name] for row in found if row["multipliers"] is not None]
+        for name in ("multipliers", "elasticities")
+    }
+    groups = _merged(by_group(rows, VERDICTS))
+    return {
         "catalogue": len(cases),
-        **counts(rows, VERDICTS),
+        **_counted(rows, groups),
         "precise": sum(row["precise"] for row in rows),
-        "groups": _merged(by_group(rows, VERDICTS)),
-        "reasons": {verdict: reasons(rows, verdict) for verdict in VERDICTS[1:]},
         "errors": {
             "told": len(told),
             "within_told": sum(row["error"] <= row["told"] for row in told),
             "most_beyond_told": max(row["error"] / max(row["told"], 1e-300) for row in told),
-            "median_doubt": _median([row["doubt"] for row in rows]),
+            "median_doubt": _median([row["doubt"] for row in rows if row["doubt"] is not None]),
         },
         "gaits": {
-            **counts(found, VERDICTS),
-            "groups": by_group(found, VERDICTS),
-            "reasons": {verdict: reasons(found, verdict) for verdict in VERDICTS[1:]},
-            "compared": len(compared),
-            "median_error": {
-                name: _median([row[name] for row in compared])
-                for name in ("multipliers", "elasticities")
-            },
-            "largest_error": {
-                name: max(row[name] for row in compared) for name in ("multipliers", "elasticities")
-            },
+            **_counted(found, by_group(found, VERDICTS)),
+            "compared": len(errors["multipliers"]),
+            "median_error": {name: _median(each) for name, each in errors.items()},
+            "largest_error": {name: max(each) for name, each in errors.items()},
         },
-        "grazing": [_grazed(each) for each in swept],
+        "grazing": [_grazed(each) for each in grazing(**options.sized({}, dict(each=4, laws=1)))],
         "picture": _draw(options, rows),
     }
-    for about in (numbers, numbers["gaits"]):
-        options.say(", ".join(f"{name} {about[name]}" for name in ("run", *VERDICTS)))
-    options.finish(numbers)
 
 
-def _median(values: Sequence[float | None]) -> float:
-    return float(np.median([value for value in values if value is not None]))
+def _counted(rows, groups):
+    told = {verdict: reasons(rows, verdict) for verdict in VERDICTS[1:]}
+    return {**counts(rows, VERDICTS), "groups": groups, "reasons": told}
 
 
-def _merged(groups: dict[str, dict[str, int]]) -> dict[str, dict[str, int]]:
+def _median(values):
+    return float(np.median(values))
+
+
+def _merged(groups):
     """The groups, all pairs of parameters as one."""
-    merged: dict[str, dict[str, int]] = {}
+    merged = {}
     for name, counted in groups.items():
-        first, _, second = name.partition(", ")
-        pair = first in RANGES and second in RANGES
+        pair = set(name.split(", ")) <= RANGES.keys() and ", " in name
         into = merged.setdefault("pairs" if pair else name, dict.fromkeys(counted, 0))
         for key, value in counted.items():
             into[key] += value
     return merged
 
 
-def _grazed(swept: Grazing) -> dict[str, Any]:
+def _grazed(swept):
     """How derivatives about a graze compare with differences of the check."""
     accurate, flagged = swept.errors <= WITHIN, swept.flagged
     return {
@@ -96,50 +94,31 @@ def _grazed(swept: Grazing) -> dict[str, Any]:
     }
 
 
-def _draw(options: Options, rows: list[dict[str, Any]]) -> str:
+def _draw(options, rows):
     """Verdicts of the cases of one parameter by its value."""
-    names = list(RANGES)
-    figure, axes = plt.subplots(4, 4, figsize=(11.0, 8.5), layout="constrained")
-    for ax, name in zip(axes.flat, names, strict=False):
-        own = [row for row in rows if name in row["case"]["at"] and row["case"]["group"] != "laws"]
-        values = sorted({row["case"]["at"][name] for row in own})
-        bottom = np.zeros(len(values))
+    figure = new_figure(11.0, 8.5)
+    *axes, _, last = figure.subplots(4, 4).ravel()
+    for ax, name in zip(axes, RANGES, strict=True):
+        own = [
+            {"at": row["case"]["at"][name], "verdict": row["verdict"]}
+            for row in rows
+            if name in row["case"]["at"] and row["case"]["group"] != "laws"
+        ]
+        values = by("at", own)
+        order, bottom = sorted(values), np.zeros(len(values))
         for verdict, colour in zip(VERDICTS, COLOURS, strict=True):
-            height = np.array(
-                [
-                    sum(r["case"]["at"][name] == v and r["verdict"] == verdict for r in own)
-                    for v in values
-                ]
-            )
-            ax.bar(range(len(values)), height, 1.0, bottom, color=colour, label=verdict)
-            bottom = bottom + height
-        shown = range(0, len(values), max(1, (len(values) + 2) // 3))
-        ax.set_xticks(list(shown), [f"{values[k]:.2g}" for k in shown])
-        ax.set_xlabel(f"{name} {UNITS[name]}")
-        ax.set_ylabel("cases")
-    for ax in axes.flat[len(names) :]:
+            tall = [sum(row["verdict"] == verdict for row in values[value]) for value in order]
+            words = verdict.replace("_", " ")
+            ax.bar(range(len(order)), tall, 1.0, bottom, color=colour, label=words)
+            bottom = bottom + tall
+        shown = range(0, len(order), max(1, (len(order) + 2) // 3))
+        ax.set_xticks(list(shown), [f"{order[k]:.2g}" for k in shown])
+        ax.set(xlabel=f"{name} {UNITS[name]}", ylabel="cases")
+    for ax in figure.axes[len(axes) :]:
         ax.set_axis_off()
-    handles, labels = axes.flat[0].get_legend_handles_labels()
-    axes.flat[-1].legend(handles, [label.replace("_", " ") for label in labels], loc="center")
+    last.legend(*axes[0].get_legend_handles_labels(), loc="center")
     return options.save(figure, "extremes.png")
 
-
-UNITS = {
-    "K": "[N/mⁿ]",
-    "c": "[N s/m²]",
-    "n": "[–]",
-    "v0": "[m/s]",
-    "xi": "[s/m]",
-    "mu": "[–]",
-    "slope": "[rad]",
-    "hip mass": "[kg]",
-    "mass": "[kg]",
-    "inertia": "[of the seed's]",
-    "r": "[m]",
-    "d": "[m]",
-    "size": "[of the seed's]",
-    "g": "[m/s²]",
-}
 
 if __name__ == "__main__":
     main()

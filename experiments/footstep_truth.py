@@ -6,32 +6,29 @@ laws at a time (`reference/footstep.py`), which shares nothing with ours. Beside
 diffrax, equal steps, CasADi's CVODES where it is installed, and differences of SciPy's solves.
 """
 
-from typing import Any
-
-import matplotlib.pyplot as plt
+from _experiment import Options, by, experiment
 from _footstep_peers import PEERS
 from _footstep_ways import INPUTS, OUTPUTS, ours, references
-from _gradient_ways import Way, draw_way, row_of
-from _options import Options, by, parse
-from _truth_table import say_rows, versions
+from _gradient_ways import Way, draw_way, row_of, versions
+from _pictures import label
 from reference.footstep import LAWS, PARAMETERS, footstep
 from reference.footstep import MID_STANCE as START
 from tqdm import tqdm
 
+from jaxbiped.plot.style import new_figure
+
 OURS = Way("jaxbiped", "rtol", (1e-4, 3e-7, 1e-9), ours)
 
 
-def main() -> None:
-    options = parse(__doc__ or "")
-    numbers = measured(options)
-    say_rows(options, numbers["rows"])
-    options.finish(numbers)
+@experiment
+def main(options: Options):
+    return measured(options)
 
 
-def measured(options: Options) -> dict[str, Any]:
+def measured(options: Options):
     """The problem with its truth, and the rows of all ways; draws them."""
     truth, change, apart = references()
-    ways = (OURS, PEERS[-1]._replace(settings=(1e-4,))) if options.quick else (OURS, *PEERS)
+    ways = options.sized((OURS, *PEERS), (OURS, PEERS[-1]._replace(settings=(1e-4,))))
     work = [(way, value) for way in ways for value in way.settings]
     rows = [
         row_of("footstep", way, value, truth, truth, repeats=1, least=1e-2)
@@ -48,19 +45,17 @@ def measured(options: Options) -> dict[str, Any]:
         "coarser_collocation": change,
         "our_finest": apart,
     }
-    options.say(f"coarser collocation changes it by {change:.1e}; our finest solve by {apart:.1e}")
-    picture = _draw(options, rows)
+    picture = _draw(options, [row for row in rows if row["outcome"] == "answered"])
     return {"problem": problem, "rows": rows, "versions": versions(), "picture": picture}
 
 
-def _draw(options: Options, rows: list[dict[str, Any]]) -> str:
-    rows = [row for row in rows if row["outcome"] == "answered"]
-    figure, ax = plt.subplots(figsize=(6.5, 5.4), layout="constrained")
+def _draw(options, rows):
+    figure = new_figure(6.5, 5.4)
+    ax = figure.subplots()
     for name, own in by("way", rows).items():
         draw_way(ax, name, own)
     ax.axhline(1.0, color="black", linewidth=0.8)
-    ax.set_xlabel("relative error of the footstep [1]")
-    ax.set_ylabel("relative error of its gradient [1]")
+    label(ax, "relative error of the footstep [1]", "relative error of its gradient [1]")
     ax.legend(fontsize="small")
     return options.save(figure, "footstep_truth.png")
 

@@ -5,18 +5,16 @@ every switch of the vector field ("landing"), or are chosen for the derivatives 
 both. Derivatives are always those of the solver's own steps. Laws: the seed's, and smoothed ones.
 """
 
-import time
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
-import matplotlib.pyplot as plt
-from _options import Options, parse
-from _smoothed_laws import smoothed_seed
+from _experiment import Options, experiment
+from _scenes import SMOOTH, seed_with
 
 import jaxbiped as jb
+from jaxbiped.plot.style import new_figure
 
-TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-QUICK_TOLERANCES = (1e-5, 1e-6)
+TOLERANCES, QUICK_TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8), (1e-5, 1e-6)
 REFERENCE, QUICK_REFERENCE = 1e-10, 1e-9
 """Tolerance of the state and of its columns, with both precautions, that counts as exact."""
 TANGENT_SHARE = 10.0
@@ -55,25 +53,25 @@ class Stepped(jb.gait.AbstractSystem):
 
     cyclic_coordinates = jb.gait.Walking.cyclic_coordinates
 
-    def vector_field(self, t: Any, y: jb.State, args: Stepping) -> jb.State:
+    def vector_field(self, t, y, args):
         """The walker's."""
         return jb.dynamics.vector_field(t, y, args.scene)
 
-    def switches(self, args: Stepping, y: jb.State) -> tuple[jb.dynamics.Switch, ...]:
+    def switches(self, args, y):
         """The walker's; where steps do not land, none is live."""
         lands = args.lands > 0.0
         found = jb.dynamics.switches(args.scene, y)
         return tuple(each._replace(live=each.live & lands) for each in found)
 
-    def ending(self, args: Stepping, y: jb.State) -> Any:
+    def ending(self, args, y):
         """The walker's."""
         return jb.gait.Walking().ending(args.scene, y)
 
-    def reset_map(self, args: Stepping, y: jb.State) -> jb.State:
+    def reset_map(self, args, y):
         """Legs exchanged."""
         return jb.dynamics.exchange_legs(y)
 
-    def load(self, args: Stepping, y: jb.State) -> None:
+    def load(self, args, y):
         """No largest load: no step is spent on it."""
         return None
 
@@ -81,24 +79,13 @@ class Stepped(jb.gait.AbstractSystem):
 class Stance(jb.dynamics.AbstractSection):
     """Mid-stance."""
 
-    def value(self, args: Stepping, y: jb.State) -> Any:
+    def value(self, args, y):
         """That of the scene."""
         return jb.MidStance().value(args.scene, y)
 
-    def counts(self, args: Stepping, y: jb.State) -> Any:
+    def counts(self, args, y):
         """Whether leg 2 stands."""
         return jb.MidStance().counts(args.scene, y)
-
-
-class Point(NamedTuple):
-    """What was measured at one tolerance; errors as `ERRORS` says."""
-
-    rtol: float
-    steps: int
-    state: float
-    period_s: float
-    unit_multiplier: float
-    period_slope: float
 
 
 class Exact(NamedTuple):
@@ -108,15 +95,29 @@ class Exact(NamedTuple):
     orbit: jb.gait.LinearisedReturn
 
 
-def laws(quick: bool) -> dict[str, jb.Scene]:
-    """The scenes by the name of their laws."""
-    seed = jb.seed_scene()
-    return {"exact laws": seed} if quick else {"exact laws": seed, "smoothed laws": smoothed_seed()}
+@experiment
+def main(options: Options):
+    levels = options.sized(TOLERANCES, QUICK_TOLERANCES)
+    reference = options.sized(REFERENCE, QUICK_REFERENCE)
+    scenes = {"exact laws": jb.seed_scene()}
+    scenes |= options.sized({"smoothed laws": seed_with(**SMOOTH)}, {})
+    exact = {law: exact_gait(scene, reference) for law, scene in scenes.items()}
+    points = {
+        law: {
+            name: [measured(scene, exact[law], name, rtol) for rtol in levels] for name in STEPPINGS
+        }
+        for law, scene in scenes.items()
+    }
+    return {
+        "tangent_share": TANGENT_SHARE,
+        "reference_tolerance": reference,
+        "reference": {law: reference_numbers(scenes[law], each) for law, each in exact.items()},
+        "points": points,
+        "picture": draw(options, points),
+    }
 
 
-def footstep(
-    scene: jb.Scene, start: jb.State, lands: bool, rtol: float, tangent_rtol: float
-) -> jb.gait.LinearisedReturn:
+def footstep(scene, start, lands, rtol, tangent_rtol):
     """One footstep from mid-stance, with derivatives with respect to the state and log K.
 
     Landing and tolerances are traced: all of them share one compiled program.
@@ -133,7 +134,13 @@ def footstep(
     )
 
 
-def exact_gait(scene: jb.Scene, rtol: float) -> Exact:
+def footstep_by(stepping, scene, start, rtol):
+    """A footstep by a way of choosing steps."""
+    lands, heard = STEPPINGS[stepping]
+    return footstep(scene, start, lands, rtol, TANGENT_SHARE * rtol if heard else UNHEARD)
+
+
+def exact_gait(scene, rtol):
     """The gait by Newton's method on the return map, solved at the reference's own tolerance.
 
     `find_gait` would find the same; this needs no other program compiled.
@@ -150,87 +157,57 @@ def exact_gait(scene: jb.Scene, rtol: float) -> Exact:
     return Exact(jb.State(jnp.zeros(()), *found), last)
 
 
-def measured(scene: jb.Scene, exact: Exact, stepping: str, rtol: float) -> Point:
-    lands, heard = STEPPINGS[stepping]
-    tangent_rtol = TANGENT_SHARE * rtol if heard else UNHEARD
-    found = footstep(scene, exact.start, lands, rtol, tangent_rtol)
-    slope, true_slope = (float(jb.gait.slopes_of(each).period[0]) for each in (found, exact.orbit))
-    return Point(
-        rtol=rtol,
-        steps=int(found.attempted),
-        state=float(jnp.max(jnp.abs(found.recurring - exact.orbit.recurring))),
-        period_s=abs(float(found.period - exact.orbit.period)),
-        unit_multiplier=unit_error(scene, exact.start, found),
-        period_slope=abs(slope / true_slope - 1.0),
-    )
+def slope_of(found):
+    return float(jb.gait.slopes_of(found).period[0])
 
 
-def unit_error(scene: jb.Scene, start: jb.State, found: jb.gait.LinearisedReturn) -> float:
+def measured(scene, exact, stepping, rtol):
+    """Errors at one tolerance, as `ERRORS` says."""
+    found = footstep_by(stepping, scene, exact.start, rtol)
+    return {
+        "rtol": rtol,
+        "steps": int(found.attempted),
+        "state": float(jnp.max(jnp.abs(found.recurring - exact.orbit.recurring))),
+        "period_s": abs(float(found.period - exact.orbit.period)),
+        "unit_multiplier": unit_error(scene, exact.start, found),
+        "period_slope": abs(slope_of(found) / slope_of(exact.orbit) - 1.0),
+    }
+
+
+def reference_numbers(scene, exact):
+    """The reference's own; `residual`: the largest change of the state over its footstep [SI]."""
+    start, orbit = exact
+    return {
+        "period_s": float(orbit.period),
+        "period_slope_s": slope_of(orbit),
+        "steps": int(orbit.attempted),
+        "unit_multiplier": unit_error(scene, start, orbit),
+        "residual": float(jnp.max(jnp.abs(orbit.recurring - jnp.stack(start[1:])))),
+    }
+
+
+def unit_error(scene, start, found):
     """Distance from 1 of the multiplier of the direction along the orbit."""
     velocity = jnp.stack(jb.dynamics.vector_field(0.0, start, scene)[1:])
     square = found.monodromy[:, : len(velocity)]
     return float(jb.gait.stability_of(square, square, velocity, 1e-3).unit_error)
 
 
-def residual(exact: Exact) -> float:
-    """Largest change of a component of the state over the reference footstep, SI units."""
-    return float(jnp.max(jnp.abs(exact.orbit.recurring - jnp.stack(exact.start[1:]))))
-
-
-def picture(options: Options, found: dict[str, dict[str, list[Point]]]) -> None:
-    rows = len(found)
-    figure, grid = plt.subplots(
-        rows, 4, figsize=(14, 0.8 + 3.4 * rows), layout="constrained", sharex=True, squeeze=False
-    )
-    for axes_row, (law, points) in zip(grid, found.items(), strict=True):
-        for axes, (key, label) in zip(axes_row, ERRORS.items(), strict=True):
-            for marker, (name, row) in zip("osd^", points.items(), strict=True):
-                errors = [getattr(p, key) for p in row]
-                axes.loglog([p.steps for p in row], errors, f"{marker}-", ms=4, label=name)
-            axes.set_title(f"{law}: {label}", fontsize=9)
+def draw(options, found):
+    figure = new_figure(14, 0.8 + 3.4 * len(found))
+    grid = figure.subplots(len(found), 4, sharex=True, squeeze=False)
+    for row, (law, points) in zip(grid, found.items(), strict=True):
+        for axes, (key, words) in zip(row, ERRORS.items(), strict=True):
+            for marker, (name, own) in zip("osd^", points.items(), strict=True):
+                pairs = [point["steps"] for point in own], [point[key] for point in own]
+                axes.loglog(*pairs, f"{marker}-", ms=4, label=name)
+            axes.set_title(f"{law}: {words}", fontsize=9)
             axes.grid(alpha=0.3)
-        axes_row[0].set_ylabel("error")
+        row[0].set_ylabel("error")
     for axes in grid[-1]:
         axes.set_xlabel("attempted steps of a footstep")
     grid[0, 0].legend(fontsize=8)
-    options.save(figure, "gradient_accuracy.png")
-
-
-def main() -> None:
-    options = parse(__doc__ or "")
-    levels = QUICK_TOLERANCES if options.quick else TOLERANCES
-    reference = QUICK_REFERENCE if options.quick else REFERENCE
-    found: dict[str, dict[str, list[Point]]] = {}
-    references: dict[str, Any] = {}
-    for law, scene in laws(options.quick).items():
-        began = time.perf_counter()
-        exact = exact_gait(scene, reference)
-        found[law] = {
-            name: [measured(scene, exact, name, rtol) for rtol in levels] for name in STEPPINGS
-        }
-        references[law] = {
-            "period_s": float(exact.orbit.period),
-            "period_slope_s": float(jb.gait.slopes_of(exact.orbit).period[0]),
-            "steps": int(exact.orbit.attempted),
-            "unit_multiplier": unit_error(scene, exact.start, exact.orbit),
-            "residual": residual(exact),
-        }
-        options.say(f"\n{law}, in {time.perf_counter() - began:.0f} s")
-        options.say(f"reference: {references[law]}")
-        rows = ({"stepping": name} | p._asdict() for name in STEPPINGS for p in found[law][name])
-        options.table(rows, stepping="", rtol=".0e", steps="d", **dict.fromkeys(ERRORS, ".1e"))
-    picture(options, found)
-    options.finish(
-        {
-            "tangent_share": TANGENT_SHARE,
-            "reference_tolerance": reference,
-            "reference": references,
-            "points": {
-                law: {name: [p._asdict() for p in row] for name, row in points.items()}
-                for law, points in found.items()
-            },
-        }
-    )
+    return options.save(figure, "gradient_accuracy.png")
 
 
 if __name__ == "__main__":

@@ -8,11 +8,10 @@ what central differences would take.
 
 import dataclasses
 import time
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from _options import parse
+from _experiment import Options, experiment
+from _scenes import rigid_seed
 from _timing import seconds_of
 from tqdm import tqdm
 
@@ -24,51 +23,41 @@ PRECISION = {"rtol": 3e-7, "tangent_rtol": 3e-6}
 """That of a gait by the balanced accuracy."""
 
 
-def driven(count: int, quick: bool) -> Any:
-    """A scene whose hip has a torque of so many coefficients; a rigid one compiles soonest."""
-    scene = jb.ladder()["rigid"] if quick else jb.seed_scene()
-    torque = tuple(1e-3 * np.ones(count))
-    return dataclasses.replace(scene, actuation=(jb.actuation.HipSpline(torque),))
+@experiment
+def main(options: Options):
+    # A rigid walker compiles soonest.
+    scene = options.sized(jb.seed_scene(), rigid_seed())
+    return {"rows": [costs(scene, n) for n in tqdm(options.sized(COUNTS, QUICK_COUNTS))]}
 
 
-def cpu_ms(run: Callable[[], Any]) -> float:
-    """Median CPU time of all threads, compiled before [ms]."""
-    return 1e3 * seconds_of({0: run}, REPEATS, clock=time.process_time)[0]
-
-
-def costs(count: int, quick: bool) -> dict[str, float]:
-    """Of a scene with so many coefficients."""
-    scene = driven(count, quick)
+def costs(scene, count):
+    """Of a scene whose hip has a torque of so many coefficients [ms]."""
+    spline = jb.actuation.HipSpline(tuple(1e-3 * np.ones(count)))
+    scene = dataclasses.replace(scene, actuation=(spline,))
     names = tuple(f"torque_{k + 1}" for k in range(count))
-    gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False, engine="lanes")
+    how = dict(engine="lanes")
+    gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False, **how)
     state = gait.measures.state
 
-    def one_return(parameters: tuple[str, ...]) -> Any:
-        return jb.gait.linearise_return_map(
-            scene, state, parameters=parameters, engine="lanes", **PRECISION
-        ).period_row
+    def one_return(parameters):
+        how_ = dict(parameters=parameters, **how, **PRECISION)
+        return lambda: jb.gait.linearise_return_map(scene, state, **how_).period_row
 
-    def found(radius: bool) -> Any:
-        return jb.find_gait(
-            scene, state, parameters=names, radius_sensitivities=radius, engine="lanes"
-        ).sensitivities
+    def found(radius):
+        how_ = dict(parameters=names, radius_sensitivities=radius, **how)
+        return lambda: jb.find_gait(scene, state, **how_).sensitivities
 
-    alone = cpu_ms(lambda: one_return(()))
-    with_columns = cpu_ms(lambda: one_return(names))
+    work = [one_return(()), one_return(names), found(True), found(False)]
+    alone, with_columns, radius, without = (
+        1e3 * seconds_of({0: run}, REPEATS, clock=time.process_time)[0] for run in work
+    )
     return {
         "parameters": count,
         "return_ms": alone,
         "return_with_columns_ms": with_columns,
-        "radius_by_adjoint_ms": cpu_ms(lambda: found(True)) - cpu_ms(lambda: found(False)),
+        "radius_by_adjoint_ms": radius - without,
         "radius_by_differences_ms": 2.0 * count * alone,
     }
-
-
-def main() -> None:
-    options = parse(__doc__ or "")
-    rows = [costs(n, options.quick) for n in tqdm(QUICK_COUNTS if options.quick else COUNTS)]
-    options.table(rows, parameters="d", **dict.fromkeys(list(rows[0])[1:], ".1f"))
-    options.finish({"rows": rows})
 
 
 if __name__ == "__main__":

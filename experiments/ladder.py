@@ -5,195 +5,230 @@ rigid_limit.png, how the seed's gait approaches the rigid walker's as its contac
 """
 
 import os
-from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
-from _options import Options, parse
-from _rigid_limit import DOUBLINGS, PATHS, QUICK_DOUBLINGS, Approach, approach
-from _rungs import Cost, cost_of, distances, gait_of, measures_of
+from _experiment import Options, experiment
+from _pictures import COLOURS, MARKERS
+from _timing import seconds_of
 
 import jaxbiped as jb
-from jaxbiped.plot.style import new_figure
+from jaxbiped.plot.style import legend_below, new_figure
 
 BATCH, QUICK_BATCH = 4096, 128
+DURATION = 10.0
+SPREAD = 0.01
+"""Largest relative change of a component of the gait's state among the starts of a batch."""
+EXACT = 1e-10
+MOST_STEPS = 1_000_000
 TOLERANCES = (1e-6, 1e-7, 1e-8)
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000")
-MARKERS = ("o", "s", "^", "D", "v")
+"""Of the seed's laws; the rigid walker's are tried until its errors are as small."""
+RIGID_TOLERANCES = tuple(float(x) for x in np.logspace(-4.0, -7.0, 13))
+MEASURES = {
+    "period": "period",
+    "step_length": "step length",
+    "speed": "speed",
+    "spectral_radius": "radius",
+}
+SHOWN = ("period", "step_length", "spectral_radius")
+WITNESSES = 64
+"""Starts whose errors are measured."""
+PATHS = {
+    "K alone": lambda s: (s, 1.0),
+    "c alone": lambda s: (1.0, s),
+    "c with K^(2/3)": lambda s: (s, s ** (2.0 / 3.0)),
+    "c with K": lambda s: (s, s),
+    "c with K^(3/2)": lambda s: (s, s**1.5),
+}
+"""By how much K and c grow for a factor s."""
+DOUBLINGS, QUICK_DOUBLINGS = 10, 4
+LAST = 4
+"""Points that the rate is fitted to."""
 
 
-def main() -> None:
-    options = parse(__doc__ or "")
-    quick = options.quick
+@experiment
+def main(options: Options):
     # One of each kind: the creeping rung compiles as long as the seed's, and is of its kind.
-    rungs = {name: rung for name, rung in jb.ladder().items() if name != "creep" or not quick}
-    gaits = {name: gait_of(scene) for name, scene in rungs.items()}
-    measures = {name: measures_of(gait) for name, gait in gaits.items()}
-    names = list(rungs)
+    names = [name for name in jb.ladder() if name != "creep" or not options.quick]
+    rungs = {name: (jb.ladder()[name], gait_of(jb.ladder()[name])) for name in names}
+    measures = {name: measures_of(gait) for name, (_, gait) in rungs.items()}
     apart = {
-        name: distances(measures[name], measures[above])
+        name: {key: measures[name][key] / measures[above][key] - 1.0 for key in MEASURES}
         for name, above in zip(names, [*names[1:], names[-1]], strict=True)
     }
-    batch = QUICK_BATCH if quick else BATCH
-    costs = costs_of(rungs, gaits, batch)
-    say_rungs(options, measures, apart, costs)
-    tolerances = TOLERANCES[:1] if quick else TOLERANCES
-    pairs = [pair_of(rungs, gaits, batch, rtol, costs) for rtol in tolerances]
-    say_pairs(options, pairs)
-    doublings = QUICK_DOUBLINGS if quick else DOUBLINGS
-    chosen = list(PATHS)[:2] if quick else list(PATHS)
-    paths = {path: approach(path, gaits["rigid"], doublings) for path in chosen}
-    say_paths(options, paths)
-    pictures = [draw_rungs(options, apart, costs), draw_paths(options, paths)]
-    options.finish(
-        {
-            "threads": os.cpu_count(),
-            "measures": measures,
-            "distance_from_rung_above": apart,
-            "costs": {name: cost._asdict() for name, cost in costs.items()},
-            "equal_errors": [
-                {
-                    "stribeck": a._asdict(),
-                    "rigid": b._asdict(),
-                    "batch_ratio": a.batch_us / b.batch_us,
-                }
-                for a, b in pairs
-            ],
-            "paths": {name: path._asdict() for name, path in paths.items()},
-            "pictures": pictures,
-        }
-    )
-
-
-def costs_of(rungs: dict[str, Any], gaits: dict[str, jb.Gait], batch: int) -> dict[str, Cost]:
-    """Costs of all rungs; the rigid one's at no larger error than the seed's laws have."""
-    costs = {
-        name: cost_of(scene, gaits[name], batch) for name, scene in rungs.items() if name != "rigid"
+    batch = options.sized(BATCH, QUICK_BATCH)
+    first, *others = options.sized(TOLERANCES, TOLERANCES[:1])
+    costs = {name: cost_of(*rungs[name], batch, [first]) for name in names if name != "rigid"}
+    costs = {"rigid": rigid_cost(rungs, batch, costs["stribeck"])} | costs
+    finer = [cost_of(*rungs["stribeck"], batch, [rtol]) for rtol in others]
+    pairs = [(costs["stribeck"], costs["rigid"])]
+    pairs += [(cost, rigid_cost(rungs, batch, cost)) for cost in finer]
+    doublings = options.sized(DOUBLINGS, QUICK_DOUBLINGS)
+    chosen = options.sized([*PATHS], [*PATHS][:2])
+    paths = {path: approach(path, rungs["rigid"][1], doublings) for path in chosen}
+    return {
+        "threads": os.cpu_count(),
+        "measures": measures,
+        "distance_from_rung_above": apart,
+        "costs": costs,
+        "equal_errors": [
+            {"stribeck": a, "rigid": b, "batch_ratio": a["batch_us"] / b["batch_us"]}
+            for a, b in pairs
+        ],
+        "paths": paths,
+        "pictures": [draw_rungs(options, apart, costs), draw_paths(options, paths)],
     }
-    error = costs["stribeck"].error
-    return {"rigid": cost_of(rungs["rigid"], gaits["rigid"], batch, error=error)} | costs
 
 
-def pair_of(
-    rungs: dict[str, Any],
-    gaits: dict[str, jb.Gait],
-    batch: int,
-    rtol: float,
-    known: dict[str, Cost],
-) -> tuple[Cost, Cost]:
-    """Costs of the seed's laws at a tolerance, and of the rigid walker at no larger an error.
+def gait_of(scene):
+    """The gait at heel strike, which every rung has."""
+    return jb.find_gait(scene, section=jb.HeelStrike(), parameters=(), radius_sensitivities=False)
 
-    What was measured of the rungs is not measured again.
+
+def measures_of(gait):
+    """Measures of a gait, and its leading multipliers."""
+    leading = np.asarray(gait.multipliers)[:3]
+    return {name: float(getattr(gait.measures, name)) for name in MEASURES} | {
+        "multipliers": [[float(value.real), float(value.imag)] for value in leading],
+        "unit_multiplier_error": float(gait.unit_multiplier_error),
+    }
+
+
+def rigid_cost(rungs, batch, compliant):
+    """Cost of the rigid walker at no larger an error than another one has."""
+    return cost_of(*rungs["rigid"], batch, RIGID_TOLERANCES, error=compliant["error"])
+
+
+def cost_of(scene, gait, batch, tolerances, *, error=np.inf):
+    """What a footstep costs by lanes at the loosest tolerance that keeps to an error.
+
+    `error`: median over the starts of the largest error of an angle or rate after ten seconds;
+    `single_us`, `batch_us`: time of a footstep in one walk, and in a batch on all cores [µs].
     """
-    if rtol == known["stribeck"].rtol:
-        return known["stribeck"], known["rigid"]
-    compliant = cost_of(rungs["stribeck"], gaits["stribeck"], batch, rtol=rtol)
-    return compliant, cost_of(rungs["rigid"], gaits["rigid"], batch, error=compliant.error)
+    starts = starts_about(gait.measures.state, batch)
+    some, one = (jax.tree.map(lambda leaf, at=at: leaf[at], starts) for at in (slice(WITNESSES), 0))
+    exact = walked(scene, EXACT)(some)
+    for rtol in tolerances:
+        reached = error_of(walked(scene, rtol)(some), exact)
+        if reached <= error:
+            break
+    alone, many = walked(scene, rtol, single=True), walked(scene, rtol)
+    work = {"single": lambda: alone(one), "batch": lambda: many(starts)}
+    seconds = {name: seconds_of({name: run}, 5, least=1.0)[name] for name, run in work.items()}
+    footsteps = DURATION / float(gait.measures.period)
+    single, together = seconds["single"] / footsteps, seconds["batch"] / (batch * footsteps)
+    return dict(rtol=rtol, error=reached, single_us=1e6 * single, batch_us=1e6 * together)
 
 
-def say_pairs(options: Options, pairs: list[tuple[Cost, Cost]]) -> None:
-    options.say()
-    for compliant, rigid in pairs:
-        options.say(
-            f"at errors of {compliant.error:.1e} and {rigid.error:.1e}: a compliant footstep "
-            f"{compliant.batch_us:.2f} us, a rigid one {rigid.batch_us:.3f} us in a batch: "
-            f"{compliant.batch_us / rigid.batch_us:.0f} to 1"
-        )
+def starts_about(state, count):
+    """Starts scattered about a gait's state; a compliant foot is not lifted by it."""
+    generator = np.random.default_rng(0)
+    leaves = {}
+    for name, leaf in state._asdict().items():
+        moves = name.startswith(("theta", "omega"))
+        spread = SPREAD * generator.uniform(-1.0, 1.0, count) * moves
+        leaves[name] = leaf * (1.0 + jnp.asarray(spread))
+    return type(state)(**leaves)
 
 
-def say_rungs(
-    options: Options,
-    measures: dict[str, Any],
-    apart: dict[str, dict[str, float]],
-    costs: dict[str, Cost],
-) -> None:
-    options.table(
-        ({"rung": name} | found for name, found in measures.items()),
-        rung="", period=".5f", step_length=".5f", spectral_radius=".4f",
-    )  # fmt: skip
-    options.say("distance from the rung above")
-    names = ("period", "step_length", "spectral_radius")
-    rows = ({"rung": name} | off for name, off in apart.items())
-    options.table(rows, rung="", **dict.fromkeys(names, ".1%"))
-    options.say("cost of a footstep")
-    rows = ({"rung": name} | cost._asdict() for name, cost in costs.items())
-    options.table(rows, rung="", rtol=".0e", error=".1e", single_us=".1f", batch_us=".3f")
+def walked(scene, rtol, *, single=False):
+    """A walk of ten seconds as a compiled function of its start; of a batch unless `single`."""
+
+    def end(start):
+        how = dict(duration=DURATION, rtol=rtol, engine="lanes")
+        if isinstance(scene, jb.RigidScene):
+            walk = jb.rigid_walk(scene, start, **how)
+        else:
+            walk = jb.simulate(scene, start, save="end", max_solver_steps=MOST_STEPS, **how)
+        return walk.final, walk.ending
+
+    return jax.jit(end if single else jax.vmap(end))
 
 
-def say_paths(options: Options, paths: dict[str, Approach]) -> None:
-    options.say()
-    options.say("path            gaits to factor  period    length    radius   rates of the three")
-    for name, path in paths.items():
-        rates = ", ".join("none" if p is None else f"{p:.2f}" for p in path.rates.values())
-        options.say(
-            f"{name:<15} {path.factors[-1]:>15.0f}  {path.period[-1]:>8.1e}  "
-            f"{path.step_length[-1]:>8.1e}  {path.spectral_radius[-1]:>8.1e}  {rates}"
-            + ("" if path.ended is None else f" ({path.ended})")
-        )
+def error_of(found, exact):
+    """Of the walks that both count as walking."""
+    (state, ending), (truth, true_ending) = found, exact
+    walking = (np.asarray(ending) == 0) & (np.asarray(true_ending) == 0)
+    names = [name for name in state._fields if name.startswith(("theta", "omega"))]
+    gaps = [np.abs(np.asarray(getattr(state, n)) - np.asarray(getattr(truth, n))) for n in names]
+    return float(np.median(np.max(gaps, axis=0)[walking]))
 
 
-def draw_rungs(options: Options, apart: dict[str, dict[str, float]], costs: dict[str, Cost]) -> str:
+def approach(path, rigid, doublings):
+    """Gaits along a path, each searched from the last one's state, beside the rigid gait.
+
+    By measure the relative differences, and the exponents p of |difference| ∝ s^(−p) over the last
+    points; `ended` says why no stiffer gait was found.
+    """
+    found, factors, guess, ended = [], [], None, None
+    for factor in (2.0**k for k in range(doublings + 1)):
+        stiffer, damped = PATHS[path](factor)
+        scene = jb.seed_scene(K=1e6 * stiffer, c=1e7 * damped)
+        gait = jb.find_gait(scene, guess, parameters=(), radius_sensitivities=False)
+        if gait.outcome is not jb.gait.Search.FOUND:
+            ended = f"at factor {factor:.0f}: {gait.outcome}"
+            break
+        guess = gait.measures.state
+        factors.append(factor)
+        found.append(gait.measures)
+    gaps = {
+        name: [float(getattr(m, name)) / float(getattr(rigid.measures, name)) - 1.0 for m in found]
+        for name in SHOWN
+    }
+    rates = {name: rate(factors, gap) for name, gap in gaps.items()}
+    peaks = [float(m.peak_normal) for m in found]
+    return dict(factors=factors, **gaps, peak_normal=peaks, rates=rates, ended=ended)
+
+
+def rate(factors, gaps):
+    """The exponent with which the last differences shrink; None unless steadily, of one sign."""
+    last = np.asarray(gaps[-LAST:])
+    steady = bool(np.all(np.sign(last) == np.sign(last[0])) and np.all(np.diff(np.abs(last)) < 0.0))
+    if len(last) < LAST or not steady:
+        return None
+    return float(-np.polyfit(np.log(factors[-LAST:]), np.log(np.abs(last)), 1)[0])
+
+
+def draw_rungs(options, apart, costs):
     figure = new_figure(8.0, 4.2)
     left, right = figure.subplots(1, 2)
     names = list(costs)
     rows = np.arange(len(names))
-    for key, colour, label in (
-        ("single_us", COLOURS[0], "one walk"),
-        ("batch_us", COLOURS[1], "in a batch"),
-    ):
-        values = [getattr(costs[name], key) for name in names]
-        left.plot(values, rows, "o", color=colour, label=label)
-    left.set_xscale("log")
-    left.set_xlabel("time for a footstep (µs)")
+    for k, (key, words) in enumerate({"single_us": "one walk", "batch_us": "in a batch"}.items()):
+        left.plot([cost[key] for cost in costs.values()], rows, "o", color=COLOURS[k], label=words)
+    left.set(xlabel="time for a footstep (µs)")
     left.set_title("Cost by lanes", loc="left")
-    shown = {"period": "period", "step_length": "step length", "spectral_radius": "radius"}
-    for k, (key, label) in enumerate(shown.items()):
+    for key, marker, colour in zip(SHOWN, MARKERS, COLOURS, strict=False):
         values = [100.0 * abs(apart[name][key]) for name in names[:-1]]
-        right.plot(values, rows[:-1], MARKERS[k], color=COLOURS[k], label=label)
-    right.set_xscale("log")
-    right.set_xlabel("distance from the rung above (%)")
+        right.plot(values, rows[:-1], marker, color=colour, label=MEASURES[key])
+    right.set(xlabel="distance from the rung above (%)")
     right.set_title("What the next rung changes", loc="left")
     for ax in (left, right):
+        ax.set(xscale="log", ylim=(-0.5, len(names) - 0.5))
         ax.set_yticks(rows, names)
-        ax.set_ylim(-0.5, len(names) - 0.5)
         ax.grid(axis="x", color="#DDDDDD")
-        ax.legend(
-            loc="upper center",
-            bbox_to_anchor=(0.5, -0.18),
-            ncols=3,
-            frameon=False,
-            columnspacing=1.0,
-            handletextpad=0.2,
-        )
+        legend_below(ax, columns=3, columnspacing=1.0, handletextpad=0.2)
     return options.save(figure, "ladder.png")
 
 
-def draw_paths(options: Options, paths: dict[str, Approach]) -> str:
+def draw_paths(options, paths):
     figure = new_figure(9.0, 4.2)
-    titles = {"period": "period", "step_length": "step length", "spectral_radius": "radius"}
-    for ax, (key, title) in zip(figure.subplots(1, 3), titles.items(), strict=True):
-        for k, (name, path) in enumerate(paths.items()):
-            gaps = np.asarray(getattr(path, key))
-            ax.plot(path.factors, np.abs(gaps), color=COLOURS[k], linewidth=1.0, label=name)
-            above = gaps > 0.0
-            factors = np.asarray(path.factors)
+    for ax, key in zip(figure.subplots(1, 3), SHOWN, strict=True):
+        for (name, path), colour, marker in zip(paths.items(), COLOURS, MARKERS, strict=False):
+            gaps, factors = np.asarray(path[key]), np.asarray(path["factors"])
+            ax.plot(factors, np.abs(gaps), color=colour, linewidth=1.0, label=name)
             # Hollow where the compliant gait's measure is the larger one.
-            for side, fill in ((above, "white"), (~above, COLOURS[k])):
-                ax.plot(
-                    factors[side],
-                    np.abs(gaps[side]),
-                    MARKERS[k],
-                    color=COLOURS[k],
-                    markerfacecolor=fill,
-                    markersize=4,
-                )
+            for side, fill in ((gaps > 0.0, "white"), (gaps <= 0.0, colour)):
+                look = dict(color=colour, markerfacecolor=fill, markersize=4)
+                ax.plot(factors[side], np.abs(gaps[side]), marker, **look)
         ax.set_xscale("log", base=2)
-        ax.set_yscale("log")
-        ax.set_title(title, loc="left")
-        ax.set_xlabel("factor of the path, $s$")
+        ax.set(yscale="log", xlabel="factor of the path, $s$")
+        ax.set_title(MEASURES[key], loc="left")
         ax.grid(color="#DDDDDD")
     figure.axes[0].set_ylabel("distance from the rigid gait, relative")
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
+    named = figure.axes[0].get_legend_handles_labels()
+    figure.legend(*named, loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle("Filled: below the rigid gait's; hollow: above it", fontsize=9)
     return options.save(figure, "rigid_limit.png")
 

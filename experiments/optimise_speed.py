@@ -8,14 +8,15 @@ conditions of optimality, multipliers, sensitivity norm, basin, footsteps. Last,
 iterations of a plain descent take.
 """
 
-import time
-from typing import Any
+import functools
 
-import matplotlib.pyplot as plt
 import numpy as np
-from _options import Options, parse
+from _experiment import Options, experiment
+from _scenes import rigid_seed
+from _timing import timed
 
 import jaxbiped as jb
+from jaxbiped.plot.style import new_figure
 
 LEG = {"d": (0.05, 0.2), "r": (0.04, 0.12), "J": (0.003, 0.02)}
 LARGE = {**LEG, "r": (0.04, 0.16)}
@@ -24,27 +25,55 @@ BOUND = 0.4
 OPTIMISERS = ("trust-region", "slsqp", "trust-constr")
 DESCENT, QUICK_DESCENT = 200, 3
 """Iterations that are timed."""
-MOST = {"trust-region": 100, "slsqp": 100, "trust-constr": 100}
+GOALS = (("maximise", "speed"), ("minimise", "spectral_radius"))
 
 
-def summary(best: jb.optimise.Optimum) -> dict[str, Any]:
-    told = best.optimality
+@experiment
+def main(options: Options):
+    scene = options.sized(jb.seed_scene(), rigid_seed())
+    starts = options.sized(4096, 128)
+    own = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
+    optimisers = options.sized(OPTIMISERS, OPTIMISERS[:1])
+    fast = {name: fastest(scene, name) for name in optimisers}
+    radius, speed = float(own.measures.spectral_radius), float(own.measures.speed)
+    kept, most = {"speed": (speed, None)}, options.sized(200, 30)
+    half = {**kept, "spectral_radius": (None, 0.499 * radius)}
+    find = functools.partial(jb.optimise_gait, scene)
+    least = dict(minimise="spectral_radius")
+    calm = dict(minimise="sensitivity_norm", subject_to=half)
+    designs = {
+        # Its own design, under the same tests.
+        "seed": find(vary={"d": (0.0999, 0.1001)}, iterations=1, **least),
+        "calmest": find(vary=LARGE, iterations=most, **calm),
+        "least radius": find(vary=BODY, iterations=most, subject_to=kept, **least),
+    }
+    told = {
+        name: summary(best) | {"certificate": certified(best, starts)}
+        for name, best in designs.items()
+    }
+    descents = {
+        f"{goal} {wanted}": descent(scene, goal, wanted, options.sized(DESCENT, QUICK_DESCENT))
+        for goal, wanted in GOALS
+    }
+    drawn = draw(options, own, designs["calmest"])
+    return {"fastest": fast, "designs": told, "descents": descents, "picture": drawn}
+
+
+def summary(best):
     return {
         "outcome": str(best.outcome),
         "variables": best.variables,
         "measures": {name: best.known.values[name] for name in ("speed", "spectral_radius")},
         "objective": best.objective,
-        "kkt_residual": told.residual,
-        "excess": told.excess,
+        "kkt_residual": best.optimality.residual,
+        "excess": best.optimality.excess,
         "iterations": len(best.history),
         "evaluations": best.evaluations,
     }
 
 
-def certified(best: jb.optimise.Optimum, starts: int) -> dict[str, Any]:
+def certified(best, starts):
     found = jb.optimise.certify(best, starts=starts)
-    assert found.basin is not None
-    assert found.walk is not None
     return {
         "kkt_residual": found.optimality.residual,
         "multipliers": [[value.real, value.imag] for value in found.multipliers.tolist()],
@@ -58,110 +87,45 @@ def certified(best: jb.optimise.Optimum, starts: int) -> dict[str, Any]:
     }
 
 
-def fastest(options: Options, scene: jb.Scene) -> dict[str, Any]:
-    """By each optimiser; the first call of each is not timed, for it compiles."""
-    found = {}
-    for name in OPTIMISERS[:1] if options.quick else OPTIMISERS:
-        problem = dict(vary=LEG, maximise="speed", subject_to=f"spectral_radius<{BOUND}")
-        jb.optimise_gait(scene, **problem, optimiser="slsqp", iterations=1)  # type: ignore[arg-type]
-        began = time.perf_counter()
-        best = jb.optimise_gait(scene, **problem, optimiser=name, iterations=MOST[name])  # type: ignore[arg-type]
-        seconds = time.perf_counter() - began
-        found[name] = summary(best) | {"wall_s": seconds}
-        options.say(
-            f"{name:>13}: {best.objective:.6f} m/s, {best.outcome}, {len(best.history)} "
-            f"iterations, {best.evaluations} gaits, {seconds:.2f} s"
-        )
-    return found
+def fastest(scene, optimiser):
+    """By an optimiser; a first call is not timed, for it compiles."""
+    problem = dict(vary=LEG, maximise="speed", subject_to=f"spectral_radius<{BOUND}")
+    jb.optimise_gait(scene, **problem, optimiser="slsqp", iterations=1)
+    how = dict(optimiser=optimiser, iterations=100)
+    best, wall, _ = timed(lambda: jb.optimise_gait(scene, **problem, **how))
+    return summary(best) | {"wall_s": wall}
 
 
-def descents(options: Options, scene: jb.Scene) -> dict[str, Any]:
-    """Times of descents by Adam, once everything is compiled."""
-    found = {}
-    for goal, wanted in (("maximise", "speed"), ("minimise", "spectral_radius")):
-        problem: dict[str, Any] = {"vary": LEG, goal: wanted, "optimiser": "optax"}
-        jb.optimise_gait(scene, **problem, iterations=2)
-        wall, cpu = time.perf_counter(), time.process_time()
-        best = jb.optimise_gait(
-            scene, **problem, iterations=QUICK_DESCENT if options.quick else DESCENT
-        )
-        found[f"{goal} {wanted}"] = times = {
-            "objective": best.objective,
-            "iterations": len(best.history),
-            "evaluations": best.evaluations,
-            "warm_wall_s": time.perf_counter() - wall,
-            "warm_cpu_s": time.process_time() - cpu,
-        }
-        options.say(
-            f"{goal} {wanted}: {best.objective:.5f} after {len(best.history)} iterations, "
-            f"{best.evaluations} gaits, {times['warm_wall_s']:.1f} s "
-            f"({times['warm_cpu_s']:.1f} s of processor)"
-        )
-    return found
+def descent(scene, goal, wanted, iterations):
+    """Times of a descent by Adam, once everything is compiled."""
+    problem = {"vary": LEG, goal: wanted, "optimiser": "optax"}
+    jb.optimise_gait(scene, **problem, iterations=2)
+    best, wall, cpu = timed(lambda: jb.optimise_gait(scene, **problem, iterations=iterations))
+    return {
+        "objective": best.objective,
+        "iterations": len(best.history),
+        "evaluations": best.evaluations,
+        "warm_wall_s": wall,
+        "warm_cpu_s": cpu,
+    }
 
 
-def picture(options: Options, own: jb.Gait, best: jb.optimise.Optimum) -> str:
+def draw(options, own, best):
     """The iterations, and the multipliers before and after."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 4.0), layout="constrained")
-    names = ("spectral_radius", "sensitivity_norm")
-    radii, norms = ([each.measures[name] for each in best.history] for name in names)
-    left.plot(norms, radii, "o-", ms=3.0)
+    figure = new_figure(9.0, 4.0)
+    left, right = figure.subplots(1, 2)
+    names = ("sensitivity_norm", "spectral_radius")
+    left.plot(*([each.measures[name] for each in best.history] for name in names), "o-", ms=3.0)
     left.axhline(0.5 * float(own.measures.spectral_radius), color="#595959", ls=":", lw=0.8)
-    left.set_xlabel("gait sensitivity norm")
-    left.set_ylabel("spectral radius")
+    left.set(xlabel="gait sensitivity norm", ylabel="spectral radius")
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
     right.plot(np.cos(angle), np.sin(angle), color="#595959", lw=0.8)
-    for gait, label, form in ((own, "seed", "o"), (best.gait, "optimum", "s")):
+    for gait, name, form in ((own, "seed", "o"), (best.gait, "optimum", "s")):
         values = np.asarray(gait.multipliers)
-        right.plot(values.real, values.imag, form, ms=5.0, mfc="none", label=label)
-    right.set_aspect("equal")
-    right.set_xlabel("real part of a multiplier")
-    right.set_ylabel("imaginary part")
+        right.plot(values.real, values.imag, form, ms=5.0, mfc="none", label=name)
+    right.set(xlabel="real part of a multiplier", ylabel="imaginary part", aspect="equal")
     right.legend(frameon=False)
     return options.save(figure, "optimise_speed.png")
-
-
-def main() -> None:
-    options = parse(__doc__ or "")
-    scene = jb.ladder()["rigid"] if options.quick else jb.seed_scene()
-    starts = 128 if options.quick else 4096
-    own = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
-    fast = fastest(options, scene)
-    radius, speed = float(own.measures.spectral_radius), float(own.measures.speed)
-    most = 30 if options.quick else 200
-    kept = {"speed": (speed, None)}
-    designs = {
-        # Its own design, under the same tests.
-        "seed": jb.optimise_gait(
-            scene, vary={"d": (0.0999, 0.1001)}, minimise="spectral_radius", iterations=1
-        ),
-        "calmest": jb.optimise_gait(
-            scene,
-            vary=LARGE,
-            minimise="sensitivity_norm",
-            subject_to={**kept, "spectral_radius": (None, 0.499 * radius)},
-            iterations=most,
-        ),
-        "least radius": jb.optimise_gait(
-            scene, vary=BODY, minimise="spectral_radius", subject_to=kept, iterations=most
-        ),
-    }
-    told = {
-        name: summary(best) | {"certificate": certified(best, starts)}
-        for name, best in designs.items()
-    }
-    for name, each in told.items():
-        certificate = each["certificate"]
-        estimate, low, high = certificate["basin"]
-        options.say(
-            f"{name:>12}: {each['outcome']}, radius {each['measures']['spectral_radius']:.5f} at "
-            f"{each['measures']['speed']:.5f} m/s, basin {estimate:.3f} ({low:.3f} to {high:.3f}), "
-            f"sensitivity norm {certificate['sensitivity_norm']:.3f}, "
-            f"{certificate['footsteps']} footsteps, returned {certificate['returned']}"
-        )
-    drawn = picture(options, own, designs["calmest"])
-    descended = descents(options, scene)
-    options.finish({"fastest": fast, "designs": told, "descents": descended, "picture": drawn})
 
 
 if __name__ == "__main__":

@@ -3,51 +3,93 @@
 Beside each figure the paper's sentence about it, and what our numbers say to it.
 """
 
-from typing import Any
+from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
-from _held import (
-    FLOOR,
-    PROJECTING,
-    Curve,
-    Integrator,
-    curve_of,
-    relative_costs,
-    say_costs,
-    truth_of,
-)
-from _held_pictures import (
-    draw_all,
-    draw_costs,
-    draw_each,
-    draw_integrators,
-    draw_times,
-)
-from _options import Options, parse
+from _constraint_runs import FLOOR, METHODS, Integrator, relative_costs, truth_of
+from _experiment import Options, experiment
+from _pictures import COLOURS, label
 
 import jaxbiped as jb
+from jaxbiped.plot.style import new_figure
+from jaxbiped.trade import work_of
 
 ODE = Integrator("dopri5", rtol=1e-3)
 """What the paper's "ode" is taken for: Dormand and Prince's pair at MATLAB's usual tolerance."""
 STIFF = Integrator("rodas4", rtol=1e-6)
 FOOTSTEP = 0.4408
+PROJECTING = ("index1", "index1aug", "described")
+ASTRAY = 0.05
+"""Error of the state (SI units) from which a run has failed."""
+STYLES = ("-", "--", "-.", ":", "-", "--", "-.")
+PARTS = 100
+"""Of a curve that wiggles more often than a picture has room for."""
+SIZES = dict(single=0.05, batch=2e-3, count=1024, turns=7)
+QUICK_SIZES = dict(single=0.02, batch=1e-3, count=64, turns=3)
+"""What costs are measured with."""
 
 
-def main() -> None:
-    options = parse(__doc__ or "")
-    scene = jb.seed_scene()
-    quick = options.quick
-    step = 1e-5 if quick else 1e-6
-    duration = 0.3 if quick else 2.0
-    methods = (
-        ("standard", "augmented", "described")
-        if quick
-        else tuple(jb.constraints.CONSTRAINT_METHODS)
+class Curve(NamedTuple):
+    """A violation over time.
+
+    Attributes:
+        t: [s]. position: ‖Φ‖ [m]. ending: of the walk, in words. seconds: of a warm run [s].
+        error: largest difference from the minimal formulation's state at the end (SI units).
+        at_steps: largest ‖Φ‖ at the ends of the steps [m]; in between the curve has the error of
+            the dense output, which a projection does not see.
+    """
+
+    t: np.ndarray
+    position: np.ndarray
+    ending: str
+    seconds: float
+    error: float
+    at_steps: float
+
+    def largest(self, start=0.0, stop=1.0):
+        """Largest violation between two parts of the whole time, 0 to 1 [m]."""
+        part = (self.t >= start * self.t[-1]) & (self.t <= stop * self.t[-1])
+        return float(self.position[part].max())
+
+    def numbers(self):
+        """What the JSON has of it."""
+        return {
+            "ending": self.ending,
+            "max_violation_m": self.at_steps if np.isfinite(self.at_steps) else None,
+            "first_half_m": self.largest(0.0, 0.5),
+            "last_half_m": self.largest(0.5, 1.0),
+            "state_error": self.error if np.isfinite(self.error) else None,
+            "wall_s_run": self.seconds,
+        }
+
+
+def curve_of(scene, method, how, duration, truth, points=1001):
+    """The violation of a method over the seed's walk, timed warm."""
+    held, times = jb.RedundantScene(scene, method), jnp.linspace(0.0, duration, points)
+    options = {name: value for name, value in how._asdict().items() if value is not None}
+    options |= dict(save=times, watch=(), extremes=jb.dynamics.violation)
+    request = jb.Simulation.prepare(
+        held, jb.seed_state(), duration=duration, max_solver_steps=1 << 25, **options
     )
-    euler, runge = Integrator("euler", dt=step), Integrator("runge2", dt=step)
+    walk, work = work_of(request, 1)
+    off = np.asarray(jb.dynamics.violation(held, walk.state).position)
+    final = np.array(jb.dynamics.minimal_state(held, walk.final))
+    error, alive = float(np.max(np.abs(final - truth))), np.isfinite(off)
+    # One that came to its end somewhere else has failed all the same.
+    ending = str(walk.outcome) if error < ASTRAY else "failed"
+    at_steps = float(walk.highest.position)
+    return Curve(np.asarray(times)[alive], off[alive], ending, work.seconds, error, at_steps)
+
+
+@experiment
+def main(options: Options):
+    scene, duration, step = jb.seed_scene(), options.sized(2.0, 0.3), options.sized(1e-6, 1e-5)
+    methods = options.sized(METHODS, ("standard", "augmented", "described"))
+    tried = {"euler": Integrator("euler", dt=step), "runge2": Integrator("runge2", dt=step)}
+    tried |= options.sized({"ode": ODE, "rodas4": STIFF}, {})
     truth = truth_of(scene, duration)
-    by_method = {name: curve_of(scene, name, euler, duration, truth) for name in methods}
-    tried = {"euler": euler, "runge2": runge} | ({} if quick else {"ode": ODE, "rodas4": STIFF})
+    by_method = {name: curve_of(scene, name, tried["euler"], duration, truth) for name in methods}
     by_integrator = {
         (method, name): by_method[method]
         if name == "euler"
@@ -55,173 +97,202 @@ def main() -> None:
         for method in ("augmented", "standard")
         for name, how in tried.items()
     }
-    long = {} if quick else hundred_footsteps(scene)
+    long = {} if options.quick else hundred_footsteps(scene)
     # Two programs for each method: one that projects and one that does not will do.
-    costed = ("standard", "described") if quick else methods
-    costs = costs_of(scene, costed, euler, quick)
-    verdicts = judged(by_method, by_integrator, long)
-    say(options, by_method, by_integrator, costs, long, verdicts)
-    pictures = [
-        draw_each(options, by_method),
-        draw_all(options, "fig12_all_methods.png", by_method, "All methods"),
-        draw_all(
-            options,
-            "fig13_without_standard.png",
-            {name: c for name, c in by_method.items() if name != "standard"},
-            "All but the standard method",
-        ),
-        draw_costs(options, costs),
-        draw_integrators(options, "fig15_augmented.png", "augmented", by_integrator),
-        draw_integrators(options, "fig16_standard.png", "standard", by_integrator),
-        draw_times(options, by_integrator),
-    ]
-    if long:
-        pictures.append(
-            draw_all(options, "hundred_footsteps.png", long, "A hundred footsteps by rodas4")
-        )
-    options.finish(
-        {
-            "duration_s": duration,
-            "dt_s": step,
-            "methods": {name: numbers(c) for name, c in by_method.items()},
-            "integrators": {f"{m} {i}": numbers(c) for (m, i), c in by_integrator.items()},
-            "costs": costs,
-            "hundred_footsteps": {name: numbers(c) for name, c in long.items()},
-            "verdicts": verdicts,
-            "pictures": pictures,
-        }
-    )
+    costed = options.sized(methods, ("standard", "described"))
+    costs = relative_costs(scene, costed, tried["euler"], **options.sized(SIZES, QUICK_SIZES))
+    return {
+        "duration_s": duration,
+        "dt_s": step,
+        "methods": {name: curve.numbers() for name, curve in by_method.items()},
+        "integrators": {f"{m} {i}": curve.numbers() for (m, i), curve in by_integrator.items()},
+        "costs": costs,
+        "hundred_footsteps": {name: curve.numbers() for name, curve in long.items()},
+        "verdicts": judged(by_method, by_integrator, long),
+        "pictures": draw(options, by_method, by_integrator, costs, long),
+    }
 
 
-def hundred_footsteps(scene: jb.Scene) -> dict[str, Curve]:
+def hundred_footsteps(scene):
     duration = 100.0 * FOOTSTEP
     truth = truth_of(scene, duration)
-    return {
-        name: curve_of(scene, name, STIFF, duration, truth, points=4001)
-        for name in jb.constraints.CONSTRAINT_METHODS
-    }
+    return {name: curve_of(scene, name, STIFF, duration, truth, points=4001) for name in METHODS}
 
 
-def costs_of(
-    scene: jb.Scene, methods: tuple[str, ...], euler: Integrator, quick: bool
-) -> dict[str, dict[str, float]]:
-    """Times beside the standard method's by Euler steps, of one walk and in a batch."""
-    count, single, batch = (64, 0.02, 1e-3) if quick else (1024, 0.05, 2e-3)
-    return relative_costs(
-        scene, methods, euler, single=single, batch=batch, count=count, turns=3 if quick else 7
-    )
-
-
-def numbers(curve: Curve) -> dict[str, Any]:
-    return {
-        "ending": curve.ending,
-        "max_violation_m": curve.at_steps if np.isfinite(curve.at_steps) else None,
-        "first_half_m": curve.largest(0.0, 0.5),
-        "last_half_m": curve.largest(0.5, 1.0),
-        "state_error": curve.error if np.isfinite(curve.error) else None,
-        "wall_s_run": curve.seconds,
-    }
-
-
-def judged(
-    by_method: dict[str, Curve], by_integrator: dict[tuple[str, str], Curve], long: dict[str, Curve]
-) -> list[dict[str, Any]]:
+def judged(by_method, by_integrator, long):
     """The paper's sentences, each with whether our numbers bear it out."""
-    curves = long or by_method
     growth = {
-        name: c.largest(0.5, 1.0) / max(c.largest(0.0, 0.5), FLOOR) for name, c in curves.items()
+        name: curve.largest(0.5, 1.0) / max(curve.largest(0.0, 0.5), FLOOR)
+        for name, curve in (long or by_method).items()
     }
-    worst = {name: c.at_steps for name, c in by_method.items()}
+    worst = {name: curve.at_steps for name, curve in by_method.items()}
     held = [name for name in growth if name not in ("standard", *PROJECTING)]
     integrators = sorted({name for _, name in by_integrator})
     augmented = {name: by_integrator["augmented", name] for name in integrators}
-
-    def verdict(figure: str, sentence: str, holds: bool, because: str) -> dict[str, Any]:
-        return dict(figure=figure, sentence=sentence, confirmed=bool(holds), numbers=because)
-
+    largest = {name: curve.largest() for name, curve in augmented.items()}
+    seconds = {name: curve.seconds for name, curve in augmented.items()}
+    slowest = {
+        max(integrators, key=lambda name, m=m: by_integrator[m, name].seconds)
+        for m in ("standard", "augmented")
+    }
     found = [
-        verdict(
+        (
             "11",
             "when the standard Lagrange multipliers method is used, the violation of constraints "
             "grows indefinitely with time",
             growth["standard"] > 1.5,
             f"last half over first half {growth['standard']:.2f}",
         ),
-        verdict(
+        (
             "11",
             "with [baumgarte, augmented, index1, described] the constraints violation does not "
             "growth with time",
             all(growth[name] < 1.5 for name in held),
             ", ".join(f"{name} {growth[name]:.2f}" for name in held),
         ),
-        verdict(
+        (
             "11",
             "the direct correction approach completely eliminate the violation of constraints",
             worst["described"] < 1e-12,
             f"largest {worst['described']:.1e} m",
         ),
-        verdict(
+        (
             "13",
             "constrains violation of the augmented lagrangian formulation, the direct correction "
             "approach and the baumgarte stabilization approach have the same order of magnitude",
             worst["described"] > 0.1 * worst["augmented"],
             f"augmented {worst['augmented']:.1e} m, described {worst['described']:.1e} m",
         ),
-        verdict(
+        (
             "15",
             "the method that most eliminates the constraints violations is the Runge-Kutta",
-            min(integrators, key=lambda i: augmented[i].largest(0.0, 1.0)) == "runge2",
-            ", ".join(f"{i} {augmented[i].largest(0.0, 1.0):.1e} m" for i in integrators),
+            min(largest, key=largest.get) == "runge2",
+            ", ".join(f"{name} {value:.1e} m" for name, value in largest.items()),
         ),
-        verdict(
+        (
             "17",
             "the Runge-Kutta integrator (with both methods: standard and augmented) is the less "
             "efficient approach",
-            all(
-                max(integrators, key=lambda i: by_integrator[m, i].seconds) == "runge2"
-                for m in ("standard", "augmented")
-            ),
-            ", ".join(f"{i} {augmented[i].seconds:.2f} s" for i in integrators),
+            slowest == {"runge2"},
+            ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items()),
         ),
     ]
-    if "ode" in integrators:
+    if "ode" in seconds:
         found.append(
-            verdict(
+            (
                 "17",
                 "the ode integrator needs much less time than the Runge-kutta integrator and the "
                 "Euler integrator",
-                augmented["ode"].seconds
-                < 0.5 * min(augmented["euler"].seconds, augmented["runge2"].seconds),
-                f"ode {augmented['ode'].seconds:.2f} s, euler {augmented['euler'].seconds:.2f} s, "
-                f"rodas4 {augmented['rodas4'].seconds:.2f} s",
+                seconds["ode"] < 0.5 * min(seconds["euler"], seconds["runge2"]),
+                ", ".join(f"{name} {seconds[name]:.2f} s" for name in ("ode", "euler", "rodas4")),
             )
         )
-    return found
+    heads = ("figure", "sentence", "confirmed", "numbers")
+    return [dict(zip(heads, (*each[:2], bool(each[2]), each[3]), strict=True)) for each in found]
 
 
-def say(
-    options: Options,
-    by_method: dict[str, Curve],
-    by_integrator: dict[tuple[str, str], Curve],
-    costs: dict[str, dict[str, float]],
-    long: dict[str, Curve],
-    verdicts: list[dict[str, Any]],
-) -> None:
-    for title, curves in (
-        ("methods by Euler steps", by_method),
-        ("integrators", {f"{m}, {i}": c for (m, i), c in by_integrator.items()}),
-        ("a hundred footsteps by rodas4", long),
-    ):
-        options.say(title)
-        options.table(
-            ({"run": name} | numbers(curve) for name, curve in curves.items()), run="", ending="",
-            first_half_m=".1e", last_half_m=".1e", max_violation_m=".1e", state_error=".1e",
-            wall_s_run=".3f",
-        )  # fmt: skip
-    say_costs(options, costs)
-    for each in verdicts:
-        word = "confirmed" if each["confirmed"] else "CONTRADICTED"
-        options.say(f'figure {each["figure"]}, {word}: "{each["sentence"]}" ({each["numbers"]})')
+def draw(options, by_method, by_integrator, costs, long):
+    """Every figure; returns their places."""
+    others = {name: curve for name, curve in by_method.items() if name != "standard"}
+    figures = {
+        "fig11_violation": each_alone(by_method),
+        "fig12_all_methods": all_together(by_method, "All methods"),
+        "fig13_without_standard": all_together(others, "All but the standard method"),
+        "fig14_time_ratio": cost_bars(costs),
+        "fig15_augmented": of_integrators("augmented", by_integrator),
+        "fig16_standard": of_integrators("standard", by_integrator),
+        "fig17_times": time_bars(by_integrator),
+    }
+    if long:
+        figures["hundred_footsteps"] = all_together(long, "A hundred footsteps by rodas4")
+    return [options.save(figure, f"{name}.png") for name, figure in figures.items()]
+
+
+def each_alone(curves):
+    columns = 3 if len(curves) < 7 else 4
+    rows = -(-len(curves) // columns)
+    figure = new_figure(3.0 * columns, 2.4 * rows)
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, (name, curve), colour in zip(axes, curves.items(), COLOURS, strict=False):
+        ax.plot(curve.t, curve.position, color=colour, linewidth=1.0)
+        label(ax, "time (s)", "violation (m)")
+        ax.set_title(name, loc="right", fontsize="medium")
+        ax.ticklabel_format(axis="y", style="sci", scilimits=(0, 0), useMathText=True)
+    for ax in axes[len(curves) :]:
+        ax.set_visible(False)
+    return figure
+
+
+def all_together(curves, title):
+    figure = new_figure(9.0, 3.8)
+    linear, logarithmic = figure.subplots(1, 2)
+    for method, curve in curves.items():
+        k = METHODS.index(method)
+        style = dict(color=COLOURS[k], linestyle=STYLES[k], linewidth=1.1)
+        linear.plot(curve.t, curve.position, label=method, **style)
+        # The largest violation in each part of the whole time, drawn in the middle of it.
+        parts = [p for p in np.array_split(np.arange(len(curve.t)), PARTS) if len(p)]
+        tops = [max(curve.position[p].max(), FLOOR) for p in parts]
+        logarithmic.plot([curve.t[p].mean() for p in parts], tops, **style)
+    label(linear, "time (s)", "violation (m)")
+    linear.ticklabel_format(axis="y", style="sci", scilimits=(0, 0), useMathText=True)
+    title_of_parts = f"largest in each of {PARTS} parts"
+    label(logarithmic, "time (s)", "violation (m)", title_of_parts, log="y")
+    figure.suptitle(title, fontsize=10)
+    legend(figure, linear, "outside lower center", min(len(curves), 4))
+    return figure
+
+
+def cost_bars(costs):
+    shown = {name: row for name, row in costs.items() if name != "minimal"}
+    heights = {
+        words: [row[key] for row in shown.values()]
+        for key, words in {"single": "one walk", "batch": "in a batch"}.items()
+    }
+    figure, ax = bars(list(shown), heights)
+    ax.axhline(1.0, color="#595959", linewidth=0.8)
+    label(ax, "method", "time by Euler steps, standard = 1")
+    legend(figure, ax, "outside upper center", 2)
+    return figure
+
+
+def of_integrators(method, curves):
+    figure = new_figure(6.4, 3.8)
+    ax = figure.subplots()
+    mine = {name: curve for (m, name), curve in curves.items() if m == method}
+    for (name, curve), colour, style in zip(mine.items(), COLOURS, STYLES, strict=False):
+        values = np.maximum(curve.position, FLOOR)
+        ax.plot(curve.t, values, color=colour, linestyle=style, label=name)
+    label(ax, "time (s)", "violation (m)", f"Integrators, {method} method", log="y")
+    legend(figure, ax, "outside lower center", 4)
+    return figure
+
+
+def time_bars(curves):
+    names = list(dict.fromkeys(name for _, name in curves))
+    heights = {m: [curves[m, name].seconds for name in names] for m in ("augmented", "standard")}
+    figure, ax = bars(names, heights)
+    for drawn in ax.containers:
+        ax.bar_label(drawn, fmt="%.2g", fontsize=8)
+    label(ax, "integrator", "time of a run (s)", "Time of the integrators", log="y")
+    ax.margins(y=0.15)
+    legend(figure, ax, "outside upper right", 2)
+    return figure
+
+
+def bars(names, heights):
+    """Two bars for each name, beside each other."""
+    figure = new_figure(7.0, 3.6)
+    ax = figure.subplots()
+    for k, (words, values) in enumerate(heights.items()):
+        places = np.arange(len(names)) + 0.4 * (k - 0.5)
+        ax.bar(places, values, 0.38, color=COLOURS[k], label=words)
+    ax.set_xticks(np.arange(len(names)), names)
+    return figure, ax
+
+
+def legend(figure, ax, place, columns):
+    figure.legend(*ax.get_legend_handles_labels(), loc=place, ncols=columns, frameon=False)
 
 
 if __name__ == "__main__":

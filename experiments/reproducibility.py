@@ -9,18 +9,18 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import matplotlib.pyplot as plt
 import numpy as np
-from _batches import labelling_of, starts_of
-from _options import Options, parse
+from _batches import labelling_of, swept
+from _experiment import Options, experiment
+from _pictures import label
 from tqdm import tqdm
 
 import jaxbiped as jb
+from jaxbiped.plot.style import new_figure
 
 WALKS, QUICK_WALKS = 1000, 40
 BATCHES, QUICK_BATCHES = (1, 7, 64), (7,)
@@ -48,58 +48,46 @@ class Setting(NamedTuple):
     """Whether it labels starts and searches the gait, too."""
 
 
-def main() -> None:
-    if len(sys.argv) > 1 and sys.argv[1] == "one":
-        one(Path(sys.argv[2]), Setting(*json.loads(sys.argv[3])), int(sys.argv[4]))
-        return
-    options = parse(__doc__ or "")
-    count = QUICK_WALKS if options.quick else WALKS
+@experiment
+def main(options: Options):
+    count = options.sized(WALKS, QUICK_WALKS)
     settings = settings_of(count, quick=options.quick)
     found = [run(options, each, count) for each in tqdm(settings, desc="settings")]
     rows = [compared(each, own, found[0]) for each, own in zip(settings, found, strict=True)]
-    for row in rows:
-        options.say(
-            f"{row['name']:36s}{row['same_bits']:6d} of {count} walks to the last bit, largest "
-            f"difference {row['largest']:.1e}, median {row['median']:.1e}; {row['endings']} "
-            f"endings differ"
-        )
-        if row["labels"] is not None:
-            options.say(f"{'':36s}{row['labels']} labels differ; gait {row['gait']:.1e}")
     picture = draw(options, rows, [apart(own, found[0]) for own in found])
-    options.finish({"walks": count, "rows": rows, "picture": picture})
+    return {"walks": count, "rows": rows, "picture": picture}
 
 
-def settings_of(count: int, *, quick: bool) -> list[Setting]:
+def settings_of(count, *, quick):
     """Of lanes and XLA; the first is what all are held against."""
-    found = [Setting("lanes", "lanes", count)]
-    found += [
-        Setting(f"lanes, {bits} bits, threads: {threads}", "lanes", count, bits, threads)
-        for bits, threads in itertools.product(("256", "128"), ("1", "2"))
-        if not quick or (bits, threads) == ("256", "1")
-    ]
-    found.append(Setting("lanes, threads: 1", "lanes", count, threads="1"))
     batches = QUICK_BATCHES if quick else BATCHES
-    found += [Setting(f"lanes, batches of {batch}", "lanes", batch) for batch in batches]
-    found.append(Setting("lanes, start one ulp away", "lanes", count, ulps=1, sweeps=False))
-    # Labels and the gait take XLA minutes to compile.
-    found.append(Setting("XLA", "xla", count, sweeps=not quick))
-    if not quick:
-        found += [
-            Setting(f"XLA, batches of {batch}", "xla", batch, sweeps=False) for batch in batches
-        ]
-        avx2 = "--xla_cpu_max_isa=AVX2"
-        found.append(Setting("XLA, 256 bits", "xla", count, flags=avx2))
-    return found
+    narrower = [("256", "1")] if quick else itertools.product(("256", "128"), ("1", "2"))
+    found = [
+        Setting("lanes", "lanes", count),
+        *(
+            Setting(f"lanes, {bits} bits, threads: {threads}", "lanes", count, bits, threads)
+            for bits, threads in narrower
+        ),
+        Setting("lanes, threads: 1", "lanes", count, threads="1"),
+        *(Setting(f"lanes, batches of {batch}", "lanes", batch) for batch in batches),
+        Setting("lanes, start one ulp away", "lanes", count, ulps=1, sweeps=False),
+        # Labels and the gait take XLA minutes to compile.
+        Setting("XLA", "xla", count, sweeps=not quick),
+    ]
+    if quick:
+        return found
+    more = [Setting(f"XLA, batches of {batch}", "xla", batch, sweeps=False) for batch in batches]
+    avx2 = "--xla_cpu_max_isa=AVX2"
+    return [*found, *more, Setting("XLA, 256 bits", "xla", count, flags=avx2)]
 
 
-def run(options: Options, setting: Setting, count: int) -> dict[str, np.ndarray]:
+def run(options, setting, count):
     """A setting's numbers, by a process of its own."""
     path = options.path("reproduced.npz")
-    flags = f"{os.environ.get('XLA_FLAGS', '')} {setting.flags}".strip()
     chosen = {
         "JAXBIPED_VECTOR_BITS": setting.bits,
         "JAXBIPED_THREADS": setting.threads,
-        "XLA_FLAGS": flags,
+        "XLA_FLAGS": f"{os.environ.get('XLA_FLAGS', '')} {setting.flags}".strip(),
     }
     command = [sys.executable, __file__, "one", str(path), json.dumps(setting), str(count)]
     subprocess.run(command, env=os.environ | chosen, check=True, timeout=LONGEST)
@@ -109,14 +97,16 @@ def run(options: Options, setting: Setting, count: int) -> dict[str, np.ndarray]
     return found
 
 
-def one(path: Path, setting: Setting, count: int) -> None:
+def one(path, setting, count):
     """Walks, labels and the gait by one setting, into a file."""
-    scene, states = jb.seed_scene(), starts(count, setting.ulps)
+    scene, setting, count = jb.seed_scene(), Setting(*json.loads(setting)), int(count)
+    states, how = starts(count, setting.ulps), dict(engine=setting.engine)
 
-    def walk(state: jb.State) -> Any:
-        return jb.simulate(scene, state, duration=DURATION, save="end", engine=setting.engine)
+    @jax.jit
+    @jax.vmap
+    def walked(state):
+        return jb.simulate(scene, state, duration=DURATION, save="end", **how)
 
-    walked = jax.jit(jax.vmap(walk))
     ends, endings = [], []
     for first in range(0, count, setting.batch):
         # The last batch is filled up.
@@ -126,19 +116,17 @@ def one(path: Path, setting: Setting, count: int) -> None:
         endings.append(np.asarray(found.ending))
     more = {}
     if setting.sweeps:
-        labelling = labelling_of("compliant", engine=setting.engine)
         chunk = max(setting.batch, count // 16)
-        labels = jb.sweep(labelling, starts_of(scene, count), chunk=chunk, look_for_gaits=False)
+        labels = swept(labelling_of("compliant", **how), count, chunk=chunk)()
         more["labels"] = labels["label"].values
-        gait = jb.find_gait(scene, engine=setting.engine, parameters=(), radius_sensitivities=False)
+        gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False, **how)
         more["period"] = np.asarray(gait.measures.period)
         more["multipliers"] = np.sort_complex(np.asarray(gait.multipliers))
-    np.savez(
-        path, ends=np.concatenate(ends)[:count], endings=np.concatenate(endings)[:count], **more
-    )
+    both = (np.concatenate(each)[:count] for each in (ends, endings))
+    np.savez(path, **dict(zip(("ends", "endings"), both, strict=True)), **more)
 
 
-def starts(count: int, ulps: int) -> jb.State:
+def starts(count, ulps):
     """Random starts about the seed's, the same in every process."""
     random = np.random.default_rng(8)
     leaves = {}
@@ -150,7 +138,7 @@ def starts(count: int, ulps: int) -> jb.State:
     return jb.State(**{name: jnp.asarray(leaf) for name, leaf in leaves.items()})
 
 
-def apart(own: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> np.ndarray:
+def apart(own, other):
     """Largest difference of each walk's end, in units of l, √(l/g) and radians."""
     scene = jb.seed_scene()
     length, gravity = float(scene.walker.l), float(scene.ground.g)
@@ -159,9 +147,7 @@ def apart(own: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> np.ndarra
     return np.max(np.abs(own["ends"] - other["ends"]) / units, axis=1)
 
 
-def compared(
-    setting: Setting, own: dict[str, np.ndarray], other: dict[str, np.ndarray]
-) -> dict[str, Any]:
+def compared(setting, own, other):
     """How a setting's numbers differ from the first one's; walks that end alike are compared."""
     alike = own["endings"] == other["endings"]
     differences = apart(own, other)[alike]
@@ -182,19 +168,19 @@ def compared(
     return row
 
 
-def draw(options: Options, rows: list[dict[str, Any]], differences: list[np.ndarray]) -> str:
+def draw(options, rows, differences):
     """How many walks differ by more than what, of the settings that differ at all."""
-    figure, ax = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
+    figure = new_figure(6.4, 4.2)
+    ax = figure.subplots()
     for row, own in zip(rows, differences, strict=True):
         if np.any(own > 0.0):
-            ax.loglog(np.sort(own)[::-1], np.arange(1, len(own) + 1) / len(own), label=row["name"])
+            ax.plot(np.sort(own)[::-1], np.arange(1, len(own) + 1) / len(own), label=row["name"])
     same = sum(not np.any(own > 0.0) for own in differences) - 1
-    ax.set_title(f"{same} other settings: the same to the last bit")
-    ax.set_xlabel("difference of the final state [relative]")
-    ax.set_ylabel("share of walks that differ by more")
+    words = "difference of the final state [relative]", "share of walks that differ by more"
+    label(ax, *words, f"{same} other settings: the same to the last bit", log="xy")
     ax.legend()
     return options.save(figure, "reproducibility.png")
 
 
 if __name__ == "__main__":
-    main()
+    one(*sys.argv[2:]) if sys.argv[1:2] == ["one"] else main()

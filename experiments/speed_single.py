@@ -6,267 +6,203 @@ Writes speed_single.png. Every method is compared at equal error, never at equal
 # ruff: noqa: E402 (the core and the flags are settled before JAX is imported)
 import os
 
-CORES = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
-if CORES:
-    os.sched_setaffinity(0, CORES[-1:])
+import _cores
+
+_cores.settle(1)
 FLAGS = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
 os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {FLAGS}".strip()
 
 import functools
 import importlib.util
-import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import diffrax
 import jax
 import jax.numpy as jnp
-import matplotlib.pyplot as plt
 import numpy as np
-from _options import Options, parse
-from _timing import seconds_of
+from _experiment import Options, experiment
+from _pictures import label
+from _timing import seconds_of, timed
+from _walks import DURATION, walk_from
 from reference.numbalsoda_solves import lsoda, lsoda_address
 from reference.scipy_solves import FINEST, final_of
 
 import jaxbiped as jb
+from jaxbiped.plot.style import new_figure
 
-DURATION = 2.0
 ERRORS = (1e-3, 1e-4, 1e-5, 1e-6)
 OURS = ("rodas4", "rodas5p", "rodas4p", "rodas3p")
 BEST = "rodas4"
-NOT_INSTALLED = "not installed"
+FINE, COARSE = (-4, -9), (-3, -7)
+"""Exponents of ten of the loosest and the tightest tolerance that suit a method."""
 
 
 class Method(NamedTuple):
     """A solver made ready: `run(rtol)` gives a final state as 8 numbers, and attempted steps."""
 
     run: Callable[[float], tuple[Any, Any]]
-    compile_seconds: float | None
+    compile_seconds: float | None = None
 
 
-class Point(NamedTuple):
-    """What was measured at one tolerance."""
+@experiment
+def main(options: Options):
+    first = None if options.quick else first_compile()
+    found = methods(options.quick)
+    # A quick version compiles one program of ours, for everything.
+    checked = found[BEST][0] if options.quick else found["rodas5p"][0]
+    exact = final_of(DURATION, *FINEST)
+    apart = np.max(np.abs(np.asarray(checked.run(1e-11)[0]) - exact))
+    points = measured(found, exact, options.sized(7, 1))
+    return {
+        "first_compile_s": checked.compile_seconds if first is None else first,
+        "compile_s": {name: m.compile_seconds for name, (m, _) in found.items() if m},
+        "reference_difference": float(apart),
+        "errors": list(ERRORS),
+        "at_equal_error": at_equal_error(points),
+        "not_installed": [name for name, (method, _) in found.items() if method is None],
+        "points": points,
+        "picture": draw(options, points),
+    }
 
-    rtol: float
-    seconds: float
-    error: float
-    steps: int | None
 
-
-def tolerances(coarsest: float, finest: float, step: float = 0.5) -> list[float]:
-    """From one exponent of ten to another, both included."""
-    return [float(10.0**e) for e in np.arange(coarsest, finest - 0.5 * step, -step)]
-
-
-def in_jax(solve: Callable[..., tuple[Any, Any]]) -> Method:
+def in_jax(solve):
     """Compiles `solve(scene, state, rtol)`, apart from its runs."""
     arguments = jb.seed_scene(), jb.seed_state()
-    began = time.perf_counter()
-    program = jax.jit(solve).lower(*arguments, 1e-6).compile()
-    compile_seconds = time.perf_counter() - began
-
-    def run(rtol: float) -> tuple[Any, Any]:
-        return jax.block_until_ready(program(*arguments, jnp.asarray(rtol)))
-
-    return Method(run, compile_seconds)
+    program, seconds, _ = timed(lambda: jax.jit(solve).lower(*arguments, 1e-6).compile())
+    return Method(
+        lambda rtol: jax.block_until_ready(program(*arguments, jnp.asarray(rtol))), seconds
+    )
 
 
-def ours(name: str) -> Method:
-    def solve(scene: jb.Scene, state: jb.State, rtol: Any) -> tuple[Any, Any]:
-        options: dict[str, Any] = dict(solver=name, rtol=rtol, atol=1e-2 * rtol, save="end")
-        end = jb.simulate(scene, state, duration=DURATION, **options)
+def ours(name):
+    def solve(scene, state, rtol):
+        end = walk_from(state, rtol, scene=scene, solver=name)
         return jnp.stack(end.final), end.attempted
 
     return in_jax(solve)
 
 
-def diffrax_plain(solver: diffrax.AbstractSolver) -> Method:
+def diffrax_plain(solver):
     """diffrax by itself: the state one vector, which suits its implicit solvers best."""
 
-    def field(t: Any, y: Any, scene: jb.Scene) -> Any:
+    def field(t, y, scene):
         return jnp.stack(jb.dynamics.vector_field(t, jb.State(*y), scene))
 
-    def solve(scene: jb.Scene, state: jb.State, rtol: Any) -> tuple[Any, Any]:
+    def solve(scene, state, rtol):
         control = diffrax.PIDController(rtol=rtol, atol=1e-2 * rtol, dtmin=1e-12, force_dtmin=True)
         solution = diffrax.diffeqsolve(
-            diffrax.ODETerm(field),
-            solver,
-            t0=0.0,
-            t1=DURATION,
-            dt0=1e-5,
-            y0=jnp.stack(state),
-            args=scene,
-            stepsize_controller=control,
-            max_steps=65536,
-            throw=False,
-        )
+            diffrax.ODETerm(field), solver, t0=0.0, t1=DURATION, dt0=1e-5, y0=jnp.stack(state),
+            args=scene, stepsize_controller=control, max_steps=65536, throw=False,
+        )  # fmt: skip
         return solution.ys[-1], solution.stats["num_steps"]
 
     return in_jax(solve)
 
 
-def methods(quick: bool) -> dict[str, tuple[Method | None, list[float]]]:
+def scipy_lsoda():
+    if importlib.util.find_spec("numba") is None:
+        return None
+    return Method(lambda rtol: (final_of(DURATION, rtol, method="LSODA"), None))
+
+
+def compiled_lsoda():
+    if lsoda_address() is None:
+        return None
+    return Method(lambda rtol: (lsoda(DURATION, rtol, 1e-2 * rtol), None))
+
+
+def methods(quick):
     """Every method by name, with the tolerances that suit it; None where it is not installed."""
-    chord = jb.solvers.SOLVERS["kvaerno3"]().root_finder
-    fine, coarse = (-4, -9), (-3, -7)
-    if quick:
-        return {
-            BEST: (ours(BEST), tolerances(*fine, step=1.0)),
-            "Kvaerno3": (diffrax_plain(diffrax.Kvaerno3()), tolerances(-3, -5, step=1.0)),
-            "SciPy LSODA": (scipy_lsoda(), tolerances(*fine, step=1.0)),
-            "numbalsoda": (compiled_lsoda(), tolerances(*fine, step=1.0)),
-        }
-    found: dict[str, tuple[Method | None, list[float]]] = {}
-    for name in OURS:
-        found[name] = ours(name), tolerances(*fine)
-    found |= {
-        "Kvaerno3": (diffrax_plain(diffrax.Kvaerno3()), tolerances(-3, -8)),
-        "Kvaerno5": (diffrax_plain(diffrax.Kvaerno5()), tolerances(*coarse)),
-        "Kvaerno3, Chord": (
-            diffrax_plain(diffrax.Kvaerno3(root_finder=chord)),
-            tolerances(*coarse),
-        ),
-        "Kvaerno5, Chord": (
-            diffrax_plain(diffrax.Kvaerno5(root_finder=chord)),
-            tolerances(*coarse),
-        ),
-    }
-    found["SciPy LSODA"] = scipy_lsoda(), tolerances(*fine)
-    found["numbalsoda"] = compiled_lsoda(), tolerances(*fine)
+    chord = dict(root_finder=jb.solvers.SOLVERS["kvaerno3"]().root_finder)
+    made = {name: (functools.partial(ours, name), FINE) for name in OURS}
+    for name, solver, ends in (
+        ("Kvaerno3", diffrax.Kvaerno3(), (-3, -8)),
+        ("Kvaerno5", diffrax.Kvaerno5(), COARSE),
+        ("Kvaerno3, Chord", diffrax.Kvaerno3(**chord), COARSE),
+        ("Kvaerno5, Chord", diffrax.Kvaerno5(**chord), COARSE),
+    ):
+        made[name] = functools.partial(diffrax_plain, solver), (-3, -5) if quick else ends
+    made |= {"SciPy LSODA": (scipy_lsoda, FINE), "numbalsoda": (compiled_lsoda, FINE)}
+    step = 1.0 if quick else 0.5
+    names = (BEST, "Kvaerno3", "SciPy LSODA", "numbalsoda") if quick else made
+    found = {}
+    for name in names:
+        make, (first, last) = made[name]
+        exponents = np.arange(first, last - 0.5 * step, -step)
+        found[name] = make(), [float(10.0**each) for each in exponents]
     return found
 
 
-def scipy_lsoda() -> Method | None:
-    if importlib.util.find_spec("numba") is None:
-        return None
-    return Method(lambda rtol: (final_of(DURATION, rtol, method="LSODA"), None), None)
-
-
-def compiled_lsoda() -> Method | None:
-    if lsoda_address() is None:
-        return None
-    return Method(lambda rtol: (lsoda(DURATION, rtol, 1e-2 * rtol), None), None)
-
-
-def measured(
-    found: dict[str, tuple[Method | None, list[float]]], exact: np.ndarray, rounds: int
-) -> dict[str, list[Point]]:
+def measured(found, exact, rounds):
     """Median times of runs that take turns, after one run each that does not count."""
-    cases = [(name, m, rtol) for name, (m, levels) in found.items() if m for rtol in levels]
-    ends = [method.run(rtol) for _, method, rtol in cases]
-    runs = {i: functools.partial(method.run, rtol) for i, (_, method, rtol) in enumerate(cases)}
+    runs = {
+        (name, rtol): functools.partial(method.run, rtol)
+        for name, (method, tolerances) in found.items()
+        if method
+        for rtol in tolerances
+    }
+    ends = {name: run() for name, run in runs.items()}
     times = seconds_of(runs, rounds, warm=False)
-    points: dict[str, list[Point]] = {name: [] for name in found}
-    for (name, _, rtol), (state, steps), seconds in zip(cases, ends, times.values(), strict=True):
+    points = {name: [] for name in found}
+    for (name, rtol), (state, steps) in ends.items():
         error = float(np.max(np.abs(np.asarray(state) - exact)))
-        count = None if steps is None else int(steps)
-        points[name].append(Point(rtol, float(seconds), error, count))
+        row = dict(rtol=rtol, seconds=times[name, rtol], error=error)
+        points[name].append(row | {"steps": None if steps is None else int(steps)})
     return points
 
 
-def time_at(points: list[Point], error: float) -> float | None:
+def time_at(points, error):
     """Time that buys an error, interpolated between logarithms; None outside what was measured.
 
     Between the points that no other point beats in both time and error.
     """
-    front: list[Point] = []
-    for point in sorted(points, key=lambda p: p.seconds):
-        if not front or point.error < front[-1].error:
+    front = []
+    for point in sorted(points, key=lambda point: point["seconds"]):
+        if not front or point["error"] < front[-1]["error"]:
             front.append(point)
-    if not front or not front[-1].error <= error <= front[0].error:
+    if not front or not front[-1]["error"] <= error <= front[0]["error"]:
         return None
-    front.reverse()
-    log_errors, log_times = np.log([p.error for p in front]), np.log([p.seconds for p in front])
-    return float(np.exp(np.interp(np.log(error), log_errors, log_times)))
+    logs = (np.log([point[key] for point in front[::-1]]) for key in ("error", "seconds"))
+    return float(np.exp(np.interp(np.log(error), *logs)))
 
 
-def picture(options: Options, points: dict[str, list[Point]]) -> None:
-    figure, axes = plt.subplots(figsize=(7.5, 5.5), layout="constrained")
+def at_equal_error(points):
+    """Times at each of the errors, and how many times those of the best."""
+    times = {name: [time_at(row, error) for error in ERRORS] for name, row in points.items()}
+
+    def scaled(row, units):
+        pairs = zip(row, units, strict=True)
+        return [None if t is None or unit is None else t / unit for t, unit in pairs]
+
+    return {
+        name: {"milliseconds": scaled(row, [1e-3] * len(ERRORS)), "ratio": scaled(row, times[BEST])}
+        for name, row in times.items()
+    }
+
+
+def draw(options, points):
+    figure = new_figure(7.5, 5.5)
+    axes = figure.subplots()
     for name, row in points.items():
+        style = "o-" if name in OURS else "s--" if "Kvaerno" in name else "^:"
+        errors = [point["error"] for point in row]
+        milliseconds = [1e3 * point["seconds"] for point in row]
         if row:
-            style = "o-" if name in OURS else "s--" if "Kvaerno" in name else "^:"
-            axes.loglog(
-                [p.error for p in row], [1e3 * p.seconds for p in row], style, ms=4, label=name
-            )
+            axes.plot(errors, milliseconds, style, ms=4, label=name)
+    title = f"{DURATION:g} simulated seconds of the seed's walker on one core"
+    words = "largest error of the final state (SI units)", "time of one simulation [ms]"
+    label(axes, *words, title, log="xy")
     axes.invert_xaxis()
-    axes.set_xlabel("largest error of the final state (SI units)")
-    axes.set_ylabel("time of one simulation [ms]")
-    axes.set_title(f"{DURATION:g} simulated seconds of the seed's walker on one core")
-    axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
-    options.save(figure, "speed_single.png")
+    return options.save(figure, "speed_single.png")
 
 
-def cell(value: float | None, form: str) -> str:
-    return "–" if value is None else format(value, form)
-
-
-def report(options: Options, points: dict[str, list[Point]], at: dict[str, Any]) -> None:
-    rows = [{"method": name} | p._asdict() for name, row in points.items() for p in row]
-    options.table(rows, method="", rtol=".1e", error=".1e", seconds=".2e", steps="d")
-    for name in (name for name, row in points.items() if not row):
-        options.say(f"{name}: {NOT_INSTALLED}")
-    options.say(f"\nTime at equal error [ms] (and how many times that of {BEST})")
-    options.say(f"{'method':17}" + "".join(f"{error:>18.0e}" for error in ERRORS))
-    for name, row in at.items():
-        texts = [
-            "–" if ms is None else f"{ms:.2f} ({cell(ratio, '.2f')})"
-            for ms, ratio in zip(row["milliseconds"], row["ratio"], strict=True)
-        ]
-        options.say(f"{name:17}" + "".join(f"{text:>18}" for text in texts))
-
-
-def at_equal_error(points: dict[str, list[Point]]) -> dict[str, Any]:
-    best = [time_at(points[BEST], error) for error in ERRORS]
-    table = {}
-    for name, row in points.items():
-        times = [time_at(row, error) for error in ERRORS]
-        table[name] = {
-            "milliseconds": [None if t is None else 1e3 * t for t in times],
-            "ratio": [
-                None if t is None or b is None else t / b for t, b in zip(times, best, strict=True)
-            ],
-        }
-    return table
-
-
-def first_compile() -> float:
+def first_compile():
     """Seconds that a first simulation takes to trace and to compile."""
-    began = time.perf_counter()
-    request = jb.Simulation.prepare(
-        jb.seed_scene(), jb.seed_state(), duration=DURATION, save="end", engine="xla"
-    )
-    request.compile()
-    return time.perf_counter() - began
-
-
-def main() -> None:
-    options = parse(__doc__ or "")
-    first = None if options.quick else first_compile()
-    found = methods(options.quick)
-    # A quick version compiles one program of ours, for everything.
-    witness = BEST if options.quick else "rodas5p"
-    checked = found[BEST][0] if options.quick else ours(witness)
-    first = checked.compile_seconds if first is None else first
-    options.say(f"Compiling a first simulation (tracing and XLA): {first:.2f} s\n")
-    exact = final_of(DURATION, *FINEST)
-    check = np.max(np.abs(np.asarray(checked.run(1e-11)[0]) - exact))
-    points = measured(found, exact, 1 if options.quick else 7)
-    at = at_equal_error(points)
-    report(options, points, at)
-    options.say(f"\nThe reference and {witness} at a tolerance of 1e-11 differ by {check:.1e}")
-    picture(options, points)
-    options.finish(
-        {
-            "first_compile_s": first,
-            "compile_s": {name: m.compile_seconds for name, (m, _) in found.items() if m},
-            "reference_difference": float(check),
-            "errors": list(ERRORS),
-            "at_equal_error": at,
-            "not_installed": [name for name, (m, _) in found.items() if m is None],
-            "points": {name: [p._asdict() for p in row] for name, row in points.items()},
-        }
-    )
+    how = dict(duration=DURATION, save="end", engine="xla")
+    request = jb.Simulation.prepare(jb.seed_scene(), jb.seed_state(), **how)
+    return timed(request.compile)[1]
 
 
 if __name__ == "__main__":

@@ -11,17 +11,15 @@ import shutil
 import subprocess
 import sys
 import time
-from pathlib import Path
-from typing import Any
 
 import _batches
 import numpy as np
 import zarr
-from _options import Options, parse
+from _experiment import Options, experiment
+from _timing import timed
 
 import jaxbiped as jb
 
-CHUNK = 16384
 COMPILED_BY = 256
 """Starts swept beforehand, so that nothing is compiled while the time is taken."""
 MOST_COMPARED = 10_000
@@ -37,7 +35,7 @@ class Job:
     model: str
     starts: int
     kills: tuple[float, ...]
-    chunk: int = CHUNK
+    chunk: int = 16384
 
 
 JOBS = (
@@ -50,29 +48,21 @@ JOBS = (
 QUICK_JOBS = (Job("rigid", 2000, (0.3,), chunk=100),)
 
 
-def main() -> None:
-    if len(sys.argv) > 1 and sys.argv[1] == "one":
-        one(*sys.argv[2:])
-        return
-    options = parse(__doc__ or "")
-    jobs = QUICK_JOBS if options.quick else JOBS
-    runs = [done(options, job) for job in jobs]
-    formats = dict(model="", starts="d", killed="d", labelled_in_last_run="d", seconds=".1f")
-    options.table(runs, **formats, us_a_start=".1f", peak_mb=".0f")
-    options.finish({"runs": runs})
+@experiment
+def main(options: Options):
+    return {"runs": [done(options, job) for job in options.sized(JOBS, QUICK_JOBS)]}
 
 
-def done(options: Options, job: Job) -> dict[str, Any]:
+def done(options, job):
     """A job's runs, one after another in the same store, and whether the labels are right."""
     path = options.path(f"{job.model}-{job.starts}-{len(job.kills)}.zarr")
     shutil.rmtree(path, ignore_errors=True)
-    runs = [run(path, job, kill) for kill in (*job.kills, None)]
-    last = runs[-1]
-    seconds = sum(each["seconds"] for each in runs)
+    runs = [timed(lambda kill=kill: run(path, job, kill)) for kill in (*job.kills, None)]
+    last = runs[-1][0]
     return {
         **dataclasses.asdict(job),
-        "killed": sum(each["killed"] for each in runs),
-        "seconds": seconds,
+        "killed": sum(found is None for found, *_ in runs),
+        "seconds": sum(seconds for _, seconds, _ in runs),
         "us_a_start": 1e6 * last["sweep_s"] / last["labelled"],
         "peak_mb": last["peak_mb"],
         "labelled_in_last_run": last["labelled"],
@@ -81,32 +71,21 @@ def done(options: Options, job: Job) -> dict[str, Any]:
     }
 
 
-def run(path: Path, job: Job, kill: float | None) -> dict[str, Any]:
-    """One process on the store, killed when this share of the chunks is complete."""
-    command = [sys.executable, __file__, "one", str(path), job.model, str(job.starts)]
-    began = time.perf_counter()
-    process = subprocess.Popen([*command, str(job.chunk)], stdout=subprocess.PIPE, text=True)
-    killed = kill is not None and killed_at(process, path, kill)
+def run(path, job, kill):
+    """What one process on the store says; None where it was killed, once so much was complete."""
+    words = [sys.executable, __file__, "one", path, job.model, job.starts, job.chunk]
+    process = subprocess.Popen(list(map(str, words)), stdout=subprocess.PIPE, text=True)
+    killed = False
+    while kill is not None and not killed and process.poll() is None:
+        killed = complete(path) >= kill
+        process.kill() if killed else time.sleep(0.002)
     said, _ = process.communicate(timeout=LONGEST)
-    seconds = time.perf_counter() - began
-    if killed:
-        return {"killed": True, "seconds": seconds}
-    if process.returncode:
+    if process.returncode and not killed:
         raise RuntimeError(f"the sweep ended with code {process.returncode}.")
-    return {"killed": False, "seconds": seconds, **json.loads(said)}
+    return None if killed else json.loads(said)
 
 
-def killed_at(process: subprocess.Popen[str], path: Path, share: float) -> bool:
-    """Kills the process once so much is complete; False where it came to its end before."""
-    while process.poll() is None:
-        if complete(path) >= share:
-            process.kill()
-            return True
-        time.sleep(0.002)
-    return False
-
-
-def complete(path: Path) -> float:
+def complete(path):
     """Share of the store's chunks that are complete, 0 before there is one."""
     try:
         group = zarr.open_group(str(path), mode="r", use_consolidated=False)
@@ -115,31 +94,26 @@ def complete(path: Path) -> float:
         return 0.0
 
 
-def one(path: str, model: str, starts: str, chunk: str) -> None:
+def one(path, model, starts, chunk):
     """What a run's process does; prints its peak memory and what it labelled."""
-    labelling = _batches.labelling_of(model)
-    _batches.swept(labelling, min(int(starts), COMPILED_BY))()
-    began = time.perf_counter()
-    found = jb.sweep(
-        labelling,
-        _batches.starts_of(labelling.scene, int(starts)),
-        store=path,
-        chunk=int(chunk),
-        look_for_gaits=False,
-    )
-    seconds = time.perf_counter() - began
-    labelled = int(found.attrs["labelled_in_this_run"])
+    count, labelling = int(starts), _batches.labelling_of(model)
+    _batches.swept(labelling, min(count, COMPILED_BY))()
+    found, seconds, _ = timed(_batches.swept(labelling, count, store=path, chunk=int(chunk)))
     # Kilobytes on Linux. Before the labels are read, which takes memory for all of them.
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    said: dict[str, Any] = {"peak_mb": peak, "labelled": labelled, "sweep_s": seconds}
-    stored = found["label"].values
-    said["pending"] = int((stored == int(jb.basins.Label.PENDING)).sum())
-    said["differ"] = None
-    if int(starts) <= MOST_COMPARED:
-        plain = _batches.swept(labelling, int(starts))()["label"].values
-        said["differ"] = int((stored != plain).sum())
+    labels, differ = found["label"].values, None
+    if count <= MOST_COMPARED:
+        plain = _batches.swept(labelling, count)()["label"].values
+        differ = int((labels != plain).sum())
+    said = {
+        "peak_mb": peak,
+        "labelled": int(found.attrs["labelled_in_this_run"]),
+        "sweep_s": seconds,
+        "pending": int((labels == int(jb.basins.Label.PENDING)).sum()),
+        "differ": differ,
+    }
     print(json.dumps(said))
 
 
 if __name__ == "__main__":
-    main()
+    one(*sys.argv[2:]) if sys.argv[1:2] == ["one"] else main()

@@ -6,20 +6,20 @@ Ways that fail stay, in a band of their own.
 """
 
 import dataclasses
-from typing import Any
+import operator
 
 import _trade_basins
 import _trade_batches
 import _trade_gaits
 import _trade_slopes
 import _trade_walks
-import tyro
-from _options import Options
-from _trade_pictures import draw
+from _experiment import Options, by, experiment
 from _trade_store import Store
 from tqdm import tqdm
 
-from jaxbiped.trade import Row, cheapest, cost_at
+import jaxbiped as jb
+from jaxbiped.plot.style import new_figure
+from jaxbiped.trade import cheapest, cost_at
 
 CASES = (
     _trade_walks.cases,
@@ -33,6 +33,25 @@ CASES = (
 )
 ERRORS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 """At which ways are compared, never at equal tolerance."""
+PANELS = (
+    ("walk", "state", "cpu_s", "State after 2 s"),
+    ("walk", "state", "attempted", "State after 2 s, steps"),
+    ("walk", "step_time", "cpu_s", "Times of heel strikes"),
+    ("walk", "energy", "cpu_s", "Energy ledger"),
+    ("batch", "state", "cpu_s", "State, a batch"),
+    ("basin", "labels", "cpu_s", "Wrong labels of 4096 starts"),
+    ("basin", "walking", "cpu_s", "Starts wrong about walking or not, of 4096"),
+    ("slopes", "slopes", "cpu_s", "State's slopes by K, c, ξ"),
+    ("gait", "period", "cpu_s", "Gait's period"),
+    ("gait", "multiplier", "cpu_s", "Largest multiplier"),
+    ("gait", "gradient", "cpu_s", "Period's gradient by K, c, ξ"),
+    ("stepping", "gradient", "attempted", "Period's gradient by K, by stepping"),
+    ("smoothed laws", "state", "attempted", "State after 2 s, smoothed laws"),
+    ("v0 ten times wider", "state", "attempted", "State after 2 s, v0 ten times wider"),
+    ("rigid gait", "multiplier", "cpu_s", "Largest multiplier, rigid walker"),
+)
+"""Group, error axis, cost and title of each panel."""
+COLUMNS = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,33 +62,30 @@ class TradeOptions(Options):
     """Report what the store has, and measure nothing more."""
 
 
-def main() -> None:
-    options = tyro.cli(TradeOptions, description=__doc__)
-    store = Store(options.path("trade_quick.jsonl" if options.quick else "trade.jsonl"))
+@experiment
+def main(options: TradeOptions):
+    store = Store(options.path(options.sized("trade.jsonl", "trade_quick.jsonl")))
     cases = [case for group in CASES for case in group(store, options.quick)]
     left = [] if options.stored else [case for case in cases if not store.measured(case)]
     for case in tqdm(left, unit="cases"):
         store.measure(case)
     rows = {group: store.rows(group) for group in dict.fromkeys(case.group for case in cases)}
     floors = {name: truth.floor for name, truth in store.truths().items()}
-    compared = {group: comparison(found) for group, found in rows.items()}
-    report(options, rows, floors, compared)
-    numbers = rounded(
-        {
-            "floors": floors,
-            "counts": {
-                "cases": len(cases),
-                "rows": sum(map(len, rows.values())),
-                "failed": sum(row.outcome != "ok" for found in rows.values() for row in found),
-            },
-            "rows": {group: [row.numbers() for row in found] for group, found in rows.items()},
-            "at_equal_error": compared,
-        }
-    )
-    options.finish(numbers | {"picture": draw(options, rows, floors)})
+    every = [row for found in rows.values() for row in found]
+    numbers = {
+        "floors": floors,
+        "counts": {
+            "cases": len(cases),
+            "rows": len(every),
+            "failed": sum(row.outcome != "ok" for row in every),
+        },
+        "rows": {group: [row.numbers() for row in found] for group, found in rows.items()},
+        "at_equal_error": {group: comparison(found) for group, found in rows.items()},
+    }
+    return rounded(numbers) | {"picture": draw(options, rows, floors)}
 
 
-def rounded(tree: Any) -> Any:
+def rounded(tree):
     """The same numbers to four digits, more than any of them is worth."""
     if isinstance(tree, dict):
         return {key: rounded(value) for key, value in tree.items()}
@@ -78,56 +94,53 @@ def rounded(tree: Any) -> Any:
     return float(f"{tree:.4g}") if isinstance(tree, float) else tree
 
 
-def comparison(rows: list[Row]) -> dict[str, Any]:
-    """By error axis: steps and CPU time of every way at equal errors, and the cheapest setting."""
-    axes = dict.fromkeys(name for row in rows for name in row.errors)
-    ways = dict.fromkeys(row.way for row in rows)
-    table: dict[str, Any] = {}
-    for axis in axes:
-        mine = {way: [row for row in rows if row.way == way] for way in ways}
-        table[axis] = {
-            "steps": {way: at_errors(found, axis, "attempted") for way, found in mine.items()},
-            "cpu_s": {way: at_errors(found, axis, "cpu_s") for way, found in mine.items()},
-            "cheapest_by_cpu": [_best(rows, axis, error) for error in ERRORS],
+def comparison(rows):
+    """By error axis: steps and CPU time of every way at `ERRORS`, and the cheapest setting.
+
+    None where a way does not reach an error.
+    """
+    ways = by("way", ({"way": row.way, "row": row} for row in rows))
+
+    def costs(axis, name):
+        cost = operator.attrgetter(name)
+        return {
+            way: [cost_at([each["row"] for each in own], axis, error, cost) for error in ERRORS]
+            for way, own in ways.items()
         }
-    return table
+
+    def best(axis, error):
+        found = cheapest(rows, axis, error, operator.attrgetter("cpu_s"))
+        return None if found is None else [found.way, found.setting]
+
+    return {
+        axis: {
+            "steps": costs(axis, "attempted"),
+            "cpu_s": costs(axis, "cpu_s"),
+            "cheapest_by_cpu": [best(axis, error) for error in ERRORS],
+        }
+        for axis in dict.fromkeys(name for row in rows for name in row.errors)
+    }
 
 
-def at_errors(rows: list[Row], axis: str, cost: str) -> list[float | None]:
-    """A way's cost at each of the errors, None where it does not reach them."""
-    return [cost_at(rows, axis, error, lambda row: getattr(row, cost)) for error in ERRORS]
+def draw(options, rows, floors):
+    """The panels of the groups that have errors."""
 
+    def has_errors(group, axis):
+        return any(row.outcome == "ok" and row.errors.get(axis) for row in rows.get(group, ()))
 
-def _best(rows: list[Row], axis: str, error: float) -> list[str] | None:
-    best = cheapest(rows, axis, error, lambda row: row.cpu_s)
-    return None if best is None else [best.way, best.setting]
-
-
-def report(
-    options: Options,
-    rows: dict[str, list[Row]],
-    floors: dict[str, dict[str, float]],
-    compared: dict[str, Any],
-) -> None:
-    for group, found in rows.items():
-        options.say(f"\n{group}; the references disagree by {_told(floors.get(group, {}))}")
-        for row in found:
-            work = "" if row.cpu_s is None else f"{1e3 * row.cpu_s:10.2f} ms of CPU"
-            steps = "" if row.attempted is None else f", {row.attempted} steps"
-            options.say(
-                f"  {row.way:42}{row.setting:12}{_told(row.errors)}{work}{steps}"
-                + ("" if row.outcome == "ok" else f"  {row.outcome.upper()}")
-            )
-        for axis, table in compared[group].items():
-            options.say(f"  CPU time [ms] at equal errors of {axis}")
-            options.say(f"    {'':40}" + "".join(f"{error:>9.0e}" for error in ERRORS))
-            for way, times in table["cpu_s"].items():
-                cells = ["–" if t is None else f"{1e3 * t:.3g}" for t in times]
-                options.say(f"    {way:40}" + "".join(f"{cell:>9}" for cell in cells))
-
-
-def _told(errors: dict[str, float | None]) -> str:
-    return ", ".join(f"{k} {'–' if v is None else f'{v:.1e}'}" for k, v in errors.items())
+    shown = [panel for panel in PANELS if has_errors(*panel[:2])]
+    lines = -(-len(shown) // COLUMNS)
+    figure = new_figure(15.0, 4.4 * lines)
+    axes = figure.subplots(lines, COLUMNS, squeeze=False).ravel()
+    for ax, (group, axis, cost, title) in zip(axes, shown, strict=False):
+        told = [row.numbers() for row in rows[group]]
+        floor = floors.get(group, {}).get(axis)
+        jb.plot.work_precision(told, axis, cost=cost, floor=floor, ax=ax)
+        ax.set_title(title, loc="left")
+        ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7, frameon=False)
+    for ax in axes[len(shown) :]:
+        ax.set_visible(False)
+    return options.save(figure, "trade.png")
 
 
 if __name__ == "__main__":

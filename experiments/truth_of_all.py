@@ -6,14 +6,14 @@ prints one table: error of the state and of the gradient, CPU time, and what eac
 
 import footstep_truth
 import gradient_truth
-from _options import parse
-from _truth_table import say_rows, versions
+from _experiment import Options, experiment
+from _gradient_ways import versions
 
 from jaxbiped.cli import Report
 
 
-def main() -> None:
-    options = parse(__doc__ or "")
+@experiment
+def main(options: Options):
     found = {
         "gradient_truth": gradient_truth.measured(options),
         "footstep_truth": footstep_truth.measured(options),
@@ -21,11 +21,8 @@ def main() -> None:
     for name, numbers in found.items():
         Report(options.path(f"{name}.json")).finish(numbers)
     rows = [row for numbers in found.values() for row in numbers["rows"]]
-    installed = versions()
-    options.say("\nversions: " + ", ".join(f"{name} {each}" for name, each in installed.items()))
-    say_rows(options, rows)
     pictures = [numbers["picture"] for numbers in found.values()]
-    options.finish({"versions": installed, "rows": rows, "pictures": pictures})
+    return {"versions": versions(), "rows": rows, "pictures": pictures}
 
 
 if __name__ == "__main__":

@@ -48,11 +48,11 @@ from jaxbiped.dynamics._state import seed_state as seed_state
 # Simulation.
 from jaxbiped._checks import ArgumentError as ArgumentError
 from jaxbiped._checks import ResourceError as ResourceError
-from jaxbiped.simulate._rigid_walk import rigid_walk as rigid_walk
+from jaxbiped.simulate._simulate import rigid_walk as rigid_walk
 from jaxbiped.simulate._simulation import CompiledSimulation as CompiledSimulation
 from jaxbiped.simulate._simulation import Simulation as Simulation
 from jaxbiped.simulate._simulate import simulate as simulate
-from jaxbiped.simulate._swing import swing as swing
+from jaxbiped.simulate._simulate import swing as swing
 from jaxbiped.solve._accuracy import ACCURACIES as ACCURACIES
 from jaxbiped._ending import Ending as Ending
 from jaxbiped.solve._engine_names import ENGINES as ENGINES
@@ -86,7 +86,7 @@ from jaxbiped.sweep._workers import local_executor as local_executor
 from jaxbiped.sweep._gait_family import Family as Family
 from jaxbiped.sweep._gait_sweep import gait_sweep as gait_sweep
 from jaxbiped.sweep._label_function import label_at as label_at
-from jaxbiped.sweep._follow_starts import Labelled as Labelled
+from jaxbiped.sweep._labelling_loop import Labelled as Labelled
 from jaxbiped.sweep._labelling import Labelling as Labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure as nearest_failure
 from jaxbiped.sweep._labelling_preparation import labelling as labelling

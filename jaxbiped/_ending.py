@@ -3,7 +3,14 @@
 import enum
 
 
-class Ending(enum.IntEnum):
+class NamedCode(enum.IntEnum):
+    """A code with a name. `str(code)` is the name in words."""
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+
+class Ending(NamedCode):
     """How a simulation ended. `str(ending)` is its name in words.
 
     - walking: the time or the footsteps asked for are done.
@@ -29,6 +36,3 @@ class Ending(enum.IntEnum):
     SOLVER_FAILED = 6
     TIMED_OUT = 9  # 7 and 8 are labels that no single simulation ends with
     FINISHED = 10
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")

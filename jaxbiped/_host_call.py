@@ -178,28 +178,26 @@ _HANDLER = ctypes.CFUNCTYPE(c_void_p, c_void_p)
 _CREATE_ERROR = ctypes.CFUNCTYPE(c_void_p, c_void_p)
 
 
-class _Version(Structure):
-    _fields_ = [("size", c_size_t), ("extension", c_void_p), ("major", c_int), ("minor", c_int)]
+class _Header(Structure):
+    """What every structure begins with."""
+
+    _fields_ = [("struct_size", c_size_t), ("extension", c_void_p)]
 
 
-class _Api(Structure):
-    _fields_ = [
-        ("size", c_size_t),
-        ("extension", c_void_p),
-        ("version", _Version),
-        ("internal", c_void_p),
-        ("create_error", _CREATE_ERROR),
-    ]
+class _Version(_Header):
+    _fields_ = [("major", c_int), ("minor", c_int)]
+
+
+class _Api(_Header):
+    _fields_ = [("version", _Version), ("internal", c_void_p), ("create_error", _CREATE_ERROR)]
 
 
 class _Span(Structure):
     _fields_ = [("start", c_void_p), ("length", c_size_t)]
 
 
-class _Buffer(Structure):
+class _Buffer(_Header):
     _fields_ = [
-        ("struct_size", c_size_t),
-        ("extension", c_void_p),
         ("dtype", c_int),
         ("data", c_void_p),
         ("rank", c_int64),
@@ -207,20 +205,12 @@ class _Buffer(Structure):
     ]
 
 
-class _Values(Structure):
-    _fields_ = [
-        ("struct_size", c_size_t),
-        ("extension", c_void_p),
-        ("size", c_int64),
-        ("types", c_void_p),
-        ("values", POINTER(c_void_p)),
-    ]
+class _Values(_Header):
+    _fields_ = [("size", c_int64), ("types", c_void_p), ("values", POINTER(c_void_p))]
 
 
-class _Attributes(Structure):
+class _Attributes(_Header):
     _fields_ = [
-        ("struct_size", c_size_t),
-        ("extension", c_void_p),
         ("size", c_int64),
         ("types", c_void_p),
         ("names", POINTER(POINTER(_Span))),
@@ -228,10 +218,8 @@ class _Attributes(Structure):
     ]
 
 
-class _CallFrame(Structure):
+class _CallFrame(_Header):
     _fields_ = [
-        ("struct_size", c_size_t),
-        ("extension", c_void_p),
         ("api", POINTER(_Api)),
         ("context", c_void_p),
         ("stage", c_int),
@@ -259,10 +247,5 @@ class _MetadataExtension(Structure):
     ]
 
 
-class _ErrorArguments(Structure):
-    _fields_ = [
-        ("struct_size", c_size_t),
-        ("extension", c_void_p),
-        ("message", c_char_p),
-        ("code", c_int),
-    ]
+class _ErrorArguments(_Header):
+    _fields_ = [("message", c_char_p), ("code", c_int)]

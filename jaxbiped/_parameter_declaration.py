@@ -1,15 +1,16 @@
 """Parameters: numeric fields that carry their words, symbol, unit and allowed range.
 
 Checks, the command line, figures and datasets read these, so that a law of the user's own says
-what its parameters are in the one place where it declares them.
+what its parameters are in the one place where it declares them. Parts of a scene are made of them.
 """
 
 import dataclasses
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._quantity import ParameterInfo, Quantity
 from jaxbiped._types import Parameter, Scalar, as_float
 
@@ -82,3 +83,36 @@ def _optional_float(value: Parameter | None) -> Scalar | None:
 def _tuple(values: Parameter | Iterable[Parameter]) -> tuple[Scalar, ...]:
     one = not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0
     return tuple(map(as_float, [values] if one else values))
+
+
+class AbstractPart(eqx.Module):
+    """A part of a scene, whose parameters are checked when it is made."""
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
+
+
+class AbstractNamedPart(AbstractPart):
+    """A part that enters the catalogue of its kind as its class is defined, a user's own too.
+
+    Attributes:
+        name: what the catalogue and the command line call it; None for one that is in none. A
+            property of the class.
+        catalogue: the classes of its kind by name. A property of the class.
+
+    Raises:
+        ArgumentError: where a class with a name is defined: a name that another class has.
+    """
+
+    name: ClassVar[str | None] = None
+    catalogue: ClassVar[dict[str, Any]] = {}
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        name = vars(cls).get("name")
+        if name is None:
+            return
+        known = cls.catalogue.setdefault(name, cls)
+        if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise ArgumentError(f"name = {name!r} is not allowed: {known.__qualname__} has it.")
+        cls.catalogue[name] = cls  # defined anew, as in a notebook

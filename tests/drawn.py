@@ -1,6 +1,7 @@
 """What a figure shows: its labels, its lines, and whether anybody could see them."""
 
 import contextlib
+import json
 import re
 from pathlib import Path
 
@@ -40,12 +41,22 @@ def leg_pixels(path):
     return [int((abs(pixels - colour).max(axis=-1) < 8).sum()) for colour in LEGS]
 
 
+def sent_in(page):
+    """What a page that plays walks was given."""
+    return json.loads(re.search(r'id="walks">(.*?)</script>', page)[1])
+
+
 def labels_of(figure):
     """Labels of all axes that are seen, as a set of texts."""
     found = set()
     for ax in figure.axes:
         found |= {ax.get_xlabel(), ax.get_ylabel()}
     return found - {""}
+
+
+def legend_of(ax):
+    """The entries of an axes' legend, in words."""
+    return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def points_of(ax, label=None):

@@ -19,6 +19,12 @@ def pinned_pendulum(orientation="angle", *, twice=False):
     return jb.constraints.Linkage((body, body), joints + joints[1:] * twice, orientation)
 
 
+def one_leg(distance=DISTANCE):
+    """The seed's leg hanging from a pin: the linkage that compiles soonest."""
+    joint = jb.constraints.Joint((0.0, distance), (0.0, 0.0), 0)
+    return jb.constraints.Linkage((jb.constraints.Body(**LEG),), (joint,))
+
+
 def four_bar(orientation="angle"):
     """Crank, coupler and rocker between two pins of the ground; each bar a thin rod."""
     lengths = (0.2, 0.5, 0.4)

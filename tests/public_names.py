@@ -1,8 +1,15 @@
-"""Look-up of public names as guides write them."""
+"""Public names as guides write them, and the namespaces that they lie in."""
 
 import dataclasses
+import types
 
 import jaxbiped as jb
+
+
+def namespaces():
+    """Modules that the top level's map lists, by the names that guides give them."""
+    listed = {f"jb.{name}": getattr(jb, name) for name in jb.__all__}
+    return {name: each for name, each in listed.items() if isinstance(each, types.ModuleType)}
 
 
 def find(name):

@@ -11,27 +11,7 @@ from pathlib import Path
 import pytest
 
 import jaxbiped as jb
-
-NAMESPACES = {
-    "jb": jb,
-    **{
-        f"jb.{name}": getattr(jb, name)
-        for name in (
-            "actuation",
-            "laws",
-            "constraints",
-            "dynamics",
-            "gait",
-            "continuation",
-            "measure",
-            "solvers",
-            "basins",
-            "starts",
-            "optimise",
-            "plot",
-        )
-    },
-}
+from tests.public_names import namespaces
 
 
 def _source(module):
@@ -42,7 +22,7 @@ def _source(module):
 
 def _public():
     """Functions and classes that a namespace defines, or imports as themselves."""
-    for space, module in NAMESPACES.items():
+    for space, module in {"jb": jb, **namespaces()}.items():
         for node in ast.parse(_source(module)).body:
             names = []
             if isinstance(node, ast.ImportFrom):
@@ -114,15 +94,9 @@ def _examples():
 
 
 COMPILING = {
-    "jb.continue_gait",
-    "jb.simulate",
-    "jb.footsteps",
-    "jb.energy_ledger",
-    "jb.find_gait",
-    "jb.rigid_walk",
-    "jb.fit_gait",
-    "jb.optimise_gait",
-}
+    "jb.continue_gait", "jb.simulate", "jb.footsteps", "jb.energy_ledger", "jb.find_gait",
+    "jb.rigid_walk", "jb.fit_gait", "jb.optimise_gait",
+}  # fmt: skip
 """Functions whose examples compile a walk or a gait."""
 EXAMPLES = list(_examples())
 

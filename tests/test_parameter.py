@@ -50,8 +50,8 @@ def _part_and_field(tree, path):
 
 
 def _documented(part):
-    """Units by parameter, from the docstring of a part's class."""
-    text = inspect.getdoc(type(part))
+    """Units by parameter, from the docstrings of a part's class and its bases."""
+    text = "\n".join(inspect.getdoc(kind) or "" for kind in type(part).__mro__)
     found = re.findall(r"^    (\w+): ((?!\n    \w)[^\[])*?\[([^\]]+)\]", text, flags=re.MULTILINE)
     return {name: unit for name, _, unit in found}
 

@@ -1,24 +1,18 @@
 """What the pages quote of the experiments, against the files of their results."""
 
-import importlib.util
 import json
 import re
-import sys
 from pathlib import Path
 
+import _quote_words as words
+import _quotes_of_gaits as gaits
 import pytest
+import quote
 
 ROOT = Path(__file__).parents[1]
 EXPERIMENTS = ROOT / "experiments"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TEXT = " ".join(" ".join(page.read_text().split()) for page in PAGES)
-
-sys.path.append(str(EXPERIMENTS))
-_place = importlib.util.spec_from_file_location("quote", EXPERIMENTS / "quote.py")
-quote = importlib.util.module_from_spec(_place)
-_place.loader.exec_module(quote)
-import _quote_words as words  # noqa: E402 (where the path leads to it)
-import _quotes_of_gaits as gaits  # noqa: E402
 
 RESULTS = sorted(quote.RESULTS.glob("*.json"))
 

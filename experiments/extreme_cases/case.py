@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
+from _scenes import seed_with
 from reference.compliant import FRICTION, FRICTION_AT, NORMAL, NORMAL_AT, SIZE, gravity
 
 import jaxbiped as jb
@@ -15,23 +16,14 @@ _FIELDS = ("hip_x", "hip_z", "theta_1", "theta_2", "hip_vx", "hip_vz", "omega_1"
 _DEPTH = 6.3e-4
 """Depth at which the standing foot starts, by that of the seed's walker [m]."""
 _STANDING = dict(
-    hip_x=0.0,
-    theta_1=-0.2479,
-    theta_2=0.1655,
-    hip_vx=0.49797,
-    hip_vz=0.05853,
-    omega_1=-0.0052,
-    omega_2=-1.2565,
-)
+    hip_x=0.0, theta_1=-0.2479, theta_2=0.1655,
+    hip_vx=0.49797, hip_vz=0.05853, omega_1=-0.0052, omega_2=-1.2565,
+)  # fmt: skip
 _STRIKING = dict(
-    hip_x=0.0,
-    theta_1=0.2389649928719203,
-    theta_2=-0.2131208501353999,
-    hip_vx=0.6779715341777804,
-    hip_vz=-0.11663022668189385,
-    omega_1=-1.4100282381682745,
-    omega_2=-1.726217738899573,
-)
+    hip_x=0.0, theta_1=0.2389649928719203, theta_2=-0.2131208501353999,
+    hip_vx=0.6779715341777804, hip_vz=-0.11663022668189385,
+    omega_1=-1.4100282381682745, omega_2=-1.726217738899573,
+)  # fmt: skip
 """Starts of the seed's walk: as the paper gives it, and 5 ms before heel strike."""
 
 
@@ -72,43 +64,21 @@ class Case:
         Raises:
             ArgumentError: a parameter that is not allowed.
         """
-        scene = jb.seed_scene(**self.parameters)
         clearance = jb.laws.StanceRotation() if self.clears else jb.laws.AlwaysTouching()
-        scene = dataclasses.replace(scene, clearance=clearance)
-        normal: Any = scene.normal
-        friction = scene.friction
-        if self.normal != "ristow-schafer":
-            law = jb.laws.normal_law_like(
-                self.normal,
-                K=normal.K,
-                c=normal.c,
-                n=normal.n,
-                mass=scene.walker.total_mass,
-                g=scene.ground.g,
-            )
-            scene = dataclasses.replace(scene, normal=law)
-        if self.friction != "bengisu-akay":
-            values = {
-                name: getattr(friction, name) for name in ("mu_static", "mu_kinetic", "v0", "xi")
-            }
-            law = jb.laws.friction_law_like(self.friction, **values)
-            scene = dataclasses.replace(scene, friction=law)
-        return scene
+        scene = seed_with(self.normal, self.friction, **self.parameters)
+        return dataclasses.replace(scene, clearance=clearance)
 
     def state(self) -> dict[str, float]:
         """The start by field [SI]; its leg length and gravity scale it."""
         told = dict(_STANDING if self.start == "standing" else _STRIKING)
         l, r = self.parameters.get("l", 0.4), self.parameters.get("r", 0.08)
         speed, rate = math.sqrt(l / 0.4) * self._root_g, self._root_g / math.sqrt(l / 0.4)
-        for name in ("hip_vx", "hip_vz"):
-            told[name] *= speed
-        for name in ("omega_1", "omega_2"):
-            told[name] *= rate
+        for name in told:
+            told[name] *= speed if "_v" in name else rate if "omega" in name else 1.0
         changed = dict(self.changed)
         height = changed.pop("height", -_DEPTH * l / 0.4)
-        told |= {name: value for name, value in changed.items()}
-        if "hip_z" not in changed:
-            told["hip_z"] = r + (l - r) * math.cos(told["theta_2"]) + height
+        told |= changed
+        told["hip_z"] = r + (l - r) * math.cos(told["theta_2"]) + height
         for name in ("theta_1", "theta_2"):
             told[name] = _within_a_turn(told[name])
         return {name: float(told[name]) for name in _FIELDS}
@@ -148,18 +118,13 @@ def check_numbers(scene: jb.Scene) -> np.ndarray:
     """A scene as the independent equations take it: plain numbers, shape (SIZE,)."""
     walker, ground = scene.walker, scene.ground
     p = np.zeros(SIZE)
-    told = (walker.m, walker.J, walker.l, walker.d, walker.r, walker.hip_mass)
-    p[:6] = [float(value) for value in told]
+    p[:6] = walker.m, walker.J, walker.l, walker.d, walker.r, walker.hip_mass
     p[6:8] = gravity(float(ground.g), float(ground.slope))
     p[8] = isinstance(scene.clearance, jb.laws.StanceRotation)
-    for at, names, law in (
-        (NORMAL_AT, NORMAL, scene.normal),
-        (FRICTION_AT, FRICTION, scene.friction),
-    ):
-        name = law.name
-        values = [value for value in vars(law).values() if value is not None]
-        p[at] = names.index(name)
-        p[at + 1 : at + 1 + len(values)] = [float(value) for value in values]
+    laws = (NORMAL_AT, NORMAL, scene.normal), (FRICTION_AT, FRICTION, scene.friction)
+    for at, names, law in laws:
+        values = [float(value) for value in vars(law).values() if value is not None]
+        p[at : at + 1 + len(values)] = names.index(law.name), *values
     return p
 
 

@@ -32,24 +32,16 @@ RANGES: dict[str, tuple[float, ...]] = {
 
 def parameters_at(name: str, value: float) -> dict[str, float]:
     """The arguments of `seed_scene` that a value of the catalogue stands for."""
-    if name == "mu":
-        return {"mu_static": value, "mu_kinetic": 0.8 * value}
-    if name == "hip mass":
-        return {"hip_mass": value}
-    if name == "mass":
-        return {"m": value, "J": 0.0096 * value}
-    if name == "inertia":
-        return {"J": 0.0096 * value}
-    if name == "size":
+    lengths = {"l": 0.4 * value, "d": 0.1 * value, "r": 0.08 * value}
+    several = {
+        "mu": {"mu_static": value, "mu_kinetic": 0.8 * value},
+        "hip mass": {"hip_mass": value},
+        "mass": {"m": value, "J": 0.0096 * value},
+        "inertia": {"J": 0.0096 * value},
         # Of the same material: mass with the volume.
-        return {
-            "l": 0.4 * value,
-            "d": 0.1 * value,
-            "r": 0.08 * value,
-            "m": value**3,
-            "J": 0.0096 * value**5,
-        }
-    return {name: value}
+        "size": lengths | {"m": value**3, "J": 0.0096 * value**5},
+    }
+    return several.get(name, {name: value})
 
 
 def singles() -> Iterator[Case]:
@@ -103,67 +95,38 @@ def laws() -> Iterator[Case]:
 
 def starts() -> Iterator[Case]:
     """Starts from high above to deep underground, crossed, spinning and thrown."""
-    still = dict(hip_vx=0.0, hip_vz=0.0)
+    both, signs = ("standing", "striking"), (1.0, -1.0)
+
+    def case(group: str, value: float, changed: dict[str, float], **options: Any) -> Case:
+        return Case(group, {group: value}, changed=changed, **options)
+
+    still = dict(hip_vx=0.0, hip_vz=0.0, omega_1=-0.5, omega_2=-0.5)
     for height in (1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0):
+        falls = math.sqrt(2.0 * height / 9.8)
         for legs in ({}, {"theta_1": 0.0, "theta_2": 0.0}, {"theta_1": 0.3, "theta_2": -0.3}):
-            falls = math.sqrt(2.0 * height / 9.8)
-            changed = {**still, "height": height, "omega_1": -0.5, "omega_2": -0.5, **legs}
+            changed = {**still, "height": height, **legs}
             for clears in (True, False):
-                yield Case(
-                    "drop [m]",
-                    {"drop [m]": height},
-                    clears=clears,
-                    changed=changed,
-                    duration=falls + 0.03,
-                )
-    for depth in (1e-6, 1e-5, 1e-4, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.08, 0.1, 0.2, 0.3, 0.39):
-        for parameters in ({}, {"K": 1e3}, {"c": 0.0}, {"n": 3.0}):
-            for start in ("standing", "striking"):
-                yield Case(
-                    "depth [m]",
-                    {"depth [m]": depth},
-                    parameters,
-                    changed={"height": -depth},
-                    start=start,
-                    duration=0.05,
-                )
+                yield case("drop [m]", height, changed, clears=clears, duration=falls + 0.03)
+    depths = (1e-6, 1e-5, 1e-4, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.08, 0.1, 0.2, 0.3, 0.39)
+    grounds: tuple[dict[str, float], ...] = ({}, {"K": 1e3}, {"c": 0.0}, {"n": 3.0})
+    for depth, parameters, start in itertools.product(depths, grounds, both):
+        how = dict(parameters=parameters, start=start, duration=0.05)
+        yield case("depth [m]", depth, {"height": -depth}, **how)
     angles = (0.0, 1e-9, 0.2, 0.5, 1.0, 1.5, math.pi / 2, 2.0, 3.0, math.pi, 10.0, 1e3)
     for one, other in itertools.product(angles, (-1.5, -0.3, 0.0, 0.3, 1.5, 3.0)):
-        yield Case(
-            "angles [rad]",
-            {"angles [rad]": one - other},
-            changed={"theta_1": one, "theta_2": other, "height": 1e-3},
-            duration=0.05,
-        )
+        changed = {"theta_1": one, "theta_2": other, "height": 1e-3}
+        yield case("angles [rad]", one - other, changed, duration=0.05)
     rates = (1e-12, 1e-6, 1.0, 10.0, 30.0, 100.0, 300.0, 1e3)
-    for rate, sign, start in itertools.product(rates, (1.0, -1.0), ("standing", "striking")):
-        for moved in (("omega_1",), ("omega_2",), ("omega_1", "omega_2")):
-            changed = {leg: sign * rate for leg in moved}
-            yield Case(
-                "leg rate [rad/s]",
-                {"leg rate [rad/s]": rate},
-                start=start,
-                changed=changed,
-                duration=0.02,
-            )
-    for speed, field in itertools.product((1e-6, 1.0, 10.0, 100.0), ("hip_vx", "hip_vz")):
-        for sign, start in itertools.product((1.0, -1.0), ("standing", "striking")):
-            yield Case(
-                "hip speed [m/s]",
-                {"hip speed [m/s]": speed},
-                start=start,
-                changed={field: sign * speed},
-                duration=0.02,
-            )
+    legs_moved = (("omega_1",), ("omega_2",), ("omega_1", "omega_2"))
+    for rate, sign, start, moved in itertools.product(rates, signs, both, legs_moved):
+        changed = dict.fromkeys(moved, sign * rate)
+        yield case("leg rate [rad/s]", rate, changed, start=start, duration=0.02)
+    speeds, fields = (1e-6, 1.0, 10.0, 100.0), ("hip_vx", "hip_vz")
+    for speed, field, sign, start in itertools.product(speeds, fields, signs, both):
+        yield case("hip speed [m/s]", speed, {field: sign * speed}, start=start, duration=0.02)
 
 
-_SCENES: tuple[dict[str, float], ...] = (
-    {},
-    {"K": 1e9},
-    {"c": 1e9},
-    {"v0": 1e-7},
-    {"xi": 1e6},
-)
+_SCENES: tuple[dict[str, float], ...] = ({}, {"K": 1e9}, {"c": 1e9}, {"v0": 1e-7}, {"xi": 1e6})
 
 
 def questions() -> Iterator[Case]:
@@ -171,17 +134,16 @@ def questions() -> Iterator[Case]:
     asked: list[tuple[str, float | str, dict[str, Any]]] = []
     for number in (1e-1, 1e-2, 1e-3, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12):
         asked.append(("accuracy", number, {"accuracy": number}))
-    for name in ("draft", "balanced", "tight"):
-        for engine in ("lanes", "xla"):
-            asked.append((f"accuracy, {engine}", name, {"accuracy": name, "engine": engine}))
-    for exponent in range(2, 14):
+    engines, names = ("lanes", "xla"), ("draft", "balanced", "tight")
+    for name, engine in itertools.product(names, engines):
+        asked.append((f"accuracy, {engine}", name, {"accuracy": name, "engine": engine}))
+    for exponent, engine in itertools.product(range(2, 14), engines):
         rtol = 10.0**-exponent
-        for engine in ("lanes", "xla"):
-            asked.append((f"rtol, {engine}", rtol, {"rtol": rtol, "engine": engine}))
-    for dt in (1e-1, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 3e-6, 1e-6):
-        for solver in ("rodas4", "rodas5p", "kvaerno3", "euler"):
-            more = {"dt": dt, "solver": solver, "max_solver_steps": 1 << 17}
-            asked.append((f"dt [s], {solver}", dt, more))
+        asked.append((f"rtol, {engine}", rtol, {"rtol": rtol, "engine": engine}))
+    steps = (1e-1, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 3e-6, 1e-6)
+    for dt, solver in itertools.product(steps, ("rodas4", "rodas5p", "kvaerno3", "euler")):
+        more = {"dt": dt, "solver": solver, "max_solver_steps": 1 << 17}
+        asked.append((f"dt [s], {solver}", dt, more))
     for solver in ("rodas3p", "rodas4p", "rodas5p", "kvaerno5", "tsit5"):
         asked.append(("solver", solver, {"accuracy": "balanced", "solver": solver}))
     for accuracy in (1e-2, "draft", "balanced"):
@@ -193,23 +155,16 @@ def questions() -> Iterator[Case]:
 
 def by_xla() -> Iterator[Case]:
     """Every third case of one parameter, and each law once, by XLA."""
-    for case in itertools.islice(singles(), 0, None, 3):
-        yield _asking(case, {"accuracy": 1e-4, "engine": "xla"})
-    for case in itertools.islice(laws(), 0, None, len(_HARD)):
-        yield _asking(case, {"accuracy": "balanced", "engine": "xla"})
-
-
-def _asking(case: Case, how: dict[str, Any]) -> Case:
-    return dataclasses.replace(case, group=f"{case.group}, xla", asked=how)
+    number, named = {"accuracy": 1e-4, "engine": "xla"}, {"accuracy": "balanced", "engine": "xla"}
+    for cases, every, how in ((singles(), 3, number), (laws(), len(_HARD), named)):
+        for case in itertools.islice(cases, 0, None, every):
+            yield dataclasses.replace(case, group=f"{case.group}, xla", asked=how)
 
 
 def long_runs() -> Iterator[Case]:
     """Horizons of up to two hundred seconds."""
-    for duration in (2.0, 10.0, 50.0, 200.0):
-        for slope in (0.012, 0.02, 0.03):
-            yield Case(
-                "horizon [s]", {"horizon [s]": duration}, {"slope": slope}, duration=duration
-            )
+    for duration, slope in itertools.product((2.0, 10.0, 50.0, 200.0), (0.012, 0.02, 0.03)):
+        yield Case("horizon [s]", {"horizon [s]": duration}, {"slope": slope}, duration=duration)
 
 
 def catalogue(*, quick: bool = False) -> list[Case]:

@@ -14,7 +14,7 @@ import jaxbiped as jb
 
 from .case import check_numbers, key_of
 from .catalogue import parameters_at
-from .verdict import SURE
+from .verdict import SURE, Verdict
 
 WANTED = 1e-2
 """Relative error asked of gaits."""
@@ -63,30 +63,6 @@ class GaitCase:
         return f"gait-{key_of(self)}"
 
 
-@dataclasses.dataclass(frozen=True)
-class GaitVerdict:
-    """How a gait came out.
-
-    Attributes:
-        verdict, reason, told, seconds: as in `Verdict`.
-        outcome: how the search ended.
-        multipliers, elasticities: relative errors of the multipliers and of the elasticities of
-            the period [–]; None where they were not compared.
-        doubts: of the check itself, for both [–].
-        state: of the gait at mid-stance, without x [SI]; empty where none was found.
-    """
-
-    verdict: str
-    reason: str = ""
-    outcome: str = ""
-    told: float | None = None
-    multipliers: float | None = None
-    elasticities: float | None = None
-    doubts: tuple[float, ...] = ()
-    state: tuple[float, ...] = ()
-    seconds: float = 0.0
-
-
 def gaits(*, quick: bool = False) -> Iterator[GaitCase]:
     """Gaits along each parameter, from the seed's outwards."""
     for name, chains in _CHAINS.items():
@@ -104,7 +80,7 @@ class GaitJudge:
     def __init__(self) -> None:
         self._near: tuple[float, ...] = ()
 
-    def __call__(self, case: GaitCase) -> GaitVerdict:
+    def __call__(self, case: GaitCase) -> Verdict:
         """The verdict on a gait."""
         if case.first:
             self._near = ()
@@ -117,38 +93,27 @@ class GaitJudge:
         self._near = tuple(row["state"]) or self._near
 
 
-def _judged(case: GaitCase, near: tuple[float, ...]) -> GaitVerdict:
+def _judged(case: GaitCase, near: tuple[float, ...]) -> Verdict:
     begun = time.perf_counter()
     guess = jb.State(*map(jnp.asarray, (0.0, *near))) if near else None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the error estimate tells it, too
         try:
             scene = jb.seed_scene(**case.parameters)
-            gait = jb.find_gait(
-                scene,
-                guess,
-                parameters=tuple(_VARIED),
-                accuracy=WANTED,
-                radius_sensitivities=False,
-                max_evaluations=60,
-            )
+            how = dict(parameters=tuple(_VARIED), accuracy=WANTED, radius_sensitivities=False)
+            gait = jb.find_gait(scene, guess, max_evaluations=60, **how)
         except jb.ArgumentError as error:
-            return GaitVerdict("refused", str(error))
+            return Verdict("refused", str(error))
     seconds = time.perf_counter() - begun
-    assert gait.error is not None
-    known: dict[str, Any] = dict(outcome=str(gait.outcome), seconds=seconds)
+    known: dict[str, Any] = dict(outcome=str(gait.outcome), wanted=WANTED, seconds=seconds)
     if gait.outcome is not jb.gait.Search.FOUND:
-        return GaitVerdict("flagged", f"the search ended as {gait.outcome}", **known)
+        return Verdict("flagged", f"the search ended as {gait.outcome}", **known)
     state = tuple(float(leaf) for leaf in gait.measures.state if leaf is not None)[-7:]
     known |= dict(told=float(gait.error.relative), state=state)
-    check = checked_gait(
-        np.array([0.0, *state]),
-        float(gait.measures.period),
-        check_numbers(scene),
-        tuple(_VARIED.values()),
-    )
+    start, period = np.array([0.0, *state]), float(gait.measures.period)
+    check = checked_gait(start, period, check_numbers(scene), tuple(_VARIED.values()))
     if check is None:
-        return GaitVerdict("unresolved", "the check's solve fails", **known)
+        return Verdict("unresolved", "the check's solve fails", **known)
     unit = max(float(np.max(np.abs(check.elasticities))), 1e-30)
     errors = (
         apart(check.multipliers, np.append(np.asarray(gait.multipliers), 1.0)),
@@ -157,10 +122,10 @@ def _judged(case: GaitCase, near: tuple[float, ...]) -> GaitVerdict:
     doubts = (check.doubt_multipliers, check.doubt_elasticities / unit)
     known |= dict(multipliers=errors[0], elasticities=errors[1], doubts=doubts)
     if not gait.error.met:
-        return GaitVerdict("flagged", f"accuracy not met: {gait.error.reason}", **known)
+        return Verdict("flagged", f"accuracy not met: {gait.error.reason}", **known)
     wrong = any(e > WANTED and d <= SURE * e for e, d in zip(errors, doubts, strict=True))
     if wrong:
-        return GaitVerdict("silently_wrong", "a derivative is off", **known)
+        return Verdict("silently_wrong", "a derivative is off", **known)
     if not max(doubts) <= SURE * WANTED:
-        return GaitVerdict("unresolved", "the check's own differences part", **known)
-    return GaitVerdict("accurate", **known)
+        return Verdict("unresolved", "the check's own differences part", **known)
+    return Verdict("accurate", **known)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from _scenes import seed_with
 from reference.scipy_solves import scales, states_of
 
 import jaxbiped as jb
@@ -27,8 +28,6 @@ _FINE, _SHARE, _LARGEST = 1e-13, 0.2, 1e-6
 class Grazing(NamedTuple):
     """Derivatives of the final state with respect to the start's height, about grazing.
 
-    Where ours are NaN they are told as not determined.
-
     Attributes:
         law: of the normal force.
         accuracy: that ours were asked for at.
@@ -45,7 +44,7 @@ class Grazing(NamedTuple):
 
     @property
     def flagged(self) -> np.ndarray:
-        """Of which heights we tell that the derivatives are not determined (booleans), (n,)."""
+        """Of which heights ours are NaN: told as not determined (booleans), (n,)."""
         return np.any(np.isnan(self.derivatives), axis=1)
 
     @property
@@ -67,38 +66,26 @@ def grazing(*, each: int = 25, laws: int = len(_LAWS)) -> list[Grazing]:
 
 def grazing_scene(name: str) -> jb.Scene:
     """The seed's walker under a normal law like its own, with feet that may always touch."""
-    law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
-    touching = jb.laws.AlwaysTouching()
-    return dataclasses.replace(jb.seed_scene(), normal=law, clearance=touching)
+    return dataclasses.replace(seed_with(name), clearance=jb.laws.AlwaysTouching())
 
 
 def _swept(name: str, heights: np.ndarray) -> list[Grazing]:
     scene = grazing_scene(name)
     p = check_numbers(scene)
     units, touching = scales(p, 8), START[1] - lowest(p)
-    starts = touching + heights
-    differences = np.array(
-        [_difference(z, h, p) * p[2] / units for z, h in zip(starts, heights, strict=True)]
-    )
+    differences = np.array([_difference(touching + h, h, p) * p[2] / units for h in heights])
+    found = []
+    for accuracy in _ACCURACIES:
 
-    def derivatives(accuracy: str) -> np.ndarray:
-        def end(height: jax.Array) -> jb.State:
-            return _end(scene, height, accuracy)
+        def end(height: jax.Array, accuracy: str = accuracy) -> jb.State:
+            state = jb.State(*map(jnp.asarray, START))._replace(hip_z=height)
+            how = dict(save="end", watch=(), engine="lanes", accuracy=accuracy)
+            return jb.simulate(scene, state, duration=TIME, **how).final
 
-        found = jax.vmap(jax.jacfwd(end))(jnp.asarray(starts))
-        return np.stack([np.asarray(leaf) for leaf in found], axis=1) * p[2] / units
-
-    return [
-        Grazing(name, accuracy, heights, derivatives(accuracy), differences)
-        for accuracy in _ACCURACIES
-    ]
-
-
-def _end(scene: jb.Scene, height: jax.Array, accuracy: str) -> jb.State:
-    state = jb.State(*map(jnp.asarray, START))._replace(hip_z=jnp.asarray(height))
-    return jb.simulate(
-        scene, state, duration=TIME, save="end", watch=(), engine="lanes", accuracy=accuracy
-    ).final
+        slopes = jax.vmap(jax.jacfwd(end))(jnp.asarray(touching + heights))
+        derivatives = np.stack(slopes, axis=1) * p[2] / units
+        found.append(Grazing(name, accuracy, heights, derivatives, differences))
+    return found
 
 
 def lowest(p: np.ndarray) -> float:

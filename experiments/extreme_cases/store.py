@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import hashlib
-import json
 import re
 import subprocess
 import sys
@@ -13,6 +12,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from _experiment import by
+from _row_store import RowStore
 from tqdm import tqdm
 
 Row = dict[str, Any]
@@ -24,45 +25,36 @@ def study(
     judge: Callable[[Any], Any],
     *,
     store: Path | None = None,
-    follow: Callable[[Row], None] | None = None,
+    follow: Callable[[Row], None] = lambda row: None,
 ) -> list[Row]:
-    """Verdicts of cases, in their order; those that the store holds of this version are not run
-    again.
+    """A row for each case; those that the store holds of this version are not judged again.
 
     Args:
         cases: dataclasses with a `key` and a `group`.
         judge: gives the verdict on a case, a dataclass.
-        follow: is shown the verdicts that the store holds, for a judge that remembers.
         store: file of JSON lines to read and to add to; None keeps nothing.
-
-    Returns:
-        A row for each case.
+        follow: is shown the verdicts that the store holds, for a judge that remembers.
     """
-    held = {} if store is None or not store.exists() else _read(store)
-    todo = sum(case.key not in held for case in cases)
-    rows = []
+    kept, rows = RowStore(store, **_writer()), []
+    todo = sum(case.key not in kept.rows for case in cases)
     with tqdm(total=todo, unit="cases", file=sys.stderr, disable=todo == 0) as bar:
         for case in cases:
-            if case.key not in held:
-                row = {"key": case.key, "case": dataclasses.asdict(case), "writer": _writer()}
-                held[case.key] = row | dataclasses.asdict(judge(case))
-                if store is not None:
-                    with store.open("a") as lines:
-                        lines.write(json.dumps(held[case.key]) + "\n")
+            if case.key in kept.rows:
+                follow(kept.rows[case.key])
+            else:
+                row = {"case": dataclasses.asdict(case)} | dataclasses.asdict(judge(case))
+                kept.row(case.key, lambda row=row: row)
                 bar.update()
-            elif follow is not None:
-                follow(held[case.key])
-            rows.append(held[case.key])
+            rows.append(kept.rows[case.key])
     return rows
 
 
 @functools.cache
 def _writer() -> dict[str, str]:
     """What judges: the version, and the revision with a digest of its changes."""
-    folder = Path(__file__).parents[2]
 
     def git(*command: str) -> str:
-        asked = ["git", "-C", str(folder), *command]
+        asked = ["git", "-C", str(Path(__file__).parents[2]), *command]
         return subprocess.run(asked, capture_output=True, text=True, check=True).stdout
 
     try:
@@ -73,19 +65,6 @@ def _writer() -> dict[str, str]:
     return {"version_jaxbiped": version("jaxbiped"), "revision": revision, "changes": changes}
 
 
-def _read(store: Path) -> dict[str, Row]:
-    """What this version has judged."""
-    held = {}
-    for line in store.read_text().splitlines():
-        try:
-            row = json.loads(line)
-        except json.JSONDecodeError:
-            continue  # cut off while it was written
-        if row.get("writer") == _writer():
-            held[row["key"]] = row
-    return held
-
-
 def counts(rows: Sequence[Row], verdicts: Sequence[str]) -> Row:
     """How many cases were run, and how many came out how."""
     found = Counter(row["verdict"] for row in rows)
@@ -94,17 +73,12 @@ def counts(rows: Sequence[Row], verdicts: Sequence[str]) -> Row:
 
 def by_group(rows: Sequence[Row], verdicts: Sequence[str]) -> dict[str, Row]:
     """The counts of each group, in the order in which groups come first."""
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(row["case"]["group"], []).append(row)
-    return {name: counts(each, verdicts) for name, each in groups.items()}
+    groups = by("group", ({"group": row["case"]["group"], "row": row} for row in rows))
+    return {name: counts([each["row"] for each in own], verdicts) for name, own in groups.items()}
 
 
 def reasons(rows: Sequence[Row], verdict: str) -> dict[str, int]:
     """How often each reason was told; numbers in it are left out."""
-    told = [_without_numbers(row["reason"]) for row in rows if row["verdict"] == verdict]
+    number = r"-?\d+(\.\d+)?(e[+-]?\d+)?"
+    told = [re.sub(number, "…", row["reason"]) for row in rows if row["verdict"] == verdict]
     return dict(Counter(told).most_common())
-
-
-def _without_numbers(text: str) -> str:
-    return re.sub(r"-?\d+(\.\d+)?(e[+-]?\d+)?", "…", text)

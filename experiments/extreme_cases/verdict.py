@@ -29,24 +29,31 @@ class Verdict:
     Attributes:
         verdict: one of `VERDICTS`.
         reason: the flag, the refusal, or what is wrong; "" where it is accurate.
-        outcome: how the simulation ended; "" where it was refused.
+        outcome: how the simulation or the search ended; "" where it was refused.
         wanted: relative error allowed [–].
-        error: by the check [–]; None where it was not compared.
         told: relative error that the result itself tells [–]; None where it tells none.
+        seconds: of the simulation or the search.
+        error: of a simulation by the check [–]; None where it was not compared.
         doubt: of the check itself [–]; None where it was not asked.
-        seconds: of the simulation.
         precise: whether the check solved in multiple precision.
+        multipliers, elasticities: relative errors of a gait's multipliers and of the elasticities
+            of its period [–]; None where they were not compared. doubts: of the check, for both.
+        state: of a gait at mid-stance, without x [SI]; empty where none was found.
     """
 
     verdict: str
     reason: str = ""
     outcome: str = ""
     wanted: float | None = None
-    error: float | None = None
     told: float | None = None
-    doubt: float | None = None
     seconds: float = 0.0
+    error: float | None = None
+    doubt: float | None = None
     precise: bool = False
+    multipliers: float | None = None
+    elasticities: float | None = None
+    doubts: tuple[float, ...] = ()
+    state: tuple[float, ...] = ()
 
 
 def judge(case: Case) -> Verdict:

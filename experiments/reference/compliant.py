@@ -36,50 +36,22 @@ def on_numbers(**numpy: Any) -> dict[str, Callable[..., Any]]:
 
 
 NORMAL = (
-    "hertz",
-    "kelvin-voigt",
-    "kuwabara-kono",
-    "tsuji",
-    "hunt-crossley",
-    "ristow-schafer",
+    "hertz", "kelvin-voigt", "kuwabara-kono", "tsuji", "hunt-crossley", "ristow-schafer",
     "smooth-ristow-schafer",
-)
+)  # fmt: skip
 FRICTION = (
-    "frictionless",
-    "viscous",
-    "coulomb",
-    "threlfall",
-    "ambrosio",
-    "stribeck",
-    "bengisu-akay",
-    "smooth-bengisu-akay",
-    "andersson",
-    "brown-mcphee",
-    "dahl",
-    "lugre",
-)
+    "frictionless", "viscous", "coulomb", "threlfall", "ambrosio", "stribeck", "bengisu-akay",
+    "smooth-bengisu-akay", "andersson", "brown-mcphee", "dahl", "lugre",
+)  # fmt: skip
 """Laws by name; a law's number is its place here."""
 NORMAL_AT, FRICTION_AT, DROP, SIZE = 9, 15, 24, 25
 """Numbers of a walker on its slope: m, J, l, d, r, m_S, gravity along the slope and along its
 normal, and whether a swinging foot clears the ground; from these places on the laws, each its
 number and its parameters; how much lower the ground is under leg 1; and how many in all."""
 SEED = dict(
-    m=1.0,
-    J=0.0096,
-    l=0.40,
-    d=0.10,
-    r=0.08,
-    hip_mass=0.0,
-    g=9.8,
-    slope=0.02,
-    K=1e6,
-    c=1e7,
-    n=1.5,
-    mu_static=0.5,
-    mu_kinetic=0.4,
-    v0=1e-4,
-    xi=1000.0,
-)
+    m=1.0, J=0.0096, l=0.40, d=0.10, r=0.08, hip_mass=0.0, g=9.8, slope=0.02,
+    K=1e6, c=1e7, n=1.5, mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0,
+)  # fmt: skip
 START = np.array([0.0, 0.395, -0.2479, 0.1655, 0.49797, 0.05853, -0.0052, -1.2565])
 """The seed's start: hip x, hip z, θ1, θ2 and their rates [SI]."""
 LAWS_AT = {"K": 10, "c": 11, "n": 12, "mu_static": 16, "mu_kinetic": 17, "v0": 18, "xi": 19}

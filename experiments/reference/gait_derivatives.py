@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from .compliant import derivative
-from .scipy_solves import final_state, scales
+from .scipy_solves import scales, states_of
 
 _EXCHANGED = [0, 1, 3, 2, 4, 5, 7, 6]
 _FINE = 1e-12
@@ -51,7 +51,7 @@ def checked_gait(
     units = scales(p, 8)
 
     def flow(y: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-        return final_state(y, numbers, period, _FINE)[_EXCHANGED]
+        return states_of(y, numbers, period, _FINE, points=40)[-1][_EXCHANGED]
 
     end = flow(start, p)
     found = [_linearised(start, end, p, varied, flow, share, period) for share in (1.0, _THIRD)]

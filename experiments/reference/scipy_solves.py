@@ -8,7 +8,7 @@ import io
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,6 +40,7 @@ def solution(
     method: str = "Radau",
     start: np.ndarray = START,
     p: np.ndarray | None = None,
+    rates: Callable[..., np.ndarray] = derivative,
     **options: Any,
 ) -> Any:
     """The motion by one of SciPy's methods, as `solve_ivp` gives it.
@@ -50,11 +51,12 @@ def solution(
         method, options: of `solve_ivp`.
         start: the seed's unless given, SI units.
         p: numbers of the scene, see `compliant`; the seed's unless given.
+        rates: of time, state and numbers.
     """
     how = dict(method=method, rtol=rtol, atol=1e-2 * rtol if atol is None else atol) | options
     numbers_of_it = (numbers() if p is None else p,)
     with np.errstate(over="ignore"):  # of columns of the Jacobian that are zero
-        return solve_ivp(derivative, (0.0, duration), start, args=numbers_of_it, **how)
+        return solve_ivp(rates, (0.0, duration), start, args=numbers_of_it, **how)
 
 
 def final_of(duration: float, rtol: float, atol: float | None = None, **options: Any) -> np.ndarray:
@@ -130,11 +132,6 @@ def _by_scipy(start: np.ndarray, p: np.ndarray, duration: float) -> Checked:
     before = first[: max(1, _POINTS * 99 // 100)]
     lowest = float(np.min(before[:, 1]) - _fallen_height(p)) / p[2]
     return Checked(first[-1], distance(first[-1], second[-1], units), lowest)
-
-
-def final_state(start: np.ndarray, p: np.ndarray, duration: float, rtol: float) -> np.ndarray:
-    """The state after a time, shape (8,) or (10,); not a number where the solve fails."""
-    return states_of(start, p, duration, rtol, points=40)[-1]
 
 
 def states_of(

@@ -80,15 +80,22 @@ def surfaces(y, p):
 
 
 @compiled
+def stepped(y, p, k, varied):
+    """State and numbers with one of them moved by a complex step: a logarithm of those varied."""
+    moved, law = y.astype(np.complex128), p.astype(np.complex128)
+    if k < 8:
+        moved[k] += 1j * TINY
+    else:
+        law[varied[k - 8]] *= 1.0 + 1j * TINY
+    return moved, law
+
+
+@compiled
 def slopes(y, p, pressing, band, varied):
     """Derivative of the field with respect to state and logarithms of numbers in p, (8, 8 + k)."""
     found = np.empty((8, 8 + len(varied)))
     for k in range(8 + len(varied)):
-        moved, law = y.astype(np.complex128), p.astype(np.complex128)
-        if k < 8:
-            moved[k] += 1j * TINY
-        else:
-            law[varied[k - 8]] *= 1.0 + 1j * TINY
+        moved, law = stepped(y, p, k, varied)
         found[:, k] = field(moved, law, pressing, band).imag / TINY
     return found
 
@@ -98,11 +105,7 @@ def surface_slopes(y, p, which, varied):
     """Derivative of one surface's function, likewise (8 + k,)."""
     found = np.empty(8 + len(varied))
     for k in range(8 + len(varied)):
-        moved, law = y.astype(np.complex128), p.astype(np.complex128)
-        if k < 8:
-            moved[k] += 1j * TINY
-        else:
-            law[varied[k - 8]] *= 1.0 + 1j * TINY
+        moved, law = stepped(y, p, k, varied)
         found[k] = surfaces(moved, law)[which].imag / TINY
     return found
 

@@ -6,9 +6,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from .compliant import START, compiled, contact, derivative, foot, numbers
+from .scipy_solves import solution
 
 SEED = numbers()
 
@@ -47,9 +47,8 @@ def with_powers(t, y, p):
 def walk(duration: float, rtol: float, method: str = "Radau") -> Walk:
     """The seed's walk at a relative tolerance, the absolute one a hundredth of it."""
     start = np.concatenate([START, np.zeros(2)])
-    how: dict[str, Any] = dict(method=method, rtol=rtol, atol=1e-2 * rtol, dense_output=True)
-    with np.errstate(over="ignore"):
-        found = solve_ivp(with_powers, (0.0, duration), start, args=(SEED,), **how)
+    how: dict[str, Any] = dict(method=method, dense_output=True, rates=with_powers)
+    found = solution(duration, rtol, start=start, **how)
     end = found.y[:, -1]
     (kinetic, lifted, pressed), first = energies(end), energies(start)
     ledger = {

@@ -102,10 +102,7 @@ def _refined_counts(boundary: RefinedBoundary) -> tuple[np.ndarray, np.ndarray]:
 
 def _grid_counts(labels: np.ndarray, sides: Sequence[int] | None) -> tuple[np.ndarray, np.ndarray]:
     shortest = min(labels.shape) - 1
-    if sides is None:
-        sizes = 2 ** np.arange(max(int(np.log2(max(shortest // 4, 1))) + 1, 1))
-    else:
-        sizes = np.unique([check_whole("sides", side, 1) for side in sides])
+    sizes = _lengths("sides", sides, shortest // 4)
     largest = int(sizes[-1])
     if largest > shortest or (largest % sizes).any():
         raise ArgumentError(
@@ -115,6 +112,13 @@ def _grid_counts(labels: np.ndarray, sides: Sequence[int] | None) -> tuple[np.nd
     whole = tuple(slice((n - 1) // largest * largest + 1) for n in labels.shape)
     counts = [_mixed_boxes(labels[whole], int(side)) for side in sizes]
     return sizes, np.asarray(counts)
+
+
+def _lengths(name: str, given: Sequence[int] | None, most: int) -> np.ndarray:
+    """Those given, in order; otherwise powers of two up to `most`."""
+    if given is None:
+        return np.asarray(2 ** np.arange(max(most, 1).bit_length()))
+    return np.unique([check_whole(name, each, 1) for each in given])
 
 
 def _mixed_boxes(labels: np.ndarray, side: int) -> int:
@@ -176,10 +180,7 @@ def uncertainty_exponent(
     """
     grid = check_label_grid(labels)
     shortest = min(grid.shape)
-    if distances is None:
-        steps = 2 ** np.arange(max(int(np.log2(max(shortest // 8, 1))) + 1, 1))
-    else:
-        steps = np.unique([check_whole("distances", k, 1) for k in distances])
+    steps = _lengths("distances", distances, shortest // 8)
     margin = int(steps[-1])
     if 2 * margin >= shortest:
         raise ArgumentError(

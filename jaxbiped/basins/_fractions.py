@@ -102,11 +102,15 @@ def fractions(
     """
     check_confidence(confidence)
     names = _names(np.asarray(labels))
-    unsure = _in_doubt(labels, doubt)
+    unsure = np.zeros(np.shape(labels), bool) if doubt is None else np.asarray(doubt, dtype=bool)
+    if unsure.shape != np.shape(labels):
+        raise ArgumentError(
+            f"doubt has shape {unsure.shape}: it must be that of labels, {np.shape(labels)}."
+        )
     known = names != str(Label.PENDING)
     distinct, place, counts = np.unique(names[known], return_inverse=True, return_counts=True)
     total = int(counts.sum())
-    own = np.bincount(place, weights=unsure[known], minlength=len(distinct)).astype(int)
+    own = np.bincount(place, weights=unsure.ravel()[known], minlength=len(distinct)).astype(int)
     low, _ = wilson_interval(counts - own, total, confidence=confidence)
     _, high = wilson_interval(counts + own.sum() - own, total, confidence=confidence)
     order = np.argsort(-counts, kind="stable")
@@ -114,16 +118,6 @@ def fractions(
         str(distinct[k]): Fraction(counts[k] / total, float(low[k]), float(high[k]), int(counts[k]))
         for k in order
     }
-
-
-def _in_doubt(labels: npt.ArrayLike, doubt: npt.ArrayLike | None) -> np.ndarray:
-    shape = np.shape(labels)
-    if doubt is None:
-        return np.zeros(shape, dtype=bool).ravel()
-    found = np.asarray(doubt, dtype=bool)
-    if found.shape != shape:
-        raise ArgumentError(f"doubt has shape {found.shape}: it must be that of labels, {shape}.")
-    return found.ravel()
 
 
 def _names(labels: np.ndarray) -> np.ndarray:

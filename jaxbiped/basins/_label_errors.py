@@ -129,15 +129,12 @@ def estimate_label_errors(seen: Seen, *, wanted: float, rtol: float) -> LabelErr
     # Chapman's (a + 1)(b + 1)/(ab + 1) − 1 in all, less those that were seen.
     overlooked = (a - ab) * (b - ab) / (ab + 1.0)
     variance = (a + 1.0) * (b + 1.0) * (a - ab) * (b - ab) / ((ab + 1.0) ** 2 * (ab + 2.0))
-    wrong = overlooked / seen.starts
     wrong_high = min(1.0, _upper_end(overlooked, variance) / seen.starts)
     return LabelErrors(
-        starts=seen.starts,
-        wanted=wanted,
-        relabelled=seen.relabelled,
-        changed=seen.changed,
-        in_doubt=seen.in_doubt,
-        wrong=wrong,
+        seen.starts,
+        wanted,
+        *(seen.relabelled, seen.changed, seen.in_doubt),
+        wrong=overlooked / seen.starts,
         wrong_high=wrong_high,
         rtol=rtol,
         met=wrong_high <= wanted,

@@ -117,7 +117,9 @@ def minimal_fatal_shock(
     rays = first_exits(around, ways, marks)
     rays = rays.take(np.isfinite(rays.outside))
     if not rays.inside.size:
-        return _without_failure(around)
+        nowhere, far = np.full((1, around.origin.size), np.nan), np.array([np.inf])
+        rays = Brackets(nowhere, far, far, np.array([around.label]))
+        return _result(around, rays, np.array([np.nan]), np.inf, tolerance)
     rays = _nearest(around, rays, max(improved, 1), tolerance)
     bisected = float(rays.outside.min())
     normals_of = (
@@ -193,22 +195,6 @@ def _result(
         direction=direction,
         angle=float(angle[k]),
         bisected_distance=bisected,
-        origin_label=around.label,
-        asked=around.ask.asked,
-        calls=around.ask.calls,
-    )
-
-
-def _without_failure(around: Surroundings) -> FatalShock:
-    unknown = np.full(around.origin.size, np.nan)
-    return FatalShock(
-        distance=np.inf,
-        push=unknown,
-        boundary_point=unknown,
-        label=around.label,
-        direction=unknown,
-        angle=np.nan,
-        bisected_distance=np.inf,
         origin_label=around.label,
         asked=around.ask.asked,
         calls=around.ask.calls,

@@ -2,24 +2,24 @@
 
 import contextlib
 import os
-import pickle
 import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import equinox as eqx
 import jax
 import jax.tree_util as jtu
 from jax.experimental import serialize_executable
 
-from jaxbiped._host_call import TARGET, HostCall, host_call, lowered_host_calls
+from jaxbiped._host_call import TARGET, HostCall, HostFunction, host_call, lowered_host_calls
 from jaxbiped._jax_versions import custom_call_targets, load_lapack
 from jaxbiped.caching._collector_pause import long_trace
-from jaxbiped.caching._disk_cache import read_entry, write_entry
+from jaxbiped.caching._disk_cache import read_object, write_object
 from jaxbiped.caching._fingerprint import Leaf, leaf_of
 
+ArrayFunction: TypeAlias = Callable[[Sequence[Any]], Any]
 _KIND = "xla"
 _LAPACK = "lapack_"
 _NOISE = b"cpu_aot_loader.cc"
@@ -45,6 +45,20 @@ class Skeleton(NamedTuple):
         known = [leaf_of(leaf) if eqx.is_array(leaf) else leaf for leaf in leaves]
         return Skeleton(known, structure), [leaf for leaf in leaves if eqx.is_array(leaf)]
 
+    @staticmethod
+    def of_tree(tree: Any) -> "Skeleton":
+        """Of a `tree` of one."""
+        return Skeleton(*jtu.tree_flatten(tree))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Structures cannot be pickled, but trees that have them."""
+        return Skeleton.of_tree, (self.tree,)
+
+    @property
+    def tree(self) -> Any:
+        """The tree with a `Leaf` for each array."""
+        return self.structure.unflatten(self.leaves)
+
     @property
     def places(self) -> list[Leaf]:
         """Where arrays belong."""
@@ -56,6 +70,35 @@ class Skeleton(NamedTuple):
         return self.structure.unflatten(
             [next(rest) if isinstance(leaf, Leaf) else leaf for leaf in self.leaves]
         )
+
+    def shapes(self) -> Any:
+        """The tree with shapes instead of arrays."""
+        return self.filled(
+            [jax.ShapeDtypeStruct(x.shape, x.dtype, weak_type=x.weak) for x in self.places]
+        )
+
+
+class KeptProgram(Protocol):
+    """A function of arrays that was compiled or written."""
+
+    @property
+    def result(self) -> Skeleton:
+        """What becomes of the arrays that it gives."""
+
+    def __call__(self, arrays: Sequence[Any]) -> Any:
+        """Runs it."""
+
+
+def flattened(function: ArrayFunction) -> tuple[Callable[..., list[Any]], list[Skeleton]]:
+    """A function as one from arrays to a list of arrays; the list gets its results' skeletons."""
+    results: list[Skeleton] = []
+
+    def flat(*given: Any) -> list[Any]:
+        result, found = Skeleton.of(function(given))
+        results.append(result)
+        return found
+
+    return flat, results
 
 
 class CompiledCall(NamedTuple):
@@ -74,25 +117,12 @@ class CompiledCall(NamedTuple):
     def __call__(self, arrays: Sequence[Any]) -> Any:
         return self.result.filled(jax.block_until_ready(self.compiled(*arrays)))
 
-    def shapes(self) -> Any:
-        """The result with shapes instead of arrays."""
-        places = self.result.places
-        return self.result.filled(
-            [jax.ShapeDtypeStruct(x.shape, x.dtype, weak_type=x.weak) for x in places]
-        )
-
 
 def trace_call(
-    function: Callable[[Sequence[Any]], Any], arrays: Sequence[Any], key: str
-) -> Callable[[], CompiledCall]:
-    """Traces a function of arrays; what then compiles it, and keeps it by its key."""
-    results: list[Skeleton] = []
-
-    def flat(*given: Any) -> list[Any]:
-        result, found = Skeleton.of(function(given))
-        results.append(result)
-        return found
-
+    function: ArrayFunction, arrays: Sequence[Any], key: str
+) -> tuple[Callable[[], CompiledCall], Skeleton]:
+    """Traces a function of arrays; what then compiles it and keeps it, and its result."""
+    flat, results = flattened(function)
     with long_trace(), lowered_host_calls() as calls:
         lowered = jax.jit(flat).lower(*arrays)
     targets = custom_call_targets(lowered.compiler_ir("stablehlo"))
@@ -108,31 +138,29 @@ def trace_call(
             _write(key, made, len(arrays), uses_lapack)
         return made
 
-    return compile_it
+    return compile_it, results[-1]
 
 
 def read_call(key: str) -> CompiledCall | None:
     """What was kept by a key; None where that is nothing, or what it calls is not there."""
-    content = read_entry(_KIND, key)
-    if content is None:
+    return read_object(_KIND, key, _load)
+
+
+def _load(
+    code: bytes, count: int, uses_lapack: bool, result: Skeleton, functions: list[HostFunction]
+) -> CompiledCall | None:
+    if not all(function.ready() for function in functions):
         return None
-    # Whatever is amiss with it, the program is compiled again.
-    with contextlib.suppress(Exception):
-        code, count, uses_lapack, leaves, skeleton, functions = pickle.loads(content)
-        if not all(function.ready() for function in functions):
-            return None
-        calls = [host_call(function) for function in functions]
-        if uses_lapack:
-            load_lapack()
-        taken = jtu.tree_structure((tuple(range(count)), {}))
-        result = Skeleton(leaves, jtu.tree_structure(skeleton))
-        given = jtu.tree_structure(list(range(len(result.places))))
-        with _LOADING, _without_noise():
-            compiled = serialize_executable.deserialize_and_load(
-                code, taken, given, execution_devices=jax.devices()[:1]
-            )
-        return CompiledCall(compiled, result, calls)
-    return None
+    calls = [host_call(function) for function in functions]
+    if uses_lapack:
+        load_lapack()
+    taken = jtu.tree_structure((tuple(range(count)), {}))
+    given = jtu.tree_structure(list(range(len(result.places))))
+    with _LOADING, _without_noise():
+        compiled = serialize_executable.deserialize_and_load(
+            code, taken, given, execution_devices=jax.devices()[:1]
+        )
+    return CompiledCall(compiled, result, calls)
 
 
 def _write(key: str, made: CompiledCall, count: int, uses_lapack: bool) -> None:
@@ -140,13 +168,9 @@ def _write(key: str, made: CompiledCall, count: int, uses_lapack: bool) -> None:
     if not all(call.storable for call in made.host_calls):
         return
     functions = list({call.key: call.function for call in made.host_calls}.values())
-    leaves, structure = made.result
-    skeleton = structure.unflatten(range(len(leaves)))
-    with contextlib.suppress(Exception):  # what cannot be pickled stays in this process
+    with contextlib.suppress(Exception):  # what cannot be serialised stays in this process
         code, _, _ = serialize_executable.serialize(made.compiled)
-        write_entry(
-            _KIND, key, pickle.dumps((code, count, uses_lapack, leaves, skeleton, functions))
-        )
+        write_object(_KIND, key, code, count, uses_lapack, made.result, functions)
 
 
 @contextlib.contextmanager

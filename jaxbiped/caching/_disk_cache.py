@@ -7,12 +7,15 @@ made again.
 import contextlib
 import hashlib
 import os
+import pickle
 import stat
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
+
+_T = TypeVar("_T")
 
 CACHE_VARIABLE = "JAXBIPED_CACHE"
 """Environment variable: the folder of the cache; empty for none."""
@@ -88,6 +91,21 @@ def write_entry(kind: str, name: str, content: bytes) -> None:
         _prune(path.parent.parent)
     except OSError:
         return
+
+
+def read_object(kind: str, name: str, load: Callable[..., _T | None]) -> _T | None:
+    """What `load` makes of the parts that were kept; None where there are none it can use."""
+    content = read_entry(kind, name)
+    if content is not None:
+        with contextlib.suppress(Exception):  # whatever is amiss with them, they are made again
+            return load(*pickle.loads(content))
+    return None
+
+
+def write_object(kind: str, name: str, *parts: Any) -> None:
+    """Keeps these, unless they cannot be pickled."""
+    with contextlib.suppress(Exception):
+        write_entry(kind, name, pickle.dumps(parts))
 
 
 def disk_use() -> dict[str, DiskUse]:

@@ -2,8 +2,11 @@
 
 import contextlib
 import dataclasses
+import functools
 import io
+import operator
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,31 +28,36 @@ from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
 from jaxbiped.cli._optimise import Optimise
 from jaxbiped.cli._options import Command
-from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._report import Report as Report
 from jaxbiped.cli._trade import Trade
 from jaxbiped.cli._walk import Walk
 
-_Command = (
-    Annotated[Walk, subcommand("walk")]
-    | Annotated[FindGait, subcommand("gait")]
-    | Annotated[ContinueGait, subcommand("continue")]
-    | Annotated[Optimise, subcommand("optimise")]
-    | Annotated[Fit, subcommand("fit")]
-    | Annotated[Basin, subcommand("basin")]
-    | Annotated[Models, subcommand("models")]
-    | Annotated[Constraints, subcommand("constraints")]
-    | Annotated[Trade, subcommand("trade")]
-    | Annotated[Cache, subcommand("cache")]
-    | Annotated[Doctor, subcommand("doctor")]
-    | Annotated[None, subcommand("version")]
-)
+COMMANDS: dict[str, type[Command] | None] = {
+    "walk": Walk,
+    "gait": FindGait,
+    "continue": ContinueGait,
+    "optimise": Optimise,
+    "fit": Fit,
+    "basin": Basin,
+    "models": Models,
+    "constraints": Constraints,
+    "trade": Trade,
+    "cache": Cache,
+    "doctor": Doctor,
+    "version": None,
+}
+"""Commands by name; `main` takes one that is added here along."""
 
 _MOVED = {
     "extremes": "extremes is no longer a command: the study of extreme cases is "
     "experiments/extremes.py in jaxbiped's repository."
 }
 """Commands of the last release, and where what they did is now."""
+
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_SIDES = re.compile(r"^[\s│|]*(.*?)[\s│|]*$")
+_RULE = re.compile(r"^[╭╰]?[─━=-]{3,}.*$")
+_OPTIONAL = re.compile(r"no type matching \{None\}\|(\w+) could be instantiated from \[(.*)\]")
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -125,10 +133,51 @@ def _parse(arguments: list[str]) -> Command | None:
     refusal = io.StringIO()
     try:
         with contextlib.redirect_stderr(refusal):
-            return tyro.cli(_Command, args=arguments, prog="jaxbiped", description=__doc__)
+            commands = (Annotated[kind, subcommand(name)] for name, kind in COMMANDS.items())
+            chosen: Any = functools.reduce(operator.or_, commands)
+            return tyro.cli(chosen, args=arguments, prog="jaxbiped", description=__doc__)
     except SystemExit as ended:
         if ended.code:
             print(f"jaxbiped: {one_sentence(refusal.getvalue())}", file=sys.stderr)
         else:
             print(refusal.getvalue(), end="", file=sys.stderr)
         raise
+
+
+def one_sentence(box: str) -> str:
+    """The message of a box: a title, then blocks between rules.
+
+    The first block is the message; of the others, flags and commands that may have been meant.
+    """
+    plain = [_SIDES.sub(r"\1", line) for line in _COLOUR.sub("", box).splitlines()]
+    lines = [line for line in plain if line]
+    blocks: list[list[str]] = [[]]
+    for line in lines:
+        if _RULE.match(line) or line.startswith("╭"):
+            blocks.append([])
+        else:
+            blocks[-1].append(line)
+    # A title stands above the first rule, or within it.
+    filled = [block for block in blocks[1:] if block]
+    if not filled:
+        return "these arguments are not allowed: see jaxbiped --help."
+    message, *others = filled
+    parts = [_join_lines(message)]
+    for block in others:
+        flags = [line.split()[0] for line in block[1:] if line.startswith("--")]
+        flags = [flag for flag in flags if flag not in parts[0].split()]
+        if block[0].startswith("Perhaps you meant") and flags:
+            parts.append(f"perhaps you meant {' or '.join(dict.fromkeys(flags))}")
+        elif block[0].startswith("Available subcommands"):
+            parts.append(_join_lines(block))
+    return "; ".join(part[0].lower() + part[1:] for part in parts) + "."
+
+
+def _join_lines(lines: list[str]) -> str:
+    """The lines of a block in one, up to where it begins to list its reasons."""
+    shown = []
+    for line in lines:
+        if line.startswith(("Got errors", "- <class")):
+            break
+        shown.append(line)
+    return _OPTIONAL.sub(r"\2 is no \1", " ".join(shown)).rstrip(". ")

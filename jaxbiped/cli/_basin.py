@@ -10,16 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import jaxbiped as jb
 from jaxbiped._progress import stage
 from jaxbiped.caching import _import_time
+from jaxbiped.cli import _options as options
 from jaxbiped.cli._basin_starts import StartsOptions
-from jaxbiped.cli._options import (
-    AnyAccuracy,
-    Command,
-    Count,
-    Engine,
-    Options,
-    OutputOptions,
-    make_folder,
-)
 from jaxbiped.cli._report import Report, columns
 from jaxbiped.cli._scene_options import SceneOptions, minimal
 
@@ -44,21 +36,21 @@ _REDUNDANT = (
 )
 
 
-class SweepOptions(Options, of=("labelling", "sweep")):
+class SweepOptions(options.Options, of=("labelling", "sweep")):
     """How starts are followed, and where the results go."""
 
-    footsteps: Count
+    footsteps: options.Count
     """After which a start that is not certain yet is unresolved."""
-    accuracy: AnyAccuracy
+    accuracy: options.AnyAccuracy
     """How accurately to solve: draft, balanced or tight; or the share of the labels that may be
     wrong, such as 1e-4."""
-    engine: Engine
+    engine: options.Engine
     store: Path | None
     """Zarr store for the results; a run that was killed continues there."""
     any_version: bool
     """Continue a store that another version or revision of jaxbiped wrote."""
-    chunk: Count
-    workers: Count = 1
+    chunk: options.Count
+    workers: options.Count = 1
     """Processes of this machine that share the work, each with its share of the cores."""
     scheduler: str | None = None
     """Address of a dask scheduler whose workers do the work."""
@@ -70,18 +62,18 @@ class SweepOptions(Options, of=("labelling", "sweep")):
         return (None if self.workers == 1 else jb.local_executor(self.workers)), self.workers
 
 
-class Basin(Command):
+class Basin(options.Command):
     """Label many starts: which walk on and in which gait, and how the others end."""
 
     scene: Annotated[SceneOptions, minimal(_REDUNDANT)]
     starts: StartsOptions
     sweep: SweepOptions
-    output: OutputOptions
+    output: options.OutputOptions
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
         from jaxbiped.solve._accuracy import accuracy_told
-        from jaxbiped.sweep._labelling_settings import effort_of
+        from jaxbiped.sweep._labelling_preparation import effort_of
         from jaxbiped.sweep._store_files import check_store
 
         scene: Any = self.scene.scene()
@@ -89,7 +81,7 @@ class Basin(Command):
         how = self.sweep.arguments("labelling")
         how["accuracy"] = accuracy_told(self.sweep.accuracy)
         effort = effort_of(scene, **how)
-        make_folder(self.output.out)
+        options.make_folder(self.output.out)
         if self.sweep.store is not None:
             check_store(self.sweep.store)
         executor, workers = self.sweep.executor()

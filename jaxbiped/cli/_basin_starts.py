@@ -6,7 +6,7 @@ from typing import Annotated
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_positive
-from jaxbiped.cli._options import Check, Count, Options, one_of
+from jaxbiped.cli import _options as options
 
 _USUAL = ("theta_swing=-0.5:0.3:100", "omega_swing=-2:4:100")
 """Axes of a basin that nobody chose, and as many starts on each."""
@@ -33,14 +33,11 @@ def parse_axis(text: str) -> tuple[str, tuple[float, float, int]]:
     return name.replace("-", "_"), (first, last, count)
 
 
-def _check_axis(name: str, text: str) -> None:
-    parse_axis(text)
+_IS_AXIS = options.Check(lambda _, text: parse_axis(text))
+Axis = Annotated[str | None, _IS_AXIS]
 
 
-Axis = Annotated[str | None, Check(_check_axis)]
-
-
-class StartsOptions(Options, of=("starts.sample", "starts.grid")):
+class StartsOptions(options.Options, of=("starts.sample", "starts.grid")):
     """Which starts; what is not named keeps the value that the gait has on its section."""
 
     x: Axis = None
@@ -48,11 +45,13 @@ class StartsOptions(Options, of=("starts.sample", "starts.grid")):
     omega_swing, hip_z, hip_vx, hip_vz, or a parameter of the scene."""
     y: Axis = None
     """Vertical axis, likewise."""
-    more: Annotated[tuple[str, ...], Check(_check_axis, each=True)] = ()
+    more: Annotated[
+        tuple[str, ...], options.Check(lambda _, text: parse_axis(text), each=True)
+    ] = ()
     """Further axes, likewise."""
-    samples: Count | None = None
+    samples: options.Count | None = None
     """So many quasi-random starts within the axes' ranges, in place of a grid."""
-    sampling: Annotated[str, one_of("starts.SAMPLINGS")] = "sobol"
+    sampling: Annotated[str, options.one_of("starts.SAMPLINGS")] = "sobol"
     """How they are drawn: uniform, latin-hypercube, sobol or halton."""
     seed: int
     """Of the samples."""
@@ -109,11 +108,7 @@ class StartsOptions(Options, of=("starts.sample", "starts.grid")):
 
 
 def read_starts(path: Path, scene: "jb.Scene | jb.RigidScene") -> object:
-    """Starts from a CSV file, leaves of shape (n,); a rigid walker keeps its part of them.
-
-    Raises:
-        ArgumentError: no such file, another header, or an entry that is not a number.
-    """
+    """Starts from a CSV file, leaves of shape (n,); a rigid walker keeps its part of them."""
     import csv
 
     import numpy as np

@@ -1,8 +1,8 @@
 """`jaxbiped cache`: what is kept on disk for the next process."""
 
 from jaxbiped.caching._disk_cache import BYTES, CACHE_VARIABLE, cache_folder, clear_disk, disk_use
-from jaxbiped.cli._options import Command, JsonPath
-from jaxbiped.cli._report import Report, columns
+from jaxbiped.cli import _options as options
+from jaxbiped.cli._report import Report, columns, records
 
 _CONTENT = {
     "lanes": "machine code of lanes",
@@ -13,12 +13,12 @@ _CONTENT = {
 }
 
 
-class Cache(Command):
+class Cache(options.Command):
     """Show the compiled programs that are kept on disk, or remove them."""
 
     clear: bool = False
     """Remove them all: what is run next compiles again."""
-    json: JsonPath = None
+    json: options.JsonPath = None
     """File for the same in JSON; - prints only that."""
 
     def run(self) -> int:
@@ -35,12 +35,7 @@ class Cache(Command):
             report.say(f"in {folder}, at most {BYTES // 2**20} MiB")
         if removed is not None:
             report.say(f"removed: {removed.entries} entries, {removed.size / 2**20:.1f} MiB")
-        report.finish(
-            {
-                "folder": None if folder is None else str(folder),
-                "bound_bytes": BYTES,
-                "kept": {kind: each._asdict() for kind, each in use.items()},
-                "removed": None if removed is None else removed._asdict(),
-            }
-        )
+        numbers = {"folder": folder and str(folder), "bound_bytes": BYTES}
+        kept = {kind: records(each) for kind, each in use.items()}
+        report.finish(numbers | {"kept": kept, "removed": records(removed)})
         return 0

@@ -26,13 +26,7 @@ _LONG = 1.0
 
 
 class Integrator(NamedTuple):
-    """How to integrate: a solver's name, and its tolerance or its step.
-
-    Attributes:
-        solver: one of `SOLVERS`.
-        rtol: relative tolerance; None for steps of one size.
-        dt: that size [s]; None under error control.
-    """
+    """How to integrate: a solver's name, and its relative tolerance or its step [s]."""
 
     solver: str
     rtol: float | None = None
@@ -40,11 +34,7 @@ class Integrator(NamedTuple):
 
     @staticmethod
     def read(text: str) -> "Integrator":
-        """From `rodas4:1e-6` (a tolerance) or `euler:dt=1e-6` (a step [s]).
-
-        Raises:
-            ArgumentError: anything else.
-        """
+        """From `rodas4:1e-6` (a tolerance) or `euler:dt=1e-6` (a step [s])."""
         solvers = names("solvers.SOLVERS")
         name, _, number = text.partition(":")
         fixed = number.startswith("dt=")
@@ -120,20 +110,9 @@ def compare_constraints(
 
     The truth is the minimal formulation's state at the end, at a tolerance of 1e-10. As many
     programs as there are threads are compiled at once; nothing is while a run is timed. Lanes run
-    what they can, XLA the rest.
-
-    Args:
-        scene: what to simulate.
-        state: start, a `State`.
-        duration: simulated time [s].
-        integrators: how to integrate.
-        methods: some of `CONSTRAINT_METHODS`.
-        repeats: runs of which the fastest counts; none is repeated once they took a second.
-        advance: is told of work that is done, `work` of an integrator for each run.
-
-    Yields:
-        A `ConstraintRun` for every pair of method and integrator as it is done, the integrators
-        with the quickest programs first, the methods of each together.
+    what they can, XLA the rest. Each run is given as it is done, the integrators with the quickest
+    programs first, the methods of each together; `advance` is told of the work, an integrator's
+    `work` for each run. Of `repeats` runs the fastest counts.
     """
     from concurrent.futures import ThreadPoolExecutor
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import jaxbiped as jb
+from jaxbiped.cli import _options as options
 from jaxbiped.cli._constraint_comparison import ConstraintRun, Integrator, compare_constraints
 from jaxbiped.cli._declarations import names
-from jaxbiped.cli._options import Check, Command, Count, Numbers, make_folder, one_of, positive
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._scene_options import SceneOptions, StartOptions, compliant_and_minimal
 
@@ -16,42 +16,42 @@ if TYPE_CHECKING:
     from jaxbiped._types import JsonObject
 
 _COLUMNS = {
-    "method": 9,
-    "integrator": 10,
-    "by": 10,
-    "ending": 13,
-    "max |Phi| m": 11,
-    "rate m/s": 8,
-    "error": 7,
-    "steps": 7,
-    "run s": 6,
-    "to standard": 11,
+    "method": (9, "{0.method}"),
+    "integrator": (10, "{0.integrator}"),
+    "by": (10, "{1} {0.rtol_or_dt:g}"),
+    "ending": (13, "{0.ending}"),
+    "max |Phi| m": (11, "{0.max_violation_m:.1e}"),
+    "rate m/s": (8, "{0.max_violation_rate:.1e}"),
+    "error": (7, "{0.state_error:.1e}"),
+    "steps": (7, "{0.steps}"),
+    "run s": (6, "{0.wall_s_run:.3f}"),
+    "to standard": (11, "{2}"),
 }
-"""Heads and widths: a row is printed before the others are known."""
+"""Widths and formats by heads: a row is printed before the others are known."""
 _BAR = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
 
-class Constraints(Command):
+class Constraints(options.Command):
     """Compare the seven ways to hold the hip together: violation, error against the minimal
     formulation, and time."""
 
     scene: Annotated[SceneOptions, compliant_and_minimal("compared")]
     start: StartOptions
     methods: Annotated[
-        tuple[str, ...], one_of("constraints.CONSTRAINT_METHODS")._replace(each=True)
+        tuple[str, ...], options.one_of("constraints.CONSTRAINT_METHODS")._replace(each=True)
     ] = names("constraints.CONSTRAINT_METHODS")
     """Names of the methods to compare."""
     integrators: Annotated[
-        tuple[str, ...], Check(lambda _, text: Integrator.read(text), each=True)
+        tuple[str, ...], options.Check(lambda _, text: Integrator.read(text), each=True)
     ] = ("rodas4:1e-6", "euler:dt=1e-6", "runge2:dt=1e-6")
     """Each SOLVER:TOLERANCE, or SOLVER:dt=STEP for steps of one size [s]."""
-    duration: Annotated[float, positive("s")] = 0.5
+    duration: Annotated[float, options.positive("s")] = 0.5
     """Simulated time [s]."""
-    repeats: Count = 3
+    repeats: options.Count = 3
     """Runs of which the fastest counts; none is repeated once they took a second."""
     out: Path | None = None
     """Folder for the picture."""
-    json: Numbers = None
+    json: options.Numbers = None
 
     def run(self) -> int:
         """Runs the command; returns the exit code, 1 where Ctrl-C ended it."""
@@ -60,7 +60,7 @@ class Constraints(Command):
         scene = self.scene.scene()
         assert isinstance(scene, jb.Scene)
         integrators = [Integrator.read(text) for text in self.integrators]
-        make_folder(self.out)
+        options.make_folder(self.out)
         report, runs = Report(self.json), list[ConstraintRun]()
         many = len(integrators) * len(self.methods)
         work = len(self.methods) * sum(each.work for each in integrators)
@@ -102,29 +102,16 @@ class Constraints(Command):
 
 def _lines(found: Iterator[ConstraintRun], runs: list[ConstraintRun]) -> Iterator[str]:
     """The table line by line, each as its run is done, which is kept in `runs`."""
-    head = [word.rjust(width) for word, width in _COLUMNS.items()]
+    head = [word.rjust(width) for word, (width, _) in _COLUMNS.items()]
     for run in found:
         runs.append(run)
-        lines = table(head, [_row(run, _usual(run, runs))], most=1).splitlines()
+        told = (run, "dt" if run.fixed else "rtol", _to_standard(run, runs))
+        row = [text.format(*told) for _, text in _COLUMNS.values()]
+        lines = table(head, [row], most=1).splitlines()
         yield "\n".join(lines if len(runs) == 1 else lines[1:])
 
 
-def _usual(run: ConstraintRun, runs: Sequence[ConstraintRun]) -> float | None:
-    """The time of the standard method's run with the same integrator, None for none so far."""
+def _to_standard(run: ConstraintRun, runs: Sequence[ConstraintRun]) -> str:
+    """The time in units of the standard method's with the same integrator, if that has run."""
     same = (each for each in runs if each[1:4] == run[1:4] and each.method == "standard")
-    return next((each.wall_s_run for each in same), None)
-
-
-def _row(run: ConstraintRun, usual: float | None) -> tuple[str, ...]:
-    return (
-        run.method,
-        run.integrator,
-        f"{'dt ' if run.fixed else 'rtol '}{run.rtol_or_dt:g}",
-        run.ending,
-        f"{run.max_violation_m:.1e}",
-        f"{run.max_violation_rate:.1e}",
-        f"{run.state_error:.1e}",
-        str(run.steps),
-        f"{run.wall_s_run:.3f}",
-        "" if usual is None else f"{run.wall_s_run / usual:.2f}",
-    )
+    return next((f"{run.wall_s_run / each.wall_s_run:.2f}" for each in same), "")

@@ -9,19 +9,8 @@ from tyro.conf import arg
 
 import jaxbiped as jb
 from jaxbiped._checks import check_finite
-from jaxbiped.caching import _import_time
-from jaxbiped.cli._options import (
-    Check,
-    Command,
-    Count,
-    CycleFootsteps,
-    Engine,
-    GaitAccuracy,
-    OutputOptions,
-    make_folder,
-    positive,
-)
-from jaxbiped.cli._report import Report, columns, table
+from jaxbiped.cli import _options as options
+from jaxbiped.cli._report import Report, columns, records, table, wall_times
 from jaxbiped.cli._scene_options import SceneOptions, StartOptions
 
 if TYPE_CHECKING:
@@ -31,45 +20,41 @@ _MOST_ROWS = 24
 _STABLE = {True: "yes", False: "no", None: "undecided"}
 
 
-class ContinueGait(Command, of=("continue_gait",)):
+class ContinueGait(options.Command, of=("continue_gait",)):
     """Follow the periodic gait along a parameter; print its stability and its bifurcations."""
 
     scene: SceneOptions
     start: StartOptions
-    output: OutputOptions
+    output: options.OutputOptions
     along: str = "slope"
     """The parameter, by its name."""
-    first: Annotated[float, arg(name="from"), Check(check_finite)] = 0.005
+    first: Annotated[float, arg(name="from"), options.Check(check_finite)] = 0.005
     """Beginning of its range (SI units)."""
-    last: Annotated[float, arg(name="to"), Check(check_finite)] = 0.1
+    last: Annotated[float, arg(name="to"), options.Check(check_finite)] = 0.1
     """End of its range."""
-    footsteps: CycleFootsteps
+    footsteps: options.CycleFootsteps
     log: bool | None
-    largest_step: Annotated[float, positive()]
+    largest_step: Annotated[float, options.positive()]
     """Largest arclength of a step, in which the range counts 1."""
-    max_points: Count
-    accuracy: GaitAccuracy
-    engine: Engine
+    max_points: options.Count
+    accuracy: options.GaitAccuracy
+    engine: options.Engine
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
         continue_gait, imported = jb.continue_gait, time.perf_counter()
         scene = self.scene.scene()
-        state = self.start.state(scene) if self.start.given else None
-        make_folder(self.output.out)
+        guess = self.start.guess(scene)
+        options.make_folder(self.output.out)
         branch = continue_gait(
             scene,  # type: ignore[arg-type]
             self.along,
             bounds=(self.first, self.last),
-            guess=state,
+            guess=guess,
             progress=True,
             **self.arguments("continue_gait"),
         )
-        wall = {
-            "import": imported - _import_time.IMPORT_BEGAN,
-            "total": time.perf_counter() - _import_time.IMPORT_BEGAN,
-        }
-        report = Report(self.output.json)
+        report, wall = Report(self.output.json), wall_times(imported)
         if len(branch):
             _print(report, branch, wall)
         else:
@@ -99,8 +84,8 @@ def branch_numbers(branch: "jb.continuation.Branch") -> "JsonObject":
             for each in branch.points
         ],
         "bifurcations": [
-            {name: x for name, x in each._asdict().items() if name != "point"}
-            | {"kind": str(each.kind), "value": each.value}
+            {name: x for name, x in records(each).items() if name != "point"}
+            | {"value": each.value}
             for each in branch.bifurcations
         ],
         "ends": [

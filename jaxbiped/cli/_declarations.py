@@ -6,8 +6,10 @@ what is said of them is read in the source of what declares it, as syntax.
 
 import ast
 import contextlib
+import inspect
 import math
 import re
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -55,19 +57,29 @@ def signature(name: str) -> dict[str, Argument]:
 
 def fields(name: str) -> dict[str, Argument]:
     """The fields of a public class; those that `parameter` declares with their units."""
-    _, part = _definition(name)
-    assert isinstance(part, ast.ClassDef)
-    said, found = _entries(part), {}
-    for node in part.body:
-        if isinstance(node, ast.AnnAssign) and "ClassVar" not in ast.unparse(node.annotation):
-            own, default, info = ast.unparse(node.target), None, None
-            if isinstance(node.value, ast.Call):
-                expression = compile(ast.Expression(node.value), name, "eval")
-                default, info = eval(expression, _DECLARING)
-            words = _UNIT.sub("", said.get(own, "")).removesuffix(".")
-            unit = f" [{info.quantity.unit}]" if info and info.quantity.unit else ""
-            found[own] = Argument(default, f"{words}{unit}.", info)
+    found = {}
+    for part in _with_bases(*_definition(name)):
+        said = _entries(part)
+        for node in part.body:
+            if isinstance(node, ast.AnnAssign) and "ClassVar" not in ast.unparse(node.annotation):
+                own, default, info = ast.unparse(node.target), None, None
+                if isinstance(node.value, ast.Call):
+                    expression = compile(ast.Expression(node.value), name, "eval")
+                    default, info = eval(expression, _DECLARING)
+                words = _UNIT.sub("", said.get(own, "")).removesuffix(".")
+                unit = f" [{info.quantity.unit}]" if info and info.quantity.unit else ""
+                found[own] = Argument(default, f"{words}{unit}.", info)
     return found
+
+
+def _with_bases(module: str, part: ast.stmt) -> list[ast.ClassDef]:
+    """A class behind those of its bases that its module defines."""
+    assert isinstance(part, ast.ClassDef)
+    found = []
+    for base in part.bases:
+        with contextlib.suppress(ValueError):
+            found += _with_bases(module, _statement(module, ast.unparse(base)))
+    return [*found, part]
 
 
 def names(registry: str) -> tuple[str, ...]:
@@ -137,7 +149,10 @@ def _statement(module: str, own: str) -> ast.stmt:
 
 def _source(module: str) -> str:
     if module not in _SOURCES:
-        path = _ROOT.joinpath(*module.split(".")[1:])
+        package, *parts = module.split(".")
+        if package != _ROOT.name:  # an option of a user's own command
+            return inspect.getsource(sys.modules[module])
+        path = _ROOT.joinpath(*parts)
         if path == _ROOT:
             path = path / "__init__.pyi"
         else:

@@ -1,12 +1,13 @@
 """`jaxbiped doctor`: what is installed and whether it computes rightly, for reports of bugs."""
 
+import contextlib
 import time
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import jaxbiped as jb
 from jaxbiped.caching._disk_cache import cache_folder, disk_use
-from jaxbiped.cli._options import Command, JsonPath
+from jaxbiped.cli import _options as options
 from jaxbiped.cli._report import Report, columns
 
 PACKAGES = (
@@ -33,10 +34,10 @@ _PUBLISHED = (0.200310900544287, -0.199832473004977)
 Chatterjee, Ruina and Coleman, Journal of Biomechanical Engineering 120 (1998) 281."""
 
 
-class Doctor(Command):
+class Doctor(options.Command):
     """Show versions, vectors, threads and caches, and test this machine's answers."""
 
-    json: JsonPath = None
+    json: options.JsonPath = None
     """File for the same in JSON; - prints only that."""
 
     def run(self) -> int:
@@ -48,9 +49,8 @@ class Doctor(Command):
         from jaxbiped.compiler import default_threads, host
 
         system = f"{platform.system()} {platform.machine()}"
-        report, versions, size = Report(self.json), _versions(), 0
-        for each in disk_use().values():
-            size += each.size
+        report, versions = Report(self.json), _versions()
+        size = sum(each.size for each in disk_use().values())
         report.say(
             columns({"package": "{0[0]}", "version": "{0[1]}"}, versions.items()),
             f"Python {platform.python_version()} on {system}",
@@ -98,23 +98,15 @@ def complaints(versions: Mapping[str, str]) -> list[str]:
 def _versions() -> dict[str, str]:
     from importlib.metadata import PackageNotFoundError, version
 
-    found = {}
+    found = dict.fromkeys(PACKAGES, "not installed")
     for name in PACKAGES:
-        try:
+        with contextlib.suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
     return found
 
 
 class Truth(NamedTuple):
-    """One number that is known, and what this machine says.
-
-    Attributes:
-        name: what it is.
-        known, found: the truth, and this machine's answer (SI units).
-        allowed: by how much they may differ.
-    """
+    """One number that is known, what this machine finds, and by how much they may differ (SI)."""
 
     name: str
     known: float

@@ -7,7 +7,7 @@ from tyro.conf import Positional
 
 import jaxbiped as jb
 from jaxbiped._files import read_json
-from jaxbiped.cli._options import Check, Command, Count, Engine, GaitAccuracy, Numbers
+from jaxbiped.cli import _options as options
 from jaxbiped.cli._report import Report, columns
 from jaxbiped.cli._scene_options import SceneOptions, minimal
 
@@ -22,18 +22,18 @@ _ESTIMATE = {
 _REDUNDANT = 'formulation = "redundant" is not allowed here: it must be "minimal".'
 
 
-class Fit(Command, of=("fit_gait",)):
+class Fit(options.Command, of=("fit_gait",)):
     """Fit parameters to measured gaits; print estimates, their errors and what data cannot tell."""
 
-    file: Annotated[Positional[Path], Check(read_json)]
+    file: Annotated[Positional[Path], options.Check(read_json)]
     """JSON file of measured gaits (see jaxbiped.identify.read_measured)."""
     vary: str
     """Names of the parameters to fit, with commas between: K,c,mu_kinetic."""
     scene: Annotated[SceneOptions, minimal(_REDUNDANT)]
-    accuracy: GaitAccuracy
-    engine: Engine
-    max_evaluations: Count
-    json: Numbers = None
+    accuracy: options.GaitAccuracy
+    engine: options.Engine
+    max_evaluations: options.Count
+    json: options.Numbers = None
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""

@@ -6,17 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
-from jaxbiped.caching import _import_time
-from jaxbiped.cli._options import (
-    Accuracy,
-    Command,
-    CycleFootsteps,
-    Engine,
-    OutputOptions,
-    among,
-    make_folder,
-)
-from jaxbiped.cli._report import Report, columns, words
+from jaxbiped.cli import _options as options
+from jaxbiped.cli._report import Report, columns, wall_times, words
 from jaxbiped.cli._scene_options import SceneOptions, StartOptions
 
 if TYPE_CHECKING:
@@ -58,17 +49,17 @@ _ELASTICITY = {
 }
 
 
-class FindGait(Command, of=("find_gait",)):
+class FindGait(options.Command, of=("find_gait",)):
     """Find the periodic gait near a start; print its multipliers and its elasticities."""
 
     scene: SceneOptions
     start: StartOptions
-    output: OutputOptions
-    accuracy: Accuracy
-    footsteps: CycleFootsteps
-    section: Annotated[str | None, among(*_SECTIONS)]
+    output: options.OutputOptions
+    accuracy: options.Accuracy
+    footsteps: options.CycleFootsteps
+    section: Annotated[str | None, options.among(*_SECTIONS)]
     """Where a cycle begins: mid-stance (the usual one) or heel-strike (a rigid walker's)."""
-    engine: Engine
+    engine: options.Engine
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
@@ -78,26 +69,21 @@ class FindGait(Command, of=("find_gait",)):
 
         find_gait, imported = jb.find_gait, time.perf_counter()
         scene = self.scene.scene()
-        # A start that is not told is the search's own choice.
-        state = self.start.state(scene) if self.start.given else None
-        make_folder(self.output.out)
+        guess = self.start.guess(scene)
+        options.make_folder(self.output.out)
         section = None if self.section is None else getattr(jb, _SECTIONS[self.section])()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
             gait = find_gait(
                 scene,
-                state,
+                guess,
                 footsteps=self.footsteps,
                 section=section,
                 accuracy=accuracy_told(self.accuracy),
                 engine=self.engine,
             )
         found = gait.outcome is jb.gait.Search.FOUND  # waits for the result
-        wall = {
-            "import": imported - _import_time.IMPORT_BEGAN,
-            "total": time.perf_counter() - _import_time.IMPORT_BEGAN,
-        }
-        search = jb.gait.explain_search(scene, gait)
+        wall, search = wall_times(imported), jb.gait.explain_search(scene, gait)
         numbers = gait_numbers(gait) | {"search": search, "wall_s": wall}
         if gait.error is not None:
             numbers["error"] = error_numbers(gait.error)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import jaxbiped as jb
 from jaxbiped._progress import stage
-from jaxbiped.cli._options import Command, JsonPath
+from jaxbiped.cli import _options as options
 from jaxbiped.cli._report import Report, columns
 from jaxbiped.cli._scene_options import MATCHED, SEED
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 _RUNG = {"rung": "{0[name]}", "states": "{0[states]}", "operations": "{0[operations]}"}
 
 
-class Models(Command):
+class Models(options.Command):
     """List the laws of contact and the ladder of models, with parameters, units and cost."""
 
-    json: JsonPath = None
+    json: options.JsonPath = None
     """File for the same in JSON; - prints only that."""
 
     def run(self) -> int:

@@ -9,16 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped.cli._options import (
-    Command,
-    Count,
-    Engine,
-    GaitAccuracy,
-    NotNegative,
-    Numbers,
-    one_of,
-)
-from jaxbiped.cli._report import Report, columns
+from jaxbiped.cli import _options as options
+from jaxbiped.cli._report import Report, columns, records
 from jaxbiped.cli._scene_options import SceneOptions, minimal
 
 if TYPE_CHECKING:
@@ -33,7 +25,7 @@ _REDUNDANT = (
 )
 
 
-class Optimise(Command, of=("optimise.certify", "optimise_gait")):
+class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
     """Find the parameters within bounds whose periodic gait is best, and certify it."""
 
     vary: str
@@ -45,26 +37,26 @@ class Optimise(Command, of=("optimise.certify", "optimise_gait")):
     """Or to minimise, such as spectral_radius."""
     subject_to: tuple[str, ...] = ()
     """What must hold, such as "spectral_radius<0.4" "step_length>0.2"."""
-    optimiser: Annotated[str, one_of("optimise.OPTIMISERS")]
+    optimiser: Annotated[str, options.one_of("optimise.OPTIMISERS")]
     """trust-region, slsqp, trust-constr, or without requirements optax."""
-    iterations: Count
+    iterations: options.Count
     """Most iterations of a run."""
-    restarts: NotNegative
+    restarts: options.NotNegative
     """Further runs, from the best of scattered designs."""
     seed: int
     """Seed of these designs."""
-    accuracy: GaitAccuracy
-    engine: Engine
-    basin: NotNegative = 1024
+    accuracy: options.GaitAccuracy
+    engine: options.Engine
+    basin: options.NotNegative = 1024
     """Starts about the gait that are labelled for the certificate's basin; 0 for none."""
-    footsteps: NotNegative
+    footsteps: options.NotNegative
     """Footsteps of the certificate's walk from a pushed start; 0 for none."""
     bifurcations: str = "slope"
     """Parameters in which the certificate seeks the nearest bifurcation: slope,d; or none."""
     fatal_push: bool
     other_engine: bool
     store: Path | None
-    json: Numbers = None
+    json: options.Numbers = None
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
@@ -117,10 +109,8 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
                     f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
                 )
             least, most = value / _USUAL_RANGE, value * _USUAL_RANGE
-            found[name] = (
-                farthest_allowed(scene, name, least),
-                farthest_allowed(scene, name, most),
-            )
+            low, high = (farthest_allowed(scene, name, end) for end in (least, most))
+            found[name] = (low, high)
             continue
         try:
             low, high = bounds.split(":", 1)
@@ -155,7 +145,7 @@ def _optimum_numbers(
             }
             for name, value in found.known.values.items()
         },
-        "history": [each._asdict() for each in found.history],
+        "history": records(found.history),
         "evaluations": found.evaluations,
         "lost": found.lost,
         "unmeasured": found.unmeasured,
@@ -166,28 +156,19 @@ def _optimum_numbers(
 def _certificate_numbers(certificate: "jb.optimise.Certificate") -> "JsonObject":
     """A certificate, for `strict_json`."""
     told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
-    basin, walk = certificate.basin, certificate.walk
-    other, push = certificate.other_engine, certificate.fatal_push
-    return {
+    basin, push = certificate.basin, certificate.fatal_push
+    numbers = {
         "kkt_residual": told.residual,
         "kkt_residual_error": told.error,
         "excess": told.excess,
-        "constraints": [each._asdict() for each in told.requirements],
-        "bounds": [each._asdict() for each in told.bounds],
-        "multipliers": certificate.multipliers,
-        "multiplier_errors": certificate.multiplier_errors,
-        "unit_multiplier_error": certificate.unit_multiplier_error,
-        "stable": certificate.stable,
+        "constraints": records(told.requirements),
+        "bounds": records(told.bounds),
+    } | records(certificate)
+    del numbers["optimality"]
+    return numbers | {
         "sensitivity_norm": {"value": norm, "error": norm_error},
         "basin": basin and dataclasses.asdict(basin),
         "fatal_push": push and {"distance": push.distance, "push": push.push},
-        "walk": walk and walk._asdict(),
-        "other_engine": other and other._asdict(),
-        "nearest_bifurcations": [
-            each._asdict() | {"kind": None if each.kind is None else str(each.kind)}
-            for each in certificate.nearest_bifurcations
-        ],
-        "failed": certificate.failed,
     }
 
 

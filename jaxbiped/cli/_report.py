@@ -1,14 +1,17 @@
 """Reports for people and for programs."""
 
+import enum
 import math
 import os
 import string
 import sys
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jaxbiped._files import strict_json
+from jaxbiped.caching import _import_time
 
 if TYPE_CHECKING:
     from jaxbiped._types import JsonObject
@@ -47,6 +50,21 @@ def _write(text: str) -> None:
     except BrokenPipeError:
         # What is left in the buffer goes nowhere, instead of raising once more at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def wall_times(imported: float) -> dict[str, float]:
+    """How long the import took, which ended at `imported`, and all until now [s]."""
+    began = _import_time.IMPORT_BEGAN
+    return {"import": imported - began, "total": time.perf_counter() - began}
+
+
+def records(result: Any) -> Any:
+    """A result as dictionaries by the names of its fields, and enumerations in words."""
+    if hasattr(result, "_asdict"):
+        return {name: records(each) for name, each in result._asdict().items()}
+    if isinstance(result, list | tuple):
+        return [records(each) for each in result]
+    return str(result) if isinstance(result, enum.Enum) else result
 
 
 class _Words(string.Formatter):

@@ -19,7 +19,6 @@ from jaxbiped.cli._options import Check, Field, Options, among, one_of
 if TYPE_CHECKING:
     AnyScene = jb.Scene | jb.RigidScene | jb.RedundantScene
 
-_BODY = ("m", "J", "l", "d", "r", "hip_mass")
 MATCHED = {"normal": ("K", "c", "n"), "friction": ("mu_static", "mu_kinetic", "v0", "xi")}
 """Parameters that laws of each kind are matched to."""
 
@@ -177,7 +176,9 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
     def scene(self) -> "AnyScene":
         """The scene that these options describe; raises `ArgumentError`."""
         self.check()
-        scene: Any = self._rigid() if self.model == "rigid" else self._compliant()
+        own = jb.seed_scene(**self.values)
+        rolls = self.model == "rigid"
+        scene: Any = jb.RigidScene(own.walker, own.ground) if rolls else self._with_laws(own)
         scene = dataclasses.replace(scene, actuation=self.driven.actuation())
         scene = jb.with_parameters(scene, self.named_values())
         if self.formulation == "minimal":
@@ -185,16 +186,10 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         method = jb.constraints.CONSTRAINT_METHODS[self.method or "index1"]()
         return jb.RedundantScene(scene, method, self.orientation)
 
-    def _rigid(self) -> "jb.RigidScene":
-        walker = jb.Walker(**{name: self.values[name] for name in _BODY})
-        ground = jb.Ground(slope=self.values["slope"], g=self.values["g"])
-        return jb.RigidScene(walker=walker, ground=ground)
-
-    def _compliant(self) -> "jb.Scene":
+    def _with_laws(self, own: "jb.Scene") -> "jb.Scene":
         import jax.tree_util as jtu
         import numpy as np
 
-        own = jb.seed_scene(**self.values)
         # By NumPy: JAX would compile a program for each operation.
         mass = jtu.tree_map(np.asarray, own.walker).total_mass
         normal = self._law("normal", {"mass": mass, "g": self.values["g"]})
@@ -266,6 +261,10 @@ class StartOptions(Options):
         """Raises `ArgumentError` for a number that is not finite."""
         for name, value in self.given.items():
             check_finite(f"state.{name}", value)
+
+    def guess(self, scene: "AnyScene") -> Any:
+        """The start if any of it was said; else None, which leaves it to a search."""
+        return self.state(scene) if self.given else None
 
     def state(self, scene: "AnyScene") -> Any:
         """The start, of the kind that the scene needs; raises `ArgumentError`.

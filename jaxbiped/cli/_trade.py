@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
 from jaxbiped._progress import stage
-from jaxbiped.cli._options import Command, Count, Numbers, make_folder, positive
+from jaxbiped.cli import _options as options
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._scene_options import SceneOptions, StartOptions, compliant_and_minimal
 
@@ -37,21 +37,21 @@ _FURTHER = {
 _FURTHER_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 
 
-class Trade(Command):
+class Trade(options.Command):
     """Measure what each accuracy costs for a scene: errors of a walk and of the gait, by our own
     methods, engines and tolerances, each beside its steps and its time."""
 
     scene: Annotated[SceneOptions, compliant_and_minimal("measured")]
     start: StartOptions
-    duration: Annotated[float, positive("s")] = 2.0
+    duration: Annotated[float, options.positive("s")] = 2.0
     """Simulated time of the walk [s]."""
-    repeats: Count = 3
+    repeats: options.Count = 3
     """Warm runs of which the median counts."""
     full: bool = False
     """Every solver, both engines and a ladder of tolerances; takes many minutes."""
     out: Path | None = None
     """Folder for the pictures."""
-    json: Numbers = None
+    json: options.Numbers = None
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
@@ -61,7 +61,7 @@ class Trade(Command):
         assert isinstance(scene, jb.Scene)
         start = self.start.state(scene)
         assert isinstance(start, jb.State)
-        make_folder(self.out)
+        options.make_folder(self.out)
         report = Report(self.json)
         trades: dict[str, Any] = {
             "walk": WalkTrade(scene, start, self.duration, self.repeats),

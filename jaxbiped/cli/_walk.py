@@ -9,17 +9,7 @@ import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
 from jaxbiped.caching import _import_time
-from jaxbiped.cli._options import (
-    AnyAccuracy,
-    Command,
-    Count,
-    Engine,
-    Options,
-    OutputOptions,
-    make_folder,
-    one_of,
-    positive,
-)
+from jaxbiped.cli import _options as options
 from jaxbiped.cli._scene_options import SceneOptions, StartOptions
 
 MOST_STEPS = 1 << 20
@@ -32,24 +22,24 @@ _ROOM = 1 << 17
 """Steps that XLA finds room for at first; a walk that takes more is run again with more room."""
 
 
-class SolveOptions(Options, of=("simulate",)):
+class SolveOptions(options.Options, of=("simulate",)):
     """How long and how to solve."""
 
-    duration: Annotated[float, positive("s")] = 10.0
+    duration: Annotated[float, options.positive("s")] = 10.0
     """Simulated time [s]."""
-    solver: Annotated[str, one_of("solvers.SOLVERS")]
+    solver: Annotated[str, options.one_of("solvers.SOLVERS")]
     """Name of a solver: ours (rodas3p, rodas4, rodas4p, rodas5p) or one of diffrax's."""
-    accuracy: AnyAccuracy | None = None
+    accuracy: options.AnyAccuracy | None = None
     """In place of tolerances: draft, balanced or tight; or a relative error, such as 1e-4."""
-    rtol: Annotated[float | None, positive()] = None
+    rtol: Annotated[float | None, options.positive()] = None
     """Relative tolerance; 1e-6 unless given."""
-    atol: Annotated[float | None, positive()] = None
+    atol: Annotated[float | None, options.positive()] = None
     """Absolute tolerance (SI units); a hundredth of the relative one unless given."""
-    dt: Annotated[float | None, positive("s")] = None
+    dt: Annotated[float | None, options.positive("s")] = None
     """Steps of this size [s], in place of tolerances; what --solver euler needs."""
-    max_solver_steps: Count | None = None
+    max_solver_steps: options.Count | None = None
     """Cap on the solver's steps: unless given 65536 for each ten seconds, at most 1048576."""
-    engine: Engine
+    engine: options.Engine
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself."""
@@ -102,13 +92,13 @@ class SolveOptions(Options, of=("simulate",)):
         return int(min(MOST_STEPS, _STEPS_OF_TEN_SECONDS * max(1.0, self.duration / 10.0)))
 
 
-class Walk(Command):
+class Walk(options.Command):
     """Simulate the seed's walker from a start; print its footsteps and how it ended."""
 
     scene: SceneOptions
     start: StartOptions
     solve: SolveOptions
-    output: OutputOptions
+    output: options.OutputOptions
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
@@ -136,7 +126,7 @@ class Walk(Command):
                 engine=solve.engine,
                 max_solver_steps=solve.most_steps(),
             )
-        make_folder(self.output.out)
+        options.make_folder(self.output.out)
         began = time.perf_counter()
         walk, seconds = _simulate(request, solve.wanted())
         wall = {"compile": time.perf_counter() - began - seconds, "run": seconds}
@@ -147,11 +137,11 @@ class Walk(Command):
     def _roll(self, scene: Any, state: Any) -> _Walked:
         """Walks on rigid feet."""
         solve = self.solve
-        make_folder(self.output.out)
+        options.make_folder(self.output.out)
         solve.check_rolling()
         wanted, tolerances = solve.wanted(), solve.tolerances()
         tolerances.pop("atol", None)
-        options = dict(
+        how = dict(
             duration=solve.duration,
             engine=solve.engine,
             max_arrivals=_MOST_STRIKES,
@@ -160,10 +150,10 @@ class Walk(Command):
         )
         prepared = time.perf_counter()
         with stage("compiling the simulation (first time for this kind of scene)"):
-            _rigid_walk(scene, state, options)
+            _rigid_walk(scene, state, how)
         compiled = time.perf_counter()
         with stage(f"simulating {solve.duration:g} s"):
-            walk = _rigid_walk(scene, state, options)
+            walk = _rigid_walk(scene, state, how)
         run = time.perf_counter() - compiled
         # The first run compiles; what a run takes by itself is the second one's.
         wall = {"compile": compiled - prepared - run, "run": run}
@@ -175,12 +165,10 @@ class Walk(Command):
         return walk, {"name": "dopri8", "rtol": rtol}, wall
 
 
-def _rigid_walk(
-    scene: "jb.RigidScene", state: Any, options: dict[str, Any]
-) -> "jb.Trajectory[Any]":
+def _rigid_walk(scene: "jb.RigidScene", state: Any, how: dict[str, Any]) -> "jb.Trajectory[Any]":
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
-        walk = jb.rigid_walk(scene, state, **options)
+        walk = jb.rigid_walk(scene, state, **how)
     walk.t.block_until_ready()
     return walk
 

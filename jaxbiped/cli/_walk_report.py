@@ -156,8 +156,12 @@ def footstep_rows(steps: Any) -> list[dict[str, float]]:
     """The footsteps of a walk on compliant feet, each ready for JSON."""
     names = ("time_s", "period_s", "length_m", "speed_m_s", "peak_normal_N", "max_penetration_m",
              "double_support_s")  # fmt: skip
-    found = np.transpose([np.asarray(getattr(steps, name)) for name in names]).tolist()
-    return [dict(zip(names, row, strict=True)) for row in found]
+    return _rows({name: np.asarray(getattr(steps, name)) for name in names})
+
+
+def _rows(columns: dict[str, np.ndarray]) -> list[dict[str, float]]:
+    rows = np.transpose([*columns.values()]).tolist()
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def _rigid_footsteps(scene: "jb.RigidScene", strikes: Any) -> list[dict[str, float]]:
@@ -167,15 +171,9 @@ def _rigid_footsteps(scene: "jb.RigidScene", strikes: Any) -> list[dict[str, flo
     # Where the new stance foot comes down: under its centre, which lies on the leg's axis.
     reach = float(scene.walker.hip_to_foot)
     places = np.asarray(states.hip_x)[:count] + reach * np.sin(np.asarray(states.theta_2)[:count])
-    return [
-        {
-            "time_s": float(time),
-            "period_s": float(period),
-            "length_m": float(length),
-            "speed_m_s": float(length / period),
-        }
-        for time, period, length in zip(at[1:], np.diff(at), np.diff(places), strict=True)
-    ]
+    periods, lengths = np.diff(at), np.diff(places)
+    columns = {"time_s": at[1:], "period_s": periods, "length_m": lengths}
+    return _rows(columns | {"speed_m_s": lengths / periods})
 
 
 def write_outputs(scene: Any, walk: "jb.Trajectory[Any]", out: Path) -> list[Path]:

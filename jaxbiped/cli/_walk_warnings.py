@@ -6,7 +6,7 @@ import numpy as np
 
 import jaxbiped as jb
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._contact_forces import contacts
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._samples import at_steps
 from jaxbiped.solve._accuracy import unresolved_slip
 

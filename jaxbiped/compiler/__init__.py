@@ -31,3 +31,5 @@ CUDA = LaneEngine(DEVICES)
 """The same programs on CUDA devices, one simulation a thread."""
 XLA = LoopEngine()
 """The same programs as loops of XLA."""
+BY_NAME: dict[str, AbstractEngine] = {"xla": XLA, "lanes": LANES, "cuda": CUDA}
+"""Engines by name. One that is added here runs rigid walks and labels."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 import equinox as eqx
 
 from jaxbiped._checks import check_at_least
-from jaxbiped._parameter_declaration import check_parameters
+from jaxbiped._parameter_declaration import AbstractPart
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.linalg._symmetric import factorise, solve
 
@@ -39,7 +39,7 @@ class Constrained(NamedTuple):
     bias: list[Scalar]
 
 
-class AbstractConstraintMethod(eqx.Module):
+class AbstractConstraintMethod(AbstractPart):
     """Finds the multipliers λ of M q̈ = Q − Jᵀ λ. A pytree of its constants.
 
     Attributes:
@@ -47,9 +47,6 @@ class AbstractConstraintMethod(eqx.Module):
     """
 
     needs_independent: AbstractClassVar[bool]
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
 
     @abc.abstractmethod
     def multipliers(self, system: Constrained) -> list[Scalar]:

@@ -60,23 +60,16 @@ class Baumgarte(AbstractConstraintMethod):
         return exact_multipliers(system, stabilised_residual(system, 2.0 * self.a, self.b * self.b))
 
 
-def penalty_system(
-    system: Constrained, A: Scalar, omega: Scalar, zeta: Scalar
-) -> tuple[Factors, list[Scalar]]:
-    """Factors of J M⁻¹ Jᵀ + 1/A, and the violation that the applied forces alone would leave.
+class AbstractPenalised(AbstractConstraintMethod):
+    """A method with a penalty, which is regular whatever the constraints say.
 
-    By Woodbury's identity (M + A JᵀJ)⁻¹ asks for no more than that k × k matrix, which is regular
-    whatever the constraints say, and is well conditioned where M + A JᵀJ is not.
-    """
-    right = stabilised_residual(system, 2.0 * zeta * omega, omega * omega)
-    return factorise(gram(system.rows, inverse_masses(system.masses), 1.0 / A)), right
-
-
-class AbstractAugmented(AbstractConstraintMethod):
-    """Accelerations by the augmented Lagrangian: the penalty's, and again for what that leaves.
+    Attributes:
+        A: penalty [kg].
+        omega: ω, the frequency at which a violation decays [1/s].
+        zeta: ζ, its damping [–].
 
     Raises:
-        ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
+        ArgumentError: A not above 0, or ω or ζ below 0.
     """
 
     A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e7)
@@ -84,14 +77,35 @@ class AbstractAugmented(AbstractConstraintMethod):
         "constraint frequency", r"$\omega$", "1/s", minimum=0.0, default=10.0
     )
     zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
-    iterations: int = eqx.field(static=True, default=3)
     needs_independent: ClassVar[bool] = False
+
+    def penalty_system(self, system: Constrained) -> tuple[Factors, list[Scalar]]:
+        """Factors of J M⁻¹ Jᵀ + 1/A, and the violation that the applied forces alone would leave.
+
+        By Woodbury's identity (M + A JᵀJ)⁻¹ asks for no more than that k × k matrix, which is
+        regular whatever the constraints say, and is well conditioned where M + A JᵀJ is not.
+        """
+        right = stabilised_residual(system, 2.0 * self.zeta * self.omega, self.omega * self.omega)
+        return factorise(gram(system.rows, inverse_masses(system.masses), 1.0 / self.A)), right
+
+
+class AbstractAugmented(AbstractPenalised):
+    """Accelerations by the augmented Lagrangian: the penalty's, and again for what that leaves.
+
+    Attributes:
+        iterations: how often, for accelerations and for each projection.
+
+    Raises:
+        ArgumentError: fewer than one iteration.
+    """
+
+    iterations: int = eqx.field(static=True, default=3)
 
     def __check_init__(self) -> None:
         check_at_least("iterations", self.iterations, "1", 1)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        factors, right = penalty_system(system, self.A, self.omega, self.zeta)
+        factors, right = self.penalty_system(system)
         matrix = gram(system.rows, inverse_masses(system.masses))
         return iterate_multipliers(factors, matrix, right, self.iterations)
 
@@ -118,7 +132,7 @@ def iterate_multipliers(
     return found
 
 
-class Penalty(AbstractConstraintMethod):
+class Penalty(AbstractPenalised):
     """(M + A JᵀJ) q̈ = Q − A Jᵀ(J̇ q̇ + 2 ζ ω Φ̇ + ω² Φ): stiff springs in place of constraints.
 
     What holds the joint is λ = A (Φ̈ + 2 ζ ω Φ̇ + ω² Φ), so a loaded joint is open by about
@@ -129,25 +143,12 @@ class Penalty(AbstractConstraintMethod):
     that say the same twice share the load, to A s roundings.
 
     Source: the seed paper, section 4, "penalty"; Bayo, García de Jalón and Serna (1988).
-
-    Attributes:
-        A: penalty [kg].
-        omega: ω, the frequency at which a violation decays [1/s].
-        zeta: ζ, its damping [–].
-
-    Raises:
-        ArgumentError: A not above 0, or ω or ζ below 0.
     """
 
     A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e10)
-    omega: Parameter = parameter(
-        "constraint frequency", r"$\omega$", "1/s", minimum=0.0, default=10.0
-    )
-    zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
-    needs_independent: ClassVar[bool] = False
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        return solve(*penalty_system(system, self.A, self.omega, self.zeta))
+        return solve(*self.penalty_system(system))
 
 
 class Augmented(AbstractAugmented):
@@ -158,15 +159,6 @@ class Augmented(AbstractAugmented):
     and derivatives are those of the same arithmetic: three leave nothing at the usual A.
 
     Source: the seed paper, section 4, "augmented"; Bayo, García de Jalón and Serna (1988).
-
-    Attributes:
-        A: penalty [kg].
-        omega: ω, the frequency at which a violation decays [1/s].
-        zeta: ζ, its damping [–].
-        iterations: how often.
-
-    Raises:
-        ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
     """
 
 
@@ -177,12 +169,6 @@ class Index1(AbstractExactProjection):
 
     Source: the seed paper, section 4, names an "index-1 projection method" and does not define it;
     this is the usual meaning.
-
-    Attributes:
-        iterations: corrections of the positions after each step.
-
-    Raises:
-        ArgumentError: fewer than one iteration.
     """
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
@@ -196,15 +182,6 @@ class Index1Augmented(AbstractAugmented, AbstractProjectingMethod):
     again with what that leaves, so that constraints which say the same twice do no harm.
 
     Source: the seed paper, section 4, "index-1 augmented lagrangian"; Bayo and Ledesma (1996).
-
-    Attributes:
-        A: penalty [kg].
-        omega: ω, the frequency at which a violation decays within a step [1/s].
-        zeta: ζ, its damping [–].
-        iterations: how often, for accelerations and for each projection.
-
-    Raises:
-        ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
     """
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
@@ -221,12 +198,6 @@ class DirectCorrection(AbstractExactProjection):
     different split between translation and rotation than the mass metric's.
 
     Source: the seed paper, section 4, "described", the direct correction method.
-
-    Attributes:
-        iterations: corrections of the positions after each step.
-
-    Raises:
-        ArgumentError: fewer than one iteration.
     """
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:

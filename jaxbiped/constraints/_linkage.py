@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped._circular import sine_cosine
-from jaxbiped._parameter_declaration import check_parameters, parameter
+from jaxbiped._parameter_declaration import AbstractPart, check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.constraints._constraint_method import Row
 
@@ -20,7 +20,7 @@ ORIENTATIONS = ("angle", "euler")
 """
 
 
-class Body(eqx.Module):
+class Body(AbstractPart):
     """A rigid body in the plane.
 
     Attributes:
@@ -33,9 +33,6 @@ class Body(eqx.Module):
 
     mass: Parameter = parameter("body mass", "$m$", "kg", positive=True)
     inertia: Parameter = parameter("body inertia", "$J$", "kg m^2", positive=True)
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
 
 
 class Joint(eqx.Module):

@@ -112,12 +112,8 @@ def bifurcation_curve(
         raise ArgumentError(f"bounds = {bounds!r} is not allowed: {along} = {own:g} is outside.")
     setup = setup_of(branch, accuracy=accuracy, engine=engine)
     curve = _extended_curve(setup, second, bifurcation.kind)
-    begin = correct(
-        curve,
-        np.append(bifurcation.point.place, second.place(own)),
-        np.eye(len(curve.sizes))[-1],
-        patient=True,
-    ).found
+    place = np.append(bifurcation.point.place, second.place(own))
+    begin = correct(curve, place, patient=True).found
     if begin is None:
         raise ArgumentError(
             f"bifurcation at {branch.along} = {bifurcation.value:.6g} is not allowed: it is not "

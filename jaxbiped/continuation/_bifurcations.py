@@ -173,8 +173,7 @@ def locate_near(
     """
     for beside in _BESIDE:
         here, there = (
-            correct(curve, place + way * beside * tangent, tangent, tangent).found
-            for way in (-1.0, 1.0)
+            correct(curve, place + way * beside * tangent, tangent).found for way in (-1.0, 1.0)
         )
         if here is not None and there is not None and test(here) * test(there) < 0.0:
             found = locate(curve, here, there, test)

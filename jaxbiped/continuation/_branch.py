@@ -15,7 +15,11 @@ from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch_point import Axis, BranchPoint
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._state import BristleState, RigidState, State, WalkerState
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import (
+    STATE_QUANTITIES,
+    recurring_names,
+    state_of_recurring,
+)
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
@@ -95,7 +99,7 @@ class Branch(eqx.Module):
             point = self.points[point]
         if isinstance(point, BifurcationPoint):
             point = point.point
-        state = self.state_type(0.0, *point.recurring.tolist())
+        state = state_of_recurring(self.state_type, point.recurring.tolist())
         return cast("WalkerState", jtu.tree_map(as_float, state))
 
     def scene_at(self, point: int | BranchPoint | BifurcationPoint) -> Scene | RigidScene:
@@ -123,13 +127,14 @@ NUMBERS = {
     "unit_multiplier_error": "",
     "residual": "SI",
 }
+_EVENT_NUMBERS = ("multiplier_real", "multiplier_imag", "error", "value_error", "beyond")
 
 
 def branch_dataset(branch: Branch) -> "xarray.Dataset":
     """A branch as a dataset; see `Branch.dataset`."""
     import xarray
 
-    names = branch.state_type._fields[1:]  # type: ignore[attr-defined]
+    names = recurring_names(branch.state_type)
     units = {name: STATE_QUANTITIES[name].unit for name in names}
     variables = _columns(branch, branch.points, "", "point", units)
     kinds = [EVENTS.index(each.kind) for each in branch.bifurcations]
@@ -140,15 +145,14 @@ def branch_dataset(branch: Branch) -> "xarray.Dataset":
     )
     special = [each.point for each in branch.bifurcations]
     variables |= _columns(branch, special, "event_", "event", units)
-    multipliers = np.array([each.multiplier for each in branch.bifurcations], complex)
-    variables["event_multiplier_real"] = ("event", multipliers.real, {"units": ""})
-    variables["event_multiplier_imag"] = ("event", multipliers.imag, {"units": ""})
-    errors = np.array([each.error for each in branch.bifurcations], float)
-    variables["event_error"] = ("event", errors, {"units": ""})
-    offs = np.array([each.value_error for each in branch.bifurcations], float)
-    variables["event_value_error"] = ("event", offs, {"units": branch.unit})
-    beyond = np.array([each.beyond for each in branch.bifurcations], float)
-    variables["event_beyond"] = ("event", beyond, {"units": branch.unit})
+    rows = [
+        (e.multiplier.real, e.multiplier.imag, e.error, e.value_error, e.beyond)
+        for e in branch.bifurcations
+    ]
+    numbers = np.array(rows, float).reshape(-1, len(_EVENT_NUMBERS)).T
+    event_units = ("", "", "", branch.unit, branch.unit)
+    for name, values, unit in zip(_EVENT_NUMBERS, numbers, event_units, strict=True):
+        variables[f"event_{name}"] = ("event", values, {"units": unit})
     settings = {
         "along": branch.along,
         "axis": branch.axis._asdict(),
@@ -235,11 +239,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
         for kind, point, real, imaginary, *errors in zip(
             _column(dataset, "event_kind"),
             special,
-            _column(dataset, "event_multiplier_real"),
-            _column(dataset, "event_multiplier_imag"),
-            _column(dataset, "event_error"),
-            _column(dataset, "event_value_error"),
-            _column(dataset, "event_beyond"),
+            *(_column(dataset, f"event_{name}") for name in _EVENT_NUMBERS),
             strict=True,
         )
     ]
@@ -271,7 +271,7 @@ def _points(
     def column(name: str) -> np.ndarray:
         return _column(dataset, before + name)
 
-    recurring = np.stack([column(f"state_{name}") for name in state_type._fields[1:]], axis=1)
+    recurring = np.stack([column(f"state_{name}") for name in recurring_names(state_type)], axis=1)
     values = column("multipliers_real") + 1j * column("multipliers_imag")
     errors, codes = column("multipliers_error"), column("bifurcation")
     numbers = {name: column(name) for name in NUMBERS}

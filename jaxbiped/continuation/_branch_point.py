@@ -5,11 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
-from jaxbiped.continuation._cycle import Cycle, CycleProblem
+from jaxbiped.continuation._cycle import Cycle
 from jaxbiped.gait._orbit_derivatives import CLOSENESS
 from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint
-from jaxbiped.gait._search_starts import component_sizes
-from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.gait._stability import critical_bifurcation
 from jaxbiped.scene._parameter_access import (
     parameter_names,
     parameter_values,
@@ -82,11 +81,6 @@ def start_of(scene: AbstractScene, axis: Axis) -> float:
     return float(np.clip(float(parameter_values(scene)[axis.name]), axis.first, axis.last))
 
 
-NO_WALK = -1
-"""Code of an orbit that returns but is none of a walk: a foot deep underground, a step uphill."""
-_CONVERGED = 3.0
-"""Size of the last correction of a point, in units of the state's tolerance."""
-
 _LOCATED = 1e-9
 """Error of a multiplier at least: so near to the unit circle bifurcations are located."""
 
@@ -137,20 +131,6 @@ def is_stable(multipliers: np.ndarray, errors: np.ndarray) -> bool | None:
     return True if np.all(sizes + errors < 1.0) else None
 
 
-def gait_curve(problem: CycleProblem, axis: Axis, footsteps: int) -> Curve:
-    """The gaits of so many footsteps along an axis, as a curve of zeros.
-
-    Each change carries the `Cycle` that was evaluated.
-    """
-
-    def change(point: np.ndarray, s: float) -> Change:
-        seen = problem.cycle(point, (axis.leaf,), [axis.value(s)], footsteps)
-        return change_of(seen, point, axis.slope(s))
-
-    sizes = np.append(component_sizes(problem.scene, problem.like), 1.0)
-    return Curve(change, sizes, _CONVERGED * float(problem.precision.rtol))
-
-
 def witness_curve(curve: Curve, axis: Axis) -> Curve:
     """The same gaits as the witness of each cycle's error has them."""
 
@@ -164,12 +144,11 @@ def witness_curve(curve: Curve, axis: Axis) -> Curve:
 def change_of(seen: Cycle, point: np.ndarray, slope: float) -> Change:
     """What a cycle changes in the point that it began at."""
     m, jacobian = len(point), np.asarray(seen.jacobian[0])
-    code = int(seen.code[0]) or (0 if bool(seen.sound[0]) else NO_WALK)
     return Change(
         value=np.asarray(seen.recurring[0]) - point,
         by_point=jacobian[:, :m] - np.eye(m),
         by_s=jacobian[:, m] * slope,
-        code=code,
+        code=seen.failure,
         seen=seen,
     )
 
@@ -189,7 +168,7 @@ def branch_point(curve: Curve, axis: Axis, found: CurvePoint) -> BranchPoint:
         multipliers=values,
         multiplier_errors=np.where(cycle.grazes[0] > 0, np.inf, errors),
         unit_multiplier_error=_unit_error(cycle),
-        bifurcation=int(_bifurcation(values, errors)),
+        bifurcation=int(critical_bifurcation(values, errors, CLOSENESS)),
         residual=float(np.max(np.abs(found.change.value))),
         place=found.place,
         tangent=found.tangent,
@@ -216,15 +195,3 @@ def _unit_error(cycle: Cycle) -> float:
     values, vectors = np.linalg.eig(np.asarray(cycle.monodromy[0]))
     parts = np.linalg.lstsq(vectors, np.asarray(cycle.velocity[0], complex))[0]
     return float(abs(values[np.argmax(np.abs(parts))] - 1.0))
-
-
-def _bifurcation(values: np.ndarray, errors: np.ndarray) -> Bifurcation:
-    """What a multiplier on the unit circle announces."""
-    near = np.abs(np.abs(values) - 1.0) <= np.maximum(errors, CLOSENESS)
-    kinds = [
-        Bifurcation.NEIMARK_SACKER
-        if value.imag != 0.0
-        else (Bifurcation.FOLD if value.real > 0.0 else Bifurcation.PERIOD_DOUBLING)
-        for value in values[near]
-    ]
-    return max(kinds, default=Bifurcation.NONE)

@@ -8,21 +8,24 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_unbatched
 from jaxbiped._types import as_float
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point, gait_curve
-from jaxbiped.continuation._cycle import CycleProblem
+from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point, change_of
+from jaxbiped.continuation._cycle import Cycle, CycleProblem
 from jaxbiped.continuation._trace import Trace, limit_cause
-from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for
+from jaxbiped.dynamics._state import WalkerState
+from jaxbiped.dynamics._state_quantities import state_of_recurring
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import recurring_components
-from jaxbiped.gait._pseudo_arclength import Attempt, Curve, CurvePoint, correct
+from jaxbiped.gait._pseudo_arclength import Attempt, Change, Curve, CurvePoint, correct
 from jaxbiped.gait._return_map_spec import return_map_spec
-from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.gait._search_starts import component_sizes, default_guess
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, precision_of
 
 _TOLD_BY_CONTACT = (BranchEnd.BREAKS_OFF, BranchEnd.WALK_ENDS)
+_CONVERGED = 3.0
+"""Size of the last correction of a point, in units of the state's tolerance."""
 _BEYOND = 5e-3
 """How far in s behind its end the walk beyond a branch is looked at."""
 
@@ -46,17 +49,23 @@ class ContinuationSetup(NamedTuple):
 
     @property
     def curve(self) -> Curve:
-        """The gaits as a curve of zeros."""
-        return gait_curve(self.problem, self.axis, self.footsteps)
+        """The gaits as a curve of zeros; each change carries the `Cycle` that was evaluated."""
 
-    def place(self, recurring: np.ndarray, value: float) -> np.ndarray:
-        """Components and value in the sizes of the curve, shape (m + 1,)."""
-        return np.append(recurring, self.axis.place(value)) / self.curve.sizes
+        def change(point: np.ndarray, s: float) -> Change:
+            return change_of(self.cycle(point, self.axis.value(s)), point, self.axis.slope(s))
+
+        sizes = np.append(component_sizes(self.scene, self.problem.like), 1.0)
+        return Curve(change, sizes, _CONVERGED * float(self.problem.precision.rtol))
+
+    def cycle(self, recurring: np.ndarray, value: float, footsteps: int | None = None) -> Cycle:
+        """The cycle from these components at a value of the parameter."""
+        count = self.footsteps if footsteps is None else footsteps
+        return self.problem.cycle(recurring, (self.axis.leaf,), [value], count)
 
     def at_value(self, recurring: np.ndarray, value: float) -> Attempt:
         """The gait near these components at a value of the parameter."""
-        place = self.place(recurring, value)
-        return correct(self.curve, place, np.eye(len(place))[-1])
+        curve = self.curve
+        return correct(curve, np.append(recurring, self.axis.place(value)) / curve.sizes)
 
     def recurring(self, state: WalkerState) -> np.ndarray:
         """The components of a state that must return."""
@@ -64,7 +73,7 @@ class ContinuationSetup(NamedTuple):
 
     def state_of(self, recurring: np.ndarray) -> WalkerState:
         """The state of these components."""
-        state = type(self.problem.like)(0.0, *recurring.tolist())
+        state = state_of_recurring(type(self.problem.like), recurring.tolist())
         return cast("WalkerState", jtu.tree_map(as_float, state))
 
     def point(self, found: CurvePoint) -> BranchPoint:
@@ -117,13 +126,6 @@ def setup_of(branch: Branch, **others: Any) -> ContinuationSetup:
     """The setup by which a branch was followed, with other settings where these are given."""
     own = {name: getattr(branch, name) for name in ("axis", "footsteps", "accuracy", "engine")}
     return continuation_setup(branch.scene, **own | others)
-
-
-def checked_start(scene: Scene | RigidScene, start: object) -> WalkerState:
-    """A start of the kind that the scene needs; raises `ArgumentError`."""
-    if isinstance(scene, RigidScene):
-        return check_state(start, RigidState, "guess")
-    return state_for(scene, start, "guess")
 
 
 def check_followed(scene: object) -> None:

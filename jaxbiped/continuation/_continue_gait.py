@@ -15,12 +15,11 @@ from jaxbiped.continuation._branch_point import Axis, BranchPoint, axis_of, star
 from jaxbiped.continuation._continuation_setup import (
     ContinuationSetup,
     check_followed,
-    checked_start,
     continuation_setup,
     setup_of,
 )
 from jaxbiped.continuation._trace import LIMITS, BranchStop, Trace, trace
-from jaxbiped.dynamics._state import WalkerState
+from jaxbiped.dynamics._state import WalkerState, state_for
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -94,7 +93,7 @@ def continue_gait(
     if isinstance(guess, Gait):
         guess = guess.measures.state
     if guess is not None:
-        guess = checked_start(scene, guess)
+        guess = state_for(scene, guess, "guess")
     setup = continuation_setup(
         scene, axis, footsteps=int(footsteps), accuracy=accuracy, engine=engine
     )
@@ -140,7 +139,7 @@ def first_gait(
     scene = with_parameters(setup.scene, {setup.axis.name: value})
     start = default_guess(scene) if guess is None else guess
     with stage("compiling the continuation (first time for this kind of scene)"):
-        seen = setup.problem.cycle(setup.recurring(start), (setup.axis.leaf,), [value], 1)
+        seen = setup.cycle(setup.recurring(start), value, 1)
     if int(seen.code[0]) == 0:
         near = setup.recurring(start) if guess is not None else np.asarray(seen.recurring[0])
         found = setup.at_value(near, value).found
@@ -209,7 +208,7 @@ def resume_branch(
     points = [_point_on_axis(point, old, axis) for point in kept]
     last = points[-1 if forward else 0]
     along = last.tangent if forward else -last.tangent
-    begin = correct(setup.curve, last.place, along, along)
+    begin = correct(setup.curve, last.place, along)
     if begin.found is None:
         raise ArgumentError(f"at = {at} is not allowed: from there the walk does not return.")
     events = _events_at(branch, kept, forward=forward)

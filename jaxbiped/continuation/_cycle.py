@@ -14,11 +14,14 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.gait._fixed_point_search import LOOSER, is_sound
+from jaxbiped.gait._fixed_point_search import is_sound, with_looser
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
+
+NO_WALK = -1
+"""Code of an orbit that returns but is none of a walk: a foot deep underground, a step uphill."""
 
 
 class Cycle(NamedTuple):
@@ -51,6 +54,11 @@ class Cycle(NamedTuple):
     grazes: Numbers
     sound: Numbers
 
+    @property
+    def failure(self) -> int:
+        """0, the code of the `Ending` that came instead, or `NO_WALK`."""
+        return int(self.code[0]) or (0 if bool(self.sound[0]) else NO_WALK)
+
 
 class CycleProblem(NamedTuple):
     """Whose cycles are followed, and how exactly.
@@ -63,7 +71,7 @@ class CycleProblem(NamedTuple):
     """
 
     spec: ReturnMapSpec
-    scene: AbstractScene
+    scene: AbstractWalkerScene
     like: PyTree
     precision: Precision
 
@@ -71,49 +79,34 @@ class CycleProblem(NamedTuple):
         self, point: np.ndarray, active: tuple[int, ...], values: list[float], footsteps: int
     ) -> Cycle:
         """The cycle from a point of m components, parameters at positions `active` so changed."""
-        pairs: PyTree = [np.array([rtol, LOOSER * rtol]) for rtol in self.precision]
-        numbers: PyTree = [np.asarray(point), np.asarray(values, dtype=float)]
-        start, given = numbers
-        count: PyTree = np.asarray(footsteps)
-        result = _evaluate(
-            self.spec, self.scene, active, self.like, start, given, Precision(*pairs), count
-        )
-        found: Cycle = jax.device_get(result)
+        numbers: PyTree = np.asarray(point), np.asarray(values, float), np.asarray(footsteps)
+        both = self._replace(precision=with_looser(self.precision))
+        found: Cycle = jax.device_get(_evaluate(both, active, *numbers))
         return found
 
 
 @cached_jit
 def _evaluate(
-    spec: ReturnMapSpec,
-    scene: AbstractScene,
+    problem: CycleProblem,
     active: tuple[int, ...],
-    like: PyTree,
     point: Scalar,
     values: Scalar,
-    precisions: Precision,
     footsteps: Scalar,
 ) -> Cycle:
     """The cycle, and in a lane of its own the looser one."""
-    leaves, structure = jtu.tree_flatten(scene)
+    leaves, structure = jtu.tree_flatten(problem.scene)
     for k, place in enumerate(active):
         leaves[place] = values[k]
-    scene = jtu.tree_unflatten(structure, leaves)
+    there = problem._replace(scene=jtu.tree_unflatten(structure, leaves))
     return jax.vmap(
-        lambda *precision: _chain(
-            spec, scene, active, like, point, Precision(*precision), footsteps
-        )
-    )(*precisions)
+        lambda precision: _chain(there._replace(precision=precision), active, point, footsteps)
+    )(problem.precision)
 
 
 def _chain(
-    spec: ReturnMapSpec,
-    scene: AbstractScene,
-    active: tuple[int, ...],
-    like: PyTree,
-    point: Scalar,
-    precision: Precision,
-    footsteps: Scalar,
+    problem: CycleProblem, active: tuple[int, ...], point: Scalar, footsteps: Scalar
 ) -> Cycle:
+    spec, scene, like, precision = problem
     m, p = point.shape[0], len(active)
     seeds, sizes = seed_directions(scene, active, m)
     units = jnp.concatenate([jnp.ones(m), sizes])

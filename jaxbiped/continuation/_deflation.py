@@ -13,14 +13,14 @@ import numpy as np
 
 from jaxbiped._checks import check_choice, check_count
 from jaxbiped._progress import stage
-from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint, axis_of
+from jaxbiped.continuation._branch_point import BranchPoint, axis_of
 from jaxbiped.continuation._continuation_setup import (
     ContinuationSetup,
     check_followed,
-    checked_start,
     continuation_setup,
 )
-from jaxbiped.dynamics._state import WalkerState
+from jaxbiped.dynamics._state import WalkerState, state_for
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._pseudo_arclength import Change
@@ -94,7 +94,7 @@ def find_isolated(
     for name, count in (("footsteps", footsteps), ("starts", starts)):
         check_count(name, count)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
-    checked = [checked_start(scene, each) for each in known]
+    checked = [state_for(scene, each, "guess") for each in known]
     slope = float(parameter_values(scene)["slope"])
     axis = axis_of(scene, "slope", (slope, slope + 0.01), None)
     setup = continuation_setup(
@@ -124,7 +124,7 @@ def _scattered_starts(
     )
     if gait.outcome is not Search.FOUND:
         rolling = rolling_starts(scene, _TRIALS * count, spread=max(_SPREADS), seed=seed)
-        yield from np.stack([np.asarray(leaf) for leaf in rolling[1:]], axis=1)
+        yield from np.stack(recurring_leaves(rolling), axis=1)
         return
     middle, random = setup.recurring(gait.measures.state), np.random.default_rng(seed)
     yield middle
@@ -198,10 +198,8 @@ class _DeflatedNewton:
         return ahead, code
 
     def _walk(self, point: np.ndarray, footsteps: int) -> tuple[np.ndarray, int]:
-        leaf = self._setup.axis.leaf
-        found = self._setup.problem.cycle(point, (leaf,), [self._value], footsteps)
-        code = int(found.code[0]) or (0 if bool(found.sound[0]) else NO_WALK)
-        return np.asarray(found.recurring[0]), code
+        found = self._setup.cycle(point, self._value, footsteps)
+        return np.asarray(found.recurring[0]), found.failure
 
     def _change(self, point: np.ndarray) -> Change:
         return self._setup.curve.change(point, self._setup.axis.place(self._value))

@@ -169,9 +169,9 @@ def _doubled_cycle(
     setup: ContinuationSetup, footsteps: int, doubling: BifurcationPoint, near: float
 ) -> CurvePoint | None:
     """A cycle of doubled period beside a doubling, its tangent pointing away from there."""
-    point, leaf = doubling.point, (setup.axis.leaf,)
-    sizes = setup.curve.sizes
-    seen = setup.problem.cycle(point.recurring, leaf, [point.value], footsteps)
+    point, curve = doubling.point, setup.curve
+    sizes = curve.sizes
+    seen = setup.cycle(point.recurring, point.value, footsteps)
     m = len(point.recurring)
     values, vectors = np.linalg.eig(
         np.asarray(seen.jacobian[0])[:, :m] / sizes[:m, None] * sizes[:m]
@@ -183,11 +183,11 @@ def _doubled_cycle(
     across /= np.linalg.norm(across)
     for amplitude in _AMPLITUDES:
         guess = point.place + amplitude * along
-        found = correct(setup.curve, guess, across, across, patient=True).found
+        found = correct(curve, guess, across, patient=True).found
         if found is None or abs(found.place[-1] - point.place[-1]) > near:
             continue
         own = found.place[:-1] * sizes[:-1]
-        half = setup.problem.cycle(own, leaf, [setup.axis.value(found.place[-1])], footsteps)
+        half = setup.cycle(own, setup.axis.value(found.place[-1]), footsteps)
         apart = np.linalg.norm((np.asarray(half.recurring[0]) - own) / sizes[:-1])
         if apart > _APART * 2.0 * amplitude:
             return found

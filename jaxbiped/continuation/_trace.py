@@ -14,8 +14,9 @@ from jaxbiped.continuation._bifurcations import (
     explains,
     not_located,
 )
-from jaxbiped.continuation._branch_point import NO_WALK, Axis, BranchPoint, branch_point
-from jaxbiped.dynamics._contact_forces import contacts
+from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point
+from jaxbiped.continuation._cycle import NO_WALK
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._state import State, WalkerState
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, correct, follow
@@ -103,7 +104,7 @@ def passed_before(curve: Curve, passed: Sequence[BranchPoint], there: CurvePoint
         t, along = shares[k], chords[k] / lengths[k]
         bend = lengths[k] * ((1.0 - t) * tangents[k] - t * tangents[k + 1])
         guess = places[k] + t * chords[k] + t * (1.0 - t) * (bend - (bend @ along) * along)
-        known = correct(curve, guess, along, along).found
+        known = correct(curve, guess, along).found
         if known is None:
             continue
         apart = np.linalg.norm(known.place - there.place)

@@ -7,11 +7,10 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
-from jaxbiped.dynamics._contact_forces import foot_force, hip_motion, normal_forces
-from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._contacts import Foot, feet, foot_force, hip_motion, normal_forces, touches
 from jaxbiped.dynamics._redundant_state import legs_of, minimal_state
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._scene import AbstractScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, Scene
 
 
 class Energies(NamedTuple):
@@ -70,7 +69,7 @@ def energies(scene: Scene, state: State) -> Energies:
     return Energies(kinetic, scene.ground.g * moment, jnp.asarray(elastic))
 
 
-def kinetic_and_moment(scene: AbstractScene, state: State) -> tuple[Scalar, Scalar]:
+def kinetic_and_moment(scene: AbstractWalkerScene, state: State) -> tuple[Scalar, Scalar]:
     """Kinetic energy [J] and mass times height [kg·m] of a walker of any kind."""
     walker, ground = scene.walker, scene.ground
     hip = minimal_state(scene, state)

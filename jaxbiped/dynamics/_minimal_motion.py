@@ -8,8 +8,7 @@ from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._actuation import hip_torques
-from jaxbiped.dynamics._contact_forces import foot_force, hip_motion
-from jaxbiped.dynamics._feet import Feet, Foot, feet
+from jaxbiped.dynamics._contacts import Feet, Foot, feet, foot_force, hip_motion
 from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.dynamics._state import State, field_of
 from jaxbiped.scene._scene import CompliantScene, Scene

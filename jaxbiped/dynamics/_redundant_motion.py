@@ -10,13 +10,12 @@ from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.constraints._linkage import constraints_of, headings_of, point_of, torque_on
 from jaxbiped.dynamics._actuation import hip_torques
-from jaxbiped.dynamics._contact_forces import foot_force, hip_motion
-from jaxbiped.dynamics._feet import feet, feet_of
+from jaxbiped.dynamics._contacts import feet, feet_of, foot_force, hip_motion
 from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
 from jaxbiped.dynamics._minimal_motion import Accelerations, accelerations, bristle_rates
 from jaxbiped.dynamics._redundant_state import Leg, LegsState, legs_of
 from jaxbiped.dynamics._state import field_of
-from jaxbiped.scene._scene import AbstractScene, CompliantScene, RedundantScene
+from jaxbiped.scene._scene import AbstractWalkerScene, CompliantScene, RedundantScene
 from jaxbiped.scene._walker import leg_of
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
@@ -168,7 +167,7 @@ def hip_force(scene: CompliantScene, state: PyTree) -> HipForce:
     )
 
 
-def _gravity(scene: AbstractScene) -> tuple[Scalar, Scalar]:
+def _gravity(scene: AbstractWalkerScene) -> tuple[Scalar, Scalar]:
     ground = scene.ground
     return ground.g * jnp.sin(ground.slope), -ground.g * jnp.cos(ground.slope)
 

@@ -8,7 +8,7 @@ from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._state import BristleState, MinimalState, State, state_type
-from jaxbiped.scene._scene import AbstractScene, RedundantScene
+from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene
 from jaxbiped.scene._walker import leg_of
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def is_redundant(state: object) -> "TypeIs[LegsState]":
     return isinstance(state, RedundantState | EulerState)
 
 
-def legs_of(scene: AbstractScene, state: CompliantState) -> tuple[Leg, Leg]:
+def legs_of(scene: AbstractWalkerScene, state: CompliantState) -> tuple[Leg, Leg]:
     """Both legs of a state of either formulation."""
     return _leg(scene, state, 1), _leg(scene, state, 2)
 
@@ -177,7 +177,7 @@ def redundant_state(scene: RedundantScene, state: MinimalState) -> LegsState:
     return kind(**fields)
 
 
-def minimal_state(scene: AbstractScene, state: CompliantState) -> MinimalState:
+def minimal_state(scene: AbstractWalkerScene, state: CompliantState) -> MinimalState:
     """The minimal state that a redundant one stands for: the hip half way between the legs' two.
 
     A minimal state is returned as it is.
@@ -193,7 +193,7 @@ def minimal_state(scene: AbstractScene, state: CompliantState) -> MinimalState:
 
 
 @kept_alone
-def _half_way(scene: AbstractScene, state: LegsState) -> MinimalState:
+def _half_way(scene: AbstractWalkerScene, state: LegsState) -> MinimalState:
     one, two = legs_of(scene, state)
     values = dict(
         hip_x=0.5 * (one.hip_x + two.hip_x),
@@ -212,7 +212,7 @@ def _half_way(scene: AbstractScene, state: LegsState) -> MinimalState:
     )
 
 
-def _leg(scene: AbstractScene, state: CompliantState, number: int) -> Leg:
+def _leg(scene: AbstractWalkerScene, state: CompliantState, number: int) -> Leg:
     def own(name: str) -> Scalar:
         return getattr(state, f"{name}_{number}")
 

@@ -8,7 +8,7 @@ from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._actuation import hip_torques
-from jaxbiped.dynamics._contact_forces import FootForce
+from jaxbiped.dynamics._contacts import FootForce
 from jaxbiped.dynamics._state import RigidState, field_of
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._walker import Walker

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._feet import feet, touches
+from jaxbiped.dynamics._contacts import feet, touches
 from jaxbiped.dynamics._state import RigidState
 
 

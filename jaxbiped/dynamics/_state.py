@@ -4,7 +4,7 @@ A formulation registers its kind of scene here, by `state_type` and `field_of`.
 """
 
 import functools
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias, TypeVar, cast
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +14,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._types import Scalar, VectorField, as_float, by_numpy
 from jaxbiped.caching._cached_jit import kept_alone
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 
 
 @functools.singledispatch
@@ -178,7 +178,7 @@ def _(scene: Scene) -> type[MinimalState]:
     return BristleState if scene.has_bristles else State
 
 
-def state_for(scene: Scene, state: PyTree, name: str = "state") -> MinimalState:
+def state_for(scene: AbstractWalkerScene, state: PyTree, name: str = "state") -> PyTree:
     """A checked start of the type that a scene needs: bristles are straight unless given.
 
     Raises:
@@ -191,10 +191,8 @@ def state_for(scene: Scene, state: PyTree, name: str = "state") -> MinimalState:
         straight = jnp.zeros_like(state.hip_x)
         return BristleState(**state._asdict(), bristle_1=straight, bristle_2=straight)
     if kind is State and isinstance(state, BristleState):
-        raise ArgumentError(
-            f"{name} has bristles, but friction = {type(scene.friction).__name__} has none: give a "
-            "State."
-        )
+        law = type(cast(Scene, scene).friction).__name__
+        raise ArgumentError(f"{name} has bristles, but friction = {law} has none: give a State.")
     return check_state(state, kind, name)
 
 
@@ -227,7 +225,7 @@ def _(scene: RigidScene) -> type[RigidState]:
 
 
 @kept_alone
-def whole_state(scene: AbstractScene, state: RigidState) -> State:
+def whole_state(scene: AbstractWalkerScene, state: RigidState) -> State:
     """The same motion in the compliant walker's coordinates, its stance foot just touching.
 
     Args:

@@ -3,6 +3,7 @@
 A coordinate that is not here has no size, and is refused where errors are measured in sizes.
 """
 
+from collections.abc import Iterable
 from typing import Any
 
 from jaxbiped._quantity import Quantity
@@ -32,6 +33,25 @@ STATE_QUANTITIES = _HIP | {
     for leg in (1, 2)
 }
 """By the names that the fields of a state of any kind have."""
+
+CYCLIC = ("hip_x",)
+"""Coordinates that no rate depends on: they need not recur, only advance."""
+
+
+def recurring_names(state: Any) -> tuple[str, ...]:
+    """Names of the coordinates of a state, or of a kind of state, that recur in a cycle."""
+    return tuple(name for name in state._fields if name not in CYCLIC)
+
+
+def recurring_leaves(state: Any) -> list[Any]:
+    """The coordinates of a state that recur in a cycle."""
+    return [getattr(state, name) for name in recurring_names(state)]
+
+
+def state_of_recurring(kind: Any, recurring: Iterable[Any], cyclic: Any = 0.0) -> Any:
+    """The state of a kind with these recurring coordinates, and `cyclic` in place of the others."""
+    named = dict(zip(recurring_names(kind), recurring, strict=True))
+    return kind(**dict.fromkeys(CYCLIC, cyclic), **named)
 
 
 def dimensions_of(kind: Any) -> dict[str, tuple[float, float]]:

@@ -6,8 +6,7 @@ No step may straddle one: derivatives taken through it would be wrong.
 from typing import NamedTuple
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._contact_forces import foot_force
-from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._contacts import Foot, feet, foot_force, touches
 from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.scene._scene import CompliantScene
 

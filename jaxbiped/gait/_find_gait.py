@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import diffrax
 import equinox as eqx
@@ -20,18 +20,25 @@ from jaxbiped.compiler import deferred_checks, host_jit
 from jaxbiped.dynamics._consistent_state import consistent_state
 from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for
+from jaxbiped.dynamics._state import WalkerState, state_for
 from jaxbiped.gait._accurate_gait import accurate_gait
-from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, search, walks_only
-from jaxbiped.gait._gait import Described, Gait, summarise_gait
+from jaxbiped.gait._fixed_point_search import (
+    FixedPointProblem,
+    Found,
+    Search,
+    search,
+    search_by_lanes,
+    walks_only,
+)
+from jaxbiped.gait._gait import Gait, summarise_gait
 from jaxbiped.gait._newton import Method
-from jaxbiped.gait._return_map_spec import ReturnMapSpec, return_map_spec, runs_by_lanes
+from jaxbiped.gait._return_map_spec import return_map_spec, runs_by_lanes
 from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_grazing
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.gait._staged_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import AbstractScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
 from jaxbiped.solve._error_estimate import check_wanted
@@ -160,24 +167,24 @@ def find_gait(
     )
     # One program of lanes serves every search, whatever it is asked for, and what follows it.
     columns = select_parameters(modelled, None)[1] if runs_by_lanes(spec) else ()
-    searching = (spec, scene, columns, start, precision, how)
-    describing = (names, active, radius_sensitivities)
+    problem = FixedPointProblem(spec, scene, columns, start, precision, how)
+    asked = problem._replace(active=active, method=None)
     by = FoundBy.GUESS if guess is not None else FoundBy.START
     origin = single_stage_origin(modelled, start, by)
     staged = guess is None and max_evaluations is None and method == "newton"
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(searching)):
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(problem)):
         if staged:
-            found, origin = search_along(*searching, origin)
+            found, origin = search_along(problem, origin)
         else:
-            found = walks_only(search(*searching))
-        return summarise_gait(spec, scene, start, precision, found, *describing, origin)
-    _compile_once(searching, describing, origin)
-    found = _search(*searching)
+            found = walks_only(search(problem))
+        return summarise_gait(asked, found, names, radius_sensitivities, origin)
+    _compile_once(problem, asked, names, radius_sensitivities, origin)
+    found = _search(problem)
     if not staged:
         found = walks_only(found)
-    elif not (_is_stable(found) and is_whole(found, spec, float(precision.rtol))):
-        found, origin = _search_on(searching, modelled, found, engine)
-    gait = summarise_gait(spec, scene, start, precision, found, *describing, origin)
+    elif not (_is_stable(found) and is_whole(found, problem)):
+        found, origin = _search_on(problem, found, engine)
+    gait = summarise_gait(asked, found, names, radius_sensitivities, origin)
     warn_of_grazing(gait)
     return gait
 
@@ -187,32 +194,30 @@ def _is_stable(found: Found) -> bool:
     return usable and spectral_radius(found) < 1.0
 
 
-def _search_on(
-    searching: SearchArguments, modelled: Scene | RigidScene, first: Found, engine: str
-) -> tuple[Found, Origin]:
+def _search_on(problem: FixedPointProblem, first: Found, engine: str) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
-    spec, scene, columns, start, precision, how = searching
+    scene, start, method = problem.args, problem.guess, problem.method
+    assert method is not None
     scout = return_map_spec(
-        modelled,
+        scene.minimal,
         start,
         solver=None,
         engine="auto" if scene.redundant else engine,
         max_solver_steps=ACCURACIES["balanced"].max_solver_steps,
     )
 
-    def search_from(spec: ReturnMapSpec, scene: PyTree, start: PyTree, patience: int) -> Found:
-        hasty = dataclasses.replace(how, patience=np.asarray(min(patience, how.max_evaluations)))
-        return _search(spec, scene, columns, start, precision, hasty)
+    def search_from(other: FixedPointProblem, patience: int) -> Found:
+        most = np.asarray(min(patience, method.max_evaluations))
+        return _search(other._replace(method=dataclasses.replace(method, patience=most)))
 
-    rtol = float(precision.rtol)
-    staged = search_in_stages(search_from, spec, scout, scene, modelled, first, rtol)
+    staged = search_in_stages(search_from, problem, scout, first)
     found = walks_only(first) if staged.best is None else staged.best.found
-    return found, origin_of(staged, modelled, start)
+    return found, origin_of(staged, scene.minimal, start)
 
 
-def _check_start(scene: AbstractScene, section: AbstractSection, start: PyTree) -> WalkerState:
-    if not scene.compliant:
-        return check_state(start, RigidState, "guess")
+def _check_start(
+    scene: AbstractWalkerScene, section: AbstractSection, start: PyTree
+) -> WalkerState:
     if scene.redundant:
         start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
     return with_leg_names_of(section, scene.minimal, state_for(scene.minimal, start, "guess"))
@@ -225,10 +230,11 @@ def _adam() -> "optax.GradientTransformation":
     return optax.adam(1e-2)
 
 
-def _compile_once(searching: SearchArguments, describing: Described, origin: Origin) -> None:
-    """Compiles what is not compiled yet for this kind of search."""
-    once = _compilation_of(_kind_of((searching, describing[0], describing[2])))
-    once(lambda: _compile(searching, describing, origin))
+def _compile_once(problem: FixedPointProblem, *summarising: Any) -> None:
+    """Compiles what is not compiled yet for this kind of search and what is asked of its gait."""
+    _, *asked, _ = summarising
+    once = _compilation_of(_kind_of((problem, *asked)))
+    once(lambda: _compile(problem, *summarising))
 
 
 @bounded_cache(PROGRAMS)
@@ -237,18 +243,16 @@ def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
     return Once()
 
 
-def _compile(searching: SearchArguments, describing: Described, origin: Origin) -> None:
+def _compile(problem: FixedPointProblem, asked: FixedPointProblem, *more: Any) -> None:
     """Compiles both programs, and what lanes run for them, at the same time."""
-    spec, scene, _, start, precision, _ = searching
     told = stage("compiling the search (first time for this kind of scene)")
     with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:
             # What takes lanes longest begins first.
-            ready = [meanwhile.submit(_search.begin(*searching))]
-            no_result = _empty_arrays(_search.result_shape(*searching))
-            given = (spec, scene, start, precision, no_result, *describing, origin)
-            finish = summarise_gait.begin(*given)
-            ready.append(meanwhile.submit(finish))
+            begun = _search.begin(problem)
+            ready = [meanwhile.submit(begun.finish)]
+            no_result = _empty_arrays(begun.result)
+            ready.append(meanwhile.submit(summarise_gait.begin(asked, no_result, *more).finish))
         try:
             for program in programs:
                 program.check()
@@ -267,11 +271,11 @@ def _kind_of(tree: PyTree) -> tuple[object, ...]:
     return jtu.tree_structure(arrays), shapes, tuple(leaves), structure
 
 
-@host_jit(runs_by_lanes, within=True)
-def _search(*searching: PyTree) -> Found:
+@host_jit(search_by_lanes, within=True)
+def _search(problem: FixedPointProblem) -> Found:
     # Without weak types, which would make the next program another one than was compiled.
     return jtu.tree_map(
-        lambda leaf: jax.lax.convert_element_type(leaf, leaf.dtype), search(*searching)
+        lambda leaf: jax.lax.convert_element_type(leaf, leaf.dtype), search(problem)
     )
 
 

@@ -12,6 +12,7 @@ from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import RigidState, State, WalkerState
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -91,8 +92,8 @@ def _told_apart(gaits: Gait) -> tuple[list[int], np.ndarray]:
 
     A gait is the same wherever its orbit was entered: its state is one of the other's crossings.
     """
-    states = np.stack([np.asarray(leaf) for leaf in gaits.measures.state[1:]], axis=1)
-    crossings = np.stack([np.asarray(leaf)[:, :, 0] for leaf in gaits.orbit[1][1:]], axis=2)
+    states = np.stack(recurring_leaves(gaits.measures.state), axis=1)
+    crossings = np.stack([leaf[:, :, 0] for leaf in recurring_leaves(gaits.orbit[1])], axis=2)
     first: list[int] = []
     which = np.full(len(states), -1)
     for i in np.flatnonzero(np.asarray(gaits.ending) == int(Search.FOUND)):

@@ -5,17 +5,18 @@ deep underground and be caught there. Stability does not tell them from gaits, s
 the return map of n footsteps also has the gaits of every divisor of n as fixed points.
 """
 
-import enum
+import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._ending import NamedCode
 from jaxbiped._types import RealScalarLike, Scalar, by_numpy
-from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._contacts import Foot, feet, touches
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.gait._newton import Method, Progress, Stage, initial_progress, newton_iteration
 from jaxbiped.gait._poincare_map import (
@@ -25,9 +26,10 @@ from jaxbiped.gait._poincare_map import (
     seed_directions,
     state_with,
 )
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
+from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
+from jaxbiped.variational._tangents import Seeded
 
 LOOSER = 10.0
 """How much looser the search is solved before its end, and the witness of its error."""
@@ -41,7 +43,7 @@ _ERRORS, _TOLERANCES = 4.0, 30.0
 """Distance of two crossings that are one: in units of the fixed point's error, and of rtol."""
 
 
-class Search(enum.IntEnum):
+class Search(NamedCode):
     """How a search ended. `str(search)` is its name in words.
 
     - found: the orbit returns to within the residual asked for.
@@ -55,9 +57,6 @@ class Search(enum.IntEnum):
     NO_RETURN = 1
     NOT_CONVERGED = 2
     NO_WALK = 3
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
 
 
 class Found(NamedTuple):
@@ -105,30 +104,52 @@ class Found(NamedTuple):
 Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]
 """The return from recurring components, as exactly as a stage wants, or none where idle."""
 
-SearchArguments: TypeAlias = tuple[
-    ReturnMapSpec, PyTree, tuple[int, ...], PyTree, Precision, Method
-]
-"""Those of `search`, for a scene and a guess."""
+
+class FixedPointProblem(NamedTuple):
+    """Which fixed point is sought, and how exactly.
+
+    Attributes:
+        spec: of the return map.
+        args: the scene, or the parameters of another system.
+        active: positions among its leaves of the parameters that derivatives are with respect to.
+        guess: where the search begins, on the section or not.
+        precision: of the solves in the end.
+        method: how to search; None once the fixed point is known.
+    """
+
+    spec: ReturnMapSpec
+    args: PyTree
+    active: tuple[int, ...]
+    guess: PyTree
+    precision: Precision
+    method: Method | None = None
+
+    def state(self, recurring: Scalar) -> PyTree:
+        """The state of these recurring components."""
+        return state_with(self.spec.system, self.guess, recurring)
+
+    def directions(self, m: int) -> tuple[Seeded, Scalar]:
+        """Seeds of the m components and the active parameters, and the sizes of these."""
+        return seed_directions(self.args, self.active, m)
 
 
-def search(
-    spec: ReturnMapSpec,
-    args: PyTree,
-    active: tuple[int, ...],
-    guess: PyTree,
-    precision: Precision,
-    method: Method,
-    wanted: Scalar | bool = True,
-) -> Found:
-    """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely.
+def search_by_lanes(problem: FixedPointProblem, *_: object, **__: object) -> bool:
+    """Whether a function of a problem leaves the work to programs of lanes."""
+    return runs_by_lanes(problem.spec)
+
+
+def search(problem: FixedPointProblem, wanted: Scalar | bool = True) -> Found:
+    """Searches from the guess: roughly, then 10 times looser, then finely.
 
     Not at all where not `wanted`. Derivatives with respect to the active parameters are not carried
     (see `with_parameter_columns`), for which gait is found does not depend on what is asked of it:
     they only choose the program.
     """
+    spec, args, guess, method = problem.spec, problem.args, problem.guess, problem.method
+    assert method is not None
     first = recurring_components(spec.system, guess)
     off = jnp.abs(spec.section.value(args, guess))
-    run = _runner(spec, args, active, guess, precision)
+    run = _runner(problem, len(first))
     shape: LinearisedReturn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
     empty_return = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
     begin = initial_progress(first, off, method, empty_return)
@@ -139,6 +160,9 @@ def search(
         int(Search.FOUND),
         jnp.where(end.stage == Stage.NO_RETURN, int(Search.NO_RETURN), int(Search.NOT_CONVERGED)),
     )
+    last = end.base_return
+    # Not every system has a cyclic coordinate.
+    sound = is_sound(args, problem.state(end.base), jnp.sum(last.advance), last.period)
     return Found(
         ending=ending,
         code=end.code,
@@ -147,7 +171,7 @@ def search(
         both=jax.tree.map(lambda *pair: jnp.stack(pair), end.base_return, end.coarse),
         evaluations=end.evaluations,
         history=end.history,
-        sound=_with_soundness(spec, args, guess, end),
+        sound=sound,
     )
 
 
@@ -161,33 +185,20 @@ def walks_only(found: Found) -> Found:
     return found._replace(ending=by_numpy(told, found.ending, found.sound))
 
 
-def _with_soundness(spec: ReturnMapSpec, args: PyTree, guess: PyTree, end: Progress) -> Scalar:
-    state, last = state_with(spec.system, guess, end.base), end.base_return
-    # Not every system has a cyclic coordinate.
-    return is_sound(args, state, jnp.sum(last.advance), last.period)
-
-
-def _runner(
-    spec: ReturnMapSpec,
-    args: PyTree,
-    active: tuple[int, ...],
-    guess: PyTree,
-    precision: Precision,
-) -> Run:
-    """Returns, with derivatives with respect to the state."""
-    seeds, _ = seed_directions(args, active, len(recurring_components(spec.system, guess)))
-    coarse = looser(precision)
+def _runner(problem: FixedPointProblem, m: int) -> Run:
+    """Returns, with derivatives with respect to the state's m recurring components."""
+    seeds, _ = problem.directions(m)
+    coarse = looser(problem.precision)
 
     def run(trial: Scalar, stage: Scalar, idle: Scalar) -> LinearisedReturn:
         wanted = Precision(
             *(
                 jnp.where(stage == Stage.FINE, a, jnp.where(stage == Stage.COARSE, b, c))
-                for a, b, c in zip(precision, coarse, ROUGH, strict=True)
+                for a, b, c in zip(problem.precision, coarse, ROUGH, strict=True)
             )
         )
-        start = state_with(spec.system, guess, trial)
-        no = jnp.asarray(False)
-        return linearised_return(spec, seeds, start, wanted, idle, carries_parameters=no)
+        start, no = problem.state(trial), jnp.asarray(False)
+        return linearised_return(problem.spec, seeds, start, wanted, idle, carries_parameters=no)
 
     return run
 
@@ -195,6 +206,15 @@ def _runner(
 def looser(precision: Precision) -> Precision:
     """The precision of the witness of a return's error."""
     return Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
+
+
+def with_looser(precision: Precision) -> Precision:
+    """A precision and that of the witness beside it, tolerances of shape (2,)."""
+
+    def both(numpy: Any, fine: Any, loose: Any) -> Any:
+        return numpy.stack([numpy.asarray(fine), numpy.asarray(loose)])
+
+    return Precision(*map(functools.partial(by_numpy, both), precision, looser(precision)))
 
 
 def _iterate(run: Run, begin: Progress, method: Method) -> Progress:
@@ -220,7 +240,7 @@ def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) 
         step_length: advance along the slope in a cycle [m].
         period: duration of a cycle [s].
     """
-    if not isinstance(scene, AbstractScene):
+    if not isinstance(scene, AbstractWalkerScene):
         return jnp.asarray(True)
     pace = jnp.sqrt(scene.walker.l / scene.ground.g)
     forward = (step_length > 0.0) & (period > _SHORTEST * pace)

@@ -1,6 +1,6 @@
 """Periodic gait: its state, measures, stability and sensitivities, found or not."""
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -15,16 +15,21 @@ from jaxbiped._summary import summary
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.gait._fixed_point_search import Found, Search, crossings_of, minimal_cycle
+from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
+from jaxbiped.gait._fixed_point_search import (
+    FixedPointProblem,
+    Found,
+    Search,
+    crossings_of,
+    minimal_cycle,
+    search_by_lanes,
+)
 from jaxbiped.gait._orbit_derivatives import Orbit, Slopes, orbit_of, with_parameter_columns
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._search_provenance import FoundBy, Origin, OtherGait
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.scene._parameter_access import parameter_quantities
-from jaxbiped.scene._scene import AbstractScene
-from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._error_estimate import ErrorEstimate
 
 _NOTHING = 1e-9
@@ -170,25 +175,21 @@ class Gait(eqx.Module):
         return found
 
 
-Described: TypeAlias = tuple[tuple[str, ...], tuple[int, ...], bool]
-"""Names and positions of the parameters, and whether the radius is differentiated."""
-
-
-@host_jit(runs_by_lanes)
+@host_jit(search_by_lanes)
 def summarise_gait(
-    spec: ReturnMapSpec,
-    scene: AbstractScene,
-    start: WalkerState,
-    precision: Precision,
-    found: Found,
-    names: tuple[str, ...],
-    active: tuple[int, ...],
-    radius: bool,
-    origin: Origin,
+    problem: FixedPointProblem, found: Found, names: tuple[str, ...], radius: bool, origin: Origin
 ) -> Gait:
-    """The gait that a search from `start` found, with its stability and its derivatives."""
-    found = with_parameter_columns(spec, scene, active, start, precision, found)
-    orbit = orbit_of(spec, scene, active, start, found, radius=radius)
+    """The gait that a search found, with its stability and its derivatives.
+
+    Args:
+        problem: what was searched; its active parameters are those that are asked for.
+        found: what the search came to.
+        names: of the active parameters.
+        radius: whether the spectral radius is differentiated.
+        origin: how the search came to it.
+    """
+    found = with_parameter_columns(problem, found)
+    orbit = orbit_of(problem, found, radius=radius)
     stability = orbit.stability
     last, m = found.last, found.recurring.shape[0]
     lost = found.ending == int(Search.NO_RETURN)
@@ -211,39 +212,39 @@ def summarise_gait(
     backwards = measures._replace(speed=-jnp.abs(measures.speed))
     slope_errors = _by_parameter(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
     errors = _measure_errors(measures, orbit)
+    rows = jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])
+    told = dict(
+        measure_errors=errors,
+        multipliers=stability.multipliers,
+        multiplier_errors=stability.errors,
+        directions=stability.directions,
+        monodromy=last.monodromy[:, :m],
+        return_jacobian=rows[:, :m],
+        unit_multiplier_error=stability.unit_error,
+        sensitivities=jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes),
+        sensitivity_errors=jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors),
+        elasticities=_elasticities(problem.args, problem.active, measures, slopes),
+    )
+    off = jnp.stack(recurring_leaves(errors.state))
+    is_found = found.ending == int(Search.FOUND)
     return Gait(
+        **known(told),
         ending=found.ending,
         walk_ending=found.code,
         measures=measures,
-        measure_errors=known(errors),
         residual=found.residual,
-        multipliers=known(stability.multipliers),
-        multiplier_errors=known(stability.errors),
-        directions=known(stability.directions),
-        monodromy=known(last.monodromy[:, :m]),
-        return_jacobian=known(
-            jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])[:, :m]
-        ),
-        unit_multiplier_error=known(stability.unit_error),
-        bifurcation=jnp.where(
-            found.ending == int(Search.FOUND), stability.bifurcation, int(Bifurcation.NONE)
-        ),
-        sensitivities=known(jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes)),
-        sensitivity_errors=known(
-            jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors)
-        ),
-        elasticities=known(_elasticities(scene, active, measures, slopes)),
+        bifurcation=jnp.where(is_found, stability.bifurcation, int(Bifurcation.NONE)),
         evaluations=found.evaluations,
         history=found.history,
         solver_steps=last.attempted,
         grazes=last.grazes,
-        cycle_footsteps=minimal_cycle(last, jnp.stack(errors.state[1:]), precision.rtol),
+        cycle_footsteps=minimal_cycle(last, off, problem.precision.rtol),
         sound=found.sound,
         origin=jtu.tree_map(jnp.asarray, origin),
-        orbit=_path(last, start),
+        orbit=_path(last, problem.guess),
         parameters=names,
-        engine=spec.engine,
-        quantities=tuple(map(parameter_quantities(scene).__getitem__, names)),
+        engine=problem.spec.engine,
+        quantities=tuple(map(parameter_quantities(problem.args).__getitem__, names)),
     )
 
 
@@ -266,7 +267,7 @@ def _at_fixed_point(once: LinearisedReturn, orbit: Orbit) -> Measures:
     period = once.period + once.period_row[:m] @ correction
     length = once.advance[0] + once.advance_rows[0, :m] @ correction
     peak = once.peak + once.peak_row[:m] @ correction
-    state = type(orbit.state)(jnp.zeros_like(period), *(begun + correction))
+    state = state_of_recurring(type(orbit.state), begun + correction, jnp.zeros_like(period))
     return Measures(period, length, length / period, peak, orbit.stability.spectral_radius, state)
 
 
@@ -282,7 +283,7 @@ def _by_parameter(orbit: Orbit, measures: Measures, slopes: Slopes, radius: Scal
     """Derivatives of the measures with respect to parameters in their own sizes, shape (p,)."""
     length, period = slopes.advance[0], slopes.period
     speed = (length - measures.speed * period) / measures.period
-    state = type(measures.state)(jnp.zeros_like(period), *slopes.recurring)
+    state = state_of_recurring(type(measures.state), slopes.recurring, jnp.zeros_like(period))
     return Measures(period, length, speed, slopes.peak, radius, state)
 
 

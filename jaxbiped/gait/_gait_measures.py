@@ -12,6 +12,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import WalkerState
+from jaxbiped.dynamics._state_quantities import recurring_names
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gradient_modes import AbstractGradient, Implicit
@@ -118,7 +119,7 @@ def _by_correction(gait: Gait, once_from: Callable[[PyTree], Return]) -> Measure
     """Newton's correction at the gait changes nothing but has the gait's derivatives."""
     state = gait.measures.state
     once = once_from(state)
-    recurring = state._fields[1:]
+    recurring = recurring_names(state)
     change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in recurring])
     size = len(recurring)
     step = solution(jnp.eye(size) - gait.return_jacobian[:size], change)

@@ -4,10 +4,9 @@ A search that fails from its start follows the seed's gait along this line to sc
 """
 
 import dataclasses
-import enum
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import islice
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -15,6 +14,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._ending import NamedCode
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.gait._pseudo_arclength import (
     Change,
@@ -26,14 +26,10 @@ from jaxbiped.gait._pseudo_arclength import (
     locate,
 )
 from jaxbiped.scene._ready_scenes import seed_scene
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.scene.actuation._abstract_actuator import Actuation
-from jaxbiped.scene.laws._catalogue import (
-    FRICTION_LAWS,
-    NORMAL_LAWS,
-    friction_law_like,
-    normal_law_like,
-)
+from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
+from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
 
 _Law = TypeVar("_Law", bound=eqx.Module)
 _CONTROL = StepControl(first=0.08, largest=0.35, smallest=2e-4)
@@ -51,10 +47,10 @@ class Homotopy(NamedTuple):
         first, last: the scenes at s = 0 and at s = 1.
     """
 
-    first: AbstractScene
-    last: AbstractScene
+    first: AbstractWalkerScene
+    last: AbstractWalkerScene
 
-    def at(self, s: Scalar | float) -> AbstractScene:
+    def at(self, s: Scalar | float) -> AbstractWalkerScene:
         """The scene at s; beyond 1 the line goes on."""
         return jtu.tree_map(lambda a, b: _interpolate(a, b, s)[0], self.first, self.last)
 
@@ -74,7 +70,7 @@ def _interpolate(a: Scalar, b: Scalar, s: Scalar | float) -> tuple[Scalar, Scala
     return value, jnp.where(geometric, power * jnp.log(ratio), b - a)
 
 
-def homotopy_to(scene: AbstractScene) -> Homotopy:
+def homotopy_to(scene: AbstractWalkerScene) -> Homotopy:
     """The line to `scene` from the seed's scene, its laws made to resemble the seed's.
 
     Numbers of laws that are not in the catalogue stay those of `scene`. Its actuators are idle.
@@ -90,31 +86,12 @@ def _seed_like(scene: Scene | RigidScene) -> Scene | RigidScene:
                 scene, walker=own.walker, ground=own.ground, actuation=_idle(scene)
             )
             return jtu.tree_map(as_float, rigid)
-        normal, friction = own.normal, own.friction
-        normals = {
-            law: normal_law_like(
-                name, K=normal.K, c=normal.c, n=normal.n, mass=own.walker.total_mass, g=own.ground.g
-            )
-            for name, law in NORMAL_LAWS.items()
-            if law is type(scene.normal)
-        }
-        frictions = {
-            law: friction_law_like(
-                name,
-                mu_static=friction.mu_static,
-                mu_kinetic=friction.mu_kinetic,
-                v0=friction.v0,
-                xi=friction.xi,
-            )
-            for name, law in FRICTION_LAWS.items()
-            if law is type(scene.friction)
-        }
         begin = dataclasses.replace(
             scene,
             walker=own.walker,
             ground=own.ground,
-            normal=_numbers_of(normals.get(type(scene.normal)), scene.normal),
-            friction=_numbers_of(frictions.get(type(scene.friction)), scene.friction),
+            normal=_like_seed(scene.normal, NORMAL_LAWS, normal_law_like),
+            friction=_like_seed(scene.friction, FRICTION_LAWS, friction_law_like),
             actuation=_idle(scene),
         )
         return jtu.tree_map(as_float, begin)
@@ -125,23 +102,19 @@ def _idle(scene: Scene | RigidScene) -> Actuation:
     return None if scene.actuation is None else tuple(part.idle() for part in scene.actuation)
 
 
-def _numbers_of(alike: eqx.Module | None, law: _Law) -> _Law:
-    """`law` with the numbers of `alike`; its own static fields, and numbers that this lacks."""
-    if alike is None:
+def _like_seed(law: _Law, catalogue: Mapping[str, type], like: Callable[[str], Any]) -> _Law:
+    """A law of the catalogue with numbers that resemble the seed's; its own where these lack."""
+    name = next((name for name, kind in catalogue.items() if kind is type(law)), None)
+    if name is None:
         return law
-    fields = [field.name for field in dataclasses.fields(law)]
-    static = [field.name for field in dataclasses.fields(law) if field.metadata.get("static")]
-    numbers = {
-        name: getattr(alike, name)
-        for name in fields
-        if name not in static
-        and getattr(law, name) is not None
-        and getattr(alike, name) is not None
-    }
-    return dataclasses.replace(law, **numbers)
+    alike = like(name)
+    own = [field.name for field in dataclasses.fields(law) if not field.metadata.get("static")]
+    values = {name: getattr(alike, name) for name in own if getattr(law, name) is not None}
+    known = {name: value for name, value in values.items() if value is not None}
+    return dataclasses.replace(law, **known)
 
 
-class BranchEnd(enum.IntEnum):
+class BranchEnd(NamedCode):
     """How a branch of gaits ended. `str(end)` is its name in words.
 
     - not followed: there was no need to.
@@ -168,9 +141,6 @@ class BranchEnd(enum.IntEnum):
     CLOSED = 8
     BRANCHES_OFF = 9
     JUMPED = 10
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
 
 
 class FollowedBranch(NamedTuple):
@@ -213,7 +183,7 @@ def follow_branch(
     """
     curve = Curve(change, np.append(scales, 1.0), _CONVERGED)
     here = np.append(start, 0.0) / curve.sizes
-    first = correct(curve, here, np.eye(len(here))[-1])
+    first = correct(curve, here)
     if first.found is None:
         return FollowedBranch(start[None], np.zeros(1), BranchEnd.NO_BEGINNING, first.code)
     control = _CONTROL._replace(smallest=smallest)
@@ -241,7 +211,7 @@ def _at_end(curve: Curve, here: CurvePoint, there: CurvePoint) -> CurvePoint | N
     """The point at s = 1 between two points on either side of it."""
     share = (1.0 - here.place[-1]) / (there.place[-1] - here.place[-1])
     guess = here.place + share * (there.place - here.place)
-    return correct(curve, guess, np.eye(len(guess))[-1], here.tangent).found
+    return correct(curve, guess, here.tangent, holds_s=True).found
 
 
 def _fold(curve: Curve, here: CurvePoint, there: CurvePoint) -> list[CurvePoint]:

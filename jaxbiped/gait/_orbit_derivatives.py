@@ -1,5 +1,6 @@
 """Periodic orbit: its stability and its sensitivities."""
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -8,13 +9,8 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._fixed_point_search import Found, Search, looser
-from jaxbiped.gait._poincare_map import (
-    LinearisedReturn,
-    linearised_return,
-    seed_directions,
-    state_with,
-)
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, with_looser
+from jaxbiped.gait._poincare_map import LinearisedReturn, linearised_return
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.gait._stability import Stability, stability_of
@@ -76,14 +72,7 @@ class Orbit(NamedTuple):
     sizes: Scalar
 
 
-def with_parameter_columns(
-    spec: ReturnMapSpec,
-    args: PyTree,
-    active: tuple[int, ...],
-    guess: PyTree,
-    precision: Precision,
-    found: Found,
-) -> Found:
+def with_parameter_columns(problem: FixedPointProblem, found: Found) -> Found:
     """What a search found, with derivatives with respect to parameters as well.
 
     The gait's own values and derivatives stay those of the search. Of parameters nothing is claimed
@@ -91,20 +80,17 @@ def with_parameter_columns(
     """
     m, own = found.recurring.shape[0], found.both
     alone = {name: getattr(own, name)[..., :m] for name in _ROWS}
-    if not active:
+    if not problem.active:
         return found._replace(both=own._replace(**alone))
-    seeds, _ = seed_directions(args, active, m)
-    start = state_with(spec.system, guess, found.recurring)
+    seeds, _ = problem.directions(m)
+    start = problem.state(found.recurring)
     idle = found.ending == int(Search.NO_RETURN)
     lost = idle | (found.ending == int(Search.NOT_CONVERGED))
 
     def once(precision: Precision) -> LinearisedReturn:
-        return linearised_return(spec, seeds, start, precision, idle)
+        return linearised_return(problem.spec, seeds, start, precision, idle)
 
-    pairs = jax.tree.map(
-        lambda *pair: jnp.stack(list(map(jnp.asarray, pair))), precision, looser(precision)
-    )
-    new = _each_of(spec, once)(pairs)
+    new = _each_of(problem.spec, once)(with_looser(problem.precision))
 
     def joined(name: str) -> Scalar:
         parameters = jnp.where(lost, jnp.nan, getattr(new, name)[..., m:])
@@ -116,20 +102,12 @@ def with_parameter_columns(
     return found._replace(both=own._replace(nodes=new.nodes, **changed))
 
 
-def orbit_of(
-    spec: ReturnMapSpec,
-    args: PyTree,
-    active: tuple[int, ...],
-    guess: PyTree,
-    found: Found,
-    *,
-    radius: bool,
-) -> Orbit:
-    """The orbit that a search from `guess` found, differentiated by the implicit function theorem.
+def orbit_of(problem: FixedPointProblem, found: Found, *, radius: bool) -> Orbit:
+    """The orbit that a search found, differentiated by the implicit function theorem.
 
     `radius` asks for the derivatives of the spectral radius as well.
     """
-    state = state_with(spec.system, guess, found.recurring)
+    state = problem.state(found.recurring)
     m = found.recurring.shape[0]
     last, coarse = found.last, found.coarse
     monodromy, witness = last.monodromy[:, :m], coarse.monodromy[:, :m]
@@ -140,12 +118,11 @@ def orbit_of(
     # Where the force itself jumped on the section by XLA, columns lack the jump's own correction.
     slopes = jax.tree.map(lambda leaf: jnp.where(last.missed > 0, jnp.nan, leaf), slopes)
     errors = _slope_errors(last, slopes, looser)
-    _, sizes = seed_directions(args, active, m)
-    radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
-    if radius and active:
-        radius_slopes, looser_slopes = _each_of(
-            spec, lambda each: _radius_slopes(spec, args, active, guess, each)
-        )(found.both)
+    _, sizes = problem.directions(m)
+    radius_slopes = radius_errors = jnp.full(len(problem.active), jnp.nan)
+    if radius and problem.active:
+        slopes_of_radius = functools.partial(_radius_slopes, problem)
+        radius_slopes, looser_slopes = _each_of(problem.spec, slopes_of_radius)(found.both)
         change = jnp.abs(radius_slopes - looser_slopes)
         size = jnp.maximum(jnp.sum(radius_slopes * radius_slopes), _NOTHING)
         share = jnp.sqrt(jnp.sum(change * change) / size)
@@ -167,10 +144,17 @@ def slopes_of(last: LinearisedReturn) -> Slopes:
     m = last.recurring.shape[0]
     by_state, by_parameter = last.jacobian[:, :m], last.jacobian[:, m:]
     recurring = solve(jnp.eye(m) - by_state, by_parameter)
-    recurring = jnp.where(last.grazes > 0, jnp.nan, recurring)
+    return _chain_rule(last, jnp.where(last.grazes > 0, jnp.nan, recurring))
+
+
+def _chain_rule(
+    last: LinearisedReturn, recurring: Scalar, size: Callable[[Scalar], Scalar] = lambda rows: rows
+) -> Slopes:
+    """What derivatives of the recurring components make of the others, of terms by their `size`."""
+    m = last.recurring.shape[0]
 
     def total(rows: Scalar) -> Scalar:
-        return rows[..., m:] + rows[..., :m] @ recurring
+        return size(rows[..., m:]) + size(rows[..., :m]) @ recurring
 
     return Slopes(recurring, total(last.period_row), total(last.advance_rows), total(last.peak_row))
 
@@ -184,14 +168,7 @@ def _slope_errors(last: LinearisedReturn, slopes: Slopes, looser: Slopes) -> Slo
     """
     m = last.recurring.shape[0]
     inverse = jnp.abs(solve(jnp.eye(m) - last.jacobian[:, :m], jnp.eye(m)))
-    recurring = inverse @ jnp.abs(last.jacobian[:, m:])
-
-    def total(rows: Scalar) -> Scalar:
-        return jnp.abs(rows[..., m:]) + jnp.abs(rows[..., :m]) @ recurring
-
-    sizes = Slopes(
-        recurring, total(last.period_row), total(last.advance_rows), total(last.peak_row)
-    )
+    sizes = _chain_rule(last, inverse @ jnp.abs(last.jacobian[:, m:]), jnp.abs)
 
     def error(slope: Scalar, other: Scalar, size: Scalar) -> Scalar:
         change = jnp.abs(slope - other)
@@ -202,9 +179,7 @@ def _slope_errors(last: LinearisedReturn, slopes: Slopes, looser: Slopes) -> Slo
     return jax.tree.map(error, slopes, looser, sizes)
 
 
-def _radius_slopes(
-    spec: ReturnMapSpec, args: PyTree, active: tuple[int, ...], like: PyTree, last: LinearisedReturn
-) -> Scalar:
+def _radius_slopes(problem: FixedPointProblem, last: LinearisedReturn) -> Scalar:
     """Derivatives of the leading multiplier's absolute value, shape (p,).
 
     dλ = wᵀ (dP_x) v with left and right eigenvectors, dP_x along the orbits' family.
@@ -218,8 +193,10 @@ def _radius_slopes(
     leading = jnp.stack([vector.real, vector.imag])
     weights = jnp.stack([weight.real, -weight.imag]) / jnp.abs(value)
     family = slopes_of(last).recurring
-    seeds, sizes = seed_directions(args, active, m)
-    slopes = second_variation(spec, seeds, like, last, leading, weights, family, sizes)
+    seeds, sizes = problem.directions(m)
+    slopes = second_variation(
+        problem.spec, seeds, problem.guess, last, leading, weights, family, sizes
+    )
     # Second derivatives across a jump of the force itself would need more than its Jacobians'.
     return jnp.where(last.jumps > 0, jnp.nan, slopes)
 

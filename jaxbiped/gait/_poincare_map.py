@@ -3,7 +3,7 @@
 Newton's method, multipliers and sensitivities all read this one evaluation.
 """
 
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -18,10 +18,16 @@ from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import recurring_inverse_units
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival, solve_to_section
-from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
+from jaxbiped.variational._tangents import (
+    SectionSolve,
+    Seeded,
+    Tangents,
+    Watch,
+    along_columns,
+    as_columns,
+)
 from jaxbiped.variational._variational_solve import solve_to_section_by_lanes
 
 STATE_FLOOR = 0.1
@@ -203,34 +209,15 @@ def _next_arrival(
     carries_parameters: Scalar | bool,
 ) -> SectionArrival:
     """The next arrival, by the engine that is asked for."""
-    most = spec.max_solver_steps
+    how = SectionSolve(watch, spec.solver, precision, limit, spec.max_solver_steps)
     m = args.seeds.shape[1] - len(args.active)
     if spec.engine == "xla":
         deaf = (jnp.arange(len(args.floors)) >= m) & ~jnp.asarray(carries_parameters)
         floors = jnp.where(deaf, jnp.inf, args.floors)
         args = Seeded(args.args, args.seeds, floors, args.active)
-        return solve_to_section(
-            watch,
-            spec.solver,
-            y0,
-            args,
-            precision=precision,
-            max_time=limit,
-            max_solver_steps=most,
-            save_nodes=True,
-        )
+        return solve_to_section(how, y0, args, save_nodes=True)
     sizes = jnp.diagonal(args.seeds[:, m:])
-    return solve_to_section_by_lanes(
-        watch,
-        cast(AbstractRosenbrock, spec.solver),
-        y0,
-        args,
-        sizes,
-        precision=precision,
-        max_time=limit,
-        max_solver_steps=most,
-        carries_parameters=carries_parameters,
-    )
+    return solve_to_section_by_lanes(how, y0, args, sizes, carries_parameters)
 
 
 def _chain_arrivals(

@@ -106,16 +106,18 @@ class StepControl(NamedTuple):
 def correct(
     curve: Curve,
     guess: np.ndarray,
-    border: np.ndarray,
     along: np.ndarray | None = None,
     *,
+    holds_s: bool = False,
     patient: bool = False,
 ) -> Attempt:
-    """The zero near `guess` in the plane normal to `border`, by Newton's method.
+    """The zero near `guess` in the plane normal to a direction, by Newton's method.
 
-    Its tangent points on from the direction `along`, towards larger s unless given. Corrections
-    that do not get smaller end it, unless it is `patient`.
+    The tangent there points on from that direction. Unless it is given the zero is sought at the
+    guess's own s, as where that `holds_s`, and the tangent points towards larger s. Corrections
+    that do not get smaller end the search, unless it is `patient`.
     """
+    border = np.eye(len(guess))[-1] if along is None or holds_s else along
     point, last = guess, np.inf
     for k in range(_PATIENT if patient else _MOST_CORRECTIONS):
         here = curve.change(point[:-1] * curve.sizes[:-1], float(point[-1] * curve.sizes[-1]))
@@ -158,8 +160,8 @@ def follow(
         if abs(rise * curve.sizes[-1] * step) > abs(room):
             length = room / (rise * curve.sizes[-1])
         # The last step ends on the bound, the others where the tangent says.
-        border = np.eye(len(here.place))[-1] if length < step else here.tangent
-        attempt = correct(curve, here.place + length * here.tangent, border, here.tangent)
+        guess = here.place + length * here.tangent
+        attempt = correct(curve, guess, here.tangent, holds_s=length < step)
         jumps = attempt.found is not None and _jumps(here, attempt.found, length, control)
         if attempt.found is None or (jumps and step > 50.0 * control.smallest):
             step *= 0.4
@@ -258,7 +260,7 @@ def _at_length(
 ) -> CurvePoint | None:
     """The point so far along the tangent of `here`, from a nearer one."""
     ahead = (length - _advance(here, near)) / (near.tangent @ here.tangent)
-    return correct(curve, near.place + ahead * near.tangent, here.tangent, here.tangent).found
+    return correct(curve, near.place + ahead * near.tangent, here.tangent).found
 
 
 def _advance(here: CurvePoint, there: CurvePoint) -> float:

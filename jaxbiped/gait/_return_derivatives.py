@@ -4,7 +4,7 @@ By lanes all directions of a derivative share one solve; by diffrax each has one
 """
 
 from collections.abc import Callable
-from typing import cast
+from typing import TypeAlias
 
 import equinox as eqx
 import equinox.internal as eqxi
@@ -20,9 +20,8 @@ from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import SectionArrival, solve_to_section
-from jaxbiped.variational._tangents import Seeded, Tangents, VariationalSolution
+from jaxbiped.variational._tangents import SectionSolve, Seeded, Tangents, VariationalSolution
 from jaxbiped.variational._variational_solve import solve_variational
 
 NO_REVERSE = (
@@ -31,25 +30,46 @@ NO_REVERSE = (
 )
 
 
+_Arrived: TypeAlias = tuple[PyTree, Scalar, Scalar]
+"""A state, the time that it took, and the code of what ended the motion."""
+
+
 @eqx.filter_custom_jvp
-def forward_by_xla(
-    spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree
-) -> tuple[PyTree, Scalar, Scalar]:
+def forward(spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree) -> _Arrived:
+    """The next arrival, its derivatives those of tangents that are carried along the motion."""
+    if spec.engine == "lanes":
+        solved = _solve(spec, precision, args, state, (), ())
+        return _reset_on_arrival(spec, args, solved.state, solved.t, solved.code)
     found = _arrival(spec, precision, args, state)
-    return reset_on_arrival(spec, args, found.y, found.time, found.code)
+    return _reset_on_arrival(spec, args, found.y, found.time, found.code)
 
 
-@forward_by_xla.def_jvp
-def _by_xla_forward_jvp(
+@forward.def_jvp
+def _forward_jvp(
     primals: tuple[PyTree, ...], tangents: tuple[PyTree, ...]
 ) -> tuple[PyTree, PyTree]:
     spec, precision, args, state = primals
-    spec_dot, _, args_dot, state_dot = tangents
+    spec_dot, _, args_dot, _ = tangents
     if jtu.tree_leaves((spec_dot.system, spec_dot.section)):
         raise ArgumentError(
             f"{type(spec.system).__name__} or {type(spec.section).__name__} holds what is "
             "differentiated: it must be among args, whose derivatives are carried."
         )
+    tangent = _tangent_by_lanes if spec.engine == "lanes" else _tangent_by_xla
+    (end, time_dot, code), row = tangent(primals, tangents)
+    arrived = jtu.tree_unflatten(jtu.tree_structure(state), list(row))
+    _, end_dot = jax.jvp(_reset(spec, code), (args, end), (full_tangents(args_dot, args), arrived))
+    end_dot, time_dot = eqxi.nondifferentiable_backward((end_dot, time_dot), msg=NO_REVERSE)
+    # The values by themselves: they must not depend on what they are differentiated along.
+    return forward(spec, precision, args, state), (end_dot, time_dot, None)
+
+
+def _tangent_by_xla(
+    primals: tuple[PyTree, ...], tangents: tuple[PyTree, ...]
+) -> tuple[_Arrived, Scalar]:
+    """Where a motion arrives, the derivatives of its time and of its state: one tangent."""
+    spec, precision, args, state = primals
+    _, _, args_dot, state_dot = tangents
     args_leaves = jtu.tree_leaves(args)
     column = jnp.stack(_dense(state_dot, state))[:, None]
     seeds = _dense(args_dot, args)
@@ -65,25 +85,40 @@ def _by_xla_forward_jvp(
         tuple(range(len(seeds))),
     )
     found = _arrival(spec, precision, seeded, Tangents(state, column))
-    structure = jtu.tree_structure(state)
-    arrived_row, time_row = jtu.tree_map(
+    row, time_dot = jtu.tree_map(
         lambda row: jnp.where(found.undetermined, jnp.nan, row),
         (found.y.columns[:, 0], found.time_columns[0]),
     )
-    arrived = jtu.tree_unflatten(structure, list(arrived_row))
-
-    _, end_dot = jax.jvp(
-        _reset(spec, found.code), (args, found.y.state), (full_tangents(args_dot, args), arrived)
-    )
-    end_dot, time_dot = eqxi.nondifferentiable_backward((end_dot, time_row), msg=NO_REVERSE)
-    # The values by themselves: they must not depend on what they are differentiated along.
-    values = forward_by_xla(spec, precision, args, state)
-    return values, (end_dot, time_dot, None)
+    return (found.y.state, time_dot, found.code), row
 
 
-def reverse_by_xla(
+def _tangent_by_lanes(
+    primals: tuple[PyTree, ...], tangents: tuple[PyTree, ...]
+) -> tuple[_Arrived, Scalar]:
+    """The same from a column for each leaf that is differentiated."""
+    spec, precision, args, state = primals
+    _, _, args_dot, state_dot = tangents
+    state_dots, args_dots = _leaves_with_none(state_dot, state), _leaves_with_none(args_dot, args)
+    places = tuple(i for i, dot in enumerate(state_dots) if dot is not None)
+    active = tuple(i for i, dot in enumerate(args_dots) if dot is not None)
+    found = _solve(spec, precision, args, state, places, active)
+    sizes = _sizes(args, active)
+    dots = [state_dots[i] for i in places]
+    dots += [args_dots[i] / size for i, size in zip(active, sizes, strict=True)]
+    along = jnp.stack(dots) if dots else jnp.zeros(0)
+    return (found.state, along @ found.time_columns, found.code), along @ found.columns
+
+
+def reverse(spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree) -> _Arrived:
+    """The next arrival, differentiable in reverse mode."""
+    if spec.engine == "lanes":
+        return _reverse_by_lanes((args, state), spec, precision)
+    return _reverse_by_xla(spec, precision, args, state)
+
+
+def _reverse_by_xla(
     spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree
-) -> tuple[PyTree, Scalar, Scalar]:
+) -> _Arrived:
     inverse = jnp.stack(jtu.tree_leaves(units_of(args, state).inverse))
     count = len(inverse)
     start = Tangents(state, jnp.eye(count))
@@ -91,7 +126,7 @@ def reverse_by_xla(
     found = _arrival(spec, precision, seeded, start, columns_only_choose_steps=True)
     known = (found.y.state, found.time)
     y, time = _without_derivatives(found.undetermined, known, (args, state))
-    return reset_on_arrival(spec, args, y, time, found.code)
+    return _reset_on_arrival(spec, args, y, time, found.code)
 
 
 def _arrival(
@@ -99,16 +134,12 @@ def _arrival(
 ) -> SectionArrival:
     """The next arrival through diffrax, of a state or of tangents under seeded arguments."""
     plain, state = (args.args, y.state) if isinstance(y, Tangents) else (args, y)
-    return solve_to_section(
-        spec.watch(plain, state, peak=False),
-        spec.solver,
-        y,
-        args,
-        precision=precision,
-        max_time=spec.max_time,
-        max_solver_steps=spec.max_solver_steps,
-        **options,
-    )
+    return solve_to_section(_how(spec, precision, plain, state), y, args, **options)
+
+
+def _how(spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree) -> SectionSolve:
+    watch = spec.watch(args, state, peak=False)
+    return SectionSolve(watch, spec.solver, precision, spec.max_time, spec.max_solver_steps)
 
 
 @jax.custom_jvp
@@ -130,9 +161,9 @@ def _without_derivatives_jvp(
     return values, jtu.tree_map(lambda dot: dot + moved, dots)
 
 
-def reset_on_arrival(
+def _reset_on_arrival(
     spec: ReturnMapSpec, args: PyTree, state: PyTree, time: Scalar, code: Scalar
-) -> tuple[PyTree, Scalar, Scalar]:
+) -> _Arrived:
     return _reset(spec, code)(args, state), time, code
 
 
@@ -154,66 +185,27 @@ def full_tangents(tangents: PyTree, like: PyTree) -> PyTree:
     return jtu.tree_map(full, like, tangents, is_leaf=lambda leaf: leaf is None)
 
 
-@eqx.filter_custom_jvp
-def forward_by_lanes(
-    spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree
-) -> tuple[PyTree, Scalar, Scalar]:
-    found = _solve(spec, precision, args, state, (), ())
-    return reset_on_arrival(spec, args, found.state, found.t, found.code)
-
-
-@forward_by_lanes.def_jvp
-def _forward_by_lanes_jvp(
-    primals: tuple[PyTree, ...], tangents: tuple[PyTree, ...]
-) -> tuple[PyTree, PyTree]:
-    spec, precision, args, state = primals
-    _, _, args_dot, state_dot = tangents
-    state_dots, args_dots = _leaves_with_none(state_dot, state), _leaves_with_none(args_dot, args)
-    places = tuple(i for i, dot in enumerate(state_dots) if dot is not None)
-    active = tuple(i for i, dot in enumerate(args_dots) if dot is not None)
-    found = _solve(spec, precision, args, state, places, active)
-    sizes = _sizes(args, active)
-    dots = [state_dots[i] for i in places]
-    dots += [args_dots[i] / size for i, size in zip(active, sizes, strict=True)]
-    along = jnp.stack(dots) if dots else jnp.zeros(0)
-    arrived = jtu.tree_unflatten(jtu.tree_structure(state), list(along @ found.columns))
-
-    _, end_dot = jax.jvp(
-        _reset(spec, found.code), (args, found.state), (full_tangents(args_dot, args), arrived)
-    )
-    end_dot, time_dot = eqxi.nondifferentiable_backward(
-        (end_dot, along @ found.time_columns), msg=NO_REVERSE
-    )
-    return forward_by_lanes(spec, precision, args, state), (end_dot, time_dot, None)
-
-
 @eqx.filter_custom_vjp
-def _reversible(
+def _reverse_by_lanes(
     given: tuple[PyTree, PyTree], spec: ReturnMapSpec, precision: Precision
-) -> tuple[PyTree, Scalar, Scalar]:
+) -> _Arrived:
+    """The columns, of just what is differentiated, are known and transposed."""
     args, state = given
-    return forward_by_lanes(spec, precision, args, state)
+    return forward(spec, precision, args, state)
 
 
-def reverse_by_lanes(
-    spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree
-) -> tuple[PyTree, Scalar, Scalar]:
-    """In reverse mode: the columns, of just what is differentiated, are known and transposed."""
-    return _reversible((args, state), spec, precision)
-
-
-@_reversible.def_fwd
-def _reversible_fwd(
+@_reverse_by_lanes.def_fwd
+def _reverse_by_lanes_fwd(
     perturbed: PyTree, given: tuple[PyTree, PyTree], spec: ReturnMapSpec, precision: Precision
 ) -> tuple[PyTree, VariationalSolution]:
     args, state = given
     active, places = (_places(part) for part in perturbed)
     found = _solve(spec, precision, args, state, places, active)
-    return reset_on_arrival(spec, args, found.state, found.t, found.code), found
+    return _reset_on_arrival(spec, args, found.state, found.t, found.code), found
 
 
-@_reversible.def_bwd
-def _reversible_bwd(
+@_reverse_by_lanes.def_bwd
+def _reverse_by_lanes_bwd(
     found: VariationalSolution,
     cotangents: PyTree,
     perturbed: PyTree,
@@ -267,14 +259,10 @@ def _solve(
     inverse = jtu.tree_leaves(units_of(args, state).inverse)
     floors = jnp.asarray([*(STATE_FLOOR * inverse[i] for i in places), *[PARAMETER_FLOOR] * p])
     found, _ = solve_variational(
-        spec.watch(args, state, peak=False),
-        cast(AbstractRosenbrock, spec.solver),
+        _how(spec, precision, args, state),
         Tangents(state, jnp.asarray(columns)),
         Seeded(args, jnp.zeros((p, m + p)), floors, active),
         jnp.stack(_sizes(args, active)) if active else jnp.zeros(0),
-        precision=precision,
-        max_time=spec.max_time,
-        max_solver_steps=spec.max_solver_steps,
     )
     nan = jnp.where(found.undetermined, jnp.nan, 0.0)
     return found._replace(columns=found.columns + nan, time_columns=found.time_columns + nan)

@@ -1,6 +1,5 @@
 """The return map as a function that JAX can differentiate, and one return with its derivatives."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import diffrax
@@ -16,25 +15,13 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import check_leaves
 from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
 from jaxbiped.gait._poincare_map import LinearisedReturn, linearised_return, seed_directions
-from jaxbiped.gait._return_derivatives import (
-    forward_by_lanes,
-    forward_by_xla,
-    reverse_by_lanes,
-    reverse_by_xla,
-)
+from jaxbiped.gait._return_derivatives import forward, reverse
 from jaxbiped.gait._return_map_spec import check_holds_none, return_map_spec
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, Precision, precision_of
 from jaxbiped.variational._hybrid_system import AbstractSystem, section_of, with_leg_names_of
-
-_FOLLOW: dict[tuple[str, type[AbstractGradient]], Callable[..., tuple[PyTree, Scalar, Scalar]]] = {
-    ("xla", Forward): forward_by_xla,
-    ("xla", Reverse): reverse_by_xla,
-    ("lanes", Forward): forward_by_lanes,
-    ("lanes", Reverse): reverse_by_lanes,
-}
 
 
 class Return(NamedTuple):
@@ -123,7 +110,7 @@ def return_map(
         max_time=max_time,
         max_solver_steps=ACCURACIES[accuracy].max_solver_steps,
     )
-    follow = _FOLLOW[spec.engine, type(gradient)]
+    follow = reverse if isinstance(gradient, Reverse) else forward
     precision = precision_of(accuracy, args)
     time, code = jnp.zeros(()), jnp.asarray(0)
     for _ in range(int(footsteps)):

@@ -13,7 +13,7 @@ from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._gradient_modes import AbstractGradient, Reverse
-from jaxbiped.scene._scene import AbstractScene, RedundantScene, is_rigid
+from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, is_rigid
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.solve._solvers import solver_named
@@ -128,7 +128,7 @@ def return_map_spec(
     )
 
 
-def patience_of(scene: AbstractScene) -> Scalar:
+def patience_of(scene: AbstractWalkerScene) -> Scalar:
     """Time that a walker's next arrival may take [s]."""
     found: Scalar = by_numpy(
         lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.walker.l, scene.ground.g

@@ -10,17 +10,13 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.gait._fixed_point_search import Found, Search, search, walks_only
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, search, walks_only
 from jaxbiped.gait._homotopy import BranchEnd, Homotopy, homotopy_to
-from jaxbiped.gait._newton import Method
-from jaxbiped.gait._poincare_map import recurring_components, state_with
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._search_provenance import FoundBy, Origin
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.linalg._small_matrices import eigenpairs
-from jaxbiped.scene._scene import AbstractScene
-from jaxbiped.solve._accuracy import Precision
+from jaxbiped.scene._scene import AbstractWalkerScene
 
 _FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3
 """Steps along the line: the first, at most, and at which it is given up."""
@@ -60,28 +56,17 @@ class _Way(NamedTuple):
     over: Scalar
 
 
-def search_along(
-    spec: ReturnMapSpec,
-    scene: AbstractScene,
-    active: tuple[int, ...],
-    start: WalkerState,
-    precision: Precision,
-    method: Method,
-    origin: Origin,
-) -> tuple[Found, Origin]:
-    """Searches from `start`, and along the line from the seed's scene where need be."""
-    line = homotopy_to(scene)
-    fitted = recurring_components(spec.system, start)
-    of_seed = line.first.minimal
-    first = recurring_components(spec.system, default_guess(of_seed))
+def search_along(problem: FixedPointProblem, origin: Origin) -> tuple[Found, Origin]:
+    """Searches from the guess, and along the line from the seed's scene where need be."""
+    line, system = homotopy_to(problem.args), problem.spec.system
+    fitted = recurring_components(system, problem.guess)
+    first = recurring_components(system, default_guess(line.first.minimal))
 
     def run(way: _Way) -> Found:
         there = line.at(jnp.where(way.s < 0.0, 1.0, way.s))
-        guess = state_with(spec.system, start, way.ahead)
-        return search(spec, there, active, guess, precision, method, ~way.over)
+        return search(problem._replace(args=there, guess=problem.state(way.ahead)), ~way.over)
 
-    one = (spec, scene, active, start, precision, method, jnp.asarray(True))
-    shape = jax.eval_shape(lambda: search(*one))
+    shape = jax.eval_shape(lambda: search(problem, jnp.asarray(True)))
     no_return = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
     begin = _Way(
         s=jnp.asarray(-1.0),
@@ -164,7 +149,9 @@ def _is_ahead(way: _Way, point: Scalar) -> Scalar:
     return jnp.where(way.at[1] > way.at[0], aside < _ASIDE * length + 0.01, length < _JUMP)
 
 
-def _nearest(kept: AbstractScene, line: Homotopy, s: Scalar, wanted: Scalar) -> AbstractScene:
+def _nearest(
+    kept: AbstractWalkerScene, line: Homotopy, s: Scalar, wanted: Scalar
+) -> AbstractWalkerScene:
     scene = line.at(s)
     return select(wanted, scene.minimal, kept)
 

@@ -1,6 +1,5 @@
 """Provenance of a gait: how a search came to it and what else it saw, also in a sentence."""
 
-import enum
 import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -8,7 +7,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._ending import Ending
+from jaxbiped._ending import Ending, NamedCode
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._fixed_point_search import Search
@@ -32,7 +31,7 @@ _HOW = {
 }
 
 
-class FoundBy(enum.IntEnum):
+class FoundBy(NamedCode):
     """The stage of the search that came to a gait. `str(found_by)` is its name in words.
 
     - guess: Newton's method from the guess that was given.
@@ -47,9 +46,6 @@ class FoundBy(enum.IntEnum):
     WALKING = 2
     CONTINUATION = 3
     SCATTERED_STARTS = 4
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
 
 
 class OtherGait(NamedTuple):
@@ -172,20 +168,14 @@ def _branch(scene: AbstractScene, gait: "Gait") -> str:
     if end is BranchEnd.NO_BEGINNING:
         return "; the seed's walker has no gait under these laws, from which one could be followed"
     place = _differing_parameters(modelled, gait.origin.nearest)
-    if end is BranchEnd.FOLD:
-        return f"; the branch of the seed's gait turns back at a fold at {place}, which has one"
-    if end is BranchEnd.WALK_ENDS:
-        walk = Ending(int(gait.origin.branch_walk_ending))
-        return (
-            f"; the branch of the seed's gait ends at {place}, which has one: beyond, the walk "
-            f"{_HOW.get(walk, f'ends ({walk})')}"
-        )
-    if end is BranchEnd.BREAKS_OFF:
-        return (
-            f"; the branch of the seed's gait breaks off at {place}, which has one: beyond, the "
-            "return map is not smooth"
-        )
-    return f"; the branch of the seed's gait was followed as far as {place}, which has one"
+    walk = Ending(int(gait.origin.branch_walk_ending))
+    verb, beyond = {
+        BranchEnd.FOLD: ("turns back at a fold at", ""),
+        BranchEnd.WALK_ENDS: ("ends at", f"the walk {_HOW.get(walk, f'ends ({walk})')}"),
+        BranchEnd.BREAKS_OFF: ("breaks off at", "the return map is not smooth"),
+    }.get(end, ("was followed as far as", ""))
+    more = f": beyond, {beyond}" if beyond else ""
+    return f"; the branch of the seed's gait {verb} {place}, which has one{more}"
 
 
 def _differing_parameters(scene: AbstractScene, nearest: AbstractScene) -> str:

@@ -14,7 +14,7 @@ from jaxbiped._types import Scalar, as_float, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._feet import standing_height
+from jaxbiped.dynamics._contacts import standing_height
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import (
     BristleState,
@@ -28,12 +28,12 @@ from jaxbiped.dynamics._state import (
     state_type,
     whole_state,
 )
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES, recurring_leaves, recurring_names
 from jaxbiped.scene._ready_scenes import seed_scene
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._walker import Walker
-from jaxbiped.simulate._rigid_walk import rigid_walk
-from jaxbiped.simulate._simulate import simulate
+from jaxbiped.simulate._simulate import rigid_walk, simulate
 from jaxbiped.solve._trajectory import Trajectory
 
 _FOOTSTEPS = 40
@@ -43,14 +43,14 @@ _DEPTH = 4
 """Longest cycle [footsteps] that is looked for in a walk's last arrivals."""
 
 
-def default_guess(scene: AbstractScene) -> WalkerState:
+def default_guess(scene: AbstractWalkerScene) -> WalkerState:
     """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight."""
     dtype = jnp.result_type(scene.walker.l, float)
     return _fitted(scene, *jax.tree.map(dtype.type, _seed()))
 
 
 @host_jit()  # many small operations
-def _fitted(scene: AbstractScene, seed: State, own: Scene) -> WalkerState:
+def _fitted(scene: AbstractWalkerScene, seed: State, own: Scene) -> WalkerState:
     """`own` is the seed's scene. As constants XLA would divide by its numbers by reciprocals."""
     if not scene.compliant:
         pace = jnp.sqrt(scene.ground.g / scene.walker.l * own.walker.l / own.ground.g)
@@ -137,7 +137,7 @@ def settle_walks(scene: Scene | RigidScene, starts: PyTree, *, most: int = 4) ->
     """
     walked: Callable[..., tuple[Scalar, PyTree]] = _arrivals if scene.compliant else _rigid_arrivals
     counts, last = walked(scene, starts)
-    points = np.stack([np.asarray(leaf) for leaf in last[1:]], axis=-1)
+    points = np.stack(recurring_leaves(last), axis=-1)
     walking = np.flatnonzero(np.asarray(counts) >= _FOOTSTEPS)
     sizes = component_sizes(scene, last)
     latest = points[walking, -1] / sizes
@@ -152,18 +152,15 @@ def settle_walks(scene: Scene | RigidScene, starts: PyTree, *, most: int = 4) ->
     return [latest[i] * sizes for i in chosen]
 
 
-def component_sizes(scene: AbstractScene, state: WalkerState) -> np.ndarray:
+def component_sizes(scene: AbstractWalkerScene, state: WalkerState) -> np.ndarray:
     """Size of each component of a state without hip_x, shape (m,), SI units.
 
-    Angles 1, lengths l, velocities √(g l), rates √(g/l).
+    Angles 1, lengths l, velocities √(g l), rates √(g/l), and bristles the number of l.
     """
     length, gravity = float(scene.walker.l), float(scene.ground.g)
-    by_prefix = {
-        "theta": 1.0,
-        "omega": np.sqrt(gravity / length),
-        "hip_v": np.sqrt(gravity * length),
-    }
-    return np.array([by_prefix.get(name[:5], length) for name in state._fields[1:]])
+    speed, rate = np.sqrt(gravity * length), np.sqrt(gravity / length)
+    sizes = {"m": length, "": length, "m/s": speed, "rad/s": rate, "rad": 1.0}
+    return np.array([sizes[STATE_QUANTITIES[name].unit] for name in recurring_names(state)])
 
 
 @cached_jit

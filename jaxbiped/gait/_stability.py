@@ -1,15 +1,15 @@
 """Stability of a periodic orbit: Floquet multipliers, their directions and their errors."""
 
-import enum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._types import Scalar
+from jaxbiped._ending import NamedCode
+from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.linalg._small_matrices import eigenpairs
 
 
-class Bifurcation(enum.IntEnum):
+class Bifurcation(NamedCode):
     """What a multiplier on the unit circle announces. `str(bifurcation)` is its name in words.
 
     - none: no multiplier within its error of the unit circle.
@@ -24,9 +24,7 @@ class Bifurcation(enum.IntEnum):
     NEIMARK_SACKER = 3
 
     def __str__(self) -> str:
-        if self is Bifurcation.NEIMARK_SACKER:
-            return "Neimark–Sacker"
-        return self.name.lower().replace("_", " ")
+        return "Neimark–Sacker" if self is Bifurcation.NEIMARK_SACKER else super().__str__()
 
 
 class Stability(NamedTuple):
@@ -68,21 +66,31 @@ def stability_of(
     looser, _, _ = _nontrivial(witness, velocity)
     distances = jnp.abs(values[:, None] - looser[None, :])
     errors = jnp.maximum(jnp.min(distances, axis=1), unit_error)
-    near = jnp.abs(jnp.abs(values) - 1.0) <= jnp.maximum(errors, closeness)
-    real = jnp.abs(values.imag) <= 1e-12
-    kinds = jnp.where(
-        real,
-        jnp.where(values.real > 0.0, int(Bifurcation.FOLD), int(Bifurcation.PERIOD_DOUBLING)),
-        int(Bifurcation.NEIMARK_SACKER),
-    )
     return Stability(
         multipliers=values,
         errors=errors,
         directions=vectors,
         unit_error=unit_error,
         spectral_radius=jnp.abs(values[0]),
-        bifurcation=jnp.max(jnp.where(near, kinds, int(Bifurcation.NONE))),
+        bifurcation=critical_bifurcation(values, errors, closeness),
     )
+
+
+def critical_bifurcation(values: Scalar, errors: Scalar, closeness: float) -> Scalar:
+    """Code of the `Bifurcation` that multipliers on the unit circle announce."""
+
+    def code(numpy: Any, values: Any, errors: Any) -> Any:
+        near = numpy.abs(numpy.abs(values) - 1.0) <= numpy.maximum(errors, closeness)
+        real = numpy.abs(values.imag) <= 1e-12
+        kinds = numpy.where(
+            real,
+            numpy.where(values.real > 0.0, int(Bifurcation.FOLD), int(Bifurcation.PERIOD_DOUBLING)),
+            int(Bifurcation.NEIMARK_SACKER),
+        )
+        return numpy.max(numpy.where(near, kinds, int(Bifurcation.NONE)))
+
+    found: Scalar = by_numpy(code, values, errors)
+    return found
 
 
 def _nontrivial(matrix: Scalar, velocity: Scalar) -> tuple[Scalar, Scalar, Scalar]:

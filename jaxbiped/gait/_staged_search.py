@@ -12,7 +12,8 @@ from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.gait._fixed_point_search import ROUGH, Found, Search, cycle_of
+from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
+from jaxbiped.gait._fixed_point_search import ROUGH, FixedPointProblem, Found, Search, cycle_of
 from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, follow_branch, homotopy_to
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._pseudo_arclength import Change
@@ -31,7 +32,7 @@ from jaxbiped.gait._search_starts import (
     rolling_starts,
     settle_walks,
 )
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import Precision
 
 _STARTS = {Scene: (16, 64), RigidScene: (1024,)}
@@ -51,8 +52,8 @@ _SAME = 1e-5
 """Relative difference of period and length up to which two finds are of one gait."""
 
 
-Searching = Callable[[ReturnMapSpec, AbstractScene, WalkerState, int], Found]
-"""Newton's method on the return map of a scene, from a start, in at most so many evaluations."""
+Searching = Callable[[FixedPointProblem, int], Found]
+"""Newton's method on a return map from a guess, in at most so many evaluations."""
 
 
 class Seen(NamedTuple):
@@ -89,24 +90,17 @@ class Staged(NamedTuple):
 
 
 def search_in_stages(
-    search: Searching,
-    spec: ReturnMapSpec,
-    scout: ReturnMapSpec,
-    scene: AbstractScene,
-    modelled: Scene | RigidScene,
-    first: Found,
-    rtol: float,
+    search: Searching, problem: FixedPointProblem, scout: ReturnMapSpec, first: Found
 ) -> Staged:
     """Searches on after Newton's method from the fitted start came to `first`.
 
     Args:
         search: Newton's method.
-        spec: whose cycles are sought.
+        problem: of a walker's cycles.
         scout: how to follow the branch: cycles of one footstep, in minimal coordinates.
-        scene: the walker; `modelled` in minimal coordinates.
         first: what the first stage came to.
-        rtol: relative tolerance of the solves.
     """
+    modelled = problem.args.minimal
     seen: list[Seen] = []
     branch = line = None
     start = default_guess(modelled)
@@ -119,11 +113,11 @@ def search_in_stages(
         sound = by is FoundBy.WALKING or bool(found.sound)
         known = any(_same(found, old) for old in seen)
         if int(found.ending) == int(Search.FOUND) and sound and not known:
-            seen.append(Seen(found, by, spectral_radius(found), is_whole(found, spec, rtol)))
+            seen.append(Seen(found, by, spectral_radius(found), is_whole(found, problem)))
 
     def try_all(points: Sequence[np.ndarray] | np.ndarray, by: FoundBy) -> None:
         for point in points:
-            add(search(spec, scene, _state(start, point), _TURNS), by)
+            add(search(problem._replace(guess=_state(start, point)), _TURNS), by)
             if has_stable():
                 return
 
@@ -145,7 +139,7 @@ def search_in_stages(
     elif not has_stable():
         with stage("following the seed's gait to this scene"):
             line = homotopy_to(modelled)
-            branch = _follow_from_seed(search, scout, line, start)
+            branch = _follow_from_seed(search, problem._replace(spec=scout), line, start)
             if branch.end is BranchEnd.REACHED:
                 known = len(seen)
                 try_all([branch.points[-1]], FoundBy.CONTINUATION)
@@ -184,9 +178,10 @@ def origin_of(staged: Staged, scene: Scene | RigidScene, start: WalkerState) -> 
     )
 
 
-def is_whole(found: Found, spec: ReturnMapSpec, rtol: float) -> bool:
+def is_whole(found: Found, problem: FixedPointProblem) -> bool:
     """Whether a fixed point's cycle has all the footsteps that were asked for."""
-    return spec.steps == 1 or cycle_of(found, rtol) == spec.steps
+    steps = problem.spec.steps
+    return steps == 1 or cycle_of(found, float(problem.precision.rtol)) == steps
 
 
 def spectral_radius(found: Found) -> float:
@@ -208,12 +203,12 @@ def _same(a: Found, b: Seen) -> bool:
 
 def _state(like: PyTree, point: np.ndarray) -> WalkerState:
     """The state with these components besides hip_x, of numbers that take no time to make."""
-    return jtu.tree_map(as_float, type(like)(0.0, *point.tolist()))
+    return jtu.tree_map(as_float, state_of_recurring(type(like), point.tolist()))
 
 
 def _columns(starts: WalkerState) -> np.ndarray:
     """States without hip_x as rows, shape (n, m)."""
-    return np.stack([np.asarray(leaf) for leaf in starts[1:]], axis=1)
+    return np.stack(recurring_leaves(starts), axis=1)
 
 
 def _starts(scene: Scene | RigidScene, seen: list[Seen], count: int) -> WalkerState:
@@ -227,7 +222,7 @@ def _starts(scene: Scene | RigidScene, seen: list[Seen], count: int) -> WalkerSt
     pushed = [row for each in seen for row in _push_off(each.found, sizes)][: count // 2]
     if pushed:
         rows[1 : 1 + len(pushed)] = pushed
-    return type(halves[0])(jnp.zeros(count), *map(jnp.asarray, rows.T))
+    return state_of_recurring(type(halves[0]), map(jnp.asarray, rows.T), jnp.zeros(count))
 
 
 def _push_off(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
@@ -241,10 +236,10 @@ def _push_off(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
 
 
 def _follow_from_seed(
-    search: Searching, scout: ReturnMapSpec, line: Homotopy, like: WalkerState
+    search: Searching, problem: FixedPointProblem, line: Homotopy, like: WalkerState
 ) -> FollowedBranch:
     """The branch of gaits from the seed's scene."""
-    first = search(scout, line.first, default_guess(line.first), _TURNS)
+    first = search(problem._replace(args=line.first, guess=default_guess(line.first)), _TURNS)
     point = np.asarray(first.recurring)
     if int(first.ending) != int(Search.FOUND):
         return FollowedBranch(point[None], np.zeros(1), BranchEnd.NO_BEGINNING, int(first.code))
@@ -252,7 +247,9 @@ def _follow_from_seed(
     def followed(precision: Precision, smallest: float) -> FollowedBranch:
         def change(point: np.ndarray, s: float) -> Change:
             given: PyTree = point, np.float64(s), precision
-            value, by_point, by_s, code = map(np.asarray, _scene_along(scout, line, like, *given))
+            value, by_point, by_s, code = map(
+                np.asarray, _scene_along(problem.spec, line, like, *given)
+            )
             return Change(value, by_point, by_s, int(code))
 
         scales = component_sizes(line.first, like)

@@ -8,9 +8,8 @@ import numpy as np
 from jaxbiped._checks import check_type
 from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._contact_forces import foot_forces
+from jaxbiped.dynamics._contacts import feet, foot_forces, touches
 from jaxbiped.dynamics._energy import energies
-from jaxbiped.dynamics._feet import feet, touches
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES

@@ -5,8 +5,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from jaxbiped.dynamics._contact_forces import Contacts, contacts
-from jaxbiped.dynamics._feet import Feet, landings, touches
+from jaxbiped.dynamics._contacts import Contacts, Feet, contacts, landings, touches
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._samples import Samples, at_steps, evaluate_at, moments_of_change, sample
 from jaxbiped.scene._scene import Scene

@@ -13,7 +13,7 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import RigidState, State
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.simulate._rigid_walk import rigid_walk
+from jaxbiped.simulate._simulate import rigid_walk
 from jaxbiped.solve._trajectory import AT_ONCE, Trajectory, join_parts, split_evenly
 
 NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)

@@ -7,6 +7,7 @@ from jaxbiped.optimise._certificate import Certificate as Certificate
 from jaxbiped.optimise._certificate import certify as certify
 from jaxbiped.optimise._objectives import OBJECTIVES as OBJECTIVES
 from jaxbiped.optimise._objectives import Evaluation as Evaluation
+from jaxbiped.optimise._objectives import Objective as Objective
 from jaxbiped.optimise._optimality import Held as Held
 from jaxbiped.optimise._optimality import Optimality as Optimality
 from jaxbiped.optimise._optimise_gait import ParetoFront as ParetoFront

@@ -13,20 +13,22 @@ from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
+from equinox import AbstractVar
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import RigidState, WalkerState
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.scene._ground import SteppedGround
-from jaxbiped.scene._scene import AbstractScene
-from jaxbiped.variational._hybrid_system import AbstractSystem, system_of
+from jaxbiped.scene._ground import Ground, SteppedGround
+from jaxbiped.scene._scene import AbstractWalkerScene
+from jaxbiped.variational._hybrid_system import AbstractSystem
 
 _KINDS: dict[tuple[type, tuple[str, ...]], Any] = {}
 """Of each walker's state the augmented ones: always the same types, or all would compile again."""
 _APART = 1e-2
 """Sine of half the angle between the legs from which a rigid walker's foot can come down."""
+PUSH, DROP = "push", "drop"
 
 
 def _augmented(walker: Any, names: tuple[str, ...]) -> Any:
@@ -69,6 +71,31 @@ def joined(like: PyTree, motion: PyTree, coordinates: dict[str, Scalar]) -> PyTr
     return type(like)(**motion._asdict(), **coordinates)
 
 
+class AbstractAugmented(AbstractSystem):
+    """A walker with further coordinates.
+
+    Attributes:
+        walker: the walker without them, or with others.
+        coordinates: their names, as they lie behind hip_x.
+        recurring: how many of them, the last ones, must return.
+    """
+
+    walker: AbstractVar[AbstractSystem]
+    coordinates: AbstractVar[tuple[str, ...]]
+    recurring: ClassVar[int] = 0
+
+    @property
+    def cyclic_coordinates(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The walker's, and those that need not return."""
+        own = len(self.coordinates) - self.recurring
+        return tuple(range(own + len(self.walker.cyclic_coordinates)))
+
+    def begin(self, state: WalkerState) -> PyTree:
+        """A walker's state with coordinates that begin at zero."""
+        inner = self.walker.begin(state) if isinstance(self.walker, AbstractAugmented) else state
+        return augment(inner, self.coordinates)
+
+
 class MotionSection(AbstractSection):
     """The walker's own section, of an augmented state.
 
@@ -85,86 +112,68 @@ class MotionSection(AbstractSection):
         return self.section.counts(args, motion_of(y))
 
 
-def undisturbed(state: WalkerState) -> PyTree:
-    """A walker's state without a push, its clock at zero."""
-    return augment(state, ("clock", "push"))
+class DisturbedCycle(AbstractAugmented):
+    """A walker that is pushed for one cycle, or whose leg 1 comes down on ground that lies lower.
 
-
-class DisturbedCycle(AbstractSystem):
-    """A walker whose weight leans downhill by a push, in units of the weight, for one cycle.
+    `push` is in units of the weight, which leans downhill by it; `drop` in leg lengths. Behind the
+    arrival `drop` is zero and its value is `fallen`: the hip is that much higher above the ground.
+    By then the leg behind has left the upper ground.
 
     Attributes:
         walker: the walker, undisturbed.
+        coordinates: a clock, and what the disturbance needs.
+        disturbance: "push" or "drop".
     """
 
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = (0, 1)
     walker: AbstractSystem
+    coordinates: tuple[str, ...] = eqx.field(static=True)
+    disturbance: str = eqx.field(static=True)
+    recurring: ClassVar[int] = 1
 
-    def vector_field(self, t: Time, y: PyTree, args: AbstractScene) -> PyTree:
-        leaning = dataclasses.replace(args.ground, slope=args.ground.slope + y.push)
-        pushed = eqx.tree_at(lambda scene: scene.ground, args, leaning)
-        rates = self.walker.vector_field(t, motion_of(y), pushed)
-        zero = jnp.zeros_like(y.push)
-        return joined(y, rates, {"clock": zero + 1.0, "push": zero})
+    def vector_field(self, t: Time, y: PyTree, args: AbstractWalkerScene) -> PyTree:
+        rates = self.walker.vector_field(t, motion_of(y), self._scene(args, y))
+        zero = jnp.zeros_like(y.clock)
+        return joined(y, rates, dict.fromkeys(self.coordinates, zero) | {"clock": zero + 1.0})
 
-    def switches(self, args: AbstractScene, y: PyTree) -> tuple[Switch, ...]:
-        return self.walker.switches(args, motion_of(y))
+    def switches(self, args: AbstractWalkerScene, y: PyTree) -> tuple[Switch, ...]:
+        return self.walker.switches(self._scene(args, y), motion_of(y))
 
-    def ending(self, args: AbstractScene, y: PyTree) -> Scalar:
-        return self.walker.ending(args, motion_of(y))
+    def ending(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
+        return self.walker.ending(self._scene(args, y), motion_of(y))
 
-    def reset_map(self, args: AbstractScene, y: PyTree) -> PyTree:
+    def reset_map(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
         after = self.walker.reset_map(args, motion_of(y))
-        return joined(y, after, {"clock": y.clock, "push": jnp.zeros_like(y.push)})
+        told = {"clock": y.clock, self.disturbance: jnp.zeros_like(y.clock)}
+        if self.disturbance == DROP:
+            told["fallen"] = y.drop
+            if not isinstance(after, RigidState):
+                after = after._replace(hip_z=after.hip_z + y.drop * args.walker.l)
+        return joined(y, after, told)
 
-    def load(self, args: AbstractScene, y: PyTree) -> None:
+    def load(self, args: AbstractWalkerScene, y: PyTree) -> None:
         return None
 
+    def _scene(self, scene: AbstractWalkerScene, y: PyTree) -> AbstractWalkerScene:
+        """The scene as it is disturbed; the step of a rigid walker is its section's."""
+        ground: Ground | SteppedGround
+        if self.disturbance == PUSH:
+            ground = dataclasses.replace(scene.ground, slope=scene.ground.slope + y.push)
+        elif scene.compliant:
+            ground = SteppedGround(scene.ground.slope, scene.ground.g, y.drop * scene.walker.l)
+        else:
+            return scene
+        found: AbstractWalkerScene = eqx.tree_at(lambda each: each.ground, scene, ground)
+        return found
 
-def disturbed(scene: AbstractScene) -> DisturbedCycle:
-    """The walker of a scene, which can be pushed."""
-    return DisturbedCycle(system_of(scene))
+
+def push_cycle(walker: AbstractSystem) -> DisturbedCycle:
+    """A walker that can be pushed."""
+    return DisturbedCycle(walker, ("clock", PUSH), PUSH)
 
 
-def unstepped(state: WalkerState) -> PyTree:
-    """A walker's state on even ground, its clock at zero."""
-    return augment(state, ("clock", "fallen", "drop"))
-
-
-class SteppedCycle(AbstractSystem):
-    """A walker whose leg 1 comes down on ground that lies lower by `drop`, in leg lengths.
-
-    Behind the arrival the coordinate is zero and its value is `fallen`: the hip is that much
-    higher above the ground. By then the leg behind has left the upper ground.
-
-    Attributes:
-        walker: the walker on even ground.
-    """
-
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = (0, 1, 2)
-    walker: AbstractSystem
-
-    def vector_field(self, t: Time, y: PyTree, args: AbstractScene) -> PyTree:
-        rates = self.walker.vector_field(t, motion_of(y), _stepped(args, y))
-        zero = jnp.zeros_like(y.drop)
-        return joined(y, rates, {"clock": zero + 1.0, "fallen": zero, "drop": zero})
-
-    def switches(self, args: AbstractScene, y: PyTree) -> tuple[Switch, ...]:
-        return self.walker.switches(_stepped(args, y), motion_of(y))
-
-    def ending(self, args: AbstractScene, y: PyTree) -> Scalar:
-        return self.walker.ending(_stepped(args, y), motion_of(y))
-
-    def reset_map(self, args: AbstractScene, y: PyTree) -> PyTree:
-        after = self.walker.reset_map(args, motion_of(y))
-        if not isinstance(after, RigidState):
-            after = after._replace(hip_z=after.hip_z + y.drop * args.walker.l)
-        return joined(
-            y, after, {"clock": y.clock, "fallen": y.drop, "drop": jnp.zeros_like(y.drop)}
-        )
-
-    def load(self, args: AbstractScene, y: PyTree) -> None:
-        return None
+def drop_cycle(walker: AbstractSystem) -> DisturbedCycle:
+    """A walker before which the ground can have a step."""
+    return DisturbedCycle(walker, ("clock", "fallen", DROP), DROP)
 
 
 class SteppedSection(AbstractSection):
@@ -186,17 +195,3 @@ class SteppedSection(AbstractSection):
 
     def counts(self, args: PyTree, y: PyTree) -> Scalar:
         return MotionSection(self.section).counts(args, y)
-
-
-def _stepped(scene: AbstractScene, y: PyTree) -> AbstractScene:
-    """The scene with the step before the swinging leg; a rigid walker's section has it."""
-    if not scene.compliant:
-        return scene
-    ground = SteppedGround(scene.ground.slope, scene.ground.g, y.drop * scene.walker.l)
-    found: AbstractScene = eqx.tree_at(lambda each: each.ground, scene, ground)
-    return found
-
-
-def stepped(scene: AbstractScene) -> SteppedCycle:
-    """The walker of a scene, before which the ground can have a step."""
-    return SteppedCycle(system_of(scene))

@@ -14,7 +14,7 @@ from jaxbiped._checks import check_choice
 from jaxbiped._types import as_float
 from jaxbiped.continuation._bifurcation_sensitivities import fold_forcing
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent, advance, locate_near
-from jaxbiped.continuation._branch_point import Axis, axis_of, start_of
+from jaxbiped.continuation._branch_point import axis_of, start_of
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
 from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.continuation._trace import LIMITS, Trace, trace
@@ -109,19 +109,24 @@ def bifurcation_distance(
     check_choice("kind", kind, KINDS)
     check_choice("along", along, parameter_names(scene))
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
-    own = float(parameter_values(scene)[along])
-    bounds = range_of(scene, along)
+    kind, names = BranchEvent(kind), parameter_names(scene)
+    own, bounds = float(parameter_values(scene)[along]), range_of(scene, along)
     axis = axis_of(scene, along, bounds, None)
     steps = int(gait.orbit[0].shape[0])
     setup = continuation_setup(scene, axis, footsteps=steps, accuracy=accuracy, engine=gait.engine)
-    parts = _both_ways(setup, gait, BranchEvent(kind))
-    event = _nearest(parts, BranchEvent(kind), own)
-    located = None if event is None else _located(setup, event)
+    parts = _both_ways(setup, gait, kind)
+    seen = [each for part in parts for each in part.bifurcations]
+    event = min(
+        (each for each in seen if each.kind is kind),
+        key=lambda each: abs(each.value - own),
+        default=None,
+    )
+    locate = _located_fold if kind is BranchEvent.FOLD else _located_doubling
+    located = None if event is None else locate(setup, event)
     if located is None:
-        none, nowhere = np.nan, np.full(len(parameter_names(scene)), np.nan)
+        none, nowhere = np.nan, np.full(len(names), np.nan)
         outcome, distance = Sought.UNKNOWN, none
-        seen = [each.kind for part in parts for each in part.bifurcations]
-        known = BranchEvent.NOT_LOCATED not in seen
+        known = all(each.kind is not BranchEvent.NOT_LOCATED for each in seen)
         if event is None and parts and known and all(part.stop.end in _ENDS for part in parts):
             outcome, distance = Sought.NONE_IN_RANGE, max(abs(end - own) for end in bounds)
         return BifurcationDistance(
@@ -129,7 +134,7 @@ def bifurcation_distance(
         )
     way = 1.0 if located.value > own else -1.0
     slopes = way * located.slopes
-    slopes[parameter_names(scene).index(along)] -= way
+    slopes[names.index(along)] -= way
     return BifurcationDistance(
         along=along,
         outcome=Sought.MET,
@@ -162,12 +167,6 @@ def _both_ways(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> list[
     ]
 
 
-def _nearest(parts: list[Trace], kind: BranchEvent, own: float) -> BifurcationPoint | None:
-    """Of the bifurcations of a kind in both ways the nearer."""
-    found = [each for part in parts for each in part.bifurcations if each.kind is kind]
-    return min(found, key=lambda each: abs(each.value - own), default=None)
-
-
 class _Located(NamedTuple):
     """Where a bifurcation lies: value, derivatives (p,), and their errors."""
 
@@ -175,10 +174,6 @@ class _Located(NamedTuple):
     error: float
     slopes: np.ndarray
     slope_errors: np.ndarray
-
-
-def _located(setup: ContinuationSetup, event: BifurcationPoint) -> _Located | None:
-    return (_located_fold if event.kind is BranchEvent.FOLD else _located_doubling)(setup, event)
 
 
 def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> _Located | None:
@@ -211,7 +206,8 @@ def _fold_slopes(setup: ContinuationSetup, fold: CurvePoint) -> tuple[float, np.
 
 def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> _Located | None:
     """By the modulus that is 1 there."""
-    scene, axis = _with(setup.scene, setup.axis, event.value), setup.axis
+    along = setup.axis.name
+    scene = jtu.tree_map(as_float, with_parameters(setup.scene, {along: event.value}))
     told = jacobian_functionals(
         scene,
         setup.state_of(event.point.recurring),
@@ -222,7 +218,7 @@ def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> _Loc
     )
     values, errors, slopes, slope_errors = (np.asarray(each) for each in told[:4])
     which = int(np.nanargmin(np.abs(values - 1.0)))
-    place = parameter_names(scene).index(axis.name)
+    place = parameter_names(scene).index(along)
     rate, rate_error = slopes[which][place], slope_errors[which][place]
     by_all = -slopes[which] / rate
     off = (slope_errors[which] + np.abs(by_all) * rate_error) / abs(rate)
@@ -230,8 +226,3 @@ def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> _Loc
     move = -(values[which] - 1.0) / rate
     error = (errors[which] + abs(move) * rate_error) / abs(rate)
     return _Located(float(event.value + move), float(error), by_all, off)
-
-
-def _with(scene: Scene | RigidScene, axis: Axis, value: float) -> Scene | RigidScene:
-    found: Scene | RigidScene = jtu.tree_map(as_float, with_parameters(scene, {axis.name: value}))
-    return found

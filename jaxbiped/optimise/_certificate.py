@@ -28,8 +28,7 @@ from jaxbiped.optimise._optimality import Optimality
 from jaxbiped.optimise._runs import Optimum
 from jaxbiped.scene._parameter_access import parameter_names
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.simulate._rigid_walk import rigid_walk
-from jaxbiped.simulate._simulate import simulate
+from jaxbiped.simulate._simulate import rigid_walk, simulate
 from jaxbiped.solve._engine_names import ENGINES
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.sweep._labelling import Labelling

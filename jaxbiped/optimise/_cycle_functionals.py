@@ -10,7 +10,7 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.gait._fixed_point_search import LOOSER
+from jaxbiped.gait._fixed_point_search import looser
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
@@ -22,7 +22,7 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, orbit_solver, patience_of
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.optimise._augmented_cycles import MotionSection
-from jaxbiped.optimise._cycle_integrals import AbstractIntegrals, integrals_of
+from jaxbiped.optimise._cycle_integrals import integrals_of
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, precision_of
@@ -74,14 +74,14 @@ def cycle_functionals(
         Of each integral in the order of `integral_names`, then of the foot's clearance [m]; with
         respect to all parameters in the order of `parameter_names`.
     """
-    section = MotionSection(section_of(scene, None))
-    spec = cycle_spec(scene, integrals_of(scene), section, footsteps, engine)
-    return _functionals(spec, scene, state, functional_precision(accuracy, scene))
+    system, section = integrals_of(scene), MotionSection(section_of(scene, None))
+    spec = cycle_spec(scene, system, section, footsteps, engine)
+    return _functionals(spec, scene, system.begin(state), functional_precision(accuracy, scene))
 
 
 def integral_names(scene: Scene | RigidScene) -> tuple[str, ...]:
     """What `cycle_functionals` tells of a scene."""
-    return (*integrals_of(scene).integrals, "foot_clearance")
+    return (*integrals_of(scene).coordinates, "foot_clearance")
 
 
 def cycle_spec(
@@ -114,30 +114,51 @@ def functional_precision(
     return Precision(*(as_float(share * tolerance) for tolerance in found))
 
 
+class Orbits(NamedTuple):
+    """An orbit by a precision, and by the ten times looser one of its errors, leaves (2, …).
+
+    Each is corrected by itself: how that moves is a part of the error, too.
+
+    Attributes:
+        seeds, sizes: what is differentiated, and the parameters' sizes (p,): of both alike.
+        points: recurring components, shape (2, m).
+        returns: one cycle of each.
+    """
+
+    seeds: Seeded
+    sizes: Scalar
+    points: Scalar
+    returns: LinearisedReturn
+
+
+def orbits_near(
+    spec: ReturnMapSpec, scene: Scene | RigidScene, y: PyTree, fine: Precision
+) -> Orbits:
+    """The orbits near a state on the section, after one more correction by Newton."""
+    point = recurring_components(spec.system, y)
+    _, active = select_parameters(scene, None)
+    seeds, sizes = seed_directions(scene, active, len(point))
+
+    def once(precision: Precision) -> tuple[Scalar, LinearisedReturn]:
+        # What a search leaves is below its tolerance, but derivatives along contact feel it.
+        by_state = linearised_return(
+            spec, seeds, y, precision, jnp.asarray(False), carries_parameters=jnp.asarray(False)
+        )
+        own = point + jnp.where(by_state.code == 0, _newton_step(by_state, point), 0.0)
+        start = state_with(spec.system, y, own)
+        return own, linearised_return(spec, seeds, start, precision, jnp.asarray(False))
+
+    pairs = zip(fine, looser(fine), strict=True)
+    return Orbits(seeds, sizes, *jax.vmap(once)(Precision(*map(jnp.stack, pairs))))
+
+
 @cached_jit
 def _functionals(
-    spec: ReturnMapSpec, scene: Scene | RigidScene, state: WalkerState, fine: Precision
+    spec: ReturnMapSpec, scene: Scene | RigidScene, y: PyTree, fine: Precision
 ) -> Functionals:
-    assert isinstance(spec.system, AbstractIntegrals)
-    y = spec.system.begin(state)
-    _, active = select_parameters(scene, None)
-    seeds, sizes = seed_directions(scene, active, len(recurring_components(spec.system, y)))
-
-    def at(precision: Precision) -> tuple[Scalar, Scalar, Scalar]:
-        own = corrected(spec, seeds, y, precision)
-        once = linearised_return(spec, seeds, own, precision, jnp.asarray(False))
-        values, slopes = _totals(once, recurring_components(spec.system, own))
-        return values, slopes / sizes, once.code
-
-    return with_errors(*jax.vmap(at)(fine_and_looser(fine)))
-
-
-def fine_and_looser(fine: Precision) -> Precision:
-    """A precision, and the ten times looser one of the witness of its error, leaves (2,).
-
-    Each has an orbit of its own: how that moves is a part of the error, too.
-    """
-    return Precision(*(jnp.stack([tolerance, LOOSER * tolerance]) for tolerance in fine))
+    found = orbits_near(spec, scene, y, fine)
+    values, slopes = jax.vmap(_totals)(found.returns, found.points)
+    return with_errors(values, slopes / found.sizes, found.returns.code)
 
 
 def with_errors(values: Scalar, slopes: Scalar, code: Scalar) -> Functionals:
@@ -152,25 +173,14 @@ def with_errors(values: Scalar, slopes: Scalar, code: Scalar) -> Functionals:
     )
 
 
-def corrected(spec: ReturnMapSpec, seeds: Seeded, y: PyTree, precision: Precision) -> PyTree:
-    """A state near a fixed point after one more correction by Newton.
-
-    What a search leaves is below its tolerance, but derivatives along contact feel it.
-    """
-    point = recurring_components(spec.system, y)
-    once = linearised_return(
-        spec, seeds, y, precision, jnp.asarray(False), carries_parameters=jnp.asarray(False)
-    )
+def _newton_step(once: LinearisedReturn, point: Scalar) -> Scalar:
     m = len(point)
-    step = solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - point)
-    return state_with(spec.system, y, point + jnp.where(once.code == 0, step, 0.0))
+    return solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - point)
 
 
 def _totals(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:
     """Values at the fixed point that Newton's correction gives, and total derivatives."""
-    m = len(point)
-    correction = solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - point)
-    slopes = slopes_of(once)
+    m, correction, slopes = len(point), _newton_step(once, point), slopes_of(once)
     gained = once.advance[1:] + once.advance_rows[1:, :m] @ correction
     depth = once.peak + once.peak_row[:m] @ correction
     values = jnp.append(gained, -depth)

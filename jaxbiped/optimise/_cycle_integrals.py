@@ -4,22 +4,21 @@ A coordinate whose rate is the integrand, and on which no rate depends, gains th
 cycle. The return map then has its value, its derivatives and their errors from one solve.
 """
 
-from typing import ClassVar
-
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._actuation import actuator_powers
+from jaxbiped.dynamics._contacts import feet, touches
 from jaxbiped.dynamics._energy import powers
-from jaxbiped.dynamics._feet import feet, touches
 from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._rolling import inertia_of, rolling_hip_motion, support_of
-from jaxbiped.dynamics._state import RigidState, WalkerState, whole_state
+from jaxbiped.dynamics._state import RigidState, whole_state
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.optimise._augmented_cycles import augment, joined, motion_of
+from jaxbiped.optimise._augmented_cycles import AbstractAugmented, joined, motion_of
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.variational._hybrid_system import AbstractSystem, Rolling, Walking
+from jaxbiped.variational._hybrid_system import Rolling, Walking
 
 COMPLIANT = ("slip_distance", "friction_loss", "impact_loss")
 """Integrals of a walker with laws of contact."""
@@ -27,10 +26,6 @@ RIGID = ("impact_loss",)
 """Those of the rigid walker."""
 MOTOR_WORK = "motor_work"
 """What a driven walker of either kind has beside them."""
-
-
-def _depth(penetration: Scalar, admitted: Scalar, deepest: Scalar) -> Scalar:
-    return jnp.where(admitted, -deepest, penetration)
 
 
 def _driving(motors: tuple[Scalar, ...], like: Scalar) -> Scalar:
@@ -41,22 +36,16 @@ def _driving(motors: tuple[Scalar, ...], like: Scalar) -> Scalar:
     return power
 
 
-class AbstractIntegrals(AbstractSystem):
-    """A walker with integrals over its cycle.
+class WalkingIntegrals(AbstractAugmented):
+    """`Walking` with its integrals; its load is the depth of a foot that swings [m].
 
     Attributes:
-        integrals: their names, as they lie behind hip_x. A property of the class.
+        walker: that system.
+        coordinates: names of the integrals.
     """
 
-    integrals: ClassVar[tuple[str, ...]] = ()
-
-    def begin(self, state: WalkerState) -> PyTree:
-        """A walker's state with integrals that begin at zero."""
-        return augment(state, self.integrals)
-
-
-class AbstractWalkingIntegrals(AbstractIntegrals):
-    """`Walking` with its integrals; its load is the depth of a foot that swings [m]."""
+    walker: Walking
+    coordinates: tuple[str, ...] = eqx.field(static=True)
 
     def vector_field(self, t: Time, y: PyTree, args: Scene) -> PyTree:
         state = motion_of(y)
@@ -71,7 +60,7 @@ class AbstractWalkingIntegrals(AbstractIntegrals):
         }
         if power.motors is not None:
             rates[MOTOR_WORK] = _driving(power.motors, slip)
-        return joined(y, Walking().vector_field(t, state, args), rates)
+        return joined(y, self.walker.vector_field(t, state, args), rates)
 
     def switches(self, args: Scene, y: PyTree) -> tuple[Switch, ...]:
         """The walker's, touchdown as a jump of the rate of slip, and changes of sign.
@@ -79,7 +68,7 @@ class AbstractWalkingIntegrals(AbstractIntegrals):
         Those of slip, and of each motor's power.
         """
         state = motion_of(y)
-        own = Walking().switches(args, state)
+        own = self.walker.switches(args, state)
         for foot in feet(args, state):
             admitted = True if foot.admitted is None else foot.admitted
             own += (Switch(foot.penetration, admitted, force_jumps=True),)
@@ -88,52 +77,48 @@ class AbstractWalkingIntegrals(AbstractIntegrals):
         return own + tuple(Switch(power, True) for power in motors)
 
     def ending(self, args: Scene, y: PyTree) -> Scalar:
-        return Walking().ending(args, motion_of(y))
+        return self.walker.ending(args, motion_of(y))
 
     def reset_map(self, args: Scene, y: PyTree) -> PyTree:
-        gained = {name: getattr(y, name) for name in self.integrals}
-        return joined(y, Walking().reset_map(args, motion_of(y)), gained)
+        gained = {name: getattr(y, name) for name in self.coordinates}
+        return joined(y, self.walker.reset_map(args, motion_of(y)), gained)
 
     def load(self, args: Scene, y: PyTree) -> Scalar:
         """How deep a foot is underground that the clearance rule lets pass [m]."""
         found = -args.walker.l
         for foot in feet(args, motion_of(y)):
             if foot.admitted is not None and foot.admitted is not False:
-                depth = _depth(foot.penetration, jnp.asarray(foot.admitted), args.walker.l)
-                found = jnp.maximum(found, depth)
+                admitted = jnp.asarray(foot.admitted)
+                found = jnp.maximum(found, jnp.where(admitted, -args.walker.l, foot.penetration))
         return found
 
 
-class WalkingIntegrals(AbstractWalkingIntegrals):
-    """A passive walker's."""
+class RollingIntegrals(AbstractAugmented):
+    """`Rolling` with the energy that impacts take; its load is the swing foot's depth [m].
 
-    integrals: ClassVar[tuple[str, ...]] = COMPLIANT
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(range(1 + len(COMPLIANT)))
+    The work of motors is that of the push-off, too.
 
+    Attributes:
+        walker: that system.
+        coordinates: names of the integrals.
+    """
 
-class DrivenWalkingIntegrals(AbstractWalkingIntegrals):
-    """A driven walker's: its motors' work too."""
-
-    integrals: ClassVar[tuple[str, ...]] = (*COMPLIANT, MOTOR_WORK)
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(range(2 + len(COMPLIANT)))
-
-
-class AbstractRollingIntegrals(AbstractIntegrals):
-    """`Rolling` with the energy that impacts take; its load is the swing foot's depth [m]."""
+    walker: Rolling
+    coordinates: tuple[str, ...] = eqx.field(static=True)
 
     def vector_field(self, t: Time, y: PyTree, args: RigidScene) -> PyTree:
         state = motion_of(y)
         rates = {"impact_loss": jnp.zeros_like(state.hip_x)}
-        if MOTOR_WORK in self.integrals:
+        if MOTOR_WORK in self.coordinates:
             rates[MOTOR_WORK] = _driving(_rolling_motors(args, state), state.hip_x)
-        return joined(y, Rolling().vector_field(t, state, args), rates)
+        return joined(y, self.walker.vector_field(t, state, args), rates)
 
     def switches(self, args: RigidScene, y: PyTree) -> tuple[Switch, ...]:
         """Each motor's change of sign."""
         return tuple(Switch(power, True) for power in _rolling_motors(args, motion_of(y)))
 
     def ending(self, args: RigidScene, y: PyTree) -> Scalar:
-        return Rolling().ending(args, motion_of(y))
+        return self.walker.ending(args, motion_of(y))
 
     def reset_map(self, args: RigidScene, y: PyTree) -> PyTree:
         state = motion_of(y)
@@ -141,27 +126,13 @@ class AbstractRollingIntegrals(AbstractIntegrals):
         push = push_off_work(args, state)
         lost = _kinetic(args, state) + push - _kinetic(args, after)
         gained = {"impact_loss": y.impact_loss + lost}
-        if MOTOR_WORK in self.integrals:
+        if MOTOR_WORK in self.coordinates:
             gained[MOTOR_WORK] = y.motor_work + jnp.maximum(push, 0.0)
         return joined(y, after, gained)
 
     def load(self, args: RigidScene, y: PyTree) -> Scalar:
         """How deep the swing foot is underground [m]."""
         return args.walker.hip_to_foot * (jnp.cos(y.theta_1) - jnp.cos(y.theta_2))
-
-
-class RollingIntegrals(AbstractRollingIntegrals):
-    """A passive walker's."""
-
-    integrals: ClassVar[tuple[str, ...]] = RIGID
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(range(1 + len(RIGID)))
-
-
-class DrivenRollingIntegrals(AbstractRollingIntegrals):
-    """A driven walker's: the work of its motors and of its push-off too."""
-
-    integrals: ClassVar[tuple[str, ...]] = (*RIGID, MOTOR_WORK)
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(range(2 + len(RIGID)))
 
 
 def _rolling_motors(scene: RigidScene, state: RigidState) -> tuple[Scalar, ...]:
@@ -180,9 +151,9 @@ def _kinetic(scene: RigidScene, state: RigidState) -> Scalar:
     return 0.5 * own + inertia.coupling * state.omega_1 * state.omega_2
 
 
-def integrals_of(scene: Scene | RigidScene) -> AbstractIntegrals:
+def integrals_of(scene: Scene | RigidScene) -> WalkingIntegrals | RollingIntegrals:
     """The walker with its integrals."""
-    driven = scene.actuation is not None
+    driven = () if scene.actuation is None else (MOTOR_WORK,)
     if scene.compliant:
-        return DrivenWalkingIntegrals() if driven else WalkingIntegrals()
-    return DrivenRollingIntegrals() if driven else RollingIntegrals()
+        return WalkingIntegrals(Walking(), (*COMPLIANT, *driven))
+    return RollingIntegrals(Rolling(), (*RIGID, *driven))

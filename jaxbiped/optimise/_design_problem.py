@@ -7,22 +7,15 @@ branch, it is followed there in smaller steps. Every design is evaluated once an
 from collections.abc import Mapping
 from typing import NamedTuple
 
-import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.dynamics._state import state_type
-from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_provenance import explain_search
+from jaxbiped.optimise._design_gaits import GaitSettings, are_walks
 from jaxbiped.optimise._design_variables import Requirement, Variables
-from jaxbiped.optimise._ensemble import (
-    Ensemble,
-    GaitSettings,
-    evaluate_ensemble,
-    with_worse_members,
-)
+from jaxbiped.optimise._ensemble import Ensemble, evaluate_ensemble, with_worse_members
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import Evaluation, evaluate
 from jaxbiped.scene._parameter_access import with_parameters
@@ -30,8 +23,8 @@ from jaxbiped.scene._scene import RigidScene, Scene
 
 KEPT = 1e-6
 """Part of its bound by which a requirement may be missed and still counts as kept, at least."""
-_HALVINGS = 5
-"""How often a step to a design is halved before its gait is given up."""
+_SMALLEST = 1.0 / 32.0
+"""Share of the way to a design below which no step is tried: its gait is given up."""
 _FLOOR, _ASIDE, _NEAR = 0.1, 0.5, 0.02
 """Size below which components of the state count as of one size; how far aside, in units of the
 step, and how far at least, relative to it, a gait may lie from where it was expected."""
@@ -92,13 +85,13 @@ class DesignProblem:
         """
         known = self.evaluations.get(u)
         if known is None:
-            gait = self._find(self.scene_at(u), None)
-            if gait.outcome is not Search.FOUND or not bool(gait.sound):
+            scene = self.scene_at(u)
+            gait = self.settings.find(scene, None)
+            if not are_walks(gait):
                 raise ArgumentError(
-                    "the design to start from has no gait: "
-                    f"{explain_search(self.scene_at(u), gait)}."
+                    f"the design to start from has no gait: {explain_search(scene, gait)}."
                 )
-            known = self._keep(u, self.scene_at(u), gait)
+            known = self._keep(u, scene, gait)
         if known is None:
             raise ArgumentError(
                 "the gait of the design to start from has a measure that is not finite: choose "
@@ -141,7 +134,7 @@ class DesignProblem:
         if known is None and not self.evaluations.is_lost(u):
             known = self._follow(np.array(u))
             if known is None:
-                self.evaluations.lose(u)
+                self.evaluations.add(u, None)
         if known is None:
             self.lost += 1
             return None
@@ -164,14 +157,14 @@ class DesignProblem:
         return slopes[..., self.variables.places] * self.variables.rates(u)
 
     def excess(self, known: Evaluation) -> float:
-        """By how much the worst requirement is missed, relative to its bound; at most 0 if none."""
-        worst = 0.0
-        for each in self.requirements:
-            value = known.values[each.name]
-            for bound, sign in ((each.low, 1.0), (each.high, -1.0)):
-                if bound is not None:
-                    worst = max(worst, sign * (bound - value) / scale_of(bound))
-        return worst
+        """By how much the worst requirement is missed, relative to its bound; 0 if none is."""
+        missed = [
+            sign * (bound - known.values[each.name]) / scale_of(bound)
+            for each in self.requirements
+            for bound, sign in ((each.low, 1.0), (each.high, -1.0))
+            if bound is not None
+        ]
+        return max([0.0, *missed])
 
     def allowance(self, known: Evaluation) -> float:
         """What of `excess` is within the error bars of the measures."""
@@ -183,35 +176,30 @@ class DesignProblem:
         ]
         return max([KEPT, *sizes])
 
-    def from_guess(self, u: np.ndarray, guess: np.ndarray) -> Evaluation | None:
-        """What is known of a design whose gait is near a guess, shape (m,)."""
-        scene = self.scene_at(u)
-        gait = self._find(scene, guess)
-        if gait.outcome is not Search.FOUND or not bool(gait.sound):
+    def from_guess(
+        self, u: np.ndarray, guess: np.ndarray, farthest: np.ndarray | float = np.inf
+    ) -> Evaluation | None:
+        """What is known of a design whose gait is near a guess, shape (m,); None where none is.
+
+        No component is off by more than `farthest`.
+        """
+        try:
+            scene = self.scene_at(u)
+        except ArgumentError:  # parameters that do not go together
             return None
-        return self._keep(u, scene, gait)
+        gait = self.settings.find_near(scene, guess)
+        if not are_walks(gait):
+            return None
+        found = np.stack(recurring_leaves(gait.measures.state))
+        return None if np.any(np.abs(found - guess) > farthest) else self._keep(u, scene, gait)
 
     def gait_of(self, design: Design) -> Gait:
         """The gait of a design that is known."""
-        return self._find(self.scene_at(design.u), design.known.state)
+        return self.settings.find_near(self.scene_at(design.u), design.known.state)
 
     def scene_at(self, u: np.ndarray) -> Scene | RigidScene:
         """The scene of a design; raises `ArgumentError` where parameters do not go together."""
         return with_parameters(self.scene, self.variables.named(u))
-
-    def _find(self, scene: Scene | RigidScene, guess: np.ndarray | None) -> Gait:
-        state = None
-        if guess is not None:
-            kind = state_type(scene)
-            state = jtu.tree_map(np.float64, kind(0.0, *guess.tolist()))
-        return find_gait(
-            scene,
-            state,
-            footsteps=self.settings.footsteps,
-            accuracy=self.settings.accuracy,
-            engine=self.settings.engine,
-            radius_sensitivities=False,
-        )
 
     def _keep(self, u: np.ndarray, scene: Scene | RigidScene, gait: Gait) -> Evaluation | None:
         if self.ensemble is None:
@@ -231,40 +219,27 @@ class DesignProblem:
     def _follow(self, u: np.ndarray) -> Evaluation | None:
         """Gaits on the way from the latest design, or from the nearest known, in halved steps."""
         assert self.latest is not None
-        here, step, halvings = Design(*self.evaluations.nearest(u)), 1.0, 0
-        done = 0.0
+        here, done, step = Design(*self.evaluations.nearest(u)), 0.0, 1.0
         begin = here.u
-        while True:
+        while step >= _SMALLEST:
             share = min(1.0, done + step)
             ahead = u if share == 1.0 else begin + share * (u - begin)
             known = self._next(here, ahead)
-            if known is not None:
-                if share == 1.0:
-                    return known
+            if known is None:
+                step *= 0.5
+            elif share == 1.0:
+                return known
+            else:
                 here, done = Design(ahead, known), share
-                continue
-            step, halvings = 0.5 * step, halvings + 1
-            if halvings > _HALVINGS:
-                return None
+        return None
 
     def _next(self, here: Design, u: np.ndarray) -> Evaluation | None:
         """The gait of a design near one whose gait is known, on the same branch."""
         before, after = (self.variables.values(each) for each in (here.u, u))
         move = here.known.state_slopes[:, self.variables.places] @ (after - before)
-        guess = here.known.state + move
-        try:
-            scene = self.scene_at(u)
-        except ArgumentError:  # parameters that do not go together
-            return None
-        gait = self._find(scene, guess)
-        if gait.outcome is not Search.FOUND or not bool(gait.sound):
-            return None
-        found = np.asarray([float(leaf) for leaf in gait.measures.state[1:]])
         sizes = _FLOOR + np.abs(here.known.state)
-        aside, length = (np.max(np.abs(each) / sizes) for each in (found - guess, move))
-        if aside > _ASIDE * length + _NEAR:
-            return None
-        return self._keep(u, scene, gait)
+        length = np.max(np.abs(move) / sizes)
+        return self.from_guess(u, here.known.state + move, (_ASIDE * length + _NEAR) * sizes)
 
 
 def scale_of(bound: float) -> float:

@@ -31,36 +31,32 @@ class Variables(NamedTuple):
     places: np.ndarray
 
     def values(self, u: np.ndarray) -> np.ndarray:
-        """Parameters at u, shape (k,); at 0 and 1 the bounds exactly."""
-        ratio = np.where(self.logarithmic, self.high, 1.0) / self._low_or_one()
-        geometric = self.low * ratio**u
+        """Parameters at u, shape (…, k); at 0 and 1 the bounds exactly."""
+        geometric = self.low * self._ratio(1.0) ** u
         values = np.where(self.logarithmic, geometric, self.low + u * (self.high - self.low))
         return np.where(u <= 0.0, self.low, np.where(u >= 1.0, self.high, values))
 
     def rates(self, u: np.ndarray) -> np.ndarray:
         """Derivatives of the parameters with respect to u, shape (k,)."""
-        ratio = np.where(self.logarithmic, self.high, 1.0) / self._low_or_one()
-        return np.where(self.logarithmic, self.values(u) * np.log(ratio), self.high - self.low)
+        growth = self.values(u) * np.log(self._ratio(1.0))
+        return np.where(self.logarithmic, growth, self.high - self.low)
 
     def positions(self, values: np.ndarray) -> np.ndarray:
         """The u of parameters, those outside the bounds moved onto them, shape (k,)."""
         within = np.clip(values, self.low, self.high)
-        ratio = np.where(self.logarithmic, self.high, np.exp(1.0)) / self._low_or_one()
-        part = np.where(self.logarithmic, within, 1.0) / self._low_or_one()
-        u = np.where(
-            self.logarithmic, np.log(part) / np.log(ratio), (within - self.low) / self._width()
-        )
-        return np.clip(u, 0.0, 1.0)
+        part = np.where(self.logarithmic, within, 1.0) / np.where(self.logarithmic, self.low, 1.0)
+        geometric = np.log(part) / np.log(self._ratio(np.exp(1.0)))
+        linear = (within - self.low) / (self.high - self.low)
+        return np.clip(np.where(self.logarithmic, geometric, linear), 0.0, 1.0)
+
+    def _ratio(self, otherwise: float) -> np.ndarray:
+        """The upper bound over the lower where u is linear in the logarithm."""
+        logarithmic = self.logarithmic
+        return np.where(logarithmic, self.high, otherwise) / np.where(logarithmic, self.low, 1.0)
 
     def named(self, u: np.ndarray) -> dict[str, float]:
         """The parameters at u by name."""
         return dict(zip(self.names, self.values(u).tolist(), strict=True))
-
-    def _low_or_one(self) -> np.ndarray:
-        return np.where(self.logarithmic, self.low, 1.0)
-
-    def _width(self) -> np.ndarray:
-        return self.high - self.low
 
 
 def variables_of(scene: Scene | RigidScene, vary: Mapping[str, tuple[float, float]]) -> Variables:
@@ -128,21 +124,21 @@ def requirements_of(scene: Scene | RigidScene, subject_to: SubjectTo) -> tuple[R
         ArgumentError: what is not understood, an objective that is unknown or that the scene
             lacks, or bounds that contradict each other.
     """
-    pairs: list[tuple[str, tuple[float | None, float | None]]]
     if subject_to is None:
         return ()
     if isinstance(subject_to, Mapping):
         pairs = [(name, _pair(name, bounds)) for name, bounds in subject_to.items()]
     else:
-        words = [subject_to] if isinstance(subject_to, str) else list(subject_to)
+        words = [subject_to] if isinstance(subject_to, str) else subject_to
         pairs = [_parse(text) for text in words]
     gathered: dict[str, tuple[float | None, float | None]] = {}
     for name, (low, high) in pairs:
         check_objective(name, scene, "subject_to")
-        old = gathered.get(name, (None, None))
-        lows = [each for each in (old[0], low) if each is not None]
-        highs = [each for each in (old[1], high) if each is not None]
-        gathered[name] = (max(lows, default=None), min(highs, default=None))
+        least, most = gathered.get(name, (None, None))
+        gathered[name] = (
+            max((each for each in (least, low) if each is not None), default=None),
+            min((each for each in (most, high) if each is not None), default=None),
+        )
     for name, (least, most) in gathered.items():
         if least is not None and most is not None and least > most:
             raise ArgumentError(
@@ -160,24 +156,17 @@ def larger_is_worse(
     Raises:
         ArgumentError: a measure of which both more and less would be worse.
     """
-    sides: dict[str, set[bool]] = {}
-    for name, weight in told.items():
-        sides.setdefault(name, set()).add(sense * weight > 0.0)
-    for each in requirements:
-        sides.setdefault(each.name, set()).update(
-            [
-                larger
-                for larger, bound in ((True, each.high), (False, each.low))
-                if bound is not None
-            ]
-        )
-    for name, both in sides.items():
-        if len(both) > 1:
+    sides = [(name, sense * weight > 0.0) for name, weight in told.items()]
+    sides += [(each.name, True) for each in requirements if each.high is not None]
+    sides += [(each.name, False) for each in requirements if each.low is not None]
+    found = dict(sides)
+    for name, larger in sides:
+        if larger != found[name]:
             raise ArgumentError(
                 f"{name} is bounded and sought from both sides: its worst member is not defined; "
                 'choose criterion = "mean".'
             )
-    return {name: both.pop() for name, both in sides.items()}
+    return found
 
 
 def _pair(name: str, bounds: object) -> tuple[float | None, float | None]:

@@ -2,25 +2,16 @@
 
 import itertools
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_within
-from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._state import state_type
-from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals
-from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
+from jaxbiped.optimise._design_gaits import GaitSettings, are_walks, gaits_near
 from jaxbiped.optimise._jacobian_weights import CLUSTER
-from jaxbiped.optimise._objectives import Evaluation, evaluate, functionals_for
-from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
+from jaxbiped.optimise._objectives import Evaluation, evaluate
+from jaxbiped.scene._parameter_access import parameter_names, parameter_values
 from jaxbiped.scene._scene import RigidScene, Scene
 
 CRITERIA = ("mean", "worst")
@@ -30,14 +21,6 @@ _WIDTHS = (1.0, 0.5, 0.25, 0.1)
 """Half-widths, as shares of the box's, about the worst member so far in which others are tried."""
 _WORSE = 1e-4
 """Relative difference by which another member counts as worse."""
-
-
-class GaitSettings(NamedTuple):
-    """How gaits are found; see `find_gait`."""
-
-    footsteps: int = 1
-    accuracy: str = "balanced"
-    engine: str = "auto"
 
 
 class Ensemble(NamedTuple):
@@ -161,55 +144,24 @@ def evaluate_members(
 ) -> list[Evaluation | None]:
     """Of each member the measures wanted; None where it has no gait."""
     names, own = parameter_names(scene), parameter_values(scene)
-    count, places = len(ensemble.factors), [names.index(name) for name in ensemble.names]
+    places = [names.index(name) for name in ensemble.names]
     values = np.asarray([float(own[name]) for name in ensemble.names]) * ensemble.factors
     changes = values - values / ensemble.factors
     points = nominal.state + changes @ nominal.state_slopes[:, places].T
+    columns = dict(zip(ensemble.names, values.T, strict=True))
     try:
-        scenes = with_parameters(
-            scene, {name: jnp.asarray(values[:, i]) for i, name in enumerate(ensemble.names)}
-        )
+        found = gaits_near(scene, columns, points, settings, wanted)
     except ArgumentError:  # parameters that do not go together
-        return [None] * count
-    scenes = jtu.tree_map(lambda leaf: jnp.broadcast_to(jnp.asarray(leaf), (count,)), scenes)
-    starts = state_type(scene)(jnp.zeros(count), *map(jnp.asarray, points.T))
-    found = jax.device_get(_members(scenes, starts, wanted, settings))
-    gaits: Gait = found[0]
-    walks = (gaits.ending == int(Search.FOUND)) & gaits.sound
+        return [None] * len(values)
     each: list[Evaluation | None] = []
-    for k in range(count):
-        scene_k, (gait, *functionals) = jtu.tree_map(lambda leaf, k=k: leaf[k], (scenes, found))
+    for k, factors in enumerate(ensemble.factors):
+        scene_k, gait, functionals = jtu.tree_map(lambda leaf, k=k: leaf[k], found)
         known = None
-        if walks[k]:
-            known = evaluate(scene_k, gait, wanted, settings.accuracy, tuple(functionals))
-            known = _by_nominal(known, ensemble.factors[k], places)
+        if are_walks(gait):
+            known = evaluate(scene_k, gait, wanted, settings.accuracy, functionals)
+            known = _by_nominal(known, factors, places)
         each.append(known)
     return each
-
-
-@cached_jit
-def _members(
-    scenes: Scene | RigidScene, starts: PyTree, wanted: tuple[str, ...], settings: GaitSettings
-) -> tuple[Gait, Functionals | None, Functionals | None]:
-    of_jacobian, of_cycle = functionals_for(wanted)
-    steps, accuracy = settings.footsteps, settings.accuracy
-
-    def one(
-        scene: Scene | RigidScene, start: PyTree
-    ) -> tuple[Gait, Functionals | None, Functionals | None]:
-        gait = find_gait(scene, start, radius_sensitivities=False, **settings._asdict())
-        state, engine, first, second = gait.measures.state, gait.engine, None, None
-        if of_jacobian:
-            first = jacobian_functionals(
-                scene, state, of_jacobian, footsteps=steps, accuracy=accuracy, engine=engine
-            )
-        if of_cycle:
-            second = cycle_functionals(
-                scene, state, footsteps=steps, accuracy=accuracy, engine=engine
-            )
-        return gait, first, second
-
-    return jax.vmap(one)(scenes, starts)
 
 
 def _by_nominal(known: Evaluation, factors: np.ndarray, places: list[int]) -> Evaluation:
@@ -233,18 +185,18 @@ def _together(ensemble: Ensemble, nominal: Evaluation, each: list[Evaluation]) -
             if name == CLUSTER[0]:  # one member's multipliers
                 chosen |= {other: chosen[name] for other in CLUSTER[1:] if other in chosen}
 
-    def number(name: str, field: str) -> float:
-        return float(np.mean([getattr(known, field)[name] for known in chosen[name]]))
-
-    def row(name: str, field: str) -> np.ndarray:
-        return np.mean([getattr(known, field)[name] for known in chosen[name]], axis=0)
+    def means(field: str) -> dict[str, Any]:
+        return {
+            name: np.mean([getattr(known, field)[name] for known in those], axis=0)
+            for name, those in chosen.items()
+        }
 
     return nominal._replace(
-        values={name: number(name, "values") for name in chosen},
-        errors={name: number(name, "errors") for name in chosen},
-        slopes={name: row(name, "slopes") for name in chosen},
-        slope_errors={name: row(name, "slope_errors") for name in chosen},
+        values={name: float(value) for name, value in means("values").items()},
+        errors={name: float(value) for name, value in means("errors").items()},
+        slopes=means("slopes"),
+        slope_errors=means("slope_errors"),
         beyond_range=tuple(
-            name for name in chosen if any(name in known.beyond_range for known in chosen[name])
+            name for name, those in chosen.items() if any(name in k.beyond_range for k in those)
         ),
     )

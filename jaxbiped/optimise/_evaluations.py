@@ -47,24 +47,16 @@ class Evaluations:
         key = u.tobytes()
         return key in self._known and self._known[key] is None
 
-    def add(self, u: np.ndarray, known: Evaluation) -> None:
-        """Keeps a design."""
+    def add(self, u: np.ndarray, known: Evaluation | None) -> None:
+        """Keeps a design, None for one that has no gait."""
         self._known[u.tobytes()] = known
-        self.count += 1
-        self._write(u, known)
-
-    def lose(self, u: np.ndarray) -> None:
-        """Keeps that a design has no gait."""
-        self._known[u.tobytes()] = None
-        self._write(u, None)
+        self.count += known is not None
+        self._append({"u": u, "known": None if known is None else known._asdict()})
 
     def nearest(self, u: np.ndarray) -> tuple[np.ndarray, Evaluation]:
         """Of the designs with a gait the nearest one."""
-        return min(self.all(), key=lambda each: float(np.linalg.norm(each[0] - u)))
-
-    def all(self) -> list[tuple[np.ndarray, Evaluation]]:
-        """The designs with a gait, in the order they were evaluated."""
-        return [(np.frombuffer(key), each) for key, each in self._known.items() if each is not None]
+        found = [(np.frombuffer(key), e) for key, e in self._known.items() if e is not None]
+        return min(found, key=lambda each: float(np.linalg.norm(each[0] - u)))
 
     def _read(self, path: Path, lines: list[str], settings: JsonObject) -> None:
         rows = [_row(line) for line in lines]
@@ -83,9 +75,6 @@ class Evaluations:
                 u = np.asarray(row["u"], dtype=float)
                 self._known[u.tobytes()] = None if known is None else _evaluation(known)
         self.count = sum(each is not None for each in self._known.values())
-
-    def _write(self, u: np.ndarray, known: Evaluation | None) -> None:
-        self._append({"u": u, "known": None if known is None else known._asdict()})
 
     def _append(self, row: JsonObject | None) -> None:
         """In one piece, so that another run may add to the same file; without a row a line's end.

@@ -13,29 +13,22 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._orbit_derivatives import slopes_of
-from jaxbiped.gait._poincare_map import (
-    LinearisedReturn,
-    linearised_return,
-    recurring_components,
-    seed_directions,
-)
+from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.linalg._small_matrices import singular_pairs
 from jaxbiped.optimise._augmented_cycles import (
+    AbstractAugmented,
     MotionSection,
     SteppedSection,
-    disturbed,
-    stepped,
-    undisturbed,
-    unstepped,
+    drop_cycle,
+    push_cycle,
 )
 from jaxbiped.optimise._cycle_functionals import (
     Functionals,
-    corrected,
     cycle_spec,
-    fine_and_looser,
     functional_precision,
+    orbits_near,
     with_errors,
 )
 from jaxbiped.optimise._jacobian_weights import (
@@ -44,13 +37,14 @@ from jaxbiped.optimise._jacobian_weights import (
     leading_multipliers,
     weighed,
 )
-from jaxbiped.optimise._lowest_swing import LowestSwingSection, through_lowest_swing, with_clearance
-from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.optimise._lowest_swing import LowestSwing, LowestSwingSection
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._adjoint_solve import COUNT
-from jaxbiped.variational._hybrid_system import AbstractSystem, section_of
+from jaxbiped.variational._hybrid_system import section_of, system_of
 
+_BY_STEP = ("floor_sensitivity", "floor_clearance_sensitivity")
+"""Functionals of a cycle that a step in the ground disturbs; of all others a push does."""
 JACOBIAN_FUNCTIONALS = (
     *MODULI,
     "radius_bound",
@@ -107,51 +101,28 @@ def jacobian_functionals(
     Returns:
         Those, with respect to all parameters in the order of `parameter_names`.
     """
-    groups = {
-        _disturbance(name): tuple(
-            each for each in names if _disturbance(each) == _disturbance(name)
-        )
-        for name in names
-    }
+    groups: dict[tuple[bool, bool], tuple[str, ...]] = {}
+    for name in names:
+        kind = name in _BY_STEP, name in CLEARANCE_NORMS
+        groups[kind] = (*groups.get(kind, ()), name)
     told = []
-    for (disturbance, has_clearance), group in groups.items():
-        y, system, section = _disturbed_by(disturbance, scene, state)
+    for (by_step, has_clearance), group in groups.items():
+        on, arrivals = section_of(scene, None), footsteps
+        disturbed = (drop_cycle if by_step else push_cycle)(system_of(scene))
+        system: AbstractAugmented = disturbed
+        section: AbstractSection = SteppedSection(on) if by_step else MotionSection(on)
         if has_clearance:
-            y, system, section = (
-                with_clearance(y),
-                through_lowest_swing(system),
-                LowestSwingSection(section),
-            )
-        arrivals = 2 * footsteps if has_clearance else footsteps
+            system, section = LowestSwing(disturbed), LowestSwingSection(section)
+            arrivals *= 2
         spec = cycle_spec(scene, system, section, arrivals, engine)
         precision = functional_precision(accuracy, scene, group)
-        told.append(_functionals(spec, scene, y, group, precision))
+        told.append(_functionals(spec, scene, system.begin(state), group, precision))
     if len(told) == 1:
         return told[0]
     every = [name for group in groups.values() for name in group]
     order = jnp.asarray([every.index(name) for name in names])
-    values, errors, slopes, slope_errors = (
-        jnp.concatenate([each[k] for each in told])[order] for k in range(4)
-    )
-    code = jnp.max(jnp.stack([each.code for each in told]))
-    return Functionals(values, errors, slopes, slope_errors, code)
-
-
-def _disturbance(name: str) -> tuple[str, bool]:
-    """What a functional's cycle is disturbed by, and whether it is followed through its foot's
-    lowest place."""
-    by = "step" if name in ("floor_sensitivity", "floor_clearance_sensitivity") else "push"
-    return by, name in CLEARANCE_NORMS
-
-
-def _disturbed_by(
-    disturbance: str, scene: Scene | RigidScene, state: WalkerState
-) -> tuple[PyTree, AbstractSystem, AbstractSection]:
-    """The state, the system and the section of a disturbed cycle."""
-    on = section_of(scene, None)
-    if disturbance == "step":
-        return unstepped(state), stepped(scene), SteppedSection(on)
-    return undisturbed(state), disturbed(scene), MotionSection(on)
+    rows = (jnp.concatenate(part)[order] for part in zip(*(each[:4] for each in told), strict=True))
+    return Functionals._make([*rows, jnp.max(jnp.stack([each.code for each in told]))])
 
 
 @cached_jit
@@ -162,15 +133,8 @@ def _functionals(
     names: tuple[str, ...],
     fine: Precision,
 ) -> Functionals:
-    m = len(recurring_components(spec.system, y))
-    _, active = select_parameters(scene, None)
-    seeds, sizes = seed_directions(scene, active, m)
-
-    def once(precision: Precision) -> LinearisedReturn:
-        own = corrected(spec, seeds, y, precision)
-        return linearised_return(spec, seeds, own, precision, jnp.asarray(False))
-
-    returns = jax.vmap(once)(fine_and_looser(fine))
+    seeds, sizes, points, returns = orbits_near(spec, scene, y, fine)
+    m = points.shape[1]
     leading = leading_multipliers(returns.jacobian[0, :, :m])
 
     def at(once: LinearisedReturn) -> tuple[Scalar, Scalar]:

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._state_quantities import dimensions_of
 from jaxbiped.linalg._small_matrices import Eigensystem, eigenpairs, eigensystem
 
 MODULI = ("spectral_radius", "modulus_2", "modulus_3")
@@ -24,8 +25,9 @@ CLEARANCE_NORMS = ("clearance_sensitivity", "floor_clearance_sensitivity")
 """Norms of the swinging foot's clearance, by a push and by a step in the ground."""
 SQUARINGS = 6
 """Of the return map's Jacobian P for its bound ‖P⁶⁴‖^(1/64)."""
-_SIZES = {"hip_z": 0.4, "hip_vx": 2.0, "hip_vz": 2.0, "omega_1": 5.0, "omega_2": 5.0}
-"""Of components (SI units), for that norm: the same for all walkers, so that it is one function."""
+_SIZES: dict[tuple[float, float], float] = {(1, 0): 0.4, (1, -1): 2.0, (0, -1): 5.0, (0, 0): 1.0}
+"""Of components by the powers of length and time in their units (SI), for that norm: the same for
+all walkers, so that it is one function."""
 _DOUBLINGS = 24
 """Of the footsteps over which responses are summed: 2 ** 24 of them."""
 
@@ -191,16 +193,20 @@ def weighed(name: str, y: PyTree, rows: Scalar, length: Scalar, leading: Scalar)
         leading: multipliers that are told apart, of a solve that all others are compared with.
     """
     if name == "radius_bound":
-        sizes = jnp.asarray([_SIZES.get(field, 1.0) for field in y._fields[3:]])
+        units = dimensions_of(type(y))
+        sizes = jnp.asarray([_SIZES[units[field]] for field in y._fields[3:]])
         return _radius_bound(sizes, rows, length)
-    if name in ("sensitivity_norm", "floor_sensitivity"):
-        return _push_norm(rows, length)
-    if name in CLEARANCE_NORMS:
-        return _clearance_norm(rows, length)
-    if name == "strike_divergence":
-        return _divergence(rows, length)
     if name in SYMMETRIC:
         return _symmetric(SYMMETRIC.index(name), rows, length)
-    if name == "next_modulus":
-        return _next_modulus(rows, length)
-    return _modulus(MODULI.index(name), rows, length, leading)
+    if name in MODULI:
+        return _modulus(MODULI.index(name), rows, length, leading)
+    return _OF_ROWS[name](rows, length)
+
+
+_OF_ROWS = {
+    "sensitivity_norm": _push_norm,
+    "floor_sensitivity": _push_norm,
+    **dict.fromkeys(CLEARANCE_NORMS, _clearance_norm),
+    "strike_divergence": _divergence,
+    "next_modulus": _next_modulus,
+}

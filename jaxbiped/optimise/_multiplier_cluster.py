@@ -105,7 +105,7 @@ class ClusterRow(NamedTuple):
 
     def is_active(self, known: Evaluation) -> bool:
         """Whether the bound holds by it: at a multiple multiplier those of all its places do."""
-        *hurwitz, pair = conditions(cluster_of(known).values, self.bound).values
+        *hurwitz, pair = self._conditions(known).values
         if self.place == CONDITIONS - 1:
             return bool(pair <= _ONE)
         for side in (hurwitz, hurwitz[::-1]):
@@ -117,25 +117,27 @@ class ClusterRow(NamedTuple):
 
     def value(self, known: Evaluation) -> float:
         """How much there is to spare beyond the condition's own error."""
-        told = conditions(cluster_of(known).values, self.bound)
-        return float(told.values[self.place]) - self.margin(known)
+        return float(self._conditions(known).values[self.place]) - self.margin(known)
 
     def margin(self, known: Evaluation) -> float:
         """A part of the condition's error."""
-        by_symmetric = conditions(cluster_of(known).values, self.bound).by_symmetric[self.place]
-        return float(np.clip(_SHARE * np.abs(by_symmetric) @ self.errors, _LEAST, _MOST))
+        error = _SHARE * np.abs(self._by_symmetric(known)) @ self.errors
+        return float(np.clip(error, _LEAST, _MOST))
 
     def slopes(self, known: Evaluation) -> np.ndarray:
         """Its derivatives with respect to all parameters."""
-        cluster = cluster_of(known)
-        return conditions(cluster.values, self.bound).by_symmetric[self.place] @ cluster.slopes
+        return self._by_symmetric(known) @ cluster_of(known).slopes
 
     def slope_errors(self, known: Evaluation) -> np.ndarray:
         """Their estimated errors."""
-        cluster = cluster_of(known)
-        by = conditions(cluster.values, self.bound).by_symmetric[self.place]
-        return np.abs(by) @ cluster.slope_errors
+        return np.abs(self._by_symmetric(known)) @ cluster_of(known).slope_errors
 
     def by_bound(self, known: Evaluation) -> float:
         """Its derivative with respect to the bound."""
-        return float(conditions(cluster_of(known).values, self.bound).by_radius[self.place])
+        return float(self._conditions(known).by_radius[self.place])
+
+    def _conditions(self, known: Evaluation) -> Conditions:
+        return conditions(cluster_of(known).values, self.bound)
+
+    def _by_symmetric(self, known: Evaluation) -> np.ndarray:
+        return self._conditions(known).by_symmetric[self.place]

@@ -1,7 +1,7 @@
 """Objectives: measures of a periodic gait by name, their gradients and their error bars."""
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +10,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped.continuation._bifurcations import BranchEvent
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
@@ -55,15 +56,18 @@ def _of_swing(scene: Scene | RigidScene) -> str | None:
 
 
 class Objective(NamedTuple):
-    """What can be optimised or bounded.
+    """What can be optimised or bounded; a user's own is added to `OBJECTIVES`.
 
     Attributes:
         quantity: words, symbol and unit.
         lacks: why a scene has none of it, None where it has.
+        measured: of a user's own, value, error, derivatives with respect to the p parameters (p,)
+            and their errors, of a scene and its gait.
     """
 
     quantity: Quantity
     lacks: Callable[[Scene | RigidScene], str | None] = _of_any
+    measured: Callable[[Scene | RigidScene, Gait], tuple[Any, Any, Any, Any]] | None = None
 
 
 OBJECTIVES = {
@@ -160,14 +164,38 @@ def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective
         raise ArgumentError(f"{what} = {name!r} is not allowed for this scene: {lacks}.")
 
 
-def functionals_for(wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
+BothFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None]
+"""Those of a gait's Jacobian and those of its cycle, None where no measure needs them."""
+
+
+def functionals_of(
+    scene: Scene | RigidScene, gait: Gait, wanted: tuple[str, ...], footsteps: int, accuracy: str
+) -> BothFunctionals:
+    """What measures need beside the gait itself."""
+    of_jacobian, of_cycle = _names_for(wanted)
+    how: dict[str, Any] = dict(footsteps=footsteps, accuracy=accuracy, engine=gait.engine)
+    state, first, second = gait.measures.state, None, None
+    if of_jacobian:
+        first = jacobian_functionals(scene, state, of_jacobian, **how)
+    if of_cycle:
+        second = cycle_functionals(scene, state, **how)
+    return first, second
+
+
+def _names_for(wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
     """Which functionals of the Jacobian these measures need, and whether those of the cycle."""
     needed = {*wanted, *(_WHOLE if "whole_sensitivity" in wanted else ())}
     of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
     if "spectral_radius" in wanted:
         of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
-    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity"}
+    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity", *_own(wanted)}
     return of_jacobian, bool(set(wanted) - others)
+
+
+def _own(wanted: tuple[str, ...]) -> dict[str, Callable[[Any, Gait], tuple[Any, Any, Any, Any]]]:
+    """Those of a user's own among these measures, by name."""
+    known = {name: OBJECTIVES[name].measured for name in wanted if name in OBJECTIVES}
+    return {name: measured for name, measured in known.items() if measured is not None}
 
 
 def evaluate(
@@ -175,21 +203,22 @@ def evaluate(
     gait: Gait,
     names: Iterable[str],
     accuracy: str,
-    functionals: tuple[Functionals | None, ...] | None = None,
+    functionals: BothFunctionals | None = None,
 ) -> Evaluation:
     """Objectives of a gait that was found with the sensitivities to all parameters.
 
-    `functionals` are those of `functionals_for`, where they are known.
+    `functionals` are those of `functionals_of`, where they are known.
     """
     wanted = tuple(names)
-    of_jacobian, of_cycle = functionals_for(wanted)
-    state, steps, engine = gait.measures.state, gait.orbit[0].shape[0], gait.engine
-    first, second = (None, None) if functionals is None else functionals
-    rows = {name: _row(gait, name) for name in _OF_THE_GAIT}
-    if of_jacobian:
-        first = first or jacobian_functionals(
-            scene, state, of_jacobian, footsteps=steps, accuracy=accuracy, engine=engine
-        )
+    both = (gait.measures, gait.measure_errors, gait.sensitivities, gait.sensitivity_errors)
+    rows = {name: _row(*(getattr(each, name) for each in both)) for name in _OF_THE_GAIT}
+    rows |= {name: _Row(*measured(scene, gait)) for name, measured in _own(wanted).items()}
+    if functionals is None:
+        footsteps = gait.orbit[0].shape[0]
+        functionals = functionals_of(scene, gait, wanted, footsteps, accuracy)
+    of_jacobian, _ = _names_for(wanted)
+    first, second = functionals
+    if first is not None:
         # The orbit's own error moves the Jacobian, too, as its multipliers tell.
         shares = np.asarray(gait.multiplier_errors) / float(gait.measures.spectral_radius)
         rows |= {
@@ -201,10 +230,7 @@ def evaluate(
         }
     if "whole_sensitivity" in wanted:
         rows["whole_sensitivity"] = _root_of_squares([rows[name] for name in _WHOLE])
-    if of_cycle:
-        second = second or cycle_functionals(
-            scene, state, footsteps=steps, accuracy=accuracy, engine=engine
-        )
+    if second is not None:
         rows |= dict(zip(integral_names(scene), _rows_of(second), strict=True))
         rows["cost_of_transport"] = _cost_of_transport(scene, rows)
     beyond_range = []
@@ -215,15 +241,17 @@ def evaluate(
             none = np.zeros_like(told.slopes)
             rows[name] = _Row(told.distance, 0.0, none, none)
             beyond_range.append(name)
-    kept = {name: rows[name] for name in dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))}
-    slopes = gait.sensitivities.state
+    kept = {
+        name: _row(*rows[name]) for name in dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))
+    }
+    state, slopes = gait.measures.state, gait.sensitivities.state
     return Evaluation(
-        values={name: float(row.value) for name, row in kept.items()},
-        errors={name: float(row.error) for name, row in kept.items()},
+        values={name: row.value for name, row in kept.items()},
+        errors={name: row.error for name, row in kept.items()},
         slopes={name: row.slopes for name, row in kept.items()},
         slope_errors={name: row.slope_errors for name, row in kept.items()},
-        state=np.asarray([float(leaf) for leaf in gait.measures.state[1:]]),
-        state_slopes=np.stack([np.asarray(leaf) for leaf in slopes[1:]]),
+        state=np.stack(recurring_leaves(state)),
+        state_slopes=np.stack(recurring_leaves(slopes)),
         beyond_range=tuple(beyond_range),
     )
 
@@ -235,19 +263,12 @@ class _Row(NamedTuple):
     slope_errors: np.ndarray
 
 
-def _row(gait: Gait, name: str) -> _Row:
-    both = (gait.measures, gait.measure_errors, gait.sensitivities, gait.sensitivity_errors)
-    value, error, slopes, slope_errors = (np.asarray(getattr(each, name)) for each in both)
-    return _Row(float(value), float(error), slopes, slope_errors)
+def _row(value: Any, error: Any, slopes: Any, slope_errors: Any) -> _Row:
+    return _Row(float(value), float(error), np.asarray(slopes), np.asarray(slope_errors))
 
 
-def _rows_of(found: object) -> list[_Row]:
-    parts = [np.asarray(getattr(found, name)) for name in _Row._fields[2:]]
-    values, errors = (np.asarray(getattr(found, name)) for name in ("values", "errors"))
-    return [
-        _Row(float(values[k]), float(errors[k]), parts[0][k], parts[1][k])
-        for k in range(len(values))
-    ]
+def _rows_of(found: Functionals) -> list[_Row]:
+    return [_row(*each) for each in zip(*map(np.asarray, found[:4]), strict=True)]
 
 
 def _root_of_squares(rows: list[_Row]) -> _Row:

@@ -132,7 +132,8 @@ def _balance(
     pairs = [p for p, size in zip(pairs, sizes, strict=True) if size > _VANISHING * max(sizes)]
     active = [(row, in_sum) for row, in_sum, _ in pairs]
     normals = [each for _, _, each in pairs]
-    normals += [_of_bound(u, place, side) for place, side in _at_bounds(u)]
+    units, zero = np.eye(len(u)), np.zeros_like(u)
+    normals += [_Normal(side * units[place], zero, 0.0) for place, side in _at_bounds(u)]
     # Columns: shares of the designs, which add up to one, and the multipliers.
     columns = [np.append(each, [of_radius / scale, _SURE]) for each in gradients]
     columns += [np.append(-each.gradient, [-each.by_radius, 0.0]) for each in normals]
@@ -176,25 +177,23 @@ def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
         spreads = np.stack([each.error for each in found.normals], axis=1)
         gradient_error = gradient_error + spreads @ np.abs(found.multipliers)
         errors = np.abs(np.linalg.pinv(matrix)) @ gradient_error
-    held: dict[tuple[str, float, float], list[float]] = {}
-    each_active = zip(found.active, found.multipliers, errors, strict=False)
-    for (row, in_sum), multiplier, error in each_active:
+    count = len(found.active)
+    held: dict[tuple[str, float, float], tuple[float, float]] = {}
+    for (row, in_sum), multiplier, error in zip(
+        found.active, found.multipliers[:count], errors[:count], strict=True
+    ):
         if not in_sum:
             size = scale * row.by_bound(known)
-            sums = held.setdefault(row[:3], [0.0, 0.0])
-            sums[0] -= multiplier * size
-            sums[1] += error * abs(size)
-    at_bound, count = _at_bounds(u), len(found.active)
-    at = zip(at_bound, found.multipliers[count:], errors[count:], strict=True)
+            total, spread = held.get(row[:3], (0.0, 0.0))
+            held[row[:3]] = total - multiplier * size, spread + error * abs(size)
+    rows = {row[:3]: row for row in rows_of(problem)}.values()
+    at_bounds = zip(_at_bounds(u), found.multipliers[count:], errors[count:], strict=True)
     return Optimality(
         residual=float(np.max(np.abs(found.left))),
         error=float(np.max(gradient_error)),
         excess=problem.excess(known),
-        requirements=tuple(
-            _held(problem, row, known, held.get(row[:3]))
-            for row in dict((row[:3], row) for row in rows_of(problem)).values()
-        ),
-        bounds=tuple(_held_bound(problem, u, problem.sense * scale, *each) for each in at),
+        requirements=tuple(_held(problem, row, known, held.get(row[:3])) for row in rows),
+        bounds=tuple(_held_bound(problem, u, scale, *each) for each in at_bounds),
     )
 
 
@@ -212,17 +211,11 @@ def _at_bounds(u: np.ndarray) -> list[tuple[int, float]]:
     return lower + [(int(k), -1.0) for k in np.flatnonzero(u >= 1.0 - _AT_BOUND)]
 
 
-def _of_bound(u: np.ndarray, place: int, side: float) -> _Normal:
-    unit = np.zeros_like(u)
-    unit[place] = side
-    return _Normal(unit, np.zeros_like(u), 0.0)
-
-
 def _held(
-    problem: DesignProblem, row: AnyRow, known: Evaluation, found: list[float] | None
+    problem: DesignProblem, row: AnyRow, known: Evaluation, found: tuple[float, float] | None
 ) -> Held:
     """Multipliers in the units of objective and measure: of moving the bound upwards."""
-    multiplier, error = (0.0, 0.0) if found is None else found
+    multiplier, error = found or (0.0, 0.0)
     return Held(
         name=row.name,
         bound=row.bound,
@@ -244,6 +237,7 @@ def _held_bound(
 ) -> Held:
     (place, side), variables = at, problem.variables
     value, rate = (float(each[place]) for each in (variables.values(u), variables.rates(u)))
+    scale *= problem.sense
     return Held(
         name=variables.names[place],
         bound=value,

@@ -17,6 +17,7 @@ from jaxbiped._checks import (
 from jaxbiped._files import user_path
 from jaxbiped._identity import DECISIVE, provenance
 from jaxbiped._types import JsonObject
+from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._design_variables import (
     SubjectTo,
@@ -25,7 +26,7 @@ from jaxbiped.optimise._design_variables import (
     start_of,
     variables_of,
 )
-from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, ensemble_of
+from jaxbiped.optimise._ensemble import Ensemble, ensemble_of
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimisers import OPTIMISERS, Ended

@@ -41,7 +41,7 @@ def run_trust_region(
     while search.descend():
         if optimality_of(problem, search.design).residual <= OPTIMAL:
             return Ended(True, search.message)
-        if not any(search.leaves(distance) for distance in _DISTANCES):
+        if not any(search.leaves(distance) for distance in _DISTANCES) and search.left > 0:
             return Ended(True, f"{search.message} None of those scattered about it is better.")
     return Ended(False, "Iteration limit reached.")
 
@@ -94,7 +94,7 @@ class _Search:
     def leaves(self, distance: float) -> bool:
         """Whether a better design is found at that distance: scattered, or by what these show."""
         k, before, self.cuts, self.reach = len(self.here.u), self.here, [], distance
-        for _ in range(2 * k + 2):
+        for _ in range(min(2 * k + 2, self.left)):
             aside = self.random.standard_normal(k)
             self.look(self.here.u + distance * aside / np.max(np.abs(aside)))
         for _ in range(_CUTS):

@@ -14,7 +14,6 @@ from jaxbiped.plot._animation import save_animation as save_animation
 from jaxbiped.plot._basin import basin as basin
 from jaxbiped.plot._branch import bifurcation_curves as bifurcation_curves
 from jaxbiped.plot._branch import branch as branch
-from jaxbiped.plot._contact_forces import contact_forces as contact_forces
 from jaxbiped.plot._fractions import basin_fractions as basin_fractions
 from jaxbiped.plot._gait_charts import elasticities as elasticities
 from jaxbiped.plot._gait_charts import multipliers as multipliers
@@ -25,6 +24,7 @@ from jaxbiped.plot._phase_portrait import gait_orbit as gait_orbit
 from jaxbiped.plot._phase_portrait import phase_portrait as phase_portrait
 from jaxbiped.plot._refined_basin import refined_basin as refined_basin
 from jaxbiped.plot._strobe import gait_strobe as gait_strobe
+from jaxbiped.plot._time_series import contact_forces as contact_forces
 from jaxbiped.plot._time_series import leg_angles as leg_angles
 from jaxbiped.plot._time_series import penetrations as penetrations
 from jaxbiped.plot._time_series import rigid_leg_angles as rigid_leg_angles

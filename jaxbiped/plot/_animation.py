@@ -1,7 +1,7 @@
 """Animation of a walk, in an upright view: gravity down the page and the slope inclined."""
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.animation import FuncAnimation
@@ -12,11 +12,11 @@ from matplotlib.patches import Circle
 
 from jaxbiped._checks import check_positive
 from jaxbiped._files import check_writable_file
-from jaxbiped.dynamics._feet import feet
+from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state import State
+from jaxbiped.plot import style
 from jaxbiped.plot._samples import end_time, state_at
-from jaxbiped.plot.style import GROUND_COLOUR, LEG_COLOURS, LEG_NAMES, LEG_STYLES, new_figure
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
@@ -44,15 +44,11 @@ def upright(scene: Scene, x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 def poses(scene: Scene, state: State) -> Pose:
     """The walker at states with leaves of shape (n,)."""
-    foot_1, foot_2 = feet(scene, state)
     hip = minimal_state(scene, state)
-    return Pose(
-        hip=upright(scene, np.asarray(hip.hip_x), np.asarray(hip.hip_z)),
-        feet=(
-            upright(scene, np.asarray(foot_1.x), np.asarray(foot_1.z)),
-            upright(scene, np.asarray(foot_2.x), np.asarray(foot_2.z)),
-        ),
+    first, second = (
+        upright(scene, np.asarray(foot.x), np.asarray(foot.z)) for foot in feet(scene, state)
     )
+    return Pose(upright(scene, np.asarray(hip.hip_x), np.asarray(hip.hip_z)), (first, second))
 
 
 _TICK = 0.1
@@ -90,7 +86,7 @@ def animate(
     last = end_time(trajectory)
     times = np.minimum(np.arange(int(last / interval + 1e-9) + 1) * interval, last)
     shown = poses(scene, state_at(trajectory, times))
-    figure = new_figure(4.8, 3.0)
+    figure = style.new_figure(4.8, 3.0)
     figure.set_dpi(100)
     figure.set_layout_engine("none")
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -141,19 +137,18 @@ class _Picture:
         self._draw_ground(scene, length)
         self._legs: list[Line2D] = []
         self._feet: list[Circle] = []
-        for colour, style, name in zip(LEG_COLOURS, LEG_STYLES, LEG_NAMES, strict=True):
-            look: dict[str, Any] = {"linestyle": style}
-            (line,) = ax.plot([], [], color=colour, linewidth=4.0, label=name, **look)
-            circle = Circle(
-                (0.0, 0.0), radius, facecolor="none", edgecolor=colour, linewidth=2.0, **look
-            )
+        for k, name in enumerate(style.LEG_NAMES):
+            look = style.leg_line(k)
+            (line,) = ax.plot([], [], linewidth=4.0, label=name, **look)
+            look["edgecolor"] = look.pop("color")
+            circle = Circle((0.0, 0.0), radius, facecolor="none", linewidth=2.0, **look)
             ax.add_patch(circle)
             self._legs.append(line)
             self._feet.append(circle)
         (self._hip,) = ax.plot([], [], "o", color="black", markersize=7)
         self._clock = ax.text(0.02, 0.95, "", transform=ax.transAxes, va="top")
         ax.set_aspect("equal", adjustable="datalim")
-        ax.legend(loc="upper right", frameon=False, fontsize="small", handlelength=3.5)
+        style.legend(ax, loc="upper right", handlelength=3.5)
         ax.set_axis_off()
         self.draw(0)
 
@@ -164,10 +159,10 @@ class _Picture:
         along = np.arange(first, last + 1.0) * _TICK
         surface = upright(scene, along, np.zeros_like(along))
         below = upright(scene, along - 0.02, np.full_like(along, -0.02))
-        self._ax.plot(*surface.T, color=GROUND_COLOUR, linewidth=1.5)
+        self._ax.plot(*surface.T, color=style.GROUND_COLOUR, linewidth=1.5)
         gap = np.full_like(surface, np.nan)
         marks = np.stack([surface, below, gap], axis=1).reshape(-1, 2)
-        self._ax.plot(*marks.T, color=GROUND_COLOUR, linewidth=1.0)
+        self._ax.plot(*marks.T, color=style.GROUND_COLOUR, linewidth=1.0)
 
     def draw(self, frame: int) -> list[Artist]:
         """Moves everything to a frame, and the camera with it."""

@@ -17,8 +17,8 @@ from jaxbiped._quantity import Quantity
 from jaxbiped.basins._arguments import check_known
 from jaxbiped.basins._fractions import fractions as fractions_of
 from jaxbiped.basins._labels import Label, label_names
+from jaxbiped.plot import style
 from jaxbiped.plot._symbols import axis_label
-from jaxbiped.plot.style import GAIT_SUFFIX, axes_or_new, figure_of, in_order, label_colour
 
 if TYPE_CHECKING:
     import xarray
@@ -80,18 +80,14 @@ def basin(
         raise ArgumentError("x, y and names are needed: these labels do not know their axes.")
     words = names_of(labels, cycle_footsteps, gait)
     x_edges, y_edges = _edges("x", x, words.shape[1]), _edges("y", y, words.shape[0])
-    ax = axes_or_new(ax, 7.2, 4.4)
+    ax = style.axes_or_new(ax, 7.2, 4.4)
     draw_labels(ax, words, x_edges, y_edges)
     finish(ax, words, names, units, mark, title)
-    return figure_of(ax)
+    return style.figure_of(ax)
 
 
 def _axes_of(labels: Any, x: Any, y: Any, names: Any) -> tuple[str, str]:
-    """The dimensions of labelled labels along x and y.
-
-    Raises:
-        ArgumentError: more or fewer than two.
-    """
+    """The dimensions of labelled labels along x and y; `ArgumentError` unless they are two."""
     if len(labels.dims) != 2:
         raise ArgumentError(
             f"labels has the axes {', '.join(map(str, labels.dims))}: choose two of them, and one "
@@ -108,12 +104,7 @@ def names_of(
     cycle_footsteps: npt.ArrayLike | None = None,
     gait: npt.ArrayLike | None = None,
 ) -> np.ndarray:
-    """Names on a grid of two dimensions, from names or codes, footsteps in a cycle and gaits.
-
-    Raises:
-        ArgumentError: not a grid of two dimensions, a code that is not known, or shapes that do
-            not fit.
-    """
+    """Names on a grid of two dimensions, from names or codes, footsteps in a cycle and gaits."""
     grid = np.asarray(labels)
     if grid.ndim != 2 or grid.size == 0:
         raise ArgumentError(
@@ -129,7 +120,7 @@ def names_of(
     if gait is not None:
         which = _fitting_names("gait", gait, grid.shape)
         walks = grid == Label.WALKING
-        words[walks] += [GAIT_SUFFIX.format(gait=k) for k in which[walks]]
+        words[walks] += [style.GAIT_SUFFIX.format(gait=k) for k in which[walks]]
     return words
 
 
@@ -163,10 +154,10 @@ def _edges(name: str, value: npt.ArrayLike, n: int) -> np.ndarray:
 
 def draw_labels(ax: Axes, words: np.ndarray, x_edges: np.ndarray, y_edges: np.ndarray) -> None:
     """Fills each cell with its label's colour, and hatches what is pending."""
-    present = in_order(set(words.ravel().tolist()))
+    present = style.in_order(set(words.ravel().tolist()))
     codes = np.searchsorted(np.sort(present), words.astype(str))
     places = np.argsort(present)[codes]
-    colours = ListedColormap([label_colour(name) for name in present])
+    colours = ListedColormap([style.label_colour(name) for name in present])
     norm = BoundaryNorm(np.arange(len(present) + 1) - 0.5, len(present))
     ax.pcolormesh(x_edges, y_edges, places, cmap=colours, norm=norm, rasterized=True)
     pending = words == str(Label.PENDING)
@@ -207,20 +198,13 @@ def finish(
         check_finite("mark", mark)
         if np.shape(mark) != (2,):
             raise ArgumentError(f"mark = {mark!r} is not allowed: it must be two numbers, x and y.")
-        style: dict[str, Any] = {
+        look: dict[str, Any] = {
             "marker": "*", "markersize": 15, "markerfacecolor": "white",
             "markeredgecolor": "black", "linestyle": "none",
         }  # fmt: skip
-        ax.plot(*mark, clip_on=False, zorder=5, **style)
-        handles.append(Line2D([], [], label="gait", **style))
-    ax.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(1.01, 1.0),
-        frameon=False,
-        fontsize="small",
-        borderaxespad=0.0,
-    )
+        ax.plot(*mark, clip_on=False, zorder=5, **look)
+        handles.append(Line2D([], [], label="gait", **look))
+    style.legend_right(ax, handles=handles)
     x_label, y_label = (axis_label(*each) for each in zip(names, units, strict=True))
     ax.set_xlabel(x_label)
     ax.set_ylabel(y_label)
@@ -231,13 +215,13 @@ def _patches(words: np.ndarray) -> list[Patch]:
     """Entries of the legend: labels that occur, with their parts of what is labelled."""
     fractions = fractions_of(words)
     patches = []
-    for name in in_order(set(words.ravel().tolist())):
+    for name in style.in_order(set(words.ravel().tolist())):
         if name == str(Label.PENDING):
             text = f"{name}: {int((words == name).sum())} of {words.size}"
-            patch = Patch(facecolor=label_colour(name), edgecolor="#A0A0A0", hatch=_HATCH)
+            patch = Patch(facecolor=style.label_colour(name), edgecolor="#A0A0A0", hatch=_HATCH)
         else:
             text = f"{name}: {_percent(fractions[name].estimate)}"
-            patch = Patch(facecolor=label_colour(name), edgecolor="#404040", linewidth=0.5)
+            patch = Patch(facecolor=style.label_colour(name), edgecolor="#404040", linewidth=0.5)
         patch.set_label(text)
         patches.append(patch)
     return patches

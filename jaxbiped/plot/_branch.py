@@ -15,9 +15,9 @@ from jaxbiped.continuation._bifurcation_curve import BifurcationCurve
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import BranchPoint
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES, recurring_names
+from jaxbiped.plot import style
 from jaxbiped.plot._symbols import NORMAL_FORCE
-from jaxbiped.plot.style import GROUND_COLOUR, axes_or_new, dress, figure_of, legend_below
 from jaxbiped.scene._parameter_access import parameter_quantities
 
 _MEASURES = {
@@ -37,8 +37,6 @@ _MARKS = {
     BranchEvent.LIMIT: ("X", "limit of the model"),
     BranchEvent.NOT_LOCATED: ("*", "bifurcation, not located"),
 }
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito's colours: one for each number of footsteps."""
 
 
 def branch(
@@ -67,23 +65,23 @@ def branch(
         raise ArgumentError("branches is not allowed: each must have a point.")
     if len({each.along for each in given}) > 1:
         raise ArgumentError("branches is not allowed: they must go along one parameter.")
-    components = given[0].state_type._fields[1:]  # type: ignore[attr-defined]
+    components = recurring_names(given[0].state_type)
     check_choice("measure", measure, (*_MEASURES, *components))
-    ax = axes_or_new(ax, 6.8, 4.6)
+    ax = style.axes_or_new(ax, 6.8, 4.6)
     counts = sorted({each.footsteps for each in given})
     for each in given:
-        _draw_lines(ax, each, measure, _COLOURS[counts.index(each.footsteps) % len(_COLOURS)])
+        _draw_lines(ax, each, measure, style.colour_of(counts.index(each.footsteps)))
     drawn = {kind for kind in _MARKS for each in given if _draw_marks(ax, each, measure, kind)}
     kinds = [kind for kind in _MARKS if kind in drawn]
     if given[0].axis.log:
         ax.set_xscale("log")
     if measure == "spectral_radius":
-        ax.axhline(1.0, color=GROUND_COLOUR, linewidth=0.6, zorder=0.5)
+        ax.axhline(1.0, color=style.GROUND_COLOUR, linewidth=0.6, zorder=0.5)
     quantity = _MEASURES.get(measure) or STATE_QUANTITIES[measure]
     along = parameter_quantities(given[0].scene)[given[0].along]
-    dress(ax, f"Gaits along {along.words}", along.on_axis(), quantity.on_axis())
+    style.dress(ax, f"Gaits along {along.words}", along.on_axis(), quantity.on_axis())
     _legend(ax, given, kinds, counts)
-    return figure_of(ax)
+    return style.figure_of(ax)
 
 
 def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = None) -> Figure:
@@ -101,12 +99,12 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
     """
     if len({(each.along, each.units) for each in curves}) != 1:
         raise ArgumentError("curves is not allowed: they must go along the same two parameters.")
-    ax = axes_or_new(ax, 6.4, 4.4)
+    ax = style.axes_or_new(ax, 6.4, 4.4)
     for k, curve in enumerate(curves):
         marker, words = _MARKS[curve.kind]
         first, second = curve.values.T
         ax.plot(
-            second, first, marker=marker, markersize=3.5, color=_COLOURS[k % len(_COLOURS)],
+            second, first, marker=marker, markersize=3.5, color=style.colour_of(k),
             linewidth=1.2, label=words,
         )  # fmt: skip
     seconds = np.concatenate([curve.values[:, 1] for curve in curves])
@@ -114,9 +112,9 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
         ax.set_xscale("log")
     names, units = curves[0].along, curves[0].units
     labels = [Quantity(name, unit=unit).on_axis() for name, unit in zip(names, units, strict=True)]
-    dress(ax, "Where gaits lose their stability", labels[1], labels[0])
-    ax.legend(frameon=False, fontsize="small")
-    return figure_of(ax)
+    style.dress(ax, "Where gaits lose their stability", labels[1], labels[0])
+    style.legend(ax)
+    return style.figure_of(ax)
 
 
 def _value(measure: str, each: Branch, point: BranchPoint) -> float:
@@ -152,7 +150,7 @@ def _draw_marks(ax: Axes, each: Branch, measure: str, kind: BranchEvent) -> bool
     points = [event.point for event in each.bifurcations if event.kind is kind]
     for point in points:
         ax.plot(
-            point.value, _value(measure, each, point), _MARKS[kind][0], color=GROUND_COLOUR,
+            point.value, _value(measure, each, point), _MARKS[kind][0], color=style.GROUND_COLOUR,
             markersize=6, zorder=3,
         )  # fmt: skip
     return bool(points)
@@ -162,20 +160,20 @@ def _legend(ax: Axes, given: list[Branch], kinds: list[BranchEvent], counts: lis
     known = [kind for kind in _WORDS if any(kind in each.stable for each in given)]
     decided = [kind for kind in known if kind is not None or _is_drawn_undecided(given)]
     handles = [
-        Line2D([], [], color=GROUND_COLOUR, linestyle=_STYLES[kind], label=_WORDS[kind])
+        Line2D([], [], color=style.GROUND_COLOUR, linestyle=_STYLES[kind], label=_WORDS[kind])
         for kind in decided
     ]
     if len(counts) > 1:
         handles += [
-            Line2D([], [], color=_COLOURS[k % len(_COLOURS)], label=_footsteps(count))
+            Line2D([], [], color=style.colour_of(k), label=_footsteps(count))
             for k, count in enumerate(counts)
         ]
     handles += [
-        Line2D([], [], color=GROUND_COLOUR, marker=_MARKS[kind][0], linestyle="none",
+        Line2D([], [], color=style.GROUND_COLOUR, marker=_MARKS[kind][0], linestyle="none",
                label=_MARKS[kind][1])
         for kind in kinds
     ]  # fmt: skip
-    legend_below(ax, columns=min(len(handles), 5), handles=handles)
+    style.legend_below(ax, columns=min(len(handles), 5), handles=handles)
 
 
 def _footsteps(count: int) -> str:

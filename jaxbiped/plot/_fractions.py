@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
 from jaxbiped._quantity import Quantity
 from jaxbiped.basins._fractions import Fraction, wilson_interval
+from jaxbiped.plot import style
 from jaxbiped.plot._symbols import axis_label
-from jaxbiped.plot.style import axes_or_new, dress, figure_of, in_order, label_colour, label_marker
 
 
 def basin_fractions(
@@ -53,32 +53,35 @@ def basin_fractions(
     along = _check(values, fractions, log)
     if kind == "stacked" and along.size == 1:
         raise ArgumentError("values has one entry: a stacked figure must have at least 2.")
-    labels = in_order({label for found in fractions for label in found})
-    counts = np.asarray([[_count(found, label) for found in fractions] for label in labels])
+    labels = style.in_order({label for found in fractions for label in found})
+    counts = np.asarray(
+        [[found[name].count if name in found else 0 for found in fractions] for name in labels]
+    )
     totals = counts.sum(axis=0)
-    ax = axes_or_new(ax, 7.2, 4.0)
+    ax = style.axes_or_new(ax, 7.2, 4.0)
+    colours = [style.label_colour(label) for label in labels]
+    title, limits, order = "Fractions of the starts", (0.0, 1.0), -1
     if kind == "stacked":
-        colours = [label_colour(label) for label in labels]
         ax.stackplot(
             along, counts / totals, labels=labels, colors=colours, edgecolor="white", linewidth=0.4
         )
     else:
+        title += f" (bands: {100.0 * confidence:.4g} % confidence)"
+        limits, order = (-0.02, 1.02), 1
         low, high = wilson_interval(counts, totals, confidence=confidence)
-        for k, label in enumerate(labels):
-            colour = label_colour(label)
+        for k, (label, colour) in enumerate(zip(labels, colours, strict=True)):
             ax.fill_between(along, low[k], high[k], color=colour, alpha=0.25, linewidth=0.0)
-            marker: dict[str, Any] = {
-                "marker": label_marker(label),
-                "markersize": 4.0,
-                "clip_on": False,
-            }
-            ax.plot(along, counts[k] / totals, color=colour, label=label, **marker)
-    _frame(ax, along, name, unit, log, f"bands: {100.0 * confidence:.4g} % confidence", kind)
-    return figure_of(ax)
-
-
-def _count(found: Mapping[str, Fraction], label: str) -> int:
-    return found[label].count if label in found else 0
+            look: dict[str, Any] = {"marker": style.label_marker(label), "markersize": 4.0}
+            ax.plot(along, counts[k] / totals, color=colour, label=label, clip_on=False, **look)
+    style.dress(ax, title, axis_label(name, unit), "fraction of the starts")
+    if log:
+        ax.set_xscale("log")
+    if along.size > 1:
+        ax.set_xlim(along[0], along[-1])
+    ax.set_ylim(*limits)
+    handles, entries = ax.get_legend_handles_labels()
+    style.legend_right(ax, handles=handles[::order], labels=entries[::order])
+    return style.figure_of(ax)
 
 
 def _check(
@@ -101,22 +104,3 @@ def _check(
             f"fractions[{empty[0]}] is empty: at least one start must be labelled at each value."
         )
     return along
-
-
-def _frame(
-    ax: Axes, along: np.ndarray, name: str | Quantity, unit: str, log: bool, bands: str, kind: str
-) -> None:
-    title = "Fractions of the starts" + (f" ({bands})" if kind == "lines" else "")
-    dress(ax, title, axis_label(name, unit), "fraction of the starts")
-    if log:
-        ax.set_xscale("log")
-    if along.size > 1:
-        ax.set_xlim(along[0], along[-1])
-    ax.set_ylim(*((0.0, 1.0) if kind == "stacked" else (-0.02, 1.02)))
-    handles, labels = ax.get_legend_handles_labels()
-    if kind == "stacked":
-        handles, labels = handles[::-1], labels[::-1]
-    ax.legend(
-        handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
-        fontsize="small", borderaxespad=0.0,
-    )  # fmt: skip

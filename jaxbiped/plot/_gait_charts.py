@@ -1,5 +1,7 @@
 """Charts of a gait: Floquet multipliers in the complex plane, and elasticities as tornados."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,15 +13,8 @@ from jaxbiped._quantity import Quantity
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.plot import style
 from jaxbiped.plot._symbols import row_label
-from jaxbiped.plot.style import (
-    GROUND_COLOUR,
-    LEG_COLOURS,
-    SHADE_COLOUR,
-    axes_or_new,
-    figure_of,
-    new_figure,
-)
 
 _NEAR_ZERO = 0.03
 """Multipliers closer to zero than this are named together."""
@@ -53,14 +48,16 @@ def multipliers(gait: Gait, *, ax: Axes | None = None) -> Figure:
     """
     check_drawable(gait)
     values, errors = np.asarray(gait.multipliers), np.asarray(gait.multiplier_errors)
-    ax = axes_or_new(ax, 5.6, 5.6)
-    inside = Circle((0.0, 0.0), 1.0, facecolor="#F6F6F6", edgecolor=GROUND_COLOUR, zorder=0)
+    ax = style.axes_or_new(ax, 5.6, 5.6)
+    inside = Circle((0.0, 0.0), 1.0, facecolor="#F6F6F6", edgecolor=style.GROUND_COLOUR, zorder=0)
     ax.add_patch(inside)
     for value, error in zip(values, errors, strict=True):
         if error > _VISIBLE:
             place = (value.real, value.imag)
-            ax.add_patch(Circle(place, error, facecolor=LEG_COLOURS[1], alpha=0.25))
-    ax.plot(values.real, values.imag, "o", color=LEG_COLOURS[0], markersize=5, label="multipliers")
+            ax.add_patch(Circle(place, error, facecolor=style.LEG_COLOURS[1], alpha=0.25))
+    ax.plot(
+        values.real, values.imag, "o", color=style.LEG_COLOURS[0], markersize=5, label="multipliers"
+    )
     _name(ax, values)
     _frame(ax, max(1.0, float(np.max(np.abs(values) + errors))))
     largest = float(np.max(errors))
@@ -70,10 +67,10 @@ def multipliers(gait: Gait, *, ax: Axes | None = None) -> Figure:
         f"largest error {largest:.1e}" + ("" if largest > _VISIBLE else ": within the dots"),
         transform=ax.transAxes,
         fontsize="small",
-        color=GROUND_COLOUR,
+        color=style.GROUND_COLOUR,
     )
     ax.set_title(_title(gait), loc="left", fontsize="medium")
-    return figure_of(ax)
+    return style.figure_of(ax)
 
 
 def _title(gait: Gait) -> str:
@@ -86,8 +83,8 @@ def _title(gait: Gait) -> str:
 
 def _frame(ax: Axes, reach: float) -> None:
     """Equal scales, both axes through zero, room for the names."""
-    ax.axhline(0.0, color=SHADE_COLOUR, linewidth=0.8, zorder=0.5)
-    ax.axvline(0.0, color=SHADE_COLOUR, linewidth=0.8, zorder=0.5)
+    ax.axhline(0.0, color=style.SHADE_COLOUR, linewidth=0.8, zorder=0.5)
+    ax.axvline(0.0, color=style.SHADE_COLOUR, linewidth=0.8, zorder=0.5)
     ax.set_aspect("equal")
     ax.set_xlim(-1.15 * reach, 1.15 * reach)
     ax.set_ylim(-1.15 * reach, 1.15 * reach)
@@ -107,26 +104,13 @@ def _name(ax: Axes, values: np.ndarray) -> None:
             # Neighbours on the real axis are written at different depths.
             text, shift, anchor = f"{value.real:.3f}", -6 - 12 * (reals % 2), "top"
             reals += 1
-        right = value.real > 0.6
-        _write(ax, value, text, (-6 if right else 6, shift), "right" if right else "left", anchor)
+        across, side = (-6, "right") if value.real > 0.6 else (6, "left")
+        place = (value.real, value.imag)
+        style.label_point(ax, text, place, (across, shift), ha=side, va=anchor)
     if small.any():
         largest = float(np.max(np.abs(values[small])))
         text = f"{int(small.sum())} near 0\n" + rf"($|\lambda| \leq$ {largest:.1e})"
-        _write(ax, 0j, text, (-8, -8), "right", "top")
-
-
-def _write(
-    ax: Axes, value: complex, text: str, shift: tuple[int, int], across: str, along: str
-) -> None:
-    ax.annotate(
-        text,
-        (value.real, value.imag),
-        xytext=shift,
-        textcoords="offset points",
-        ha=across,
-        va=along,
-        fontsize="small",
-    )
+        style.label_point(ax, text, (0.0, 0.0), (-8, -8), ha="right", va="top")
 
 
 MEASURES = {
@@ -180,7 +164,7 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
     columns = min(len(names), 3)
     rows = -(-len(names) // columns)
     height = 1.3 + 0.2 * len(gait.parameters)
-    figure = new_figure(max(3.9 * columns, 4.6), height * rows)
+    figure = style.new_figure(max(3.9 * columns, 4.6), height * rows)
     panels = list(figure.subplots(rows, columns, squeeze=False).flat)
     values = {name: np.asarray(getattr(gait.elasticities, name)) for name in names}
     largest = max(float(np.max(np.abs(_finite(each)))) for each in values.values())
@@ -191,7 +175,7 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
     for ax in spare:
         ax.set_axis_off()
     if spare:
-        spare[0].text(0.0, 0.95, _READING, va="top", fontsize="small", color=GROUND_COLOUR)
+        spare[0].text(0.0, 0.95, _READING, va="top", fontsize="small", color=style.GROUND_COLOUR)
     return figure
 
 
@@ -202,17 +186,20 @@ def _finite(values: np.ndarray) -> np.ndarray:
 def _panel(
     ax: Axes, title: str, parameters: tuple[str | Quantity, ...], values: np.ndarray
 ) -> None:
-    """One measure: bars from the largest down, unknown ones last."""
+    """One measure: bars from the largest down, unknown ones last, and their numbers beside."""
     order = np.argsort(-np.where(np.isfinite(values), np.abs(values), -1.0), kind="stable")
     values = values[order]
     drawn = _finite(values)
     places = np.arange(len(values))
-    colours = [LEG_COLOURS[0] if value >= 0.0 else LEG_COLOURS[1] for value in drawn]
+    colours = [style.LEG_COLOURS[0] if value >= 0.0 else style.LEG_COLOURS[1] for value in drawn]
     ax.barh(places, drawn, color=colours, height=0.7)
-    ax.axvline(0.0, color=GROUND_COLOUR, linewidth=0.8)
+    ax.axvline(0.0, color=style.GROUND_COLOUR, linewidth=0.8)
     ax.set_yticks(places, [row_label(parameters[i]) for i in order], fontsize="small")
     ax.set_ylim(len(values) - 0.4, -0.6)
-    _numbers(ax, places, values)
+    look: dict[str, Any] = {"fontsize": "x-small", "color": style.GROUND_COLOUR}
+    for place, value in zip(places, values, strict=True):
+        beside = ax.get_yaxis_transform()
+        ax.text(1.02, place, _format(value), transform=beside, va="center", **look)
     ax.set_title(title, loc="left", fontsize="medium")
     ax.set_xlabel("d log measure / d log parameter", fontsize="small")
     ax.grid(axis="x", color="#E6E6E6", linewidth=0.6)
@@ -233,20 +220,6 @@ def _scale(ax: Axes, largest: float) -> None:
         fontsize="small",
     )
     ax.xaxis.set_minor_locator(NullLocator())
-
-
-def _numbers(ax: Axes, places: np.ndarray, values: np.ndarray) -> None:
-    """The elasticities as numbers, in a column right of the bars."""
-    for place, value in zip(places, values, strict=True):
-        ax.text(
-            1.02,
-            place,
-            _format(value),
-            transform=ax.get_yaxis_transform(),
-            va="center",
-            fontsize="x-small",
-            color=GROUND_COLOUR,
-        )
 
 
 def _format(value: float) -> str:

@@ -14,30 +14,21 @@ from matplotlib.figure import Figure, SubFigure
 
 from jaxbiped._checks import check_positive, check_type
 from jaxbiped._types import Scalar
+from jaxbiped.plot import style
 from jaxbiped.plot._symbols import FORCE_RATIO, NORMAL_FORCE, PENETRATION, SLIP_SPEED, law_name
-from jaxbiped.plot.style import (
-    GROUND_COLOUR,
-    LEG_COLOURS,
-    axes_or_new,
-    dress,
-    figure_of,
-    leg_line,
-    legend_above,
-    new_figure,
-)
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractBristleLaw,
     AbstractFrictionLaw,
     AbstractNormalLaw,
 )
 
-_RATE_COLOURS = ("#56B4E9", GROUND_COLOUR, "#E69F00", LEG_COLOURS[1])
+_RATE_COLOURS = ("#56B4E9", style.GROUND_COLOUR, "#E69F00", style.LEG_COLOURS[1])
 """One rate each, from the slowest; the fifth begins anew."""
 _MOST_STEPS = 16384
 _LONGEST = 2.0
+"""How long a drop is followed [s]: a strongly damped foot may creep for ever."""
 _Drop: TypeAlias = tuple[Scalar, Scalar]
 _Falling: TypeAlias = tuple[AbstractNormalLaw, float]
-"""How long a drop is followed [s]: a strongly damped foot may creep for ever."""
 
 
 def normal_law(
@@ -75,11 +66,11 @@ def normal_law(
     check_positive("mass", mass, "kg")
     check_positive("approach_speed", approach_speed, "m/s")
     if figure is None:
-        figure = new_figure(9.2, 3.8)
+        figure = style.new_figure(9.2, 3.8)
     left, right = figure.subplots(1, 2)
     _draw_rates(left, law, depth, _telling_rates(law, depth) if rates is None else rates)
     _draw_drop(right, law, mass, approach_speed)
-    return figure_of(left)
+    return style.figure_of(left)
 
 
 def friction_law(
@@ -114,15 +105,15 @@ def friction_law(
     check_positive("fastest", end, "m/s")
     bend = min(own, end)
     slip = bend * np.sinh(np.linspace(-1.0, 1.0, 1601) * np.arcsinh(end / bend))
-    ax = axes_or_new(ax, 6.4, 3.8)
-    ax.axhline(0.0, color=GROUND_COLOUR, linewidth=0.6)
-    ax.plot(slip, _per_load(law, load, slip), color=LEG_COLOURS[0], linewidth=1.4)
+    ax = style.axes_or_new(ax, 6.4, 3.8)
+    ax.axhline(0.0, color=style.GROUND_COLOUR, linewidth=0.6)
+    ax.plot(slip, _per_load(law, load, slip), color=style.LEG_COLOURS[0], linewidth=1.4)
     ax.set_xscale("asinh", linear_width=bend)
     _mark_speeds(ax, bend, end)
     ax.set_xlim(-end, end)
     ax.margins(y=0.08)
-    dress(ax, law_name(law), SLIP_SPEED.on_axis(), FORCE_RATIO.on_axis())
-    return figure_of(ax)
+    style.dress(ax, law_name(law), SLIP_SPEED.on_axis(), FORCE_RATIO.on_axis())
+    return style.figure_of(ax)
 
 
 def _telling_rates(law: AbstractNormalLaw, depth: float) -> list[float]:
@@ -136,11 +127,11 @@ def _draw_rates(ax: Axes, law: AbstractNormalLaw, depth: float, rates: Sequence[
     depths = np.concatenate([[-0.05 * depth, 0.0], np.linspace(1e-9 * depth, depth, 400)])
     for k, rate in enumerate(rates):
         force = law.force(jnp.asarray(depths), jnp.full(depths.shape, float(rate)))
-        colour = GROUND_COLOUR if len(rates) == 1 else _RATE_COLOURS[k % len(_RATE_COLOURS)]
+        colour = style.GROUND_COLOUR if len(rates) == 1 else _RATE_COLOURS[k % len(_RATE_COLOURS)]
         ax.plot(1e3 * depths, force, color=colour, linewidth=1.4, label=f"{rate:.3g} m/s")
     ax.margins(x=0.0)
-    dress(ax, law_name(law), PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis())
-    ax.legend(title="rate of penetration", frameon=False, fontsize="small", title_fontsize="small")
+    style.dress(ax, law_name(law), PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis())
+    style.legend(ax, title="rate of penetration", title_fontsize="small")
 
 
 def _draw_drop(ax: Axes, law: AbstractNormalLaw, mass: float, speed: float) -> None:
@@ -150,18 +141,18 @@ def _draw_drop(ax: Axes, law: AbstractNormalLaw, mass: float, speed: float) -> N
     leaving = [0.0] if force[-1] <= 0.0 else []
     depth, force = (np.concatenate([[0.0], part, leaving]) for part in (depth, force))
     turn = int(np.argmax(depth)) + 1
-    ax.fill(1e3 * depth, force, color=LEG_COLOURS[0], alpha=0.12, linewidth=0)
-    for part, style, label in (
+    ax.fill(1e3 * depth, force, color=style.LEG_COLOURS[0], alpha=0.12, linewidth=0)
+    for part, dashes, label in (
         (slice(None, turn), "-", "going in"),
         (slice(turn - 1, None), (0, (5, 1.5)), "coming out"),
     ):
-        look: dict[str, Any] = {"linestyle": style, "label": label}
-        ax.plot(1e3 * depth[part], force[part], color=LEG_COLOURS[0], linewidth=1.4, **look)
+        look: dict[str, Any] = {"linestyle": dashes, "label": label}
+        ax.plot(1e3 * depth[part], force[part], color=style.LEG_COLOURS[0], linewidth=1.4, **look)
     ax.margins(x=0.02)
     restitution = max(-rate[-1], 0.0) / speed
     title = f"Drop of {mass:g} kg at {speed:g} m/s: restitution {restitution:.3f}"
-    dress(ax, title, PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis())
-    ax.legend(frameon=False, fontsize="small")
+    style.dress(ax, title, PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis())
+    style.legend(ax)
 
 
 def _drop(law: AbstractNormalLaw, mass: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
@@ -244,8 +235,8 @@ def bristle_law(
     """
     check_type("law", law, AbstractBristleLaw)
     check_positive("slip_speed", slip_speed, "m/s")
-    ax = axes_or_new(ax, 6.4, 3.8)
-    ax.axhline(0.0, color=GROUND_COLOUR, linewidth=0.6)
+    ax = style.axes_or_new(ax, 6.4, 3.8)
+    ax.axhline(0.0, color=style.GROUND_COLOUR, linewidth=0.6)
     place, bristle = 0.0, 0.0
     passes = (("from straight bristles", 1.0), ("back", -1.0), ("there again", 1.0))
     for k, (label, direction) in enumerate(passes):
@@ -253,13 +244,13 @@ def bristle_law(
         times, bristles = _bristle_deflection(law, speed, bristle)
         places = place + speed * times
         friction = law.coefficient(jnp.asarray(speed), jnp.asarray(bristles))
-        look = leg_line(min(k, 1)) | {"label": label if k < 2 else None}
+        look = style.leg_line(min(k, 1)) | {"label": label if k < 2 else None}
         ax.plot(1e3 * places, friction, linewidth=1.4, **look)
         place, bristle = places[-1], bristles[-1]
     title = f"{law_name(law)} at {slip_speed:g} m/s"
-    dress(ax, title, "place of the foot, $x$ (mm)", FORCE_RATIO.on_axis())
-    legend_above(ax)
-    return figure_of(ax)
+    style.dress(ax, title, "place of the foot, $x$ (mm)", FORCE_RATIO.on_axis())
+    style.legend_above(ax)
+    return style.figure_of(ax)
 
 
 def _bristle_deflection(

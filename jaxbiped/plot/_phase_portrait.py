@@ -12,19 +12,10 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Numbers
 from jaxbiped.gait._gait import Gait
 from jaxbiped.measure._footsteps import heel_strikes
+from jaxbiped.plot import style
 from jaxbiped.plot._gait_charts import check_drawable
 from jaxbiped.plot._samples import sample
 from jaxbiped.plot._symbols import LEG_ANGLE, LEG_RATE
-from jaxbiped.plot.style import (
-    LEG_COLOURS,
-    LEG_NAMES,
-    axes_or_new,
-    dress,
-    figure_of,
-    leg_line,
-    legend_above,
-    legend_below,
-)
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
@@ -94,34 +85,34 @@ def phase_portrait(
     t, state = sample(trajectory)
     strikes = heel_strikes(scene, trajectory)
     angles, rates = (state.theta_1, state.theta_2), (state.omega_1, state.omega_2)
-    ax = axes_or_new(ax, 5.8, 5.0)
+    ax = style.axes_or_new(ax, 5.8, 5.0)
     for k in sorted({leg - 1 for leg in legs}):
         own = strikes.time_s[strikes.foot == k + 1]
         since = float(own[-2]) if own.size > 1 else 0.0
         _draw_leg(ax, k, t, angles[k], rates[k], since)
     if trajectory.outcome != Ending.WALKING:
         for k in sorted({leg - 1 for leg in legs}):
-            ax.plot(angles[k][-1], rates[k][-1], "X", color=LEG_COLOURS[k], markersize=9)
+            ax.plot(angles[k][-1], rates[k][-1], "X", color=style.LEG_COLOURS[k], markersize=9)
         _explain(ax, "X", str(trajectory.outcome))
     _explain(ax, "o", "start")
-    dress(ax, "Phase portrait", LEG_ANGLE.on_axis(), LEG_RATE.on_axis())
-    legend_below(ax, columns=2)
-    return figure_of(ax)
+    style.dress(ax, "Phase portrait", LEG_ANGLE.on_axis(), LEG_RATE.on_axis())
+    style.legend_below(ax, columns=2)
+    return style.figure_of(ax)
 
 
 def _draw_leg(ax: Axes, k: int, t: np.ndarray, angle: Numbers, rate: Numbers, since: float) -> None:
     """The whole walk, faint where a last stride is drawn over it."""
-    look = leg_line(k)
-    whole: dict[str, Any] = {"linewidth": 1.3, "label": LEG_NAMES[k]}
+    look = style.leg_line(k)
+    whole: dict[str, Any] = {"linewidth": 1.3, "label": style.LEG_NAMES[k]}
     last = t >= since
     if since > 0.0:
-        whole = {"linewidth": 0.8, "alpha": _FAINT, "label": f"{LEG_NAMES[k]}, whole walk"}
+        whole = {"linewidth": 0.8, "alpha": _FAINT, "label": f"{style.LEG_NAMES[k]}, whole walk"}
     ax.plot(angle, rate, **look, **whole)
     if since > 0.0:
-        label = f"last stride of {LEG_NAMES[k]}, from {since:.2f} s"
+        label = f"last stride of {style.LEG_NAMES[k]}, from {since:.2f} s"
         ax.plot(angle[last], rate[last], linewidth=1.5, label=label, **look)
-    direction_arrows(ax, angle[last], rate[last], LEG_COLOURS[k])
-    ax.plot(angle[0], rate[0], "o", color=LEG_COLOURS[k], markersize=5)
+    direction_arrows(ax, angle[last], rate[last], style.LEG_COLOURS[k])
+    ax.plot(angle[0], rate[0], "o", color=style.LEG_COLOURS[k], markersize=5)
 
 
 def _explain(ax: Axes, marker: str, words: str) -> None:
@@ -147,21 +138,21 @@ def gait_orbit(gait: Gait, *, ax: Axes | None = None) -> Figure:
         ValueError: no gait was found, or this is a batch.
     """
     check_drawable(gait)
-    ax = axes_or_new(ax, 5.6, 4.4)
+    ax = style.axes_or_new(ax, 5.6, 4.4)
     start = gait.measures.state
     begins = ((start.theta_1, start.omega_1), (start.theta_2, start.omega_2))
     for k, (angle, rate) in enumerate(_legs(gait)):
-        ax.plot(angle, rate, linewidth=1.1, label=LEG_NAMES[k], **leg_line(k))
-        direction_arrows(ax, angle, rate, LEG_COLOURS[k])
-        ax.plot(*map(float, begins[k]), "o", color=LEG_COLOURS[k], markersize=6)
-    dress(
+        ax.plot(angle, rate, linewidth=1.1, label=style.LEG_NAMES[k], **style.leg_line(k))
+        direction_arrows(ax, angle, rate, style.LEG_COLOURS[k])
+        ax.plot(*map(float, begins[k]), "o", color=style.LEG_COLOURS[k], markersize=6)
+    style.dress(
         ax,
         "Periodic orbit (dots: on the section)",
         LEG_ANGLE.on_axis(),
         LEG_RATE.on_axis(),
     )
-    legend_above(ax)
-    return figure_of(ax)
+    style.legend_above(ax)
+    return style.figure_of(ax)
 
 
 def _legs(gait: Gait) -> list[tuple[np.ndarray, np.ndarray]]:

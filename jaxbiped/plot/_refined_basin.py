@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.basins._refined_boundary import RefinedBoundary
+from jaxbiped.plot import style
 from jaxbiped.plot._basin import draw_labels, finish, names_of
-from jaxbiped.plot.style import axes_or_new, figure_of
 
 _CORNERS = np.asarray([(0, 0), (1, 0), (1, 1), (0, 1)])
 
@@ -54,7 +54,7 @@ def refined_basin(
     if len(boundary.shape) != 2:
         raise ArgumentError(f"boundary has {len(boundary.shape)} dimensions: it must have 2.")
     words = _words(boundary, codes)
-    ax = axes_or_new(ax, 7.2, 4.4)
+    ax = style.axes_or_new(ax, 7.2, 4.4)
     draw_labels(ax, words, *(_edges(boundary, k) for k in (0, 1)))
     more: tuple[Line2D, ...] = ()
     if cells and boundary.levels:
@@ -65,7 +65,7 @@ def refined_basin(
     ax.set_ylim(boundary.lower[1], boundary.upper[1])
     said = title or f"{boundary.asked} labels of the full grid's {boundary.full}"
     finish(ax, words, names, units, mark, said, more)
-    return figure_of(ax)
+    return style.figure_of(ax)
 
 
 def _words(boundary: RefinedBoundary, codes: Mapping[int, str] | None) -> np.ndarray:

@@ -6,7 +6,7 @@ import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped.dynamics._contact_forces import Contacts, contacts
+from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._state import State
 from jaxbiped.measure._samples import evaluate_along, evaluate_at
 from jaxbiped.scene._scene import Scene
@@ -24,21 +24,13 @@ class Samples(NamedTuple):
 
 
 def end_time(trajectory: Trajectory) -> float:
-    """Time of the last state [s].
-
-    Raises:
-        ValueError: the trajectory was not saved step by step, or this is a batch.
-    """
+    """Time of the last state [s]; raises `ValueError` for a batch, or no step by step motion."""
     trajectory.require_dense()
     return float(np.asarray(trajectory.t)[-1])
 
 
 def state_at(trajectory: Trajectory, t: npt.ArrayLike) -> State:
-    """States at times [s], as NumPy arrays.
-
-    Raises:
-        ValueError: the trajectory was not saved step by step.
-    """
+    """States at times [s], as NumPy arrays."""
     return jtu.tree_map(np.asarray, trajectory.at(t))
 
 
@@ -48,10 +40,7 @@ def sample(
     """Every step of the solver between two times [s], and 2048 evenly spaced times.
 
     The steps crowd where the motion is fast (a heel strike lasts a millisecond), the even times
-    fill in where they are far apart.
-
-    Raises:
-        ValueError: the trajectory was not saved step by step.
+    fill in where they are far apart. Raises `ValueError` where the steps were not saved.
     """
     last = end_time(trajectory)
     start = 0.0 if start is None else max(start, 0.0)
@@ -88,9 +77,6 @@ def sampled_forces(
     itself within half a microsecond, less than a step. So the intervals on both sides of every
     local extreme of a force are split again and again, until peaks no longer depend on where
     the steps happen to end.
-
-    Raises:
-        ValueError: the trajectory was not saved step by step.
     """
     samples = sample(trajectory, start=start, stop=stop)
     t, found = samples.t, evaluate_along(scene, samples.state, contacts)

@@ -10,19 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from jaxbiped._checks import ArgumentError, check_positive
+from jaxbiped.plot import style
 from jaxbiped.plot._animation import Pose, poses
 from jaxbiped.plot._samples import end_time, state_at
 from jaxbiped.plot._symbols import HEIGHT, HORIZONTAL
-from jaxbiped.plot.style import (
-    GROUND_COLOUR,
-    LEG_COLOURS,
-    LEG_NAMES,
-    LEG_STYLES,
-    axes_or_new,
-    dress,
-    figure_of,
-    legend_above,
-)
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
@@ -86,27 +77,32 @@ def gait_strobe(
     shown = Pose(everything.hip[:count], (everything.feet[0][:count], everything.feet[1][:count]))
 
     corners = _corners(scene, everything)
-    ax = axes_or_new(ax, _WIDTH, _height(corners))
-    _draw_slope(ax, scene, shown)
+    ax = style.axes_or_new(ax, _WIDTH, _height(corners))
+    x, steepness = float(shown.hip[0, 0]), -math.tan(float(scene.ground.slope))
+    # A straight line that runs on past both edges, whatever the limits become.
+    look: dict[str, Any] = {"color": style.GROUND_COLOUR, "linewidth": 1.4, "zorder": 1}
+    ax.axline((x, steepness * x), slope=steepness, **look)
     ax.plot(*everything.hip[count:].T, color="#8C8C8C", linewidth=0.8, zorder=1)
     _draw_legs(ax, scene, shown)
     ax.set_aspect("equal", adjustable="box")
     ax.set_xlim(*corners[:, 0])
     ax.set_ylim(*corners[:, 1])
     interval = (stop - start) / max(count - 1, 1)
-    dress(
+    style.dress(
         ax,
         f"Gait from {start:.2f} s to {stop:.2f} s, a pose every {interval * 1e3:.3g} ms",
         HORIZONTAL.on_axis(),
         HEIGHT.on_axis(),
     )
     handles = [
-        Line2D([], [], color=colour, linestyle=style, linewidth=2.0, label=name)
-        for colour, style, name in zip(LEG_COLOURS, LEG_STYLES, LEG_NAMES, strict=True)
+        Line2D([], [], linewidth=2.0, label=name, **style.leg_line(k))
+        for k, name in enumerate(style.LEG_NAMES)
     ]
-    ground = Line2D([], [], color=GROUND_COLOUR, label=f"slope {float(scene.ground.slope):.3g} rad")
-    legend_above(ax, handles=[*handles, ground])
-    return figure_of(ax)
+    ground = Line2D(
+        [], [], color=style.GROUND_COLOUR, label=f"slope {float(scene.ground.slope):.3g} rad"
+    )
+    style.legend_above(ax, handles=[*handles, ground])
+    return style.figure_of(ax)
 
 
 def _draw_legs(ax: Axes, scene: Scene, shown: Pose) -> None:
@@ -114,13 +110,13 @@ def _draw_legs(ax: Axes, scene: Scene, shown: Pose) -> None:
     opacity = np.linspace(_FAINTEST, 1.0, count) if count > 1 else np.ones(1)
     diameter = np.full(count, 2.0 * float(scene.walker.r))
     for k, feet in enumerate(shown.feet):
-        look: dict[str, Any] = {"linestyles": [LEG_STYLES[k]], "alpha": opacity}
+        look: dict[str, Any] = {"linestyles": [style.LEG_STYLES[k]], "alpha": opacity}
         legs = LineCollection(
             list(np.stack([shown.hip, feet], axis=1)),
-            colors=LEG_COLOURS[k],
+            colors=style.LEG_COLOURS[k],
             linewidths=1.6,
             zorder=3,
-            label=LEG_NAMES[k],
+            label=style.LEG_NAMES[k],
             **look,
         )
         circles = EllipseCollection(
@@ -131,7 +127,7 @@ def _draw_legs(ax: Axes, scene: Scene, shown: Pose) -> None:
             offsets=feet,
             transOffset=ax.transData,
             facecolors="none",
-            edgecolors=LEG_COLOURS[k],
+            edgecolors=style.LEG_COLOURS[k],
             linewidths=0.8,
             zorder=2,
             **look,
@@ -155,10 +151,3 @@ def _height(corners: np.ndarray) -> float:
     width, height = corners[1] - corners[0]
     needed = (_WIDTH - _LABELS[0]) * height / width + _LABELS[1]
     return float(np.clip(needed, _LEAST, _MOST))
-
-
-def _draw_slope(ax: Axes, scene: Scene, shown: Pose) -> None:
-    """A straight line that runs on past both edges, whatever the limits become."""
-    steepness = -math.tan(float(scene.ground.slope))
-    x = float(shown.hip[0, 0])
-    ax.axline((x, steepness * x), slope=steepness, color=GROUND_COLOUR, linewidth=1.4, zorder=1)

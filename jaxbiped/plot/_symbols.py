@@ -8,7 +8,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._walker import Walker
-from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
+from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
 from jaxbiped.sweep.starts._coordinates import START_QUANTITIES
@@ -62,7 +62,7 @@ def axis_label(name: str | Quantity, unit: str = "") -> str:
 
     Any other name is taken for words, with the unit behind them, if there is one.
     """
-    quantity = QUANTITIES.get(_own_name(name)) if isinstance(name, str) else name
+    quantity = _quantity(name)
     if quantity is not None and (not unit or isinstance(name, Quantity)):
         return quantity.on_axis(unit or None)
     return f"{name} ({unit})" if unit else str(name)
@@ -70,13 +70,13 @@ def axis_label(name: str | Quantity, unit: str = "") -> str:
 
 def row_label(name: str | Quantity) -> str:
     """Words and symbol of a quantity or a name of the table; any other name itself."""
-    quantity = QUANTITIES.get(_own_name(name)) if isinstance(name, str) else name
+    quantity = _quantity(name)
     return str(name) if quantity is None else quantity.in_row()
 
 
-def _own_name(name: str) -> str:
-    """A parameter's own name, where it is told from its namesake as `part.name`."""
-    return name.rpartition(".")[2]
+def _quantity(name: str | Quantity) -> Quantity | None:
+    """That of a name of the table, also where it is told from its namesake as `part.name`."""
+    return QUANTITIES.get(name.rpartition(".")[2]) if isinstance(name, str) else name
 
 
 def law_name(law: object) -> str:

@@ -8,21 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped.plot.style import (
-    GROUND_COLOUR,
-    SHADE_COLOUR,
-    axes_or_new,
-    dress,
-    figure_of,
-    new_figure,
-)
+from jaxbiped.plot import style
 
 COSTS = {
     "cpu_s": "CPU time of a run (s)",
     "seconds": "time of a run (s)",
     "attempted": "attempted steps (–)",
 }
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 _MARKERS = "osD^vPX"
 _BAND = 0.12
 """Width of the band of failures, in parts of the axis."""
@@ -59,17 +51,18 @@ def work_precision(
     ways = list(dict.fromkeys(row["way"] for row in rows if _error(row, axis) is not None))
     if not ways:
         raise ArgumentError(f"rows have no error of axis = {axis!r}: there must be one at least.")
-    ax = axes_or_new(ax, 7.0, 5.0)
+    ax = style.axes_or_new(ax, 7.0, 5.0)
     ax.set_xscale("log")
     ax.set_yscale("log")
     for k, way in enumerate(ways):
-        mine = [row for row in rows if row["way"] == way and _is_shown(row, axis, cost)]
+        own = (row for row in rows if row["way"] == way and row["outcome"] == "ok")
+        mine = [row for row in own if _error(row, axis) and row[cost]]
         ax.plot(
             np.array([_error(row, axis) for row in mine], dtype=float),
             np.array([row[cost] for row in mine], dtype=float),
-            marker=_MARKERS[k // len(_COLOURS) % len(_MARKERS)],
-            color=_COLOURS[k % len(_COLOURS)],
-            linestyle="-" if k < len(_COLOURS) else "--",
+            marker=_MARKERS[k // len(style.COLOURS) % len(_MARKERS)],
+            color=style.colour_of(k),
+            linestyle="-" if k < len(style.COLOURS) else "--",
             markersize=4,
             linewidth=1.0,
             label=way,
@@ -77,7 +70,9 @@ def work_precision(
     if floor is not None and floor > 0.0:
         ax.set_xlim(left=min(ax.get_xlim()[0], 0.3 * floor))
         ax.axvspan(ax.get_xlim()[0], floor, color="#F3F3F3", zorder=0)
-        ax.axvline(floor, color=GROUND_COLOUR, linestyle=":", label="the references' disagreement")
+        ax.axvline(
+            floor, color=style.GROUND_COLOUR, linestyle=":", label="the references' disagreement"
+        )
     failed = [
         row
         for row in rows
@@ -85,8 +80,8 @@ def work_precision(
     ]
     if failed:
         _draw_failures(ax, failed, cost, ways)
-    dress(ax, "", f"error of {axis.replace('_', ' ')}, relative", COSTS[cost])
-    return figure_of(ax)
+    style.dress(ax, "", f"error of {axis.replace('_', ' ')}, relative", COSTS[cost])
+    return style.figure_of(ax)
 
 
 def _draw_failures(
@@ -96,7 +91,7 @@ def _draw_failures(
     low, high = np.log10(ax.get_xlim())
     # The band lies beyond the axis as it was, whose upper end is its left edge.
     edge, right = 10.0**high, 10.0 ** (high + _BAND * (high - low) / (1.0 - _BAND))
-    ax.axvspan(edge, right, color=SHADE_COLOUR, zorder=0)
+    ax.axvspan(edge, right, color=style.SHADE_COLOUR, zorder=0)
     ax.set_xlim(10.0**low, right)
     bottom = ax.get_ylim()[0]
     places = np.geomspace(edge, right, len(failed) + 2)[1:-1]
@@ -106,16 +101,12 @@ def _draw_failures(
             [place],
             [row[cost] if row[cost] else bottom],
             "x",
-            color=_COLOURS[ways.index(row["way"]) % len(_COLOURS)] if known else GROUND_COLOUR,
+            color=style.colour_of(ways.index(row["way"])) if known else style.GROUND_COLOUR,
             markersize=5,
         )
     ax.text(
         1.0 - 0.5 * _BAND, 1.01, "failed", transform=ax.transAxes, ha="center", fontsize="small"
     )
-
-
-def _is_shown(row: Mapping[str, Any], axis: str, cost: str) -> bool:
-    return row["outcome"] == "ok" and bool(_error(row, axis)) and bool(row[cost])
 
 
 def _error(row: Mapping[str, Any], axis: str) -> float | None:
@@ -153,7 +144,7 @@ def constraint_runs(runs: Sequence[Mapping[str, Any]]) -> Figure:
         raise ArgumentError("runs is empty: there must be one at least.")
     methods = list(dict.fromkeys(run["method"] for run in runs))
     ways = list(dict.fromkeys(_integrator_label(run) for run in runs))
-    figure = new_figure(11.0, 1.7 + 0.42 * len(methods) + 0.2 * -(-len(ways) // 3))
+    figure = style.new_figure(11.0, 1.7 + 0.42 * len(methods) + 0.2 * -(-len(ways) // 3))
     panels = figure.subplots(1, len(_MEASURES), sharey=True)
     for ax, (measure, label) in zip(panels, _MEASURES.items(), strict=True):
         for k, way in enumerate(ways):
@@ -163,13 +154,13 @@ def constraint_runs(runs: Sequence[Mapping[str, Any]]) -> Figure:
             _draw_way(ax, mine, rows, measure, k, way)
         ax.set_xscale("log")
         ax.margins(x=0.12)
-        dress(ax, "", label, "")
+        style.dress(ax, "", label, "")
     panels[0].set_yticks(np.arange(len(methods)), methods)
     panels[0].set_ylim(len(methods) - 0.5, -0.5)
     panels[0].set_ylabel("method")
     handles, labels = panels[0].get_legend_handles_labels()
     if any(_has_failed(run) for run in runs):
-        (cross,) = panels[0].plot([], [], "x", color=GROUND_COLOUR)
+        (cross,) = panels[0].plot([], [], "x", color=style.GROUND_COLOUR)
         handles, labels = [*handles, cross], [*labels, "failed"]
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
     return figure
@@ -188,7 +179,7 @@ def _draw_way(
     failed = np.array([_has_failed(run) for run in runs])
     # A run that failed took its time all the same.
     lost = failed & (measure != "wall_s_run") | ~np.isfinite(values)
-    colour = _COLOURS[k % len(_COLOURS)]
+    colour = style.colour_of(k)
     ax.plot(
         np.maximum(values[~lost], _FLOOR),
         rows[~lost],

@@ -16,6 +16,8 @@ LEG_COLOURS_ON_DARK = ("#56B4E9", "#E69F00")
 LEG_STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)))
 """Leg 1 solid, leg 2 dashed, for print without colour."""
 LEG_NAMES = ("leg 1", "leg 2")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Okabe and Ito's, in the order in which lines of many kinds take them."""
 GROUND_COLOUR = "#595959"
 SHADE_COLOUR = "#DDDDDD"
 _ENERGY_COLOURS = {
@@ -39,6 +41,11 @@ def view_colours() -> dict[str, str]:
         for k, page in enumerate(("light", "dark"))
         for name, pair in pairs.items()
     }
+
+
+def colour_of(k: int) -> str:
+    """The colour of the k-th kind of line."""
+    return COLOURS[k % len(COLOURS)]
 
 
 def leg_line(k: int) -> dict[str, Any]:
@@ -75,36 +82,37 @@ def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
+def label_point(
+    ax: Axes, text: str, place: tuple[float, float], shift: tuple[float, float], **anchor: Any
+) -> None:
+    """Writes a few words beside a point, so many points of print away from it."""
+    ax.annotate(text, place, xytext=shift, textcoords="offset points", fontsize="small", **anchor)
+
+
+def legend(ax: Axes, **options: Any) -> None:
+    """A legend in small letters without a frame, within the axes unless told otherwise."""
+    ax.legend(**{"frameon": False, "fontsize": "small"} | options)
+
+
 def legend_below(ax: Axes, *, columns: int, **options: Any) -> None:
     """A legend under the axes, for more than fits beside the title."""
-    ax.legend(
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.14),
-        ncols=columns,
-        frameon=False,
-        fontsize="small",
-        borderaxespad=0.2,
-        **options,
-    )
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14)}
+    legend(ax, **place, ncols=columns, borderaxespad=0.2, **options)
 
 
 def legend_above(ax: Axes, **options: Any) -> None:
     """A legend in one row above the axes, right of the title, where it covers no data."""
-    handles, _ = ax.get_legend_handles_labels()
-    ax.legend(
-        **{
-            "loc": "lower right",
-            "bbox_to_anchor": (1.0, 1.0),
-            "ncols": max(len(options.get("handles", handles)), 1),
-            "frameon": False,
-            "fontsize": "small",
-            "borderaxespad": 0.2,
-        }
-        | options
-    )
+    entries = options.get("handles") or ax.get_legend_handles_labels()[0]
+    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
+    legend(ax, **place | {"ncols": max(len(entries), 1), "borderaxespad": 0.2} | options)
 
 
-_COLOURS = {
+def legend_right(ax: Axes, **options: Any) -> None:
+    """A legend right of the axes, for entries of many words."""
+    legend(ax, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **options)
+
+
+_LABEL_COLOURS = {
     str(Label.FELL_FORWARD): "#D55E00",
     str(Label.FELL_BACK): "#E69F00",
     str(Label.STOPPED): "#009E73",
@@ -121,7 +129,7 @@ _BLUES = ("#0072B2", "#56B4E9", "#0B3C5D", "#A6D8F5", "#3A6EA5", "#1E90FF")
 """Walking: shades by gait, or else by the cycle's length; they repeat after six."""
 _WALKING_MARKERS = "os8hpH"
 _MARKERS = "D^vPX*<>d."
-_ORDER = list(_COLOURS)
+_ORDER = list(_LABEL_COLOURS)
 GAIT_SUFFIX = ", gait {gait}"
 """Said after the name of what walks, where several gaits are told apart."""
 
@@ -129,7 +137,7 @@ GAIT_SUFFIX = ", gait {gait}"
 def label_colour(name: str) -> str:
     """The colour of a label's name (`label_name`); grey for a name that is not known."""
     if not _walks(name):
-        return _COLOURS.get(name, "#BBBBBB")
+        return _LABEL_COLOURS.get(name, "#BBBBBB")
     return _BLUES[_shade(name) % len(_BLUES)]
 
 

@@ -7,11 +7,11 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_choice
-from jaxbiped._parameter_declaration import check_parameters, parameter
+from jaxbiped._parameter_declaration import AbstractPart, parameter
 from jaxbiped._types import Parameter, Scalar
 
 
-class Ground(eqx.Module):
+class Ground(AbstractPart):
     """A plane that falls at an angle towards positive x.
 
     Attributes (leaves of any batch shape):
@@ -24,9 +24,6 @@ class Ground(eqx.Module):
 
     slope: Parameter = parameter("slope", r"$\alpha$", "rad", size_below=math.pi / 2)
     g: Parameter = parameter("gravity", "$g$", "m/s^2", minimum=0.0, default=9.8)
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
 
 
 class SteppedGround(eqx.Module):

@@ -40,9 +40,7 @@ def parameter_names(scene: AbstractScene) -> tuple[str, ...]:
         >>> jb.parameter_names(jb.seed_scene())[:5]
         ('K', 'c', 'xi', 'm', 'J')
     """
-    names = _names_by_leaf(scene)
-    first = [name for name in _FIRST if name in names]
-    return (*first, *(name for name in names if name not in first))
+    return tuple(_parameters(scene))
 
 
 def parameter_values(scene: AbstractScene) -> dict[str, Scalar]:
@@ -59,8 +57,7 @@ def parameter_values(scene: AbstractScene) -> dict[str, Scalar]:
         >>> float(jb.parameter_values(jb.seed_scene())["K"])
         1000000.0
     """
-    by_leaf = dict(zip(_names_by_leaf(scene), jtu.tree_leaves(scene.minimal), strict=True))
-    return {name: by_leaf[name] for name in parameter_names(scene)}
+    return {name: leaf for name, (_, leaf) in _parameters(scene).items()}
 
 
 def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
@@ -74,9 +71,8 @@ def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
     Returns:
         A `Quantity` (words, symbol and SI unit) by each name.
     """
-    paths = [path for path, _ in jtu.tree_flatten_with_path(scene.minimal)[0]]
-    by_leaf = dict(zip(_names_by_leaf(scene), paths, strict=True))
-    return {name: _quantity(scene.minimal, name, by_leaf[name]) for name in parameter_names(scene)}
+    known = _parameters(scene).items()
+    return {name: _quantity(scene.minimal, name, path) for name, (path, _) in known}
 
 
 def _quantity(part: object, name: str, path: _Path) -> Quantity:
@@ -112,13 +108,13 @@ def select_parameters(
     Raises:
         ArgumentError: a name that the scene does not have.
     """
-    by_leaf = _names_by_leaf(scene)
     if isinstance(parameters, str):
         raise ArgumentError(
             f"parameters = {parameters!r} is not allowed: give a tuple of names, such as "
             f"({parameters!r},)."
         )
-    names = parameter_names(scene) if parameters is None else tuple(parameters)
+    names = tuple(_parameters(scene) if parameters is None else parameters)
+    by_leaf = list(_leaves_by_name(scene))
     for name in names:
         check_choice("parameters", name, by_leaf)
     return names, tuple(by_leaf.index(name) for name in names)
@@ -144,11 +140,10 @@ def with_parameters(scene: SomeScene, values: Mapping[str, Parameter]) -> SomeSc
         >>> float(scene.ground.slope), float(scene.normal.K)
         (0.01, 2000000.0)
     """
-    names, changed = _names_by_leaf(scene), scene.minimal
-    paths = [path for path, _ in jtu.tree_flatten_with_path(changed)[0]]
+    leaves, changed = _leaves_by_name(scene), scene.minimal
     for name, value in values.items():
-        check_choice("parameter", name, names)
-        changed = _replace(changed, paths[names.index(name)], value)
+        check_choice("parameter", name, leaves)
+        changed = _replace(changed, leaves[name][0], value)
     return scene.with_minimal(changed)
 
 
@@ -163,11 +158,20 @@ def _replace(part: Any, path: _Path, value: Parameter) -> Any:
     return dataclasses.replace(part, **{key.name: _replace(getattr(part, key.name), rest, value)})
 
 
-def _names_by_leaf(scene: PyTree) -> list[str]:
+def _parameters(scene: PyTree) -> dict[str, tuple[_Path, Scalar]]:
+    """Paths and leaves of a scene's parameters by name, those first that are first asked for."""
+    leaves = _leaves_by_name(scene)
+    return {name: leaves[name] for name in _FIRST if name in leaves} | leaves
+
+
+def _leaves_by_name(scene: PyTree) -> dict[str, tuple[_Path, Scalar]]:
+    """Paths and leaves of what is modelled, by name, in the order of the leaves."""
     modelled = scene.minimal if isinstance(scene, AbstractScene) else scene
-    whole = [_texts(path) for path, _ in jtu.tree_flatten_with_path(modelled)[0]]
+    leaves = jtu.tree_flatten_with_path(modelled)[0]
+    whole = [_texts(path) for path, _ in leaves]
     own = [texts[-1] for texts in whole]
-    return [texts[-1] if own.count(texts[-1]) == 1 else ".".join(texts) for texts in whole]
+    names = [texts[-1] if own.count(texts[-1]) == 1 else ".".join(texts) for texts in whole]
+    return dict(zip(names, leaves, strict=True))
 
 
 def _texts(path: _Path) -> list[str]:

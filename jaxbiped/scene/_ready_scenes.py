@@ -4,7 +4,6 @@ import dataclasses
 import inspect
 
 from jaxbiped._checks import check_choice, check_type
-from jaxbiped._types import by_numpy
 from jaxbiped.scene._ground import Ground, StanceRotation
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Walker
@@ -35,8 +34,7 @@ def seed_scene(
 ) -> Scene:
     """The paper's walker (section 2.3) on its slope, any parameter replaced by its paper name.
 
-    Units: `slope` rad, `g` m/s², `m` and `hip_mass` kg, `J` kg·m², `l`, `d`, `r` m, `K` N/mⁿ,
-    `c` N·s/m², `v0` m/s, `xi` s/m. The paper prints slopes as "0,20 rad"; 0.02 is meant.
+    The paper prints slopes as "0,20 rad"; 0.02 is meant.
 
     Args:
         slope: inclination of the ground [rad].
@@ -81,10 +79,8 @@ def seed_scene(
 
 _CREEP = 1e-3
 """Slip speed of the friction without slip cost [m/s]: a stance foot creeps at less than it."""
-_GIVE = 1e-5
-"""Deflection of the bristles at the static coefficient [m]."""
 _BRISTLE_DAMPING = 100.0
-"""Their damping [s/m]: they settle without ringing under a leg of some kilograms."""
+"""Damping of the bristles [s/m]: they settle without ringing under a leg of some kilograms."""
 
 
 def ladder(scene: Scene | None = None) -> dict[str, Scene | RigidScene]:
@@ -114,13 +110,7 @@ def ladder(scene: Scene | None = None) -> dict[str, Scene | RigidScene]:
     law = scene.friction
     check_type("scene.friction", law, BengisuAkay)
     assert isinstance(law, BengisuAkay)
-    bristles = LuGre(
-        mu_static=law.mu_static,
-        mu_kinetic=law.mu_kinetic,
-        v_s=by_numpy(lambda _, xi: 1.0 / xi, law.xi),
-        sigma_0=by_numpy(lambda _, mu: mu / _GIVE, law.mu_static),
-        sigma_1=_BRISTLE_DAMPING,
-    )
+    bristles = dataclasses.replace(LuGre.like_seed(law), sigma_1=_BRISTLE_DAMPING)
     creep = RegularisedCoulomb(mu=law.mu_kinetic, v_d=_CREEP)
     return {
         "rigid": RigidScene(walker=scene.walker, ground=scene.ground),

@@ -27,15 +27,34 @@ else:
 
 
 class AbstractScene(eqx.Module):
-    """A walker on a slope, and how it is modelled; a frozen pytree of its parameters.
+    """What is modelled, and how it is written down; a frozen pytree of its parameters.
 
     Attributes:
-        walker: masses and lengths.
-        ground: slope and gravity.
         compliant: whether feet sink into the ground and slip on it by laws of contact; else they
             roll and strike. A property of the class.
         redundant: whether constraints hold more coordinates together than there are degrees of
             freedom. A property of the class.
+    """
+
+    compliant: AbstractClassVar[bool]
+    redundant: AbstractClassVar[bool]
+
+    @property
+    @abc.abstractmethod
+    def minimal(self) -> Any:
+        """The same model in minimal coordinates, whose leaves are the parameters."""
+
+    @abc.abstractmethod
+    def with_minimal(self, minimal: Any) -> Self:
+        """The scene of another model, held together as this one is."""
+
+
+class AbstractWalkerScene(AbstractScene):
+    """A walker on a slope, and how it is modelled.
+
+    Attributes:
+        walker: masses and lengths.
+        ground: slope and gravity.
     """
 
     if TYPE_CHECKING:
@@ -47,36 +66,39 @@ class AbstractScene(eqx.Module):
     else:
         walker: AbstractVar[Walker]
         ground: AbstractVar[Ground]
-    compliant: AbstractClassVar[bool]
-    redundant: AbstractClassVar[bool]
 
     @property
-    @abc.abstractmethod
-    def minimal(self) -> Any:
-        """The same model in minimal coordinates, whose leaves are the parameters: itself, unless
-        it is redundant."""
-
-    @abc.abstractmethod
-    def with_minimal(self, minimal: Any) -> Self:
-        """The scene of another model, held together as this one is."""
-
-    @property
-    @abc.abstractmethod
     def has_bristles(self) -> bool:
         """Whether the friction has states of its own."""
+        return isinstance(getattr(self.minimal, "friction", None), AbstractBristleLaw)
+
+
+class AbstractMinimalScene(AbstractWalkerScene):
+    """A walker in minimal coordinates."""
+
+    redundant: ClassVar[bool] = False
+
+    @property
+    def minimal(self) -> Self:
+        """The scene itself."""
+        return self
+
+    def with_minimal(self, minimal: Self) -> Self:
+        """The other model itself."""
+        return minimal
 
 
 def is_compliant(args: object) -> bool:
     """Whether the parameters of a system are a scene with laws of contact."""
-    return isinstance(args, AbstractScene) and args.compliant
+    return isinstance(args, AbstractWalkerScene) and args.compliant
 
 
 def is_rigid(args: object) -> bool:
     """Whether the parameters of a system are a scene whose feet roll and strike."""
-    return isinstance(args, AbstractScene) and not args.compliant
+    return isinstance(args, AbstractWalkerScene) and not args.compliant
 
 
-class Scene(AbstractScene):
+class Scene(AbstractMinimalScene):
     """A walker on a slope, with its laws of contact.
 
     A frozen pytree whose numeric leaves are the parameters: differentiate or `vmap` with respect
@@ -97,7 +119,6 @@ class Scene(AbstractScene):
     """
 
     compliant: ClassVar[bool] = True
-    redundant: ClassVar[bool] = False
     walker: Walker
     ground: Ground
     normal: AbstractNormalLaw
@@ -113,19 +134,8 @@ class Scene(AbstractScene):
         check_type("clearance", self.clearance, AbstractClearance)
         check_actuation(self.actuation, "compliant")
 
-    @property
-    def minimal(self) -> "Scene":
-        return self
 
-    def with_minimal(self, minimal: "Scene") -> "Scene":
-        return minimal
-
-    @property
-    def has_bristles(self) -> bool:
-        return isinstance(self.friction, AbstractBristleLaw)
-
-
-class RigidScene(AbstractScene):
+class RigidScene(AbstractMinimalScene):
     """A walker whose feet are rigid: they roll without slip and strike without rebound.
 
     Single support is a smooth motion of two legs; a footstep ends by a plastic impact at which the
@@ -144,7 +154,6 @@ class RigidScene(AbstractScene):
     """
 
     compliant: ClassVar[bool] = False
-    redundant: ClassVar[bool] = False
     walker: Walker
     ground: Ground
     actuation: Actuation = eqx.field(converter=actuation_of, default=None)
@@ -154,19 +163,8 @@ class RigidScene(AbstractScene):
         check_type("ground", self.ground, Ground)
         check_actuation(self.actuation, "rigid")
 
-    @property
-    def minimal(self) -> "RigidScene":
-        return self
 
-    def with_minimal(self, minimal: "RigidScene") -> "RigidScene":
-        return minimal
-
-    @property
-    def has_bristles(self) -> bool:
-        return False
-
-
-class RedundantScene(AbstractScene):
+class RedundantScene(AbstractWalkerScene):
     """A walker whose legs are bodies of their own, held together at the hip by a method.
 
     What is modelled is the `Scene`; how it is written down differs. Goes wherever a `Scene` does;
@@ -197,12 +195,8 @@ class RedundantScene(AbstractScene):
     def minimal(self) -> Scene:
         return self.scene
 
-    def with_minimal(self, minimal: Scene) -> "RedundantScene":
+    def with_minimal(self, minimal: Scene) -> Self:
         return dataclasses.replace(self, scene=minimal)
-
-    @property
-    def has_bristles(self) -> bool:
-        return self.scene.has_bristles
 
     @property
     def walker(self) -> Walker:

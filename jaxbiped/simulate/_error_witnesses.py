@@ -8,7 +8,7 @@ as wrong by chance, nothing is seen.
 
 import dataclasses
 import warnings
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -18,26 +18,13 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
+from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._simulation import Simulation
-from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
+from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name
 from jaxbiped.solve._error_estimate import LOOSER, Judged, check_untraced, check_wanted, refine
-from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import relative_to_scene, sizes_of
-from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
 
-_FIRST = 1e-2
-"""First tolerance as a share of the relative error wanted: errors of walks are about 0.5 to 6
-tolerances (the seed's walk of two seconds, 1e-5 to 1e-9), and bars some fifteen times that."""
-
-_FINEST_FIRST = 1e-10
-"""Finest tolerance to begin with."""
-
-_AS_FINE = 2.0
-"""Weight of a witness whose own error is about the walk's: their difference may be either's.
-
-Weight and share were chosen on 1000 random scenes (draw 23 of `experiments/accuracy_coverage.py`):
-without them every number lay within its bar in 95.1 % of the scenes, with them in 99.1 %."""
 _SHARE = 0.05
 """Least bar of one number over the largest bar of the same moment, in the scene's units.
 
@@ -48,6 +35,9 @@ _LONG = 1e-2
 _MANY = 8
 """Steps from which the other ones are longer, and cost less; those of fewer are shorter."""
 _LONGER, _SHORTER = (2.0, 2.0**0.5), (1.0 / 2.0, 1.0 / 3.0)
+
+
+AnySimulation: TypeAlias = Simulation | RigidSimulation
 
 
 class Witness(NamedTuple):
@@ -73,7 +63,7 @@ def check_accurate_walk(accuracy: str | float, **replaced: object) -> float | No
     return float(accuracy)
 
 
-def accurate_walk(run: Simulation, wanted: float) -> Trajectory:
+def accurate_walk(run: AnySimulation, wanted: float) -> Trajectory[Any]:
     """The walk whose estimated relative error is at most `wanted`, or as small as can be had.
 
     Tolerances are inputs of the compiled programs: no round compiles anything anew.
@@ -82,31 +72,22 @@ def accurate_walk(run: Simulation, wanted: float) -> Trajectory:
         ArgumentError: under `jit`, `vmap` or differentiation.
     """
     check_untraced(wanted, run, ACCURACIES)
-    share = float(run.atol) / float(run.rtol)
-    other = solver_named("rodas4p" if isinstance(run.solver, Rodas5P) else "rodas5p")
-    # Rodas4P takes about as many steps as Rodas5P at a ten times looser tolerance.
-    other_looser, weight = (LOOSER, 1.0) if isinstance(run.solver, Rodas5P) else (1.0, _AS_FINE)
+    other, other_looser, weight = run.by_other_method()
 
-    def solved(tolerance: float, **changes: Any) -> Trajectory:
-        rtol = np.asarray(tolerance, run.rtol.dtype)
-        atol = np.asarray(share * tolerance, run.rtol.dtype)
-        return dataclasses.replace(
-            run, rtol=jax.numpy.asarray(rtol), atol=jax.numpy.asarray(atol), **changes
-        )()
-
-    def attempt(tolerance: float) -> tuple[Trajectory, Judged]:
-        walk = solved(tolerance)
+    def attempt(tolerance: float) -> tuple[Trajectory[Any], Judged]:
+        walk = run.at_tolerance(tolerance)()
         witnesses = (
-            Witness(solved(LOOSER * tolerance), 1.0),
-            Witness(solved(other_looser * tolerance, solver=other), weight),
+            Witness(run.at_tolerance(LOOSER * tolerance)(), 1.0),
+            Witness(other.at_tolerance(other_looser * tolerance)(), weight),
         )
-        return walk, judge_walk(run.scene.minimal, walk, witnesses)
+        bars, relative, obstacle = judge_walk(run.scene.minimal, walk, witnesses)
+        # Whether a foot that grazes the ground strikes is for a finer tolerance to tell.
+        grazes = walk.grazes is not None and int(walk.grazes) > 0
+        return walk, (bars, np.inf if grazes else relative, obstacle)
 
-    # What cannot be met is told with the error that can: not at once by the finest steps.
-    # Coarser than what resolves slip both witnesses may chatter alike.
-    resolved = float(resolve_slip_speed(1.0, run.scene.minimal))
-    first = min(max(_FIRST * wanted, _FINEST_FIRST), float(run.rtol) * 10.0, resolved)
-    walk, error = refine(attempt, wanted, first=first, dtype=run.rtol.dtype)
+    dtype = run.rtol.dtype
+    first = run.first_tolerance(wanted)
+    walk, error = refine(attempt, wanted, first=first, dtype=dtype, finest=run.finest_tolerance)
     return dataclasses.replace(walk, error=error)
 
 

@@ -8,23 +8,16 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array, ArrayLike, PyTree
+from jaxtyping import Array, PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import LaneEngine, Request
-from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
-from jaxbiped.solve._adaptive_program import Solve, Solved
-from jaxbiped.solve._engine_names import ENGINES, engine_for
-from jaxbiped.solve._lane_solve import (
-    Setting,
-    lane_engine,
-    request_of,
-    solve_scene,
-    solve_step_by_step,
-)
+from jaxbiped.simulate._start import Options
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adaptive_program
+from jaxbiped.solve._engine_names import ENGINES, engine_for, engine_named
 from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 from jaxbiped.solve.controllers._first_and_last_step import just_before_end
@@ -36,31 +29,24 @@ if TYPE_CHECKING:
 
 _QUICK = 100_000
 """Attempted steps that take less than a second."""
+_ROOM = 1 << 18
+"""Steps that there is room for at first; who takes more runs again, with room for as many."""
 
 
 def choose_engine(
-    engine: str,
-    *,
-    solver: diffrax.AbstractSolver[PyTree],
-    save_steps: bool,
-    adjoint: diffrax.AbstractAdjoint | None,
-    leaves: PyTree,
-    times: str | ArrayLike | AbstractSection,
-    section: AbstractSection | None,
-    dt: ArrayLike | None = None,
-    redundant: bool = False,
+    asked: Options, solver: diffrax.AbstractSolver[PyTree], leaves: PyTree, *, redundant: bool
 ) -> str:
     """The engine that "auto" stands for, or the one that is asked for.
 
     Raises:
         ArgumentError: an unknown name, or lanes or CUDA for what they cannot do.
     """
-    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(leaves))
-    obstacle = _hindrance(solver, save_steps, adjoint, leaves, times, traced=traced)
-    if redundant and not (isinstance(times, str) and times == "end"):
+    obstacle = _hindrance(asked, solver, leaves)
+    if redundant and not (isinstance(asked.save, str) and asked.save == "end"):
         obstacle = 'redundant coordinates are diffrax\'s, but for save="end"'
-    if dt is not None:
+    if asked.dt is not None:
         obstacle = "steps of one size (dt) are diffrax's"
+    engine, section = asked.engine, asked.section
     if section is None:
         return engine_for(engine, obstacle=obstacle, prefers_xla=redundant, by_device=True)
     check_choice("engine", engine, ENGINES)
@@ -73,49 +59,45 @@ def choose_engine(
 
 
 def _hindrance(
-    solver: diffrax.AbstractSolver[PyTree],
-    save_steps: bool,
-    adjoint: diffrax.AbstractAdjoint | None,
-    leaves: PyTree,
-    times: str | ArrayLike | AbstractSection,
-    *,
-    traced: bool,
+    asked: Options, solver: diffrax.AbstractSolver[PyTree], leaves: PyTree
 ) -> str | None:
     """Why lanes cannot do what is asked."""
+    each, section = jtu.tree_leaves(leaves), asked.section
     if not isinstance(solver, AbstractRosenbrock):
         return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
-    if save_steps and traced:
+    if asked.save_steps and any(isinstance(leaf, jax.core.Tracer) for leaf in each):
         return 'under jit, vmap or derivatives it does not save every step (save="steps")'
-    if adjoint is not None:
+    if asked.adjoint is not None:
         return "an adjoint is diffrax's"
-    if isinstance(times, jax.core.Tracer):
+    if isinstance(asked.times, jax.core.Tracer):
         return "the times to save at must be known beforehand"
-    if isinstance(times, AbstractSection) and jtu.tree_leaves(times):
-        return f"the section {type(times).__name__} holds numbers of its own"
-    if any(jnp.result_type(leaf) != jnp.float64 for leaf in jtu.tree_leaves(leaves)):
+    if section is not None and jtu.tree_leaves(section):
+        return f"the section {type(section).__name__} holds numbers of its own"
+    if any(jnp.result_type(leaf) != jnp.float64 for leaf in each):
         return "it computes in 64 bits"
     return None
 
 
 def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
     """Runs a request; see `simulate`. What it asks of lanes may be known, see `lane_request`."""
-    dense, arrivals, setting = None, None, _setting(run)
-    solve: Solve = (lane_request(run) if request is None else request).inputs
+    request = lane_request(run) if request is None else request
+    dense, arrivals = None, None
     if run.save_steps:
-        ended, t, state, dense = _step_by_step(run, solve, setting)
-    elif not setting.saved.within:
-        ended, _ = solve_scene(solve, setting)
-        t, state = single_time(ended.t, ended.state)
+        ended, rows = _step_by_step(run, request)
+        t, state, dense = recorded_steps(run.state, rows, _rosenbrock(run))
     else:
         times = None if run.times is None else np.asarray(run.times)
         room = 0 if run.section is None else run.max_arrivals
-        ended, recorded = solve_scene(solve, setting, times=times, room=room)
-        assert recorded is not None
-        # As diffrax has it: infinite where the solve ended before.
-        saved = arrivals_among(recorded.values, jnp.asarray(recorded.counts), run.state)
-        t, state = saved.t, saved.state
-        if run.section is not None:
-            arrivals, (t, state) = saved, single_time(ended.t, ended.state)
+        found = engine_named(run.engine).run(request._replace(times=times, room=room))
+        ended, recorded = found.outputs, found.records
+        t, state = single_time(ended.t, ended.state)
+        if recorded is not None:
+            # As diffrax has it: infinite where the solve ended before.
+            saved = arrivals_among(recorded.values, jnp.asarray(recorded.counts), run.state)
+            if run.section is None:
+                t, state = saved.t, saved.state
+            else:
+                arrivals = saved
     return Trajectory(
         t=t,
         state=state,
@@ -132,60 +114,9 @@ def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
 
 
 def lane_request(run: "Simulation") -> Request:
-    """What a request asks of lanes."""
-    return request_of(_solve(run), _setting(run))
-
-
-def able_request(run: "Simulation") -> Request | None:
-    """What is asked of lanes; None where XLA runs it, also for what they lack by "auto"."""
-    if run.engine == "xla":
-        return None
-    request = lane_request(run)
-    hindered = run.replaceable and _engine(run).can(request) is not None
-    return None if hindered else request
-
-
-def prepare_lanes(run: "Simulation", request: Request) -> Callable[["Simulation"], Trajectory]:
-    """`by_lanes`, with all compiled that it needs for one simulation.
-
-    Where only the end is asked for, what JAX does around it is compiled as well.
-    """
-    _engine(run).compile(request).prepare(1)
-    return by_lanes if _setting(run).saved.within else _compiled
-
-
-_compiled = cached_jit(by_lanes)
-
-
-def _step_by_step(
-    run: "Simulation", solve: Solve, setting: Setting
-) -> tuple[Solved, Array, State, diffrax.DenseInterpolation]:
-    ended, rows = solve_step_by_step(solve, setting, most=run.max_solver_steps)
-    ended = jax.device_put(ended)
-    return ended, *recorded_steps(run.state, rows, setting.solver)
-
-
-def _engine(run: "Simulation") -> LaneEngine:
-    return lane_engine(device=run.engine == "cuda")
-
-
-def _setting(run: "Simulation") -> Setting:
-    assert isinstance(run.solver, AbstractRosenbrock)
-    quick = run.max_solver_steps <= _QUICK
-    saved = Saved(
-        steps=run.save_steps,
-        times=run.times is not None,
-        section=run.section,
-        extremes=run.extremes,
-    )
-    return Setting(
-        run.solver, run.watch, run.footsteps is not None, quick, saved, device=run.engine == "cuda"
-    )
-
-
-def _solve(run: "Simulation") -> Solve:
+    """What a request asks of lanes, which may hold no operation that it needs."""
     footsteps = 0 if run.footsteps is None else run.footsteps
-    return Solve(
+    solve = Solve(
         scene=run.scene,
         state=run.state,
         duration=run.duration,
@@ -197,6 +128,56 @@ def _solve(run: "Simulation") -> Solve:
         patience=as_float(PATIENCE * footsteps),
         max_attempts=as_float(run.max_solver_steps),
     )
+    saved = Saved(run.save_steps, run.times is not None, run.section, run.extremes)
+    steps = AdaptiveSolve(
+        _rosenbrock(run), run.watch, run.footsteps is not None, saved, located=True
+    )
+    return Request(adaptive_program(steps), solve, quick=run.max_solver_steps <= _QUICK)
+
+
+def able_request(run: "Simulation") -> Request | None:
+    """What is asked of lanes; None where XLA runs it, also for what they lack by "auto"."""
+    if run.engine == "xla":
+        return None
+    request = lane_request(run)
+    hindered = run.replaceable and engine_named(run.engine).can(request) is not None
+    return None if hindered else request
+
+
+def prepare_lanes(run: "Simulation", request: Request) -> Callable[["Simulation"], Trajectory]:
+    """`by_lanes`, with all compiled that it needs for one simulation.
+
+    Where only the end is asked for, what JAX does around it is compiled as well.
+    """
+    engine = engine_named(run.engine)
+    assert isinstance(engine, LaneEngine)
+    engine.compile(request).prepare(1)
+    within = run.save_steps or run.times is not None or run.section is not None
+    return by_lanes if within else _compiled
+
+
+_compiled = cached_jit(by_lanes)
+
+
+def _rosenbrock(run: "Simulation") -> AbstractRosenbrock:
+    assert isinstance(run.solver, AbstractRosenbrock)
+    return run.solver
+
+
+def _step_by_step(run: "Simulation", request: Request) -> tuple[Solved, np.ndarray]:
+    """One simulation, not traced, and the records of its steps, (n, numbers)."""
+    one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], request.inputs)
+    room = min(run.max_solver_steps, _ROOM)
+    while True:
+        asked = request._replace(inputs=one, room=room, batch=True)
+        outputs, recorded, _ = engine_named(run.engine).run(asked)
+        assert recorded is not None
+        steps = int(recorded.counts[0])
+        if steps <= room:
+            ended = jax.device_put(jtu.tree_map(lambda leaf: leaf[0], outputs))
+            return ended, recorded.values[0, :steps]
+        # Memory is asked for by what a solve takes, not by what it might.
+        room = steps
 
 
 class RecordedSteps(NamedTuple):

@@ -1,4 +1,4 @@
-"""Simulation of a scene from a start."""
+"""Simulation of a scene from a start: the door for every kind of scene, and its short names."""
 
 from collections.abc import Callable
 from typing import Literal
@@ -6,16 +6,25 @@ from typing import Literal
 import diffrax
 from jaxtyping import Array, PyTree
 
+from jaxbiped._checks import check_type
 from jaxbiped._debug_switches import without_switches
-from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.scene._scene import RedundantScene, Scene
+from jaxbiped._types import Parameter
+from jaxbiped.dynamics._linkage_motion import LinkageState
+from jaxbiped.dynamics._section import AbstractSection, HeelStrike
+from jaxbiped.dynamics._state import RigidState
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._walker import LinkageScene
 from jaxbiped.simulate._error_witnesses import (
+    AnySimulation,
     accurate_walk,
     check_accurate_walk,
     warn_of_long_steps,
     warn_of_missed_contacts,
 )
+from jaxbiped.simulate._linkage_simulation import simulate_linkage
+from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._simulation import Simulation
+from jaxbiped.simulate._start import Options
 from jaxbiped.solve._accuracy import warn_of_unresolved_slip
 from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._trajectory import Trajectory
@@ -23,7 +32,7 @@ from jaxbiped.solve._trajectory import Trajectory
 
 @without_switches
 def simulate(
-    scene: Scene | RedundantScene,
+    scene: Scene | RedundantScene | RigidScene | LinkageScene,
     state: PyTree,
     *,
     duration: float | None = None,
@@ -51,7 +60,9 @@ def simulate(
     ends or saves the motion; NaN where it is grazed. There are none of `save="steps"`.
 
     Args:
-        scene: what to simulate; a `RedundantScene` for coordinates of each leg.
+        scene: what to simulate; a `RedundantScene` for coordinates of each leg. For a `RigidScene`
+            and a `LinkageScene` see `rigid_walk` and `swing`, whose options alone apply; the first
+            saves "end" or `HeelStrike()`, the second an array of times.
         state: start, a `State`; where friction has bristles also a `BristleState`, for their
             part (zero unless given). Its dtype, that of the most precise leaf, is the precision
             of the solve: 64 bits unless the user says otherwise. A redundant scene also takes a
@@ -108,14 +119,11 @@ def simulate(
         >>> str(walk.outcome), float(walk.t[-1])
         ('walking', 0.1)
     """
-    wanted = check_accurate_walk(accuracy, rtol=rtol, atol=atol, dt=dt)
-    run = Simulation.prepare(
-        scene,
-        state,
+    asked = Options(
         duration=duration,
         footsteps=footsteps,
         solver=solver,
-        accuracy=accuracy if isinstance(accuracy, str) else "balanced",
+        accuracy=accuracy,
         rtol=rtol,
         atol=atol,
         dt=dt,
@@ -127,12 +135,130 @@ def simulate(
         adjoint=adjoint,
         engine=engine,
     )
+    if isinstance(scene, LinkageScene):
+        return simulate_linkage(scene, state, asked)
+    wanted = check_accurate_walk(accuracy, rtol=rtol, atol=atol, dt=dt)
+    if wanted is not None:
+        asked = asked._replace(accuracy="balanced")
+    kind = RigidSimulation if isinstance(scene, RigidScene) else Simulation
+    run: AnySimulation = kind.of(scene, state, asked)
     if wanted is not None:
         return accurate_walk(run, wanted)
-    if rtol is not None and dt is None:
+    if isinstance(run, Simulation) and rtol is not None and dt is None:
         warn_of_unresolved_slip(rtol, scene.minimal)
     walk = run()
-    if dt is not None:
+    if isinstance(run, Simulation) and dt is not None:
         warn_of_missed_contacts(run, walk)
         warn_of_long_steps(run, walk)
     return walk
+
+
+def rigid_walk(
+    scene: RigidScene,
+    state: RigidState,
+    *,
+    footsteps: int | None = None,
+    duration: float | None = None,
+    accuracy: str | float = "balanced",
+    rtol: float | None = None,
+    max_arrivals: int = 0,
+    max_solver_steps: int = 65536,
+    engine: str = "auto",
+) -> Trajectory[RigidState]:
+    """Walks a rigid walker for a number of footsteps, a time, or whichever ends first.
+
+    Explicit steps of eighth order (Dormand and Prince) under error control. Heel strikes and falls
+    are the roots of each step's interpolant, two within one step included, and Newton's method
+    lands on them. A foot that comes to the ground, or misses it, by less than the tolerance tells
+    does not strike; `grazes` counts these. Works under `jit`, `vmap` and first derivatives, which
+    follow the strikes and the end.
+
+    Args:
+        scene: the walker.
+        state: start, leg 2 standing.
+        footsteps: heel strikes after which to end; with a `duration`, too, whichever comes first.
+        duration: simulated time [s].
+        accuracy: "draft" (1e-4), "balanced" (1e-6) or "tight" (1e-11): the relative tolerance; the
+            absolute one (SI) is a hundredth of it. Or a number: the relative error wanted of
+            every state and time that is returned, lengths in units of the legs' l, times of
+            √(l/g), angles of 1 rad, as in `simulate`; `error` then has the bars, and a
+            `RuntimeWarning` tells where they cannot meet the number.
+        rtol: relative tolerance, in place of the accuracy's.
+        max_arrivals: how many heel strikes to keep.
+        max_solver_steps: cap on the attempted steps.
+        engine: "xla", "lanes", "cuda" or "auto" (see `ENGINES`).
+
+    Returns:
+        When, where and how the walk ended: after a footstep, just after the impact, leg 2
+        standing. Its `arrivals` count the heel strikes, and hold the first `max_arrivals`.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> scene = jb.ladder()["rigid"]
+        >>> start = jb.dynamics.rigid_state(jb.seed_state())
+        >>> walk = jb.rigid_walk(scene, start, footsteps=2, engine="lanes")
+        >>> str(walk.outcome), int(walk.arrivals.total)
+        ('walking', 2)
+    """
+    check_type("scene", scene, RigidScene)
+    return simulate(
+        scene,
+        state,
+        footsteps=footsteps,
+        duration=duration,
+        accuracy=accuracy,
+        rtol=rtol,
+        save=HeelStrike() if max_arrivals else "end",
+        max_arrivals=max_arrivals if max_arrivals else 1,
+        max_solver_steps=max_solver_steps,
+        engine=engine,
+    )
+
+
+def swing(
+    scene: LinkageScene,
+    state: LinkageState,
+    *,
+    times: Parameter,
+    solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
+    accuracy: str = "balanced",
+    rtol: float | None = None,
+    atol: float | None = None,
+    dt: float | None = None,
+    max_solver_steps: int = 65536,
+    adjoint: diffrax.AbstractAdjoint | None = None,
+) -> Trajectory[LinkageState]:
+    """Simulates a linkage from a start, which is first put on its constraints.
+
+    Works under `jit`, `vmap` and differentiation.
+
+    Args:
+        scene: linkage, constraint method and gravity.
+        state: start at time 0, on its constraints or near them.
+        times: when to save, increasing from 0 on [s], shape (n,); the last one ends the solve.
+        solver, accuracy, rtol, atol, dt, max_solver_steps, adjoint: as in `simulate`.
+
+    Returns:
+        States at the `times`, and how far each is off its constraints, leaves of shape (n,). Its
+        `ending` is "finished", "out of steps" or "solver failed".
+
+    Raises:
+        ArgumentError: an argument that is not allowed, or constraints that the method cannot hold,
+            before anything is compiled.
+    """
+    check_type("scene", scene, LinkageScene)
+    return simulate(
+        scene,
+        state,
+        save=times,
+        solver=solver,
+        accuracy=accuracy,
+        rtol=rtol,
+        atol=atol,
+        dt=dt,
+        max_solver_steps=max_solver_steps,
+        adjoint=adjoint,
+    )

@@ -18,24 +18,22 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import RigidState, exchange_legs
 from jaxbiped.dynamics._switches import switches
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._failure_events import FALL_ANGLE, ending_surface
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
-from jaxbiped.variational._tangents_at_times import (
+from jaxbiped.variational._variational_solve import (
     EventMotion,
     TangentsAtTimes,
     follow_event,
+    motion_solve,
     seeded_directions,
     tangents_after,
     tangents_at_times,
 )
 
-LOOSER = 10.0
-"""Tolerance of derivatives, in units of the state's."""
 _WATCH = Watch(field=vector_field, switches=switches)
 """Derivatives are taken up to the times at which the plain solve saved."""
 _ROLLING = Watch(field=rolling_field, switches=lambda args, y: ())
@@ -96,22 +94,13 @@ def slopes_of(
     at = TangentsAtTimes(like, jnp.zeros((len(t), 0, len(like))))
     time = jnp.zeros((len(t), 0))
     if places or active:
-        at = tangents_at_times(
-            _WATCH,
-            solver,
-            scene,
-            state,
-            times=t,
-            places=places,
-            active=active,
-            precision=Precision(rtol, LOOSER * rtol),
-            engine=CUDA if device else None,
-        )
+        how = motion_solve(_WATCH, solver, rtol)
+        start, seeded = seeded_directions(scene, state, places, active)
+        at = tangents_at_times(how, start, seeded, t, CUDA if device else None)
         time = jnp.zeros(at.columns.shape[:2])
     columns = at.columns
     if until is not None and (places or active):
         end = jtu.tree_map(lambda leaf: leaf[-1], saved)
-        _, seeded = seeded_directions(scene, state, places, active)
         moves = _at_events(scene, at, end, found.ending, section, rtol, seeded)
         time = jnp.where(by_clock[:, None], 0.0, moves.time)
         columns = jnp.where(by_clock[:, None, None], columns, moves.state)
@@ -210,13 +199,13 @@ def rigid_slopes_of(
     """
     scene, state = jtu.tree_map(lambda leaf: jnp.asarray(leaf, jnp.float64), (scene, state))
     start, seeded = seeded_directions(scene, state, places, active)
-    precision, solver = Precision(rtol, LOOSER * rtol), Rodas5P()
+    how = motion_solve(_ROLLING, Rodas5P(), rtol)
     unit = jnp.sqrt(scene.walker.l / scene.ground.g)
     n = len(places) + len(active)
 
     def follow(since: _Strike, t: Scalar) -> Tangents:
         """With derivatives at this very time."""
-        found = tangents_after(_ROLLING, solver, since.after, seeded, t - since.t, precision)
+        found = tangents_after(how, since.after, seeded, t - since.t)
         velocity = as_columns(rolling_field(0.0, found.state, scene))
         return found._replace(columns=found.columns - velocity[:, None] * since.time)
 
@@ -239,7 +228,7 @@ def rigid_slopes_of(
         found = select(comes, found, before)
         return found, found
 
-    first = _Strike(jnp.zeros_like(end), jnp.zeros(n), Tangents(state, start))
+    first = _Strike(jnp.zeros_like(end), jnp.zeros(n), start)
     reached = jnp.arange(len(strikes)) < count
     last, each = jax.lax.scan(strike, first, (strikes, reached))
     at = follow(last, end)

@@ -1,7 +1,8 @@
-"""Start of a simulation, and the steps and saved times that are asked for, checked."""
+"""Start of a simulation, and what else is asked of it, checked."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import diffrax
 import jax
@@ -10,19 +11,26 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import ArrayLike, PyTree
 
-from jaxbiped._checks import ArgumentError, check_positive, check_unbatched, holds_somewhere
+from jaxbiped._checks import (
+    ArgumentError,
+    check_count,
+    check_positive,
+    check_unbatched,
+    holds_somewhere,
+)
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._projection import check_independent
 from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
 from jaxbiped.dynamics._redundant_motion import coordinates_of
+from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import BristleState, State, state_for
 from jaxbiped.scene._ground import AbstractClearance, Ground
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._walker import Walker
-from jaxbiped.scene.actuation._catalogue import ACTUATORS
-from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
-from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
+from jaxbiped.scene.actuation._abstract_actuator import ACTUATORS
+from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS, AbstractNormalLaw
+from jaxbiped.solve._failure_events import WATCHES
 
 _PRECISIONS = (np.float16, np.float32, np.float64)
 """Of NumPy's, those that JAX has."""
@@ -30,6 +38,49 @@ _DEEPEST = 0.25
 """Penetration of a foot that touches, in units of l, from which it starts below the ground."""
 _HIGHEST = 100.0
 """Energy stored in a foot's contact, in units of m g l, from which it does."""
+
+
+class Options(NamedTuple):
+    """What is asked of a simulation: the keywords of `simulate`, as they are given."""
+
+    duration: float | None = None
+    footsteps: int | None = None
+    solver: str | diffrax.AbstractSolver[PyTree] = "rodas4p"
+    accuracy: str | float = "balanced"
+    rtol: float | None = None
+    atol: float | None = None
+    dt: float | None = None
+    save: Any = "steps"
+    max_arrivals: int = 64
+    extremes: Callable[..., PyTree] | None = None
+    watch: tuple[str, ...] = WATCHES
+    max_solver_steps: int = 65536
+    adjoint: diffrax.AbstractAdjoint | None = None
+    engine: str = "auto"
+
+    @property
+    def save_steps(self) -> bool:
+        """Whether every step is saved."""
+        return isinstance(self.save, str) and self.save == "steps"
+
+    @property
+    def section(self) -> AbstractSection | None:
+        """The section at which to save arrivals."""
+        return self.save if isinstance(self.save, AbstractSection) else None
+
+    @property
+    def times(self) -> Any:
+        """The times to save at, as they are given."""
+        return None if isinstance(self.save, str | AbstractSection) else self.save
+
+    def refuse_others(self, scene: Any, allowed: tuple[str, ...]) -> None:
+        """Raises `ArgumentError` for an option that does not apply to such a scene."""
+        for name, value in self._asdict().items():
+            if name not in allowed and value != self._field_defaults[name]:
+                raise ArgumentError(
+                    f"{name} = {value!r} is not allowed for a {type(scene).__name__}: choose among "
+                    f"{', '.join(allowed)}."
+                )
 
 
 def start_for(scene: Scene | RedundantScene, state: PyTree) -> tuple[PyTree, Consistent | None]:
@@ -82,6 +133,18 @@ def check_single_scene(scene: Scene | RigidScene | RedundantScene) -> None:
     for part in scene.actuation or ():
         if type(part) in ACTUATORS.values():
             check_unbatched("scene.actuation", part, "one scene")
+
+
+def check_limits(
+    duration: Scalar | float | None, footsteps: int | None, max_solver_steps: int
+) -> None:
+    """Raises `ArgumentError` for what cannot end a simulation."""
+    if duration is None and footsteps is None:
+        raise ArgumentError("duration = None and footsteps = None: say how long to simulate.")
+    if footsteps is not None:
+        check_count("footsteps", footsteps)
+    check_unbatched("duration", duration)
+    check_count("max_solver_steps", max_solver_steps)
 
 
 def check_steps(

@@ -4,6 +4,7 @@ Rounding differs, and it decides on step sizes after a few steps: the steps are 
 """
 
 import contextlib
+import dataclasses
 import functools
 import operator
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Numbers, Scalar, select
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._consistent_state import project
 from jaxbiped.dynamics._state import field_of
@@ -86,8 +88,9 @@ class _Now(NamedTuple):
     extremes: tuple[PyTree, PyTree] | None
 
 
+@dataclasses.dataclass(frozen=True)
 class AdaptiveSolve:
-    """The functions of a `Program` that solves a `Solve`.
+    """The functions of a `Program` that solves a `Solve`. Hashable.
 
     Attributes:
         solver: its steps.
@@ -98,28 +101,12 @@ class AdaptiveSolve:
         fenced: whether XLA is to compile it, and not lanes (see `fenced`).
     """
 
-    def __init__(
-        self,
-        solver: AbstractRosenbrock,
-        watch: tuple[str, ...],
-        *,
-        counting: bool,
-        saved: Saved,
-        located: bool = False,
-        fenced: bool = False,
-    ) -> None:
-        self.solver, self.counting, self.saved, self.fenced = solver, counting, saved, fenced
-        self.events, self.located = ending_events(watch), watch if located else None
-
-    def program(self) -> Program:
-        """The program."""
-        return Program(
-            self.start,
-            self.attempt,
-            self.finish,
-            record=self.record if self.saved.within else None,
-            scheduled=self.saved.times,
-        )
+    solver: AbstractRosenbrock
+    watch: tuple[str, ...]
+    counting: bool
+    saved: Saved = dataclasses.field(default_factory=Saved)
+    located: bool = False
+    fenced: bool = False
 
     def start(self, solve: Solve) -> _Now:
         zero, none = jnp.zeros_like(solve.duration), jnp.asarray(False)
@@ -214,7 +201,7 @@ class AdaptiveSolve:
         """The failure that ends a solve here, the first of them."""
         happened: dict[Ending, Scalar] = {}
         none = _has_begun(now)
-        for name, happens in self.events.items():
+        for name, happens in ending_events(self.watch).items():
             happened[name] = none & jnp.asarray(happens(now.t, now.state, scene))
             none = none & ~happened[name]
         return happened
@@ -225,7 +212,8 @@ class AdaptiveSolve:
         Asked here and not where a step ends: of the state that a step starts from, the step itself
         needs what failures are told by.
         """
-        found = [jnp.asarray(each(now.t, now.state, scene)) for each in self.events.values()]
+        events = ending_events(self.watch).values()
+        found = [jnp.asarray(each(now.t, now.state, scene)) for each in events]
         return _has_begun(now) & functools.reduce(operator.or_, found)
 
     def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
@@ -247,7 +235,16 @@ class AdaptiveSolve:
         control = walk_control(solve.rtol, solve.atol, solve.units)
         if self.counting:
             control = FootstepLimit(control, solve.footsteps)
-        return control if self.located is None else LocatedEnding(control, self.located, probe)
+        return LocatedEnding(control, self.watch, probe) if self.located else control
+
+
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def adaptive_program(steps: AdaptiveSolve) -> Program:
+    """The program of these functions."""
+    record = steps.record if steps.saved.within else None
+    return Program(
+        steps.start, steps.attempt, steps.finish, record=record, scheduled=steps.saved.times
+    )
 
 
 def _term(solve: Solve) -> "diffrax.ODETerm[PyTree]":

@@ -3,7 +3,7 @@
 import jax
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped.compiler import CUDA, LANES, XLA, AbstractEngine
+from jaxbiped.compiler import BY_NAME, CUDA, AbstractEngine
 
 ENGINES = ("auto", "xla", "lanes", "cuda")
 """Names of the engines.
@@ -14,17 +14,22 @@ ENGINES = ("auto", "xla", "lanes", "cuda")
 - cuda: what lanes run, on this machine's CUDA devices: for walks and labels by the million.
 - auto: lanes where JAX computes on a CPU and they can do what is asked, else xla.
   Batches of labels that keep a CUDA device busy, where there is one, are its own.
+- an engine of a user's own: by the name that it has in `jaxbiped.compiler.BY_NAME`.
 """
-_BY_NAME = {"xla": XLA, "lanes": LANES, "cuda": CUDA}
 
 
 def engine_named(name: str) -> AbstractEngine:
     """The engine of a name that is not "auto"."""
-    return _BY_NAME[name]
+    return BY_NAME[name]
 
 
 def engine_for(
-    engine: str, *, obstacle: str | None, prefers_xla: bool = False, by_device: bool = False
+    engine: str,
+    *,
+    obstacle: str | None,
+    prefers_xla: bool = False,
+    by_device: bool = False,
+    by_any: bool = False,
 ) -> str:
     """The engine to use.
 
@@ -33,12 +38,19 @@ def engine_for(
         obstacle: why lanes, and so devices, cannot do what is asked; None where they can.
         prefers_xla: whether "auto" is "xla" here all the same.
         by_device: whether CUDA devices do such things at all.
+        by_any: whether any engine does, a user's own too.
 
     Raises:
         ArgumentError: an unknown name, or lanes or devices for what they cannot do, or devices
             where there is none.
     """
-    check_choice("engine", engine, ENGINES)
+    own = [name for name in BY_NAME if name not in ENGINES]
+    check_choice("engine", engine, (*ENGINES, *own))
+    if engine in own and not by_any:
+        raise ArgumentError(
+            f"engine = {engine!r} is not allowed here: an engine of one's own runs rigid walks and "
+            "labels."
+        )
     if engine == "cuda":
         _check_device(obstacle, by_device=by_device)
     if engine == "lanes" and obstacle is not None:

@@ -9,8 +9,8 @@ from jaxtyping import PyTree
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time
 from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.dynamics._contacts import Foot, feet, touches
 from jaxbiped.dynamics._energy import energies
-from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._minimal_motion import accelerations
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state import RigidState, State
@@ -135,32 +135,33 @@ def _failed(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
     return ~jnp.isfinite(sum(jtu.tree_leaves(y)))
 
 
-def _fell_forward(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
-    y = minimal_state(args, y)
-    too_late, _ = is_barred(args, y)
-    return too_late | (has_fallen(args, y) & (y.hip_vx >= 0.0))
+def _event(condition: Callable[[Scene, State], Scalar]) -> Callable[..., Scalar]:
+    """A condition of scene and minimal state as diffrax asks it."""
+
+    def happens(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
+        return condition(args, minimal_state(args, y))
+
+    return happens
 
 
-def _fell_back(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
-    y = minimal_state(args, y)
-    return has_fallen(args, y) & (y.hip_vx < 0.0)
+def _fell_forward(scene: Scene, y: State) -> Scalar:
+    too_late, _ = is_barred(scene, y)
+    return too_late | (has_fallen(scene, y) & (y.hip_vx >= 0.0))
 
 
-def _stopped(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
-    y = minimal_state(args, y)
-    return has_stopped(args, y)
+def _fell_back(scene: Scene, y: State) -> Scalar:
+    return has_fallen(scene, y) & (y.hip_vx < 0.0)
 
 
-def _stumbled(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
-    y = minimal_state(args, y)
-    _, too_short = is_barred(args, y)
-    return too_short | has_stumbled(args, y)
+def _stumbled(scene: Scene, y: State) -> Scalar:
+    _, too_short = is_barred(scene, y)
+    return too_short | has_stumbled(scene, y)
 
 
 _EVENTS: dict[str, dict[Ending, Callable[..., Scalar]]] = {
-    "fall": {Ending.FELL_FORWARD: _fell_forward, Ending.FELL_BACK: _fell_back},
-    "stop": {Ending.STOPPED: _stopped},
-    "stumble": {Ending.STUMBLED: _stumbled},
+    "fall": {Ending.FELL_FORWARD: _event(_fell_forward), Ending.FELL_BACK: _event(_fell_back)},
+    "stop": {Ending.STOPPED: _event(has_stopped)},
+    "stumble": {Ending.STUMBLED: _event(_stumbled)},
 }
 WATCHES = tuple(_EVENTS)
 

@@ -57,12 +57,10 @@ class Projected(diffrax.AbstractWrappedSolver):  # type: ignore[type-arg]
 
     @property
     def term_structure(self) -> PyTree:
-        """The solver's."""
         return self.solver.term_structure
 
     @property
     def interpolation_cls(self) -> Callable[..., diffrax.AbstractLocalInterpolation]:  # type: ignore[override]
-        """The solver's."""
         return self.solver.interpolation_cls
 
     @property
@@ -76,19 +74,15 @@ class Projected(diffrax.AbstractWrappedSolver):  # type: ignore[type-arg]
         return getattr(self.solver, "root_finder", None)
 
     def order(self, terms: Any) -> int | None:
-        """The solver's."""
         return self.solver.order(terms)
 
     def error_order(self, terms: Any) -> RealScalarLike | None:
-        """The solver's."""
         return self.solver.error_order(terms)
 
     def init(self, terms: Any, t0: Time, t1: Time, y0: PyTree, args: PyTree) -> Any:
-        """The solver's."""
         return self.solver.init(terms, t0, t1, y0, args)
 
     def func(self, terms: Any, t0: Time, y0: PyTree, args: PyTree) -> PyTree:
-        """The vector field at a point."""
         return self.solver.func(terms, t0, y0, args)
 
     def step(

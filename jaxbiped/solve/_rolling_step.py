@@ -17,6 +17,7 @@ import numpy as np
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._rolling import rolling_rates
 from jaxbiped.dynamics._state import RigidState
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._failure_events import FALL_ANGLE
 from jaxbiped.solve._step_polynomials import Quintic
@@ -59,7 +60,7 @@ def rolling_step(
     weights = _TABLEAU.b_sol - _TABLEAU.b_error if embedded else _TABLEAU.b_sol
     end = advance(state, step, weights[:-1], stages)
     share = jnp.zeros_like(step)
-    for i, (a, b) in enumerate(zip(state[1:], end[1:], strict=True)):
+    for i, (a, b) in enumerate(zip(recurring_leaves(state), recurring_leaves(end), strict=True)):
         error = step * _weighted(_TABLEAU.b_error[:-1], stages, i)
         size = rtol * (0.01 + jnp.maximum(jnp.abs(a), jnp.abs(b)))
         share = share + (error / size) ** 2
@@ -77,7 +78,7 @@ def advance(
     state: RigidState, step: Scalar, weights: Sequence[float] | np.ndarray, stages: list[Rates]
 ) -> RigidState:
     """The state a step further, at weighted rates of its angles and of their rates."""
-    old = state[1:]
+    old = recurring_leaves(state)
     new = (leaf + step * _weighted(weights, stages, i) for i, leaf in enumerate(old))
     return RigidState(state.hip_x, *new)
 

@@ -9,7 +9,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._feet import feet, standing_foot
+from jaxbiped.dynamics._contacts import feet, standing_foot
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.scene._scene import Scene

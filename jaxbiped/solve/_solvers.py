@@ -10,10 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import check_choice
 from jaxbiped._types import Numbers
 from jaxbiped.solve._accuracy import rms_norm
-from jaxbiped.solve.rosenbrock._rodas3p import Rodas3P
-from jaxbiped.solve.rosenbrock._rodas4 import Rodas4
-from jaxbiped.solve.rosenbrock._rodas4p import Rodas4P
-from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas import Rodas3P, Rodas4, Rodas4P, Rodas5P
 
 
 def _chord() -> optimistix.AbstractRootFinder[PyTree, PyTree, PyTree, PyTree]:

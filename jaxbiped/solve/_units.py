@@ -14,8 +14,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import dimensions_of
-from jaxbiped.scene._scene import AbstractScene, is_compliant
+from jaxbiped.dynamics._state_quantities import dimensions_of, recurring_leaves
+from jaxbiped.scene._scene import AbstractWalkerScene, is_compliant
 
 _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""
@@ -64,11 +64,11 @@ def recurring_inverse_units(args: PyTree, count: int) -> Scalar:
     if not is_compliant(args):
         return jnp.ones(count)
     kind = state_type(args.minimal)
-    inverse = units_of(args, kind(*[0.0] * len(kind._fields))).inverse[1:]
+    inverse = recurring_leaves(units_of(args, kind(*[0.0] * len(kind._fields))).inverse)
     return jnp.stack(inverse) if len(inverse) == count else jnp.ones(count)
 
 
-def _length_and_time(args: AbstractScene) -> tuple[Scalar, Scalar]:
+def _length_and_time(args: AbstractWalkerScene) -> tuple[Scalar, Scalar]:
     walker, ground = args.walker, args.ground
     known = not any(isinstance(leaf, jax.core.Tracer) for leaf in (walker.l, ground.g))
     xp: Any = np if known else jnp  # where numbers are known nothing is compiled for them

@@ -8,6 +8,7 @@ from typing import NamedTuple, cast
 import jax
 import jax.tree_util as jtu
 import numpy as np
+import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
@@ -15,15 +16,15 @@ from jaxbiped._types import as_float
 from jaxbiped.basins._label_oracle import spread_directions
 from jaxbiped.basins._labels import Label
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._feet import feet
+from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.solve._units import sizes_of
 from jaxbiped.sweep._convergence_test import Goals
-from jaxbiped.sweep._follow_starts import broadcast_leaves, follow_starts
-from jaxbiped.sweep._labelling_settings import Effort
+from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
 from jaxbiped.variational._hybrid_system import section_of
 
 _SHELLS = 1e-5 * 1.5 ** np.arange(30)
@@ -75,7 +76,12 @@ class Attractor(NamedTuple):
     @property
     def point(self) -> np.ndarray:
         """Its state on the section without hip_x, shape (m,)."""
-        return np.array([float(leaf) for leaf in self.state[1:]])
+        return np.stack(recurring_leaves(self.state))
+
+    @property
+    def goal(self) -> tuple[npt.ArrayLike, ...]:
+        """Its entry in the first fields of `Goals`, all but the scales."""
+        return (self.point, self.metric, self.model, self.slowest, self.contraction, self.radius)
 
     def distance(self, states: np.ndarray) -> np.ndarray:
         """Of states on the section without hip_x, shape (n, m), in the metric; shape (n,)."""
@@ -121,7 +127,7 @@ def attractor_without_radius(scene: Scene | RigidScene, gait: Gait) -> Attractor
         radius=-1.0,
         model=factor.T @ slopes @ np.linalg.inv(factor.T),
         slowest=np.stack([left.real, left.imag]) @ tangents.T,
-        crossings=np.stack([np.asarray(leaf)[:, 0] for leaf in gait.orbit[1][1:]], axis=1),
+        crossings=np.stack([leaf[:, 0] for leaf in recurring_leaves(gait.orbit[1])], axis=1),
     )
 
 
@@ -130,7 +136,7 @@ def section_tangents(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
     import scipy.linalg
 
     slope = _section_slope(section_of(scene, None), scene, jtu.tree_map(as_float, state))
-    normal = np.array([float(leaf) for leaf in slope[1:]])
+    normal = np.stack(recurring_leaves(slope))
     return scipy.linalg.null_space(normal[None])
 
 
@@ -144,13 +150,11 @@ def component_scales(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
 
     Angles 1, velocities √(g l), rates √(g/l), the hip's height the stance foot's penetration.
     """
-    walker, gravity = scene.walker, float(scene.ground.g)
-    length = float(walker.l)
-    speed, rate = np.sqrt(gravity * length), np.sqrt(gravity / length)
-    sizes = {"m/s": speed, "rad/s": rate, "rad": 1.0, "": 1.0}
+    _, sizes = sizes_of(scene, state)
     if scene.compliant:
-        sizes["m"] = abs(float(feet(cast(Scene, scene), state).foot_2.penetration))
-    return np.array([sizes[STATE_QUANTITIES[name].unit] for name in state._fields[1:]])
+        depth = feet(cast(Scene, scene), state).foot_2.penetration
+        sizes = sizes._replace(hip_z=abs(float(depth)))
+    return np.array(recurring_leaves(sizes))
 
 
 def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort) -> Attractor:
@@ -190,13 +194,18 @@ def _draws_in(
     back = tangents @ np.linalg.inv(attractor.metric @ tangents)
     offsets = (shells[:, None, None] * directions).reshape(-1, size - 1) @ back.T
     count = len(offsets)
+    # Followed wherever they go: the linear model decides nothing.
+    nothing = np.full_like(attractor.model, np.inf)
+    aim = attractor._replace(model=nothing, contraction=1.0, radius=-1.0)
+    scales = component_scales(scene, attractor.state)
+    goals = Goals(*[*(np.stack([each]) for each in aim.goal), scales])
     strikes = cycles * attractor.cycle_footsteps + (1 if scene.compliant else 0)
     found = follow_starts(
         broadcast_leaves(scene, count),
         _displace(attractor.state, offsets),
-        _no_goals(scene, attractor, count),
+        broadcast_leaves(goals, count),
         (attractor.cycle_footsteps,),
-        effort._replace(footsteps=strikes, gap=0.0),
+        effort._replace(footsteps=strikes, gap_share=0.0),
     )
     returned = (found.label == int(Label.UNRESOLVED)) & np.isfinite(found.final).all(axis=1)
     after = attractor.distance(np.where(returned[:, None], found.final, attractor.point))
@@ -208,20 +217,5 @@ def _draws_in(
 
 
 def _displace(state: PyTree, offsets: np.ndarray) -> PyTree:
-    leaves = [np.full(len(offsets), float(state[0]))]
-    leaves += [float(leaf) + offsets[:, i] for i, leaf in enumerate(state[1:])]
-    return type(state)(*leaves)
-
-
-def _no_goals(scene: Scene | RigidScene, attractor: Attractor, count: int) -> Goals:
-    # Followed wherever they go: the linear model decides nothing.
-    goals = Goals(
-        attractor.point[None],
-        attractor.metric[None],
-        np.full((1, *attractor.model.shape), np.inf),
-        attractor.slowest[None],
-        np.ones(1),
-        np.full(1, -1.0),
-        component_scales(scene, attractor.state),
-    )
-    return broadcast_leaves(goals, count)
+    leaves = [float(x) + off for x, off in zip(recurring_leaves(state), offsets.T, strict=True)]
+    return state_of_recurring(type(state), leaves, np.zeros(len(offsets)))

@@ -15,9 +15,9 @@ from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named
-from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
-from jaxbiped.sweep._follow_starts import Labelled
-from jaxbiped.sweep._labelling_settings import Effort
+from jaxbiped.solve.rosenbrock._rodas import Rodas5P
+from jaxbiped.sweep._follow_starts import Effort
+from jaxbiped.sweep._labelling_loop import Labelled
 
 _FINER = 10.0
 """From one tolerance to the next."""
@@ -40,19 +40,13 @@ def relabel_doubtful(
     In doubt is what a ten times looser tolerance or another method of steps labels otherwise, and
     what grazes the ground: whether there was a contact may decide. It is solved by both methods at
     ten times finer tolerances, until all four labels of two tolerances in a row agree; where they
-    never do the doubt remains.
-
-    Args:
-        follow: labels starts with an effort.
-        count: how many starts.
-        effort: of the first solve.
-        scene: the walker.
+    never do the doubt remains. The effort is that of the first solve.
     """
     every = np.arange(count)
     first, other = follow(every, effort), follow(every, _by_other_method(effort))
     # One that leaves slip unresolved doubts three times more labels, and finds no more wrong ones.
     loose = max(float(resolve_slip_speed(LOOSER * effort.rtol, scene)), _LEAST * effort.rtol)
-    looser = follow(every, effort.at_tolerance(loose))
+    looser = follow(every, effort._replace(rtol=loose))
     agree = ~_differ(first, other)
     disagreed = np.where(_differ(first, looser), int(Witness.LOOSER), 0)
     disagreed = disagreed + np.where(agree, 0, int(Witness.OTHER))
@@ -64,7 +58,7 @@ def relabel_doubtful(
     open_ = np.flatnonzero(doubtful)
     agree, finer, finest = agree[open_], effort, _FINEST[scene.compliant]
     while len(open_) and finer.rtol > 1.001 * finest:
-        finer = finer.at_tolerance(max(finer.rtol / _FINER, finest))
+        finer = finer._replace(rtol=max(finer.rtol / _FINER, finest))
         finer = finer._replace(max_attempts=_STEPS * finer.max_attempts)
         found, check = follow(open_, finer), follow(open_, _by_other_method(finer))
         agree_now = ~_differ(found, check)

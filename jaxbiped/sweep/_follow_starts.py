@@ -8,9 +8,8 @@ import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._types import as_float
-from jaxbiped.basins._labels import label_names
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import Program, Request
+from jaxbiped.compiler import DEVICES, Program, Request
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._engine_names import engine_named
@@ -19,15 +18,10 @@ from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._first_and_last_step import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import Goals
-from jaxbiped.sweep._labelling_loop import (
-    AbstractLabellingLoop,
-    CompliantLabelling,
-    Outcome,
-    RigidLabelling,
-    Start,
-)
-from jaxbiped.sweep._labelling_settings import Effort
+from jaxbiped.sweep._labelling_loop import CompliantLabelling, Labelled, RigidLabelling, Start
 
+_GAP = 1e-4
+"""Gap between states that repeat each other, at least; see `after_arrival`."""
 _LONGEST = 1e6
 """Simulated time [s] that no start takes: its footsteps or its patience end it before."""
 _PATIENCE = 50.0
@@ -43,49 +37,45 @@ _WHOLE: dict[str, type] = dict(
 """Types of the fields of `Labelled` that hold whole numbers."""
 
 
-class Labelled(NamedTuple):
-    """What became of n starts: NumPy's arrays of shape (n,).
+class Effort(NamedTuple):
+    """How starts are followed. All hashable.
 
     Attributes:
-        label: code of a `Label`.
-        gait: the gait that it converges to, by its position in `Family.cycles`; −1 for none.
-        cycle_footsteps: footsteps in that gait's cycle. Where the label is "unresolved" it is that
-            of a cycle which the last footsteps repeated, of a gait that is not among the
-            attractors.
-        footsteps: heel strikes until the label was certain.
-        time: simulated until then [s].
-        distance: walked along the slope until then [m].
-        rate: share of the distance from the gait that is left after a footstep, over the last
-            cycle; NaN without a cycle, and where nothing but rounding is left of the distance.
-        closest: smallest distance from any of the gaits, in its metric; infinite without arrival.
-        attempted: how many steps the solver attempted; of all its solves, where there were more.
-        final: last states on the section without hip_x, shape (n, m); infinite without arrival.
-        doubt, disagreed, changed: where the accuracy was asked for by a number, codes of `Doubt`,
-            sums of codes of `Witness`, and whether finer tolerances gave another label than the
-            first; else None.
-        grazes: steps in which a foot touches the ground or misses it by less than the tolerance
-            resolves, where the accuracy was asked for by a number and the walker is compliant.
+        rtol: relative tolerance; the absolute one is a hundredth of it in the scene's units.
+        footsteps: after which a start that is not certain is given up.
+        max_attempts: cap on the solver's attempted steps.
+        gap_share: the gap in units of the tolerance; 0 where recurrences are not looked for.
+        solver: of the compliant walker.
+        engine: "lanes", "cuda" or "xla".
+        may_move: whether large batches go from lanes to a CUDA device where there is one.
+        wanted: share of the labels that may be wrong; None where the tolerance decides.
+        embedded: whether the rigid walker steps by the embedded method; see `rolling_step`.
     """
 
-    label: np.ndarray
-    gait: np.ndarray
-    cycle_footsteps: np.ndarray
-    footsteps: np.ndarray
-    time: np.ndarray
-    distance: np.ndarray
-    rate: np.ndarray
-    closest: np.ndarray
-    attempted: np.ndarray
-    final: np.ndarray
-    doubt: np.ndarray | None = None
-    disagreed: np.ndarray | None = None
-    changed: np.ndarray | None = None
-    grazes: np.ndarray | None = None
+    rtol: float
+    footsteps: int
+    max_attempts: int
+    gap_share: float
+    solver: AbstractRosenbrock
+    engine: str
+    wanted: float | None = None
+    embedded: bool = False
+    may_move: bool = False
 
     @property
-    def names(self) -> np.ndarray:
-        """The labels in words, "walking period-1" and so on, shape (n,)."""
-        return label_names(self.label, self.cycle_footsteps)
+    def gap(self) -> float:
+        """Between states that repeat each other; see `after_arrival`."""
+        return max(_GAP, self.gap_share * self.rtol) if self.gap_share else 0.0
+
+    @property
+    def may_use_device(self) -> bool:
+        """Whether a CUDA device may follow them."""
+        moves = self.may_move and self.engine == "lanes" and DEVICES.hindrance() is None
+        return moves or self.engine == "cuda"
+
+    def engine_of(self, count: int) -> str:
+        """The engine that follows `count` starts: large batches go where a device is kept busy."""
+        return "cuda" if self.may_use_device and DEVICES.fills(count) else self.engine
 
 
 def follow_starts(
@@ -101,9 +91,9 @@ def follow_starts(
     counted = effort.wanted is not None
     if not count:
         none = np.zeros(0)
-        empty: dict[str, Any] = dict.fromkeys(Outcome._fields, none)
-        empty |= {"final": (none,) * (len(states) - 1), "grazes": none if counted else None}
-        return _labels_of(Outcome(**empty))
+        final: Any = (none,) * (len(states) - 1)
+        plain = Labelled(*[*[none] * 9, final])
+        return _as_arrays(plain._replace(grazes=none if counted else None))
 
     def same(value: npt.ArrayLike) -> np.ndarray:
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
@@ -131,7 +121,7 @@ def follow_starts(
     program = _program(scene.compliant, effort.solver, cycles, fenced, embedded, counted)
     engine = engine_named(effort.engine_of(count))
     given = jtu.tree_map(np.asarray, starts)
-    return _labels_of(engine.run(Request(program, given, batch=True)).outputs)
+    return _as_arrays(engine.run(Request(program, given, batch=True)).outputs)
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
@@ -143,19 +133,22 @@ def _program(
     embedded: bool,
     grazes: bool,
 ) -> Program:
-    loop: AbstractLabellingLoop = RigidLabelling(cycles, embedded=embedded, grazes=grazes)
+    loop: CompliantLabelling | RigidLabelling
     if compliant:
         loop = CompliantLabelling(solver, cycles, fenced=fenced, grazes=grazes)
+    else:
+        loop = RigidLabelling(cycles, embedded=embedded, grazes=grazes)
     return Program(loop.begin, loop.attempt, loop.finish)
 
 
-def _labels_of(outcome: Outcome[np.ndarray]) -> Labelled:
-    columns = outcome._asdict() | {"final": np.stack(outcome.final, axis=1)}
-    found: dict[str, Any] = {}
-    for name, column in columns.items():
-        kind = _WHOLE.get(name, np.float64)
-        found[name] = None if column is None else column.astype(kind, copy=False)
-    return Labelled(**found)
+def _as_arrays(found: Labelled) -> Labelled:
+    """Of an engine's outputs, columns of the right types."""
+    columns = found._replace(final=np.stack(list(found.final), axis=1))._asdict()
+    arrays: dict[str, Any] = {
+        name: None if column is None else column.astype(_WHOLE.get(name, float), copy=False)
+        for name, column in columns.items()
+    }
+    return Labelled(**arrays)
 
 
 def broadcast_leaves(tree: PyTree, count: int) -> PyTree:

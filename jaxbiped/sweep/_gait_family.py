@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
+import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
@@ -20,12 +21,14 @@ from jaxbiped.sweep._attractor import (
     with_radius,
 )
 from jaxbiped.sweep._convergence_test import NO_GAIT, Goals
-from jaxbiped.sweep._follow_starts import broadcast_leaves
-from jaxbiped.sweep._labelling_settings import Effort
+from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves
 
 _SAME = 1e-5
 """Distance in the components' sizes up to which two states on the section are of one gait, where
 its convergence is quick."""
+
+Guesses = Mapping[int, Sequence[tuple[int, Sequence[float]]]]
+"""By row of a family: footsteps in a cycle and states, without hip_x, from which to search."""
 
 
 class Family(NamedTuple):
@@ -76,10 +79,9 @@ class Family(NamedTuple):
 
     def places_in(self, other: "Family") -> np.ndarray:
         """Where another family, with more gaits, has what this one has at each position."""
-        own, new = self.cycles, other.cycles
         if not any(self.rows):
             return np.zeros(1, dtype=int)
-        return np.array([new.index(p) + i - own.index(p) for i, p in enumerate(own)])
+        return np.array(_places(self.cycles, other.cycles))
 
     def row_of(self, parameters: Mapping[str, np.ndarray]) -> np.ndarray:
         """The combination that each start has, shape (n,).
@@ -127,36 +129,19 @@ class Family(NamedTuple):
         ]
 
     def _goals_of(self, k: int, cycles: tuple[int, ...]) -> Goals:
-        size = self.scales.shape[1]
-        count = len(cycles)
-        goals = Goals(
-            np.zeros((count, size)),
-            np.zeros((count, size - 1, size)),
-            np.zeros((count, size - 1, size - 1)),
-            np.zeros((count, 2, size)),
-            np.zeros(count),
-            np.full(count, NO_GAIT),
-            self.scales[k],
-        )
-        for place, gait in zip(_places(self.rows[k], cycles), self.rows[k], strict=True):
-            goals.points[place] = gait.point
-            goals.metrics[place] = gait.metric
-            goals.models[place] = gait.model
-            goals.slowest[place] = gait.slowest
-            goals.contractions[place] = gait.contraction
-            goals.radii[place] = gait.radius
-        return goals
+        m = self.scales.shape[1]
+        shapes = (m,), (m - 1, m), (m - 1, m - 1), (2, m), ()
+        none: tuple[npt.ArrayLike, ...] = (*map(np.zeros, shapes), NO_GAIT)
+        entries = [none] * len(cycles)
+        own = tuple(gait.cycle_footsteps for gait in self.rows[k])
+        for place, gait in zip(_places(own, cycles), self.rows[k], strict=True):
+            entries[place] = gait.goal
+        return Goals(*[*map(np.stack, zip(*entries, strict=True)), self.scales[k]])
 
 
-def _places(row: tuple[Attractor, ...], cycles: tuple[int, ...]) -> list[int]:
-    """Where each gait of a row stands among the cycles that there is room for."""
-    free = list(range(len(cycles)))
-    places = []
-    for gait in row:
-        place = next(i for i in free if cycles[i] == gait.cycle_footsteps)
-        free.remove(place)
-        places.append(place)
-    return places
+def _places(own: tuple[int, ...], room: tuple[int, ...]) -> list[int]:
+    """Where gaits with cycles of these lengths stand among the lengths that there is room for."""
+    return [room.index(length) + own[:i].count(length) for i, length in enumerate(own)]
 
 
 def find_family(
@@ -175,40 +160,38 @@ def find_family(
     grids = np.meshgrid(*[np.asarray(parameters[name], float) for name in names], indexing="ij")
     table = np.stack([grid.ravel() for grid in grids], axis=1) if names else np.zeros((1, 0))
     spans = np.where(np.ptp(table, axis=0) > 0.0, np.ptp(table, axis=0), 1.0)
+    scenes = [scene_with(scene, names, values) for values in table]
     rows: list[tuple[Attractor, ...]] = [()] * len(table)
-
-    def near(k: int) -> list[PyTree]:
-        """The state of the nearest gait that is known."""
-        known = [j for j, row in enumerate(rows) if row]
-        off = [float(np.linalg.norm((table[j] - table[k]) / spans)) for j in known]
-        return [rows[known[int(np.argmin(off))]][0].state] if known else []
-
     # Forward, then back: a gait may be found from one side only.
     for k in [*range(len(table)), *reversed(range(len(table)))]:
         if not rows[k]:
-            own = scene_with(scene, names, table[k])
-            guesses = [*(near(k) or [guess]), None]
-            rows[k] = tuple(
-                with_radius(own, gait, effort) for gait in _stable_gaits(own, guesses, 1)
-            )
-    return _family(scene, names, table, tuple(rows), guess)
+            known = [j for j, row in enumerate(rows) if row]
+            off = [np.linalg.norm((table[j] - table[k]) / spans) for j in known]
+            near = rows[known[int(np.argmin(off))]][0].state if known else guess
+            found = _stable_gaits(scenes[k], [near, None], 1)
+            rows[k] = tuple(with_radius(scenes[k], gait, effort) for gait in found)
+    known = [k for k, row in enumerate(rows) if row]
+    states = []
+    for k in range(len(table)):
+        off_rows = [(abs(j - k), j) for j in known]
+        state = rows[min(off_rows)[1]][0].state if known else guess
+        states.append(jtu.tree_map(np.asarray, state))
+    scales = [component_scales(own, state) for own, state in zip(scenes, states, strict=True)]
+    return Family(names, table, tuple(rows), tuple(states), np.stack(scales))
 
 
 def with_gaits(
-    scene: Scene | RigidScene,
-    family: Family,
-    effort: Effort,
-    found: Mapping[int, Sequence[tuple[int, PyTree]]],
+    scene: Scene | RigidScene, family: Family, effort: Effort, guesses: Guesses
 ) -> Family:
-    """The family with more gaits in some rows, searched from these cycles' footsteps and states."""
+    """The family that also knows the gaits to which these guesses lead."""
     rows = list(family.rows)
-    for k, guesses in found.items():
-        own = scene_with(scene, family.names, family.table[k])
-        for length, guess in guesses:
-            scales = family.scales[k]
+    for k, each in guesses.items():
+        own, scales = scene_with(scene, family.names, family.table[k]), family.scales[k]
+        for length, point in each:
+            start = type(family.states[k])(0.0, *point)
             new = [
                 with_radius(own, gait, effort)
-                for gait in _stable_gaits(own, [guess], length)
+                for gait in _stable_gaits(own, [start], length)
                 if not any(_is_same_orbit(gait, old, scales) for old in rows[k])
             ]
             # Stable by the cycles' lengths, from which positions follow.
@@ -247,23 +230,6 @@ def _stable_gaits(
         if bool(gait.stable):
             return (attractor_without_radius(scene, gait),)
     return ()
-
-
-def _family(
-    scene: Scene | RigidScene,
-    names: tuple[str, ...],
-    table: np.ndarray,
-    rows: tuple[tuple[Attractor, ...], ...],
-    guess: PyTree,
-) -> Family:
-    known = [k for k, row in enumerate(rows) if row]
-    states, scales = [], []
-    for k, values in enumerate(table):
-        near = min(known, key=lambda j: (abs(j - k), j)) if known else None
-        state = guess if near is None else rows[near][0].state
-        states.append(jtu.tree_map(np.asarray, state))
-        scales.append(component_scales(scene_with(scene, names, values), state))
-    return Family(names, table, rows, tuple(states), np.stack(scales))
 
 
 def _is_same_orbit(a: Attractor, b: Attractor, scales: np.ndarray) -> bool:

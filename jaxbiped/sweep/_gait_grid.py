@@ -11,25 +11,19 @@ from typing import TYPE_CHECKING, Any
 import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
-from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import (
+    STATE_QUANTITIES,
+    recurring_names,
+)
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._search_provenance import FoundBy
-from jaxbiped.sweep._store_files import (
-    SETTINGS,
-    check_same,
-    check_writers,
-    consolidate,
-    create_store,
-    open_store,
-    writing,
-)
+from jaxbiped.sweep._store_files import SETTINGS, continue_store, open_store, writing
 
 if TYPE_CHECKING:
     import xarray
@@ -60,26 +54,17 @@ class GaitGrid:
         self._dataset, self._state, self._path = dataset, state, path
         self._written, self._pause = time.monotonic(), _PAUSE
 
-    def is_done(self, place: tuple[int, ...], *, found: bool) -> bool:
-        """Whether a point is known; where `found`, whether a gait was found there."""
-        done = bool(self._dataset[_DONE].data[place])
-        return done and (not found or self._dataset["ending"].data[place] == int(Search.FOUND))
+    def is_done(self, place: tuple[int, ...]) -> bool:
+        """Whether it is known what a point has, a gait or none."""
+        return bool(self._dataset[_DONE].data[place])
 
     def is_stable(self, place: tuple[int, ...]) -> bool:
-        """Whether a stable gait was found at a point."""
-        found = self.is_done(place, found=True)
-        return found and bool(self._dataset["spectral_radius"].data[place] < 1.0)
-
-    def state(self, place: tuple[int, ...]) -> PyTree:
-        """The gait's state on the section, None where there is none."""
-        if self._dataset["ending"].data[place] != int(Search.FOUND):
-            return None
-        names = self._state._fields[1:]  # type: ignore[attr-defined]
-        return self._state(0.0, *(float(self._dataset[f"state_{n}"].data[place]) for n in names))
+        """Whether a point has a stable gait."""
+        return bool(self._dataset["spectral_radius"].data[place] < 1.0)
 
     def states(self) -> np.ndarray:
         """States without hip_x at all points, shape (*grid, m); NaN where there is no gait."""
-        names = self._state._fields[1:]  # type: ignore[attr-defined]
+        names = recurring_names(self._state)
         return np.stack([self._dataset[f"state_{name}"].data for name in names], axis=-1)
 
     def write(self, place: tuple[int, ...], gait: Gait) -> None:
@@ -134,10 +119,8 @@ class GaitGrid:
             group: Any = zarr.open_group(str(self._path), mode="r+", use_consolidated=False)
             # What says that points are known is written after what is known of them.
             names = [str(name) for name in self._dataset.data_vars if name != _DONE]
-            # What is not there then was lost, whatever it held.
-            with zarr.config.set({"array.write_empty_chunks": True}):
-                for name in (*names, _DONE):
-                    group[name][...] = self._dataset[name].data
+            for name in (*names, _DONE):
+                group[name][...] = self._dataset[name].data
         self._written = time.monotonic()
         # All is written each time: that must not take longer than what is searched between.
         self._pause = max(_PAUSE, _SHARE * (self._written - began))
@@ -153,73 +136,58 @@ def open_gait_grid(
     *,
     any_version: bool,
 ) -> GaitGrid:
-    """A grid without results, or what a store holds of it.
+    """A grid without results, or what a store holds of it; see `continue_store`.
 
     Args:
         first: any gait of the sweep, for the shapes.
-        values: of the swept parameters.
-        units: SI units of these.
-        settings: all that the results depend on; those of a store that is there must be equal.
-        writer: what writes.
+        values, units: of the swept parameters.
+        settings, writer, any_version: as there.
         path: of the store; None for one in memory.
-        any_version: whether a store may have been written by another version.
     """
     state = type(first.measures.state)
     dataset = _empty(first, values, units).assign_attrs({**writer, SETTINGS: strict_json(settings)})
     if path is None:
         return GaitGrid(dataset, state, None)
-    path = path.absolute()
-    with writing(path):
-        if path.exists() and any(path.iterdir()):
-            check_same(path, settings)
-            new = check_writers(path, writer, any_version)
-            dataset = _same_variables(_load(path, dataset), dataset, path)
-            if new:
-                _note(path, new)
-        else:
-            empty = dataset
-            create_store(path, lambda half: empty.to_zarr(half, consolidated=False, zarr_format=3))
-    return GaitGrid(dataset, state, path)
+    new = continue_store(
+        path,
+        settings,
+        writer,
+        any_version=any_version,
+        create=lambda half: dataset.to_zarr(half, consolidated=False, zarr_format=3),
+    )
+    return GaitGrid(dataset if new else _load(path, dataset), state, path)
 
 
 def _load(path: Path, empty: "xarray.Dataset") -> "xarray.Dataset":
-    """What a store holds; nothing where some of it was lost or damaged."""
+    """What a store holds; nothing where some of it was lost or damaged.
+
+    Raises:
+        ArgumentError: another version kept less in it.
+    """
     import zarr
 
-    try:
+    stored = empty
+    whole = False
+    # What is damaged raises errors of its codec's own.
+    with contextlib.suppress(Exception):
         stored = open_store(path).load()
         arrays = [each for _, each in zarr.open_group(str(path), mode="r").arrays()]
         whole = all(each.nchunks_initialized == each.nchunks for each in arrays)
-        if whole or not bool(stored[_DONE].any()):
-            return stored
-    except Exception:  # damaged, of which each codec has errors of its own
-        pass
-    warnings.warn(
-        f"store = {str(path)!r} was damaged: its gaits are searched anew.",
-        RuntimeWarning,
-        stacklevel=4,
-    )
-    return empty
-
-
-def _same_variables(
-    stored: "xarray.Dataset", here: "xarray.Dataset", path: Path
-) -> "xarray.Dataset":
-    """What a store holds; another version may have kept less in it."""
-    missing = sorted(set(map(str, here.data_vars)) - set(map(str, stored.data_vars)))
+        whole = whole or not bool(stored[_DONE].any())
+    if not whole:
+        warnings.warn(
+            f"store = {str(path)!r} was damaged: its gaits are searched anew.",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+        return empty
+    missing = sorted(set(map(str, empty.data_vars)) - set(map(str, stored.data_vars)))
     if missing:
         raise ArgumentError(
             f"store = {str(path)!r} was written by a version that kept no {missing[0]}: give it "
             "another store."
         )
     return stored
-
-
-def _note(path: Path, attributes: JsonObject) -> None:
-    import zarr
-
-    zarr.open_group(str(path), mode="r+", use_consolidated=False).attrs.update(attributes)
-    consolidate(path)
 
 
 def _empty(
@@ -269,7 +237,7 @@ def _variables(gait: Gait) -> dict[str, tuple[tuple[str, ...], np.ndarray, JsonO
         error = getattr(gait.sensitivity_errors, name)
         add(f"sensitivity_error_{name}", error, per, "parameter")
         add(f"elasticity_{name}", getattr(gait.elasticities, name), "", "parameter")
-    for name in gait.measures.state._fields[1:]:
+    for name in recurring_names(gait.measures.state):
         add(f"state_{name}", getattr(gait.measures.state, name), STATE_QUANTITIES[name].unit)
     add("multiplier_real", np.real(gait.multipliers), "", "multiplier")
     add("multiplier_imag", np.imag(gait.multipliers), "", "multiplier")

@@ -1,21 +1,23 @@
 """Sweeps of gaits over parameters: each point is searched from its neighbours on the grid."""
 
+import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import jax
+import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._files import user_path
 from jaxbiped._identity import provenance
 from jaxbiped._types import as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._parameter_access import (
     parameter_quantities,
@@ -27,14 +29,17 @@ from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._gait_grid import open_gait_grid
 from jaxbiped.sweep._gait_waves import GaitWaves
-from jaxbiped.sweep._grid_waves import LARGE, Place, neighbours, rings
-from jaxbiped.sweep._store_files import check_store
+from jaxbiped.sweep._grid_waves import LARGE, Place
+from jaxbiped.sweep._store_files import store_path
 from jaxbiped.sweep.starts._coordinates import parameter_axes
 
 if TYPE_CHECKING:
     import xarray
 
 AnyScene: TypeAlias = Scene | RigidScene | RedundantScene
+
+_FEW, _MANY = 16, 256
+"""Searches in a batch: every size is a program that XLA compiles."""
 
 
 def gait_sweep(
@@ -53,15 +58,13 @@ def gait_sweep(
     """Finds the periodic gait at every point of a grid over scene parameters.
 
     The search begins at the point nearest to the scene's own parameters, without a guess, and goes
-    on from neighbour to neighbour, so that one branch is followed. Where a neighbour's gait leads
-    to none, or to an unstable one, the point is searched without a guess as well; what failed is
-    tried once more from neighbours that were found later.
+    outwards, each point from where its neighbours' gaits point to, so that one branch is followed.
+    Where that leads to no stable gait, Newton's method begins from neighbours; then the point is
+    searched without a guess, and stable gaits that this finds lead on to their neighbours'.
 
     By lanes a grid of 64 points or more is searched in waves, all points of a wave at once: a
-    coarse lattice from its middle outwards, then each finer one from interpolated states. Where
-    that leads to no stable gait, Newton's method begins from neighbours; then, where there is no
-    gait or the point is of the coarse lattice, the point is searched without a guess, and stable
-    gaits that this finds lead on to their neighbours'.
+    coarse lattice from its middle outwards, then each finer one from interpolated states. Points of
+    the finer lattices are searched without a guess only where there is no gait.
 
     Args:
         scene: the walker; parameters that are not swept keep its values.
@@ -85,9 +88,7 @@ def gait_sweep(
     """
     scene = check_scene(scene, Scene, RigidScene, RedundantScene)
     values = _check_values(scene, over)
-    path = None if store is None else user_path(store, "store")
-    if path is not None:
-        check_store(path)
+    path = store_path(store)
     options: dict[str, Any] = dict(
         parameters=parameters,
         footsteps=footsteps,
@@ -101,64 +102,85 @@ def gait_sweep(
         "over": {name: column.tolist() for name, column in values.items()},
         "options": {**options, "parameters": None if parameters is None else list(parameters)},
     }
-    shape = tuple(map(len, values.values()))
-    states: dict[Place, PyTree] = {}
     centre = _nearest(scene, values)
-    order = [place for ring in rings(shape, centre) for place in ring]
 
     def scene_at(place: Place) -> AnyScene:
         point = {name: values[name][i] for name, i in zip(values, place, strict=True)}
         own: AnyScene = jtu.tree_map(as_float, with_parameters(scene, point))
         return own
 
+    first = find_gait(scene_at(centre), engine=engine, **options)
+    kind = type(first.measures.state)
+    size = math.prod(map(len, values.values()))
+    at_once = size >= LARGE and first.engine == "lanes"
+
     def search_alone(place: Place) -> Gait:
-        return find_gait(scene_at(place), engine=engine, **options)
+        return first if place == centre else find_gait(scene_at(place), engine=engine, **options)
 
-    def search(place: Place, *, again: bool) -> Gait | None:
-        """The gait there; none again where no neighbour has one."""
-        near = [states[at] for at in neighbours(place, shape) if states.get(at) is not None]
-        if again and not near:
-            return None
-        return _find(scene_at(place), near, options | {"engine": engine}, alone=not again)
+    def find(places: Sequence[Place], guesses: np.ndarray) -> Iterator[tuple[slice, Gait]]:
+        if at_once:
+            columns = zip(values, np.transpose(places), strict=True)
+            chosen = {name: values[name][rows] for name, rows in columns}
+            yield from find_each(scene, chosen, guesses, kind, options)
+            return
+        for k, (place, guess) in enumerate(zip(places, guesses, strict=True)):
+            start = jtu.tree_map(as_float, kind(0.0, *guess))
+            gait = find_gait(scene_at(place), start, engine=engine, **options)
+            yield slice(k, k + 1), jtu.tree_map(lambda leaf: np.asarray(leaf)[None], gait)
 
-    first = search_alone(centre)
     units = {name: parameter_quantities(scene)[name].unit for name in values}
     grid = open_gait_grid(
         first, values, units, settings, provenance(scene), path, any_version=any_version
     )
-    with tqdm(total=math.prod(shape), unit="gaits", disable=not progress) as bar, grid.open():
-        if math.prod(shape) >= LARGE and first.engine == "lanes":
-            if not grid.is_done(centre, found=False):
-                grid.write(centre, first)
-            GaitWaves(scene, values, (centre, first), grid, options, search_alone, bar.update).run()
+    with tqdm(total=size, unit="gaits", disable=not progress) as bar, grid.open():
+        GaitWaves(grid, (centre, first), find, search_alone, bar.update).run()
+        if at_once:
             grid.warn_of_grazing()
-            return grid.dataset()
-        for again in (False, True):
-            for place in order:
-                if not grid.is_done(place, found=again):
-                    gait = search(place, again=again) if place != centre or again else first
-                    # What the first pass found out about a failure is kept.
-                    if gait is not None and (not again or gait.outcome is Search.FOUND):
-                        grid.write(place, gait)
-                states[place] = grid.state(place)
-                bar.update(not again)
         return grid.dataset()
 
 
-def _find(scene: AnyScene, near: list[PyTree], options: dict[str, Any], *, alone: bool) -> Gait:
-    """The gait that a neighbour's leads to; the search's own where that is none or not stable."""
-    best: Gait | None = None
-    for state in near[:2]:
-        gait = find_gait(scene, jtu.tree_map(as_float, state), **options)
-        if bool(gait.stable):
-            return gait
-        if best is None or gait.outcome is Search.FOUND:
-            best = gait
-    if alone or best is None:
-        gait = find_gait(scene, **options)
-        if best is None or bool(gait.stable) or best.outcome is not Search.FOUND:
-            best = gait
-    return best
+def find_each(
+    scene: AnyScene,
+    values: Mapping[str, np.ndarray],
+    starts: np.ndarray,
+    state: type,
+    options: Mapping[str, Any],
+) -> Iterator[tuple[slice, Gait]]:
+    """The gaits that lanes come to, batch by batch: which of the n, and these with a first axis.
+
+    Args:
+        scene: the walker.
+        values: of the parameters that differ, shape (n,) each.
+        starts: states without hip_x, shape (n, m), of the type `state`.
+        options: those of `find_gait`. Gaits have no orbits.
+    """
+    count, first = len(starts), 0
+    scene = jtu.tree_map(as_float, scene)
+    while first < count:
+        size = _MANY if count - first > 3 * _FEW else _FEW
+        part = slice(first, min(first + size, count))
+        missing = size - (part.stop - first)
+        # A search from nowhere ends at once: it fills the batch.
+        rows = np.pad(starts[part], ((0, missing), (0, 0)), constant_values=np.nan)
+        columns = {k: np.pad(v[part], (0, missing), mode="edge") for k, v in values.items()}
+        begin = state(np.zeros(size), *np.ascontiguousarray(rows.T))
+        gaits = _find_each(scene, columns, begin, dict(options))
+        kept = part.stop - first
+        yield part, jtu.tree_map(lambda leaf, kept=kept: np.asarray(leaf)[:kept], gaits)
+        first = part.stop
+
+
+@cached_jit
+def _find_each(
+    scene: AnyScene, values: dict[str, np.ndarray], starts: PyTree, options: dict[str, Any]
+) -> Gait:
+    def one(values: dict[str, np.ndarray], start: PyTree) -> Gait:
+        own = jtu.tree_map(jnp.asarray, with_parameters(scene, values))
+        # Times and states of all steps would take more memory than all else.
+        gait = find_gait(own, start, **options)
+        return dataclasses.replace(gait, orbit=None)  # type: ignore[arg-type]
+
+    return jax.vmap(one)(values, starts)
 
 
 def _check_values(

@@ -1,81 +1,27 @@
-"""Sweep of gaits in waves: all points of a wave are searched at once, by lanes.
+"""Sweep of gaits in waves: no point of a wave needs another.
 
-Newton's method from where the neighbours point to, first on a coarse lattice; where that leads to
-no stable gait, from neighbours; and only then without a guess.
+Newton's method begins where the neighbours point to; where that leads to no stable gait, at
+neighbours; and only then without a guess.
 """
 
-import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeAlias
 
-import jax
-import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import PyTree
 
-from jaxbiped._types import as_float
-from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._parameter_access import with_parameters
-from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.sweep._gait_grid import GaitGrid
 from jaxbiped.sweep._grid_waves import Place, Wave, extrapolated, interpolated, neighbours, waves
 
-_FEW, _MANY = 16, 256
-"""Searches in a batch: every size is a program that XLA compiles."""
 _TRIES = 2
 """Neighbours from which a point is searched again."""
 
-
-def find_each(
-    scene: AbstractScene,
-    values: Mapping[str, np.ndarray],
-    starts: np.ndarray,
-    state: type,
-    options: Mapping[str, Any],
-) -> Iterator[tuple[slice, Gait]]:
-    """The gaits that Newton's method comes to, part by part.
-
-    Args:
-        scene: the walker.
-        values: of the parameters that differ, shape (n,) each.
-        starts: states without hip_x, shape (n, m).
-        state: their type.
-        options: those of `find_gait`.
-
-    Yields:
-        Which of the n, and their gaits, every array of NumPy with a first axis; no orbits.
-    """
-    count, first = len(starts), 0
-    scene = jtu.tree_map(as_float, scene)
-    while first < count:
-        size = _MANY if count - first > 3 * _FEW else _FEW
-        part = slice(first, min(first + size, count))
-        missing = size - (part.stop - first)
-        # A search from nowhere ends at once: it fills the batch.
-        rows = np.pad(starts[part], ((0, missing), (0, 0)), constant_values=np.nan)
-        columns = {k: np.pad(v[part], (0, missing), mode="edge") for k, v in values.items()}
-        begin = state(np.zeros(size), *np.ascontiguousarray(rows.T))
-        gaits = _find_each(scene, columns, begin, dict(options))
-        kept = part.stop - first
-        yield part, jtu.tree_map(lambda leaf, kept=kept: np.asarray(leaf)[:kept], gaits)
-        first = part.stop
-
-
-@cached_jit
-def _find_each(
-    scene: AbstractScene, values: dict[str, np.ndarray], starts: PyTree, options: dict[str, Any]
-) -> Gait:
-    def one(values: dict[str, np.ndarray], start: PyTree) -> Gait:
-        own = jtu.tree_map(jnp.asarray, with_parameters(scene, values))
-        # Times and states of all steps would take more memory than all else.
-        gait = find_gait(own, start, **options)
-        return dataclasses.replace(gait, orbit=None)  # type: ignore[arg-type]
-
-    return jax.vmap(one)(values, starts)
+Find: TypeAlias = Callable[[Sequence[Place], np.ndarray], Iterator[tuple[slice, Gait]]]
+"""Which of the points, and the gaits, with a first axis, to which Newton's method leads from the
+states without hip_x that are given, shape (n, m)."""
 
 
 class GaitWaves:
@@ -86,25 +32,27 @@ class GaitWaves:
 
     def __init__(
         self,
-        scene: AbstractScene,
-        values: Mapping[str, np.ndarray],
-        first: tuple[Place, Gait],
         grid: GaitGrid,
-        options: Mapping[str, Any],
+        first: tuple[Place, Gait],
+        find: Find,
         search_alone: Callable[[Place], Gait],
         tell: Callable[[int], object],
     ) -> None:
         """`first` is the gait at one point, `tell` is told how many points are done."""
-        self._scene, self._values, self._grid = scene, values, grid
-        self._options, self._search_alone, self._tell = options, search_alone, tell
-        self._shape = tuple(map(len, values.values()))
+        self._grid, self._tell, self._search_alone = grid, tell, search_alone
+        self._find_from = find
         self._first, gait = first
-        self._type = type(gait.measures.state)
         # What is known so far: states, NaN where no gait is, and whether the gaits are stable.
-        self._states = np.full((*self._shape, len(self._type._fields) - 1), np.nan)
+        self._states = np.full_like(grid.states(), np.nan)
+        self._shape = self._states.shape[:-1]
         self._stable = np.zeros(self._shape, dtype=bool)
         self._doubtful: dict[Place, Gait | None] = {}
         self._tried: dict[Place, list[Place]] = {}
+        if not grid.is_done(self._first):
+            if bool(gait.stable):
+                grid.write(self._first, gait)
+            else:
+                self._doubt(self._first, gait)
 
     def run(self) -> None:
         """Searches whatever the grid does not hold yet."""
@@ -123,27 +71,23 @@ class GaitWaves:
             guesses = interpolated(self._states, self._first, wave)
         else:
             guesses = extrapolated(self._states, wave)
-        new = [not self._grid.is_done(place, found=False) for place in wave.places]
-        old = [place for place, is_new in zip(wave.places, new, strict=True) if not is_new]
-        leads = np.array(new) & np.all(np.isfinite(guesses), axis=1)
-        for place, is_new, leads_on in zip(wave.places, new, leads, strict=True):
-            if is_new and not leads_on:
-                self._doubtful[place] = None
-        known = self._grid.states()
-        for place in old:
-            self._states[place] = known[place]
-            self._stable[place] = self._grid.is_stable(place)
-        self._tell(len(old))
-        self._find([p for p, on in zip(wave.places, leads, strict=True) if on], guesses[leads])
+        known, leads = self._grid.states(), []
+        for k, place in enumerate(wave.places):
+            if self._grid.is_done(place):
+                self._states[place] = known[place]
+                self._stable[place] = self._grid.is_stable(place)
+                self._tell(1)
+            elif np.all(np.isfinite(guesses[k])):
+                leads.append(k)
+            else:
+                self._doubtful.setdefault(place, None)
+        self._find([wave.places[k] for k in leads], guesses[leads])
 
     def _find(self, places: Sequence[Place], guesses: np.ndarray) -> None:
         """Newton's method at these points, from these states."""
         if not places:
             return
-        at = np.transpose(places)
-        values = {name: v[i] for (name, v), i in zip(self._values.items(), at, strict=True)}
-        parts = find_each(self._scene, values, guesses, self._type, self._options)
-        for part, gaits in parts:
+        for part, gaits in self._find_from(places, guesses):
             stable, here = np.asarray(gaits.stable), places[part]
             self._keep([here[k] for k in map(int, np.flatnonzero(stable))], _rows(gaits, stable))
             for k in map(int, np.flatnonzero(~stable)):
@@ -154,7 +98,7 @@ class GaitWaves:
         if not places:
             return
         at = tuple(np.transpose(places))
-        self._states[at] = np.stack([np.asarray(x) for x in gaits.measures.state[1:]], axis=-1)
+        self._states[at] = np.stack(recurring_leaves(gaits.measures.state), axis=-1)
         self._stable[at] = True
         for place in places:
             self._doubtful.pop(place, None)
@@ -162,12 +106,10 @@ class GaitWaves:
         self._tell(len(places))
 
     def _doubt(self, place: Place, gait: Gait) -> None:
-        best = self._doubtful.get(place)
-        found = int(gait.ending) == int(Search.FOUND)
-        if best is None or (found and int(best.ending) != int(Search.FOUND)):
+        if not _is_found(self._doubtful.get(place)):
             self._doubtful[place] = gait
-            if found:
-                self._states[place] = [float(x) for x in gait.measures.state[1:]]
+            if _is_found(gait):
+                self._states[place] = np.stack(recurring_leaves(gait.measures.state))
 
     def _spread(self) -> None:
         """Searches doubtful points from their neighbours, as long as there are new ones."""
@@ -196,21 +138,23 @@ class GaitWaves:
     def _settle(self, place: Place, *, alone: bool) -> None:
         """Writes what is best at a doubtful point, searched without a guess where need be."""
         best = self._doubtful[place]
-        missing = best is None or int(best.ending) != int(Search.FOUND)
-        if missing or alone:
+        if alone or not _is_found(best):
             gait = self._search_alone(place)
             if bool(gait.stable):
                 self._keep([place], _rows(gait, None))
                 self._spread()
                 return
-            if missing:
-                best = gait
+            best = best if _is_found(best) else gait
         assert best is not None
         self._doubtful.pop(place)
         self._grid.write(place, best)
-        if int(best.ending) == int(Search.FOUND):
-            self._states[place] = [float(x) for x in best.measures.state[1:]]
+        if _is_found(best):
+            self._states[place] = np.stack(recurring_leaves(best.measures.state))
         self._tell(1)
+
+
+def _is_found(gait: Gait | None) -> bool:
+    return gait is not None and int(gait.ending) == int(Search.FOUND)
 
 
 def _rows(gaits: Gait, which: Any) -> Gait:

@@ -4,6 +4,7 @@ On a large grid a coarse lattice comes first, breadth first from one point; then
 at once, from interpolation between the points that are known.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, TypeAlias
 
@@ -134,8 +135,7 @@ def _between(rows: np.ndarray, odd: int) -> np.ndarray:
 
 def _lattice(shape: Sequence[int], first: Place, stride: int) -> Iterator[Place]:
     axes = [range(i % stride, size, stride) for i, size in zip(first, shape, strict=True)]
-    for place in np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(shape)):
-        yield tuple(map(int, place))
+    return itertools.product(*axes)
 
 
 def _is_on(place: Place, first: Place, stride: int) -> bool:

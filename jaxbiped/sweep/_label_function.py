@@ -8,7 +8,6 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.basins._labels import Doubt, Label
-from jaxbiped.sweep._follow_starts import Labelled
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._coordinates import check_coordinates
 from jaxbiped.sweep.starts._starts import Completion, batch_at
@@ -50,20 +49,14 @@ def label_at(
         columns = {name: points[:, i] for i, name in enumerate(names)}
         batch = batch_at(labelling, columns, place=place, follow=follow)
         labelled = labelling(batch.states, parameters=batch.parameters)
-        _warn_of_doubt(labelled)
+        remain = np.sum(labelled.doubt == int(Doubt.REMAINS)) if labelled.doubt is not None else 0
+        if remain:
+            warnings.warn(
+                f"{remain} of {len(points)} labels remain in doubt at the finest tolerance.",
+                RuntimeWarning,
+                stacklevel=2,
+            )
         found = labelled.label.astype(int)
         return (found != int(Label.WALKING)).astype(int) if failing else found
 
     return label_of
-
-
-def _warn_of_doubt(labelled: Labelled) -> None:
-    if labelled.doubt is None:
-        return
-    count = int((labelled.doubt == int(Doubt.REMAINS)).sum())
-    if count:
-        warnings.warn(
-            f"{count} of {len(labelled.label)} labels remain in doubt at the finest tolerance.",
-            RuntimeWarning,
-            stacklevel=3,
-        )

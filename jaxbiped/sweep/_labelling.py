@@ -19,9 +19,9 @@ from jaxbiped.scene._parameter_access import scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._doubtful_labels import relabel_doubtful
-from jaxbiped.sweep._follow_starts import Labelled, broadcast_leaves, follow_starts
+from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
 from jaxbiped.sweep._gait_family import Family
-from jaxbiped.sweep._labelling_settings import Effort
+from jaxbiped.sweep._labelling_loop import Labelled
 
 
 class Labelling(eqx.Module):
@@ -59,16 +59,15 @@ class Labelling(eqx.Module):
         """
         states = _check_states(self.scene, states)
         count = len(states.hip_x)
-        values = {} if parameters is None else dict(parameters)
+        values = {} if parameters is None else parameters
         given = {name: _column(name, value, count) for name, value in values.items()}
 
         def follow(places: np.ndarray, effort: Effort) -> Labelled:
-            some = jtu.tree_map(lambda leaf: leaf[places], states)
-            return self._label_once(some, {k: v[places] for k, v in given.items()}, effort)
+            some, own = jtu.tree_map(lambda leaf: leaf[places], (states, given))
+            return self._label_once(some, own, effort)
 
-        every = np.arange(count)
         if self.effort.wanted is None:
-            return follow(every, self.effort)
+            return follow(np.arange(count), self.effort)
         return relabel_doubtful(follow, count, self.effort, self.scene)
 
     def _label_once(
@@ -78,7 +77,7 @@ class Labelling(eqx.Module):
         count = len(states.hip_x)
         scene = with_parameters(self.scene, {k: jnp.asarray(v) for k, v in given.items()})
         scene = check_scene(scene, Scene, RigidScene)
-        scene = jtu.tree_map(lambda leaf: _spread(leaf, count), scene)
+        scene = jtu.tree_map(lambda leaf: np.broadcast_to(as_float(leaf), (count,)), scene)
         goals, cycles = self.family.goals(given, count)
         found = follow_starts(scene, states, goals, cycles, effort)
         if not given or self.family.names:
@@ -104,8 +103,8 @@ class Labelling(eqx.Module):
         """Everything that the labels depend on, ready for JSON."""
         own = scene_identity(self.scene)
         effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
-        # All engines give the same labels; the gap follows from the tolerance.
-        del effort["engine"], effort["may_move"], effort["gap"], effort["embedded"]
+        # All engines give the same labels.
+        del effort["engine"], effort["may_move"], effort["embedded"]
         if effort["wanted"] is None:
             del effort["wanted"]
         return {
@@ -124,16 +123,21 @@ def _check_states(scene: Scene | RigidScene, states: PyTree) -> PyTree:
         states = BristleState(*states, *[straight] * 2)
     check_type("states", states, kind)
     leaves = [np.asarray(leaf, dtype=np.float64) for leaf in states]
-    shapes = {leaf.shape for leaf in leaves}
-    if len(shapes) > 1 or len(leaves[0].shape) != 1:
-        raise ArgumentError(
-            f"states has leaves of shapes {sorted(shapes)}: all of them must be (n,)."
-        )
     whole: PyTree = kind(*leaves)
+    check_leaves_of_starts(whole)
     return whole._replace(
         theta_1=np.asarray(within_a_turn(whole.theta_1)),
         theta_2=np.asarray(within_a_turn(whole.theta_2)),
     )
+
+
+def check_leaves_of_starts(states: PyTree) -> None:
+    """Raises `ArgumentError` unless all leaves are of one shape (n,)."""
+    shapes = {np.shape(leaf) for leaf in states}
+    if len(shapes) > 1 or len(min(shapes)) != 1:
+        raise ArgumentError(
+            f"states has leaves of shapes {sorted(shapes)}: all of them must be (n,)."
+        )
 
 
 def _column(name: str, value: npt.ArrayLike, count: int) -> np.ndarray:
@@ -144,8 +148,3 @@ def _column(name: str, value: npt.ArrayLike, count: int) -> np.ndarray:
             "starts is needed."
         )
     return column
-
-
-def _spread(leaf: npt.ArrayLike, count: int) -> np.ndarray:
-    array = np.asarray(as_float(leaf))
-    return array if array.shape == (count,) else broadcast_leaves(array, count)

@@ -3,19 +3,20 @@
 Both engines run these same functions, so that labels do not depend on the engine.
 """
 
-import abc
 from collections.abc import Callable
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Parameter, Scalar, select
-from jaxbiped.basins._labels import Label
+from jaxbiped.basins._labels import Label, label_names
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
 from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._rigid_steps import (
@@ -36,8 +37,6 @@ from jaxbiped.sweep._convergence_test import (
 )
 from jaxbiped.sweep._walk_events import arrival_time, contact_places, grazes, slip_distances
 
-_Number = TypeVar("_Number")
-
 
 class Start(NamedTuple):
     """One start's inputs; every leaf a 64-bit floating-point number, or an array of them.
@@ -55,23 +54,49 @@ class Start(NamedTuple):
     patience: Parameter
 
 
-class Outcome(NamedTuple, Generic[_Number]):
-    """What became of one start; see `Labelled`. `final` is the last state on the section.
+class Labelled(NamedTuple):
+    """What became of n starts: NumPy's arrays of shape (n,).
 
-    `grazes` counts steps in which a foot grazed the ground, if that is asked for.
+    Attributes:
+        label: code of a `Label`.
+        gait: the gait that it converges to, by its position in `Family.cycles`; −1 for none.
+        cycle_footsteps: footsteps in that gait's cycle. Where the label is "unresolved" it is that
+            of a cycle which the last footsteps repeated, of a gait that is not among the
+            attractors.
+        footsteps: heel strikes until the label was certain.
+        time: simulated until then [s].
+        distance: walked along the slope until then [m].
+        rate: share of the distance from the gait that is left after a footstep, over the last
+            cycle; NaN without a cycle, and where nothing but rounding is left of the distance.
+        closest: smallest distance from any of the gaits, in its metric; infinite without arrival.
+        attempted: how many steps the solver attempted; of all its solves, where there were more.
+        final: last states on the section without hip_x, shape (n, m); infinite without arrival.
+        doubt, disagreed, changed: where the accuracy was asked for by a number, codes of `Doubt`,
+            sums of codes of `Witness`, and whether finer tolerances gave another label than the
+            first; else None.
+        grazes: steps in which a foot touches the ground or misses it by less than the tolerance
+            resolves, where the accuracy was asked for by a number and the walker is compliant.
     """
 
-    label: _Number
-    gait: _Number
-    cycle_footsteps: _Number
-    footsteps: _Number
-    time: _Number
-    distance: _Number
-    rate: _Number
-    closest: _Number
-    attempted: _Number
-    final: tuple[_Number, ...]
-    grazes: _Number | None = None
+    label: np.ndarray
+    gait: np.ndarray
+    cycle_footsteps: np.ndarray
+    footsteps: np.ndarray
+    time: np.ndarray
+    distance: np.ndarray
+    rate: np.ndarray
+    closest: np.ndarray
+    attempted: np.ndarray
+    final: np.ndarray
+    doubt: np.ndarray | None = None
+    disagreed: np.ndarray | None = None
+    changed: np.ndarray | None = None
+    grazes: np.ndarray | None = None
+
+    @property
+    def names(self) -> np.ndarray:
+        """The labels in words, "walking period-1" and so on, shape (n,)."""
+        return label_names(self.label, self.cycle_footsteps)
 
 
 class Progress(NamedTuple):
@@ -92,24 +117,10 @@ class Progress(NamedTuple):
     grazes: Scalar | None = None
 
 
-class AbstractLabellingLoop(abc.ABC):
-    """The functions of a labelling loop: `begin`, `attempt` until it is over, `finish`."""
-
-    @abc.abstractmethod
-    def begin(self, start: Start) -> Progress:
-        """Before the first step."""
-
-    @abc.abstractmethod
-    def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
-        """One attempted step further, and whether the label is certain (boolean)."""
-
-    @abc.abstractmethod
-    def finish(self, start: Start, now: Progress) -> Outcome[Scalar]:
-        """The label and what goes with it."""
-
-
-class CompliantLabelling(AbstractLabellingLoop):
+class CompliantLabelling:
     """Of the compliant walker, which arrives at mid-stance, on whichever leg.
+
+    A walk begins, attempts steps until its label is certain, and finishes.
 
     Attributes:
         cycles: footsteps in a cycle of each known gait.
@@ -139,6 +150,7 @@ class CompliantLabelling(AbstractLabellingLoop):
         return Progress(self.steps.start(solve), trace, zero, landed, count)
 
     def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
+        """One attempted step further, and whether the label is certain (boolean)."""
         solve: Solve = start.solve
         after, over = self.steps.attempt(solve, now.solve)
         _, _, before_count = now.solve.control
@@ -158,7 +170,7 @@ class CompliantLabelling(AbstractLabellingLoop):
             count = count + jnp.where(grazed, 1, 0)
         return Progress(after, trace, strike, landed, count), over | (verdict != UNDECIDED)
 
-    def finish(self, start: Start, now: Progress) -> Outcome[Scalar]:
+    def finish(self, start: Start, now: Progress) -> Labelled:
         solved = self.steps.finish(start.solve, now.solve)
         _, _, count = now.solve.control
         return _outcome(
@@ -168,7 +180,8 @@ class CompliantLabelling(AbstractLabellingLoop):
             time=solved.t,
             distance=solved.state.hip_x - start.solve.state.hip_x,
             attempted=solved.accepted + solved.rejected,
-        )._replace(grazes=now.grazes)
+            grazes=now.grazes,
+        )
 
     def _traced(self, start: Start, now: Progress, after: PyTree) -> ArrivalHistory:
         """After the last step, within which it may have arrived at mid-stance."""
@@ -188,18 +201,14 @@ class CompliantLabelling(AbstractLabellingLoop):
             pairs = zip(_with_leg_names(True, state), _with_leg_names(False, state), strict=True)
             return type(state)(*[jnp.where(first, a, b) for a, b in pairs])
 
-        def on_section() -> ArrivalHistory:
-            def value(time: Scalar) -> Scalar:
-                return section.value(scene, at(time))
+        def on_section() -> State:
+            return at(arrival_time(lambda time: section.value(scene, at(time)), last.t, after.t))
 
-            time = arrival_time(value, last.t, after.t)
-            return _after_arrival(start, now, at(time), self.cycles)
-
-        return _trace_or(arrives, on_section, now.trace)
+        return _after_arrival(start, now, arrives, on_section, self.cycles)
 
 
-class RigidLabelling(AbstractLabellingLoop):
-    """Of the rigid walker, which arrives just after its impacts.
+class RigidLabelling:
+    """Of the rigid walker, which arrives just after its impacts; as `CompliantLabelling`.
 
     Attributes:
         cycles: footsteps in a cycle of each known gait.
@@ -220,18 +229,14 @@ class RigidLabelling(AbstractLabellingLoop):
         after, over = attempt_step(
             start.solve, now.solve, embedded=self.embedded, lands_on_falls=False
         )
-
-        def on_section() -> ArrivalHistory:
-            return _after_arrival(start, now, after.state, self.cycles)
-
-        trace = _trace_or(after.struck, on_section, now.trace)
+        trace = _after_arrival(start, now, after.struck, lambda: after.state, self.cycles)
         strike = jnp.where(after.struck, after.t, now.strike)
         late = after.t - strike > start.patience
         verdict = jnp.where(late, int(Label.TIMED_OUT), trace.verdict)
         trace = trace._replace(verdict=verdict)
         return Progress(after, trace, strike, None), over | (verdict != UNDECIDED)
 
-    def finish(self, start: Start, now: Progress) -> Outcome[Scalar]:
+    def finish(self, start: Start, now: Progress) -> Labelled:
         walked: RigidProgress = now.solve
         return _outcome(
             now.trace,
@@ -240,18 +245,11 @@ class RigidLabelling(AbstractLabellingLoop):
             time=walked.t,
             distance=state_with_hip(start.solve, walked).hip_x - start.solve.state.hip_x,
             attempted=walked.accepted + walked.rejected,
-        )._replace(grazes=walked.grazes if self.grazes else None)
+            grazes=walked.grazes if self.grazes else None,
+        )
 
 
-def _outcome(
-    trace: ArrivalHistory,
-    *,
-    code: Scalar,
-    footsteps: Scalar,
-    time: Scalar,
-    distance: Scalar,
-    attempted: Scalar,
-) -> Outcome[Scalar]:
+def _outcome(trace: ArrivalHistory, *, code: Scalar, **walked: Any) -> Labelled:
     """A failure is certain; all footsteps walked without a verdict are not."""
     kind = trace.verdict.dtype
     spent = (code == int(Label.WALKING)) | (code == int(Label.OUT_OF_STEPS))
@@ -259,38 +257,34 @@ def _outcome(
     label = jnp.where(spent & (trace.verdict != UNDECIDED), trace.verdict, plain)
     walks = label == int(Label.WALKING)
     converges = walks | (label == int(Label.UNRESOLVED))
-    return Outcome(
+    certain: dict[str, Any] = dict(
         label=label,
         gait=jnp.where(walks, trace.goal, -1),
         cycle_footsteps=jnp.where(converges, trace.cycle_footsteps, 0),
-        footsteps=footsteps,
-        time=time,
-        distance=distance,
         rate=trace.rate,
         closest=trace.closest,
-        attempted=attempted,
         final=trace.recent[0],
     )
-
-
-def _trace_or(
-    condition: Scalar, make: Callable[[], ArrivalHistory], old: ArrivalHistory
-) -> ArrivalHistory:
-    """A new trace where the condition holds; made only if it does in any start of the batch."""
-
-    def made() -> ArrivalHistory:
-        return select(condition, make(), old)
-
-    trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(condition), made, lambda: old)
-    return trace
+    return Labelled(**certain, **walked)
 
 
 def _after_arrival(
-    start: Start, now: Progress, state: PyTree, cycles: tuple[int, ...]
+    start: Start,
+    now: Progress,
+    arrives: Scalar,
+    state: Callable[[], PyTree],
+    cycles: tuple[int, ...],
 ) -> ArrivalHistory:
-    """After an arrival in this state, its place along the slope left out."""
-    recurring = tuple(state[1:])
-    return after_arrival(now.trace, recurring, start.goals, cycles, start.gap, start.solve.rtol)
+    """The trace after an arrival, if there is one; made only if any start of the batch has one."""
+    old = now.trace
+
+    def made() -> ArrivalHistory:
+        recurring = tuple(recurring_leaves(state()))
+        new = after_arrival(old, recurring, start.goals, cycles, start.gap, start.solve.rtol)
+        return select(arrives, new, old)
+
+    trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(arrives), made, lambda: old)
+    return trace
 
 
 def _with_leg_names(exchanged: bool, state: PyTree) -> PyTree:

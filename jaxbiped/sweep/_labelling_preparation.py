@@ -3,17 +3,24 @@
 import warnings
 from collections.abc import Mapping, Sequence
 
+import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._labels import Label
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
+from jaxbiped.solve._engine_names import engine_for
+from jaxbiped.solve._error_estimate import check_wanted
+from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.sweep._gait_family import find_family, with_gaits
+from jaxbiped.sweep._follow_starts import Effort
+from jaxbiped.sweep._gait_family import Guesses, find_family, with_gaits
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._labelling_settings import effort_of
 from jaxbiped.sweep.starts._coordinates import parameter_axes
 from jaxbiped.sweep.starts._starts import AbstractStarts
 
@@ -21,6 +28,14 @@ _ALIKE = 0.05
 """Distance of two starts' last states, in the components' scales, that count as one guess."""
 _MOST_GUESSES = 8
 """Of one cycle length for one combination of parameters."""
+_GAP_SHARE = {True: 30.0, False: 3.0}
+"""Gap between states that repeat each other in units of the tolerance, compliant or not: rolling
+errs by less, and slow transients past an unstable gait move by as little as a wider gap."""
+_FIRST = 3e-3
+"""First tolerance as a share of the accuracy wanted, at most that of "draft": of 100,000 labels of
+the seed's slice 37 were wrong and not in doubt at 1e-5 by Rodas4, and 11 at 1e-6."""
+FINEST_FIRST = {True: 1e-9, False: 1e-11}
+"""Finest tolerance at which every start is labelled, compliant or not."""
 
 
 def labelling(
@@ -69,21 +84,76 @@ def labelling(
         max_solver_steps=max_solver_steps,
         engine=engine,
     )
-    values = parameter_axes(scene, parameters or {}, "parameters")
+    values = parameter_axes(scene, parameters, "parameters") if parameters else {}
     start = default_guess(scene) if guess is None else guess
     family = find_family(scene, effort, parameters=values, guess=start)
     missing = sum(not row for row in family.rows)
     if missing:
-        of = (
-            f" for {missing} of {len(family.rows)} combinations of the parameters" if values else ""
-        )
+        of = f" for {missing} of {len(family.rows)} combinations of the parameters"
         warnings.warn(
-            f"no stable gait was found{of}: what walks there is labelled unresolved until one is "
-            "met (see `with_gaits_met`).",
+            f"no stable gait was found{of if values else ''}: what walks there is labelled "
+            "unresolved until one is met (see `with_gaits_met`).",
             RuntimeWarning,
             stacklevel=2,
         )
     return Labelling(scene, family, effort)
+
+
+def effort_of(
+    scene: Scene | RigidScene,
+    *,
+    footsteps: int = 30,
+    accuracy: str | float = "draft",
+    rtol: float | None = None,
+    solver: str | AbstractRosenbrock = "rodas4p",
+    max_solver_steps: int = 65536,
+    engine: str = "auto",
+) -> Effort:
+    """How to follow starts, from the arguments of `labelling`; raises `ArgumentError`."""
+    scene = check_scene(scene, Scene, RigidScene)
+    check_whole("footsteps", footsteps, 1)
+    check_whole("max_solver_steps", max_solver_steps, 1)
+    if any(np.ndim(leaf) for leaf in jtu.tree_leaves(scene)):
+        raise ArgumentError(
+            "scene has parameters that are arrays: give one scene, and name what differs from "
+            "start to start among the parameters."
+        )
+    wanted = _share_wanted(accuracy, rtol)
+    named = ACCURACIES["draft" if wanted is not None else str(accuracy)]
+    own = named.walk if scene.compliant else named.rigid_walk
+    if wanted is not None:
+        own = min(own, max(_FIRST * wanted, FINEST_FIRST[scene.compliant]))
+    tolerance = resolve_slip_speed(own, scene) if rtol is None else rtol
+    check_positive("rtol", tolerance)
+    method = solver_named(solver)
+    if not isinstance(method, AbstractRosenbrock):
+        raise ArgumentError(
+            f"solver = {type(method).__name__} is not allowed: labelling takes rodas3p to rodas5p."
+        )
+    return Effort(
+        rtol=float(tolerance),
+        footsteps=int(footsteps),
+        max_attempts=int(max_solver_steps),
+        gap_share=_GAP_SHARE[scene.compliant],
+        solver=method,
+        engine=engine_for(engine, obstacle=None, by_device=True, by_any=True),
+        may_move=engine == "auto",
+        wanted=wanted,
+    )
+
+
+def _share_wanted(accuracy: str | float, rtol: float | None) -> float | None:
+    """The share of wrong labels that is allowed; None where an accuracy is asked for by name."""
+    if isinstance(accuracy, str):
+        check_accuracy_name(accuracy)
+        return None
+    check_wanted(accuracy, rtol=rtol)
+    if not accuracy < 1.0:
+        raise ArgumentError(
+            f"accuracy = {accuracy:g} is not allowed: it is the share of the labels that may be "
+            "wrong, and must be below 1."
+        )
+    return float(accuracy)
 
 
 def with_gaits_met(labelling: Labelling, starts: AbstractStarts, *, count: int = 512) -> Labelling:
@@ -108,10 +178,6 @@ def with_gaits_met(labelling: Labelling, starts: AbstractStarts, *, count: int =
     return with_guesses(labelling, guesses_among(labelling, starts, chosen))
 
 
-Guesses = dict[int, list[tuple[int, list[float]]]]
-"""By row of a family: footsteps in a cycle and states, without hip_x, from which to search."""
-
-
 def guesses_among(labelling: Labelling, starts: AbstractStarts, numbers: np.ndarray) -> Guesses:
     """Where to seek the gaits that the starts with these numbers seem to converge to."""
     batch = starts.at(labelling, numbers)
@@ -123,7 +189,7 @@ def guesses_among(labelling: Labelling, starts: AbstractStarts, numbers: np.ndar
     rows = np.zeros(len(found.label), dtype=int)
     if family.names:
         rows = family.row_of(batch.parameters)
-    guesses: Guesses = {}
+    guesses: dict[int, list[tuple[int, list[float]]]] = {}
     for row, length in sorted({(int(rows[i]), int(found.cycle_footsteps[i])) for i in open_}):
         among = open_[(rows[open_] == row) & (found.cycle_footsteps[open_] == length)]
         for i in among[_distinct_points(found.final[among] / family.scales[row])]:
@@ -135,12 +201,7 @@ def with_guesses(labelling: Labelling, guesses: Guesses) -> Labelling:
     """The labelling that also knows the gaits to which these guesses lead."""
     if not guesses:
         return labelling
-    family = labelling.family
-    states = {
-        row: [(length, type(family.states[row])(0.0, *point)) for length, point in each]
-        for row, each in guesses.items()
-    }
-    more = with_gaits(labelling.scene, family, labelling.effort, states)
+    more = with_gaits(labelling.scene, labelling.family, labelling.effort, guesses)
     return Labelling(labelling.scene, more, labelling.effort)
 
 

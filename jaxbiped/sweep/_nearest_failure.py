@@ -13,6 +13,7 @@ from jaxbiped.basins._labels import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock, minimal_fatal_shock
 from jaxbiped.basins._ray_descent import Normal
 from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._attractor import Attractor
@@ -119,8 +120,8 @@ def _arrivals(scene: Scene | RigidScene, kind: type, points: Array) -> PyTree:
     """Derivatives of the next arrivals from points (n, m), these arrivals and their codes."""
 
     def arrival(point: Array) -> tuple[Array, tuple[Array, Array]]:
-        came = return_map(scene, kind(jnp.zeros(()), *point))
-        after = jnp.stack(came.state[1:])
+        came = return_map(scene, state_of_recurring(kind, point, jnp.zeros(())))
+        after = jnp.stack(recurring_leaves(came.state))
         return after, (after, came.code)
 
     return jax.vmap(jax.jacfwd(arrival, has_aux=True))(points)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._files import failure_kind, strict_json
+from jaxbiped._files import failure_kind, strict_json, user_path
 from jaxbiped._identity import DECISIVE, difference_of
 from jaxbiped._types import JsonObject
 from jaxbiped.caching._disk_cache import ABANDONED
@@ -31,13 +31,57 @@ _CLOSE = 1e-6
 """Relative difference of two gaits' numbers that counts as none."""
 
 
-def check_same(path: Path, settings: JsonObject, *, but: str = "") -> None:
-    """Raises `ArgumentError` unless a store that is there was made with these settings."""
+def continue_store(
+    path: Path,
+    settings: JsonObject,
+    writer: Mapping[str, str],
+    *,
+    any_version: bool,
+    create: Callable[[Path], object],
+) -> bool:
+    """Makes a store, or goes on with one that the same settings made; returns whether it is new.
+
+    Args:
+        path: of the store's directory.
+        settings: all that the results depend on.
+        writer: the `provenance` of what is written; a new store says it of itself.
+        any_version: whether to continue what another version, revision or user's code wrote. The
+            store then says that this one wrote in it, too.
+        create: writes a store without results at another path.
+
+    Raises:
+        ArgumentError: the directory holds something else, or a store made with other settings or by
+            another version, or may not be written.
+        ResourceError: its disk is full or fails.
+    """
+    check_store(path)
+    with writing(path):
+        new = is_new(path)
+        if new:
+            create_store(path, create)
+        note(path, check_continued(path, settings, writer, any_version=any_version))
+    return new
+
+
+def check_continued(
+    path: Path,
+    settings: JsonObject,
+    writer: Mapping[str, str],
+    *,
+    any_version: bool,
+    but: str = "",
+) -> dict[str, str]:
+    """What a store that is there must note of a writer that is new to it; empty for a known one.
+
+    Raises:
+        ArgumentError: other settings than these made it, apart from the one named `but`; or another
+            version wrote there, and `any_version` does not allow that.
+    """
     import zarr
 
     try:
-        group = zarr.open_group(str(path), mode="r", use_consolidated=False)
-        stored = json.loads(str(group.attrs[SETTINGS]))
+        attributes = zarr.open_group(str(path), mode="r", use_consolidated=False).attrs
+        stored = json.loads(str(attributes[SETTINGS]))
     except (KeyError, ValueError, zarr.errors.GroupNotFoundError, FileNotFoundError):
         raise ArgumentError(
             f"store = {str(path)!r} holds something else: it must be a new directory, or a store "
@@ -52,27 +96,16 @@ def check_same(path: Path, settings: JsonObject, *, but: str = "") -> None:
             f"store = {str(path)!r} was made with other settings: {difference}; give it those, or "
             "another store."
         )
-
-
-def check_writers(path: Path, writer: Mapping[str, str], any_version: bool) -> dict[str, str]:
-    """What a store that is there must note of a writer that is new to it; empty for a known one.
-
-    Raises:
-        ArgumentError: another version wrote there, and `any_version` does not allow that.
-    """
-    import zarr
-
-    attributes = zarr.open_group(str(path), mode="r", use_consolidated=False).attrs
-    here = {name: writer[name] for name in DECISIVE}
+    own = {name: writer[name] for name in DECISIVE}
     others = json.loads(str(attributes.get(_ALSO, "[]")))
     known = [{name: each.get(name) for name in DECISIVE} for each in (attributes, *others)]
-    difference = next((difference_of(each, here) for each in known if each != here), None)
-    if difference is not None and not any_version:
+    version = next((difference_of(each, own) for each in known if each != own), None)
+    if version is not None and not any_version:
         raise ArgumentError(
-            f"store = {str(path)!r} was written by another version: {difference}; give it another "
+            f"store = {str(path)!r} was written by another version: {version}; give it another "
             "store, or any_version=True (--any-version) to let the labels of both stand in it."
         )
-    return {} if here in known else {_ALSO: json.dumps([*others, dict(writer)])}
+    return {} if own in known else {_ALSO: json.dumps([*others, dict(writer)])}
 
 
 def _is_close(old: Any, new: Any, name: str) -> bool:
@@ -80,6 +113,15 @@ def _is_close(old: Any, new: Any, name: str) -> bool:
     numbers = isinstance(old, float) and isinstance(new, float)
     own = name.startswith("gaits")
     return numbers and own and abs(old - new) <= _CLOSE * max(1e-3, abs(old))
+
+
+def store_path(store: str | Path | None) -> Path | None:
+    """The path that a user gives for a store, None for one in memory; raises as `check_store`."""
+    if store is None:
+        return None
+    path = user_path(store, "store")
+    check_store(path)
+    return path.absolute()
 
 
 def check_store(path: Path) -> None:
@@ -101,14 +143,18 @@ def open_store(path: Path) -> "xarray.Dataset":
 
 @contextlib.contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Within, a disk that fails is told of in one sentence.
+    """Within, a disk that fails is told of in one sentence, and chunks are written whatever they
+    hold: one that is not there was lost.
 
     Raises:
         ArgumentError: the store may not be written.
         ResourceError: its disk is full or fails.
     """
+    import zarr
+
     try:
-        yield
+        with zarr.config.set({"array.write_empty_chunks": True}):
+            yield
     except OSError as error:
         why = (error.strerror or str(error)).lower()
         raise failure_kind(error)(
@@ -139,6 +185,15 @@ def create_store(path: Path, write: Callable[[Path], object]) -> None:
                 raise
     finally:
         shutil.rmtree(half, ignore_errors=True)
+
+
+def note(path: Path, attributes: Mapping[str, str | float]) -> None:
+    """Sets attributes of a store."""
+    import zarr
+
+    if attributes:
+        zarr.open_group(str(path), mode="r+", use_consolidated=False).attrs.update(dict(attributes))
+        consolidate(path)
 
 
 def consolidate(path: Path) -> None:

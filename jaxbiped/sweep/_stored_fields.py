@@ -1,6 +1,7 @@
 """Array layout of a sweep's results, and how it is cut into chunks."""
 
 import enum
+import functools
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -9,7 +10,7 @@ import numpy as np
 
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import Doubt, Label, Witness
-from jaxbiped.sweep._follow_starts import Labelled
+from jaxbiped.sweep._labelling_loop import Labelled
 from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
 
 if TYPE_CHECKING:
@@ -45,15 +46,14 @@ class Layout(NamedTuple):
 
     Attributes:
         starts: the starts.
-        axis: along which it is cut: a chunk has one place of the axes before, all of those after.
-        rows: places of that axis in a chunk.
+        chunk_shape: of all chunks but those at the far end of the axis that is cut: one place of
+            the axes before it, all of those after.
         units: SI units of the starts' coordinates, as far as they are known.
         doubts: whether `DOUBT_FIELDS` are kept.
     """
 
     starts: AbstractStarts
-    axis: int
-    rows: int
+    chunk_shape: tuple[int, ...]
     units: Mapping[str, str]
     doubts: bool = False
 
@@ -66,12 +66,11 @@ class Layout(NamedTuple):
         doubts: bool = False,
     ) -> "Layout":
         """With at most `chunk` starts in a chunk."""
-        shape = starts.shape
-        axis, inner = len(shape) - 1, 1
-        while axis > 0 and inner * shape[axis] <= chunk:
-            inner *= shape[axis]
-            axis -= 1
-        return Layout(starts, axis, max(1, min(chunk // inner, shape[axis])), units or {}, doubts)
+        shape, left = [], chunk
+        for size in reversed(starts.shape):
+            shape.append(max(1, min(left, size)))
+            left = left // size if left >= size else 1
+        return Layout(starts, tuple(reversed(shape)), units or {}, doubts)
 
     @property
     def fields(self) -> dict[str, tuple[str, float, str, str]]:
@@ -79,27 +78,24 @@ class Layout(NamedTuple):
         return FIELDS | DOUBT_FIELDS if self.doubts else FIELDS
 
     @property
-    def chunks(self) -> int:
-        """Number of chunks."""
-        return math.prod(self.starts.shape[: self.axis]) * self._cuts
+    def _counts(self) -> tuple[int, ...]:
+        """How many chunks lie along each axis."""
+        pairs = zip(self.starts.shape, self.chunk_shape, strict=True)
+        return tuple(-(-size // length) for size, length in pairs)
 
     @property
-    def chunk_shape(self) -> tuple[int, ...]:
-        """Of all but the last of the axis that is cut."""
-        shape = self.starts.shape
-        return (*[1] * self.axis, self.rows, *shape[self.axis + 1 :])
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return math.prod(self._counts)
+
+    def place(self, chunk: int) -> tuple[int, ...]:
+        """Of a chunk among the others, along each axis."""
+        return tuple(map(int, np.unravel_index(chunk, self._counts)))
 
     def region(self, chunk: int) -> tuple[slice, ...]:
         """Where a chunk lies in the arrays."""
-        shape = self.starts.shape
-        outer, cut = divmod(chunk, self._cuts)
-        places = np.unravel_index(outer, shape[: self.axis]) if self.axis else ()
-        first = cut * self.rows
-        return (
-            *[slice(int(place), int(place) + 1) for place in places],
-            slice(first, min(first + self.rows, shape[self.axis])),
-            *[slice(0, size) for size in shape[self.axis + 1 :]],
-        )
+        sizes = zip(self.place(chunk), self.chunk_shape, self.starts.shape, strict=True)
+        return tuple(slice(k * part, min((k + 1) * part, size)) for k, part, size in sizes)
 
     def shape_of(self, chunk: int) -> tuple[int, ...]:
         """Of a chunk."""
@@ -107,24 +103,16 @@ class Layout(NamedTuple):
 
     def numbers(self, chunk: int) -> tuple[int, int]:
         """The first of its starts, and the one after its last."""
-        region, shape = self.region(chunk), self.starts.shape
-        first = 0
-        for part, size in zip(region, shape, strict=True):
-            first = first * size + part.start
+        corner = [part.start for part in self.region(chunk)]
+        first = int(np.ravel_multi_index(corner, self.starts.shape))
         return first, first + math.prod(self.shape_of(chunk))
 
     @property
     def sizes(self) -> np.ndarray:
         """How many starts each chunk has, shape (chunks,)."""
-        full = math.prod(self.chunk_shape)
-        last = math.prod(self.shape_of(self._cuts - 1))
-        sizes = np.full((self.chunks // self._cuts, self._cuts), full)
-        sizes[:, -1] = last
-        return sizes.ravel()
-
-    @property
-    def _cuts(self) -> int:
-        return -(-self.starts.shape[self.axis] // self.rows)
+        along = zip(self._counts, self.chunk_shape, self.starts.shape, strict=True)
+        lengths = [np.minimum(part, size - part * np.arange(n)) for n, part, size in along]
+        return np.asarray(functools.reduce(np.multiply.outer, lengths)).ravel()
 
 
 def fields_of(starts: AbstractStarts, found: Labelled, batch: Batch) -> dict[str, np.ndarray]:

@@ -11,24 +11,22 @@ import numpy as np
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._files import user_path
 from jaxbiped._identity import provenance
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_label_errors
 from jaxbiped.basins._labels import Doubt, Label, Witness
+from jaxbiped.sweep._gait_family import Guesses
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import (
-    Guesses,
+    FINEST_FIRST,
     guesses_among,
     with_gaits_met,
     with_guesses,
 )
-from jaxbiped.sweep._labelling_settings import FINEST_FIRST
-from jaxbiped.sweep._store import ALL_GAITS, AbstractStore, MemoryStore
-from jaxbiped.sweep._store_files import GAITS, check_store
+from jaxbiped.sweep._store import ALL_GAITS, Store
+from jaxbiped.sweep._store_files import GAITS, check_continued, is_new, store_path, writing
 from jaxbiped.sweep._stored_fields import DOUBT_FIELDS, Layout, fields_of
 from jaxbiped.sweep._workers import compute_chunks
-from jaxbiped.sweep._zarr_store import ZarrStore
 from jaxbiped.sweep.starts._coordinates import coordinate_quantities
 from jaxbiped.sweep.starts._starts import AbstractStarts
 
@@ -97,9 +95,7 @@ def sweep(
     check_whole("workers", workers, 1)
     if not starts.size:
         raise ArgumentError("starts is empty: give at least one.")
-    path = None if store is None else user_path(store, "store")
-    if path is not None:
-        check_store(path)
+    path = store_path(store)
     began = time.perf_counter()
     quantities = coordinate_quantities(labelling.scene)
     units = {name: quantity.unit for name, quantity in quantities.items()}
@@ -111,16 +107,18 @@ def sweep(
         "chunk_shape": list(layout.chunk_shape),
     }
     writer = provenance(labelling.scene, labelling.effort.solver, starts)
-    if path is not None:
-        ZarrStore.check(path, labelling.settings() | own, writer, any_version=any_version)
+    if path is not None and not is_new(path):
+        # Before gaits are sought: they may be missing from these settings.
+        early = labelling.settings() | own
+        with writing(path):
+            check_continued(path, early, writer, any_version=any_version, but=GAITS)
     known = with_gaits_met(labelling, starts) if look_for_gaits else labelling
     settings = known.settings() | own
-    results: AbstractStore = (
-        MemoryStore(layout, settings, writer)
-        if path is None
-        else ZarrStore.open(path, layout, settings, writer, any_version=any_version)
-    )
-    missing = results.missing()
+    if path is None:
+        results = Store.in_memory(layout, settings, writer)
+    else:
+        results = Store.open(path, layout, settings, writer, any_version=any_version)
+    missing = results.behind()
     sizes = layout.sizes
     fresh = int(sizes[missing].sum())
     with tqdm(total=starts.size, unit="starts", disable=not progress, smoothing=0.05) as bar:
@@ -147,7 +145,7 @@ def sweep(
     return results.dataset()
 
 
-def _resolve(labelling: Labelling, layout: Layout, results: AbstractStore) -> Labelling:
+def _resolve(labelling: Labelling, layout: Layout, results: Store) -> Labelling:
     """Seeks gaits from starts that are unresolved but repeat a cycle; labels the unresolved anew.
 
     Where they were sought is noted first: a run that is killed here finds the same ones again,
@@ -179,7 +177,7 @@ def _resolve(labelling: Labelling, layout: Layout, results: AbstractStore) -> La
     return known
 
 
-def _guesses(labelling: Labelling, layout: Layout, results: AbstractStore) -> Guesses:
+def _guesses(labelling: Labelling, layout: Layout, results: Store) -> Guesses:
     """From some of the starts that are open, evenly spread over all of them."""
     counts = np.array([len(_open(results, chunk)) for chunk in range(layout.chunks)])
     before = np.cumsum(counts) - counts
@@ -195,7 +193,7 @@ def _guesses(labelling: Labelling, layout: Layout, results: AbstractStore) -> Gu
     return guesses_among(labelling, layout.starts, np.concatenate(numbers))
 
 
-def _open(results: AbstractStore, chunk: int) -> np.ndarray:
+def _open(results: Store, chunk: int) -> np.ndarray:
     """Places of a chunk's starts that are unresolved but repeat a cycle."""
     fields = results.read(chunk, ("label", "cycle_footsteps"))
     unresolved = fields["label"] == int(Label.UNRESOLVED)
@@ -205,7 +203,7 @@ def _open(results: AbstractStore, chunk: int) -> np.ndarray:
 def tightened(
     labelling: Labelling,
     layout: Layout,
-    results: AbstractStore,
+    results: Store,
     executor: Executor | None,
     workers: int,
 ) -> LabelErrors:
@@ -222,7 +220,8 @@ def tightened(
     while True:
         more = len(tolerances) - 1
         if more:
-            finer = _at_tolerance(labelling, tolerances[-1])
+            effort = labelling.effort._replace(rtol=tolerances[-1])
+            finer = dataclasses.replace(labelling, effort=effort)
             left = results.behind(ALL_GAITS + more)
             for chunk, fields in compute_chunks(finer, layout, left, executor, workers):
                 results.write(chunk, fields, mark=ALL_GAITS + more)
@@ -237,7 +236,7 @@ def tightened(
         results.note({_TOLERANCES: json.dumps(tolerances)})
 
 
-def tally_results(layout: Layout, results: AbstractStore) -> Seen:
+def tally_results(layout: Layout, results: Store) -> Seen:
     """What the witnesses saw of all starts, a chunk at a time."""
     total = Seen()
     for chunk in range(layout.chunks):
@@ -259,7 +258,3 @@ def tally_disagreements(doubt: np.ndarray, disagreed: np.ndarray, changed: np.nd
         looser & other,
     )
     return Seen(doubt.size, *[int(part.sum()) for part in parts])
-
-
-def _at_tolerance(labelling: Labelling, rtol: float) -> Labelling:
-    return dataclasses.replace(labelling, effort=labelling.effort.at_tolerance(rtol))

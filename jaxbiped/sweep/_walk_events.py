@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._contacts import Foot, feet, touches
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import CompliantScene, Scene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
@@ -59,10 +59,7 @@ def slip_distances(
 ) -> tuple[tuple[Scalar, Scalar], Scalar]:
     """The places at which the feet last came down, and how far the worse one has slid since [m].
 
-    Args:
-        scene: with the ground.
-        state: now.
-        landed: the places a step ago; see `contact_places`.
+    `landed` are these places a step ago; see `contact_places`.
     """
     both, places = feet(scene, state), contact_places(scene, state)
     kept = [
@@ -78,11 +75,8 @@ def grazes(
 ) -> Scalar:
     """Whether a foot's depth turns nearer to zero within a step than it is known to (boolean).
 
-    Args:
-        scene: with the ground.
-        span: the step's duration [s].
-        before, after: states at its ends.
-        rtol: relative tolerance; the depth counts as known to that share of the leg's length.
+    Within the `span` [s] from the state before to that after. The depth counts as known to the
+    share `rtol` of the leg's length.
     """
     pairs = list(zip(feet(scene, before), feet(scene, after), strict=True))
     known = rtol * scene.walker.l

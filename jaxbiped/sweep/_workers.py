@@ -1,5 +1,6 @@
 """Workers: chunks of a sweep labelled here, by spawned processes or by a dask cluster."""
 
+import contextlib
 import importlib
 import itertools
 import multiprocessing
@@ -113,9 +114,14 @@ def compute_chunks(
         ArgumentError: the workers cannot be sent the starts.
         ResourceError: the workers were lost.
     """
+    if executor is None and labelling.effort.may_use_device:
+        # While a chunk is written, the device labels the next one.
+        with ThreadPoolExecutor(1) as pool:
+            yield from compute_chunks(labelling, layout, chunks, pool, 1)
+        return
     if executor is None:
-        ahead = _one_ahead if labelling.effort.may_use_device else _one_by_one
-        yield from ahead(labelling, layout, chunks)
+        for chunk in map(int, chunks):
+            yield chunk, label_range(labelling, *_part(layout, chunk))
         return
     _check_sent(executor, labelling, layout)
     queue = map(int, chunks)
@@ -123,39 +129,20 @@ def compute_chunks(
     try:
         while True:
             for chunk in itertools.islice(queue, _AHEAD * workers - len(running)):
-                running[_submit(executor, labelling, layout, chunk)] = chunk
+                with _told_if_lost(executor, RuntimeError):
+                    future = executor.submit(label_range, labelling, *_part(layout, chunk))
+                running[future] = chunk
             if not running:
                 return
             ready, _ = wait(running, return_when=FIRST_COMPLETED)
             for future in ready:
                 chunk = running.pop(future)
-                yield chunk, _result(executor, future)
+                with _told_if_lost(executor, BrokenExecutor, CancelledError, OSError):
+                    fields = future.result()
+                yield chunk, fields
     finally:
         for future in running:
             future.cancel()
-
-
-def _one_by_one(
-    labelling: Labelling, layout: Layout, chunks: np.ndarray
-) -> Iterator[tuple[int, Fields]]:
-    for chunk in map(int, chunks):
-        yield chunk, label_range(labelling, *_part(layout, chunk))
-
-
-def _one_ahead(
-    labelling: Labelling, layout: Layout, chunks: np.ndarray
-) -> Iterator[tuple[int, Fields]]:
-    """While a chunk is written, a device labels the next one."""
-    with ThreadPoolExecutor(1) as pool:
-        labelled: list[tuple[int, Future[Fields]]] = []
-        for chunk in map(int, chunks):
-            future = pool.submit(label_range, labelling, *_part(layout, chunk))
-            labelled.append((chunk, future))
-            if len(labelled) > 1:
-                number, first = labelled.pop(0)
-                yield number, first.result()
-        for number, last in labelled:
-            yield number, last.result()
 
 
 def label_range(labelling: Labelling, starts: AbstractStarts, first: int, last: int) -> Fields:
@@ -172,31 +159,21 @@ def _part(layout: Layout, chunk: int) -> tuple[AbstractStarts, int, int]:
     return layout.starts, first, last
 
 
-def _submit(executor: Executor, labelling: Labelling, layout: Layout, chunk: int) -> Future[Fields]:
+@contextlib.contextmanager
+def _told_if_lost(executor: Executor, *signs: type[Exception]) -> Iterator[None]:
+    """Within, errors of these kinds mean that the workers were lost."""
     try:
-        return executor.submit(label_range, labelling, *_part(layout, chunk))
-    except (BrokenExecutor, RuntimeError) as error:
-        raise _lost(executor, error) from None
-
-
-def _result(executor: Executor, future: Future[Fields]) -> Fields:
-    try:
-        return future.result()
-    except (BrokenExecutor, CancelledError, OSError) as error:
-        raise _lost(executor, error) from None
+        yield
     except Exception as error:
-        # A cluster's own, such as KilledWorker, whose package may be missing here.
-        if type(error).__module__.split(".")[0] == "distributed":
-            raise _lost(executor, error) from None
-        raise
-
-
-def _lost(executor: Executor, error: BaseException) -> ResourceError:
-    what = " ".join(str(error).split()) or type(error).__name__
-    return ResourceError(
-        f"executor = {type(executor).__name__} lost its workers ({what[:200].rstrip('.')}): start "
-        "it anew and run again; the chunks that are complete stay in the store."
-    )
+        # A cluster has its own, such as KilledWorker, whose package may be missing here.
+        of_cluster = type(error).__module__.split(".")[0] == "distributed"
+        if not of_cluster and not isinstance(error, signs):
+            raise
+        what = " ".join(str(error).split()) or type(error).__name__
+        raise ResourceError(
+            f"executor = {type(executor).__name__} lost its workers ({what[:200].rstrip('.')}): "
+            "start it anew and run again; the chunks that are complete stay in the store."
+        ) from None
 
 
 def _check_sent(executor: Executor, labelling: Labelling, layout: Layout) -> None:

@@ -207,7 +207,6 @@ class _AdjointSolve:
         return self.engine, self.flow, self.size
 
     def program(self) -> Program:
-        """The program."""
         return Program(self.start, self.attempt, self.finish, stream=self.size, backwards=True)
 
     def start(self, given: _Given) -> _Now:

@@ -17,7 +17,7 @@ from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve.rosenbrock._linearisation import Components, split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import Stages, stages_of
 from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau, end_weights, error_weights
-from jaxbiped.variational._rosenbrock_tangents import kept_in_order
+from jaxbiped.variational._rosenbrock_tangents import kept_in_order, stage_matrices
 from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
 
 
@@ -154,7 +154,7 @@ def column_step(
     g, led = stages.step, len(stages.direct)
     start = jnp.stack([column[i] for i in order])
     zero_state = jnp.zeros_like(start)
-    inverse, entries = _inverse(stages)
+    inverse, entries = stage_matrices(stages)
     increments: list[Scalar] = []
     for i in range(len(tableau.alpha)):
         argument = _weighted_sum(tableau.a[i - 1] if i else (), increments, start)
@@ -175,24 +175,6 @@ def column_step(
     end = _weighted_sum(end_weights(tableau), increments, start)
     error = _weighted_sum(error_weights(tableau), increments, zero_state)
     return jnp.stack([end[i] for i in back]), jnp.stack([error[i] for i in back])
-
-
-def _inverse(stages: Stages) -> tuple[Scalar, Scalar]:
-    """(I − g J)⁻¹ of the kept components, and their J by the direct ones."""
-    kept = kept_in_order(stages)
-    places = [stages.kept.index(i) for i in kept]
-    inverse = jnp.stack([jnp.stack([stages.factors[i][j] for j in places]) for i in places])
-    if not stages.direct:
-        return inverse, jnp.zeros((len(kept), 0))
-    zero = jnp.zeros_like(stages.step)
-    entries = [
-        [
-            zero if entry is None else entry
-            for entry in (stages.jacobian[i][p] for p in stages.direct)
-        ]
-        for i in kept
-    ]
-    return inverse, jnp.stack([jnp.stack(row) for row in entries])
 
 
 def _weighted_sum(weights: Sequence[float], increments: Sequence[Scalar], start: Scalar) -> Scalar:

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from jax.flatten_util import ravel_pytree
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import AbstractEngine, Program
 from jaxbiped.variational._collocated_step import (
     KnownStep,
@@ -135,7 +135,6 @@ class FirstVariationSolve:
         self.engine, self.flow, self.row = engine, flow, row
 
     def program(self) -> Program:
-        """The program."""
         return Program(self.start, self.attempt, self.finish, record=self.record, stream=self.row)
 
     def start(self, given: FirstVariationInputs) -> _Now:
@@ -200,7 +199,7 @@ class FirstVariationSolve:
         )
         soon = (end - now.switched < SETTLED) & ~crossing.crossed & ~over
         waiting = now._replace(node=node, read=read, ends=jnp.asarray(False))
-        return jax.tree.map(lambda a, b: jnp.where(soon, a, b), waiting, after), over
+        return select(soon, waiting, after), over
 
     def record(
         self, given: FirstVariationInputs, now: _Now, time: Scalar

@@ -12,8 +12,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, Time
-from jaxbiped.dynamics._contact_forces import foot_forces
-from jaxbiped.dynamics._feet import with_leg_2_standing
+from jaxbiped.dynamics._contacts import foot_forces, with_leg_2_standing
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._redundant_motion import redundant_field
@@ -21,6 +20,7 @@ from jaxbiped.dynamics._redundant_state import LegsState
 from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.dynamics._state import RigidState, State, exchange_legs
+from jaxbiped.dynamics._state_quantities import CYCLIC
 from jaxbiped.dynamics._switches import Switch, switches
 from jaxbiped.scene._scene import (
     AbstractScene,
@@ -73,29 +73,39 @@ def system_of(scene: AbstractScene) -> AbstractSystem:
     return Walking() if scene.compliant else Rolling()
 
 
-class Walking(AbstractSystem):
-    """The walker: legs exchanged at each footstep, the place along the slope left out."""
+class AbstractWalking(AbstractSystem):
+    """A walker on compliant ground: legs exchanged at each footstep."""
 
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = (State._fields.index("hip_x"),)
+    def switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
+        return switches(args, y)
+
+    def ending(self, args: PyTree, y: PyTree) -> Scalar:
+        code = jnp.asarray(0)
+        for name, happens in ending_events(WATCHES).items():
+            code = jnp.where(happens(0.0, y, args), int(name), code)
+        return code
+
+    def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
+        return exchange_legs(y)
+
+    def load(self, args: PyTree, y: PyTree) -> Scalar:
+        """Normal force on the foot that carries more [N]."""
+        forces = foot_forces(args, y)
+        one, two = forces.foot_1.normal, forces.foot_2.normal
+        # Versions of JAX differentiate a maximum by other operations.
+        return jnp.where(one > two, one, two)
+
+
+class Walking(AbstractWalking):
+    """The walker in minimal coordinates, of which the place along the slope need not return."""
+
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(map(State._fields.index, CYCLIC))
 
     def vector_field(self, t: Time, y: State, args: Scene) -> State:
         return vector_field(t, y, args)
 
-    def switches(self, args: Scene, y: State) -> tuple[Switch, ...]:
-        return switches(args, y)
 
-    def ending(self, args: Scene, y: State) -> Scalar:
-        return _ending(args, y)
-
-    def reset_map(self, args: Scene, y: State) -> State:
-        return exchange_legs(y)
-
-    def load(self, args: Scene, y: State) -> Scalar:
-        """Normal force on the foot that carries more [N]."""
-        return _load(args, y)
-
-
-class RedundantWalking(AbstractSystem):
+class RedundantWalking(AbstractWalking):
     """The walker in coordinates of each leg. Its constraints leave fewer directions than leaves.
 
     `find_gait` tells its returns in minimal coordinates; by itself it is for `return_map`.
@@ -103,33 +113,6 @@ class RedundantWalking(AbstractSystem):
 
     def vector_field(self, t: Time, y: LegsState, args: RedundantScene) -> LegsState:
         return redundant_field(t, y, args)
-
-    def switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
-        return switches(args, y)
-
-    def ending(self, args: PyTree, y: PyTree) -> Scalar:
-        return _ending(args, y)
-
-    def reset_map(self, args: RedundantScene, y: LegsState) -> LegsState:
-        return exchange_legs(y)
-
-    def load(self, args: PyTree, y: PyTree) -> Scalar:
-        """Normal force on the foot that carries more [N]."""
-        return _load(args, y)
-
-
-def _ending(args: PyTree, y: PyTree) -> Scalar:
-    code = jnp.asarray(0)
-    for name, happens in ending_events(WATCHES).items():
-        code = jnp.where(happens(0.0, y, args), int(name), code)
-    return code
-
-
-def _load(args: PyTree, y: PyTree) -> Scalar:
-    forces = foot_forces(args, y)
-    one, two = forces.foot_1.normal, forces.foot_2.normal
-    # Versions of JAX differentiate a maximum by other operations.
-    return jnp.where(one > two, one, two)
 
 
 def section_of(scene: object, section: AbstractSection | None) -> AbstractSection:
@@ -162,7 +145,7 @@ def with_leg_names_of(section: AbstractSection, scene: AbstractScene, state: PyT
 class Rolling(AbstractSystem):
     """The rigid walker: it rolls on leg 2, and exchanges support at each heel strike."""
 
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = (RigidState._fields.index("hip_x"),)
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(map(RigidState._fields.index, CYCLIC))
 
     def vector_field(self, t: Time, y: RigidState, args: RigidScene) -> RigidState:
         return rolling_field(t, y, args)

@@ -136,7 +136,7 @@ def _column_stages(
 ) -> list[Scalar]:
     """dU_i of every stage, each of shape (components, n)."""
     step, led = stages.step, len(stages.direct)
-    inverse, entries = _inverse(stages)
+    inverse, entries = stage_matrices(stages)
     increments: list[Scalar] = []
     for i in range(len(tableau.alpha)):
         argument = columns
@@ -167,11 +167,13 @@ def _rows(matrix: Scalar, order: Sequence[int]) -> Scalar:
     return jnp.concatenate([matrix[i : i + 1] for i in order])
 
 
-def _inverse(stages: Stages) -> tuple[Scalar, Scalar]:
+def stage_matrices(stages: Stages) -> tuple[Scalar, Scalar]:
     """(I − g J)⁻¹ for the kept components alone, and their J by the direct ones."""
     kept = kept_in_order(stages)
     places = [stages.kept.index(i) for i in kept]
     inverse = jnp.stack([jnp.stack([stages.factors[i][j] for j in places]) for i in places])
+    if not stages.direct:
+        return inverse, jnp.zeros((len(kept), 0))
     zero = jnp.zeros_like(stages.step)
     rows = [
         [zero if stages.jacobian[i][p] is None else stages.jacobian[i][p] for p in stages.direct]

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.variational._tangents import Seeded, Watch, active_leaves, with_active
 
@@ -156,14 +156,10 @@ def saltation_at(watch: Watch, state: PyTree, args: Seeded, happens: Scalar) -> 
             saltation = Saltation((after - before) / safe, normal, by_parameter, which)
             delay = jnp.abs(value / safe)
             closer = delay < nearest
-            found = saltation if found is None else _where(closer, saltation, found)
+            found = saltation if found is None else select(closer, saltation, found)
             nearest = delay if k == 0 else jnp.where(closer, delay, nearest)
         assert found is not None
         return found
 
     found = fusion_barrier(happens, compute)
     return found._replace(change=jnp.where(happens, found.change, 0.0))
-
-
-def _where(condition: Scalar, a: Saltation, b: Saltation) -> Saltation:
-    return Saltation(*(jnp.where(condition, x, y) for x, y in zip(a, b, strict=True)))

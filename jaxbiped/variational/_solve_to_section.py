@@ -12,7 +12,7 @@ from jaxtyping import PyTree
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.compiler import Recorded, Recording
-from jaxbiped.solve._accuracy import Precision, rms_norm
+from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._first_and_last_step import first_step
 from jaxbiped.solve.controllers._tangent_step_size import step_control
@@ -24,6 +24,7 @@ from jaxbiped.variational._tangent_solver import (
     worst_norm,
 )
 from jaxbiped.variational._tangents import (
+    SectionSolve,
     Seeded,
     Tangents,
     Watch,
@@ -93,22 +94,18 @@ class SectionArrival(NamedTuple):
 
 
 def solve_to_section(
-    watch: Watch,
-    solver: diffrax.AbstractAdaptiveSolver[PyTree],
+    how: SectionSolve,
     y0: PyTree,
     args: PyTree,
     *,
-    precision: Precision,
-    max_time: Time,
-    max_solver_steps: int,
     columns_only_choose_steps: bool = False,
     save_nodes: bool = False,
 ) -> SectionArrival:
-    """Solves from `y0` until the section of `watch`, a failure, or `max_time` [s].
+    """Solves from `y0` through diffrax.
 
-    With `y0` a `Tangents` and `args` a `Seeded` the columns are carried along under
-    `precision.tangent_rtol`.
+    With `y0` a `Tangents` and `args` a `Seeded` the columns are carried along.
     """
+    watch, solver, precision = how.watch, how.solver, how.precision
     carries = isinstance(y0, Tangents)
     norm = worst_norm if carries else rms_norm
     units = units_of(plain_args(args), plain_state(y0))
@@ -127,7 +124,7 @@ def solve_to_section(
     end = diffrax.SubSaveAt(t1=True)
     every = diffrax.SubSaveAt(t0=True, steps=True, fn=_plain_node)
     subs = [end, every] if save_nodes else [end]
-    limit = jnp.asarray(max_time, dtype=jnp.result_type(*jtu.tree_leaves(y0)))
+    limit = jnp.asarray(how.max_time, dtype=jnp.result_type(*jtu.tree_leaves(y0)))
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(field),
         solver,
@@ -138,7 +135,7 @@ def solve_to_section(
         args=args,
         saveat=diffrax.SaveAt(subs=subs, controller_state=True),
         stepsize_controller=SwitchLocator(controller, watch),
-        max_steps=max_solver_steps,
+        max_steps=how.max_solver_steps,
         throw=False,
     )
     times: PyTree = solution.ts

@@ -12,14 +12,13 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractWrappedControl,
     Adapted,
     Attempt,
-    StepControl,
     try_again,
 )
 from jaxbiped.variational._grazing import turns_of
@@ -82,11 +81,9 @@ class SwitchLocator(AbstractWrappedControl):
     counts as an arrival, so a solve may start on its section.
     """
 
-    controller: StepControl
     watch: Watch
 
     def init(self, *request: Any) -> tuple[Scalar, SwitchLocatorState]:
-        """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(*request)
         _, _, _, y0, _, args, *_ = request
         zero, no = jnp.asarray(0), jnp.asarray(False)
@@ -217,11 +214,8 @@ class SwitchLocator(AbstractWrappedControl):
     ) -> SwitchLocatorState:
         code, sizes = old.code, old.sizes
         if sizes is not None:
-            sizes = jtu.tree_map(
-                lambda size, leaf: jnp.where(keep, jnp.maximum(size, jnp.abs(leaf)), size),
-                sizes,
-                after,
-            )
+            grown = jtu.tree_map(lambda s, leaf: jnp.maximum(s, jnp.abs(leaf)), sizes, after)
+            sizes = select(keep, grown, sizes)
         if self.watch.ending is not None:
             ending = functools.partial(self.watch.ending, scene, after)
             code = jnp.where(keep, fusion_barrier(keep, ending), 0)
@@ -231,7 +225,7 @@ class SwitchLocator(AbstractWrappedControl):
             record = keep & (value > peak)
             peak = jnp.where(record, value, peak)
             peak_saltation_pending = jnp.where(record, crossed.jump, peak_saltation_pending)
-            at_peak = jtu.tree_map(lambda a, b: jnp.where(record, a, b), y1, at_peak)
+            at_peak = select(record, y1, at_peak)
         return SwitchLocatorState(
             inner=inner,
             sizes=sizes,

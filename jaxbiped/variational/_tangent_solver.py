@@ -19,12 +19,14 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._projected_solver import Projected
 from jaxbiped.solve.controllers._wrapped_control import (
-    AbstractWrappedControl,
+    AbstractMemorylessControl,
     Adapted,
     Attempt,
-    StepControl,
 )
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
+    AbstractMemorylessSolver,
+    AbstractRosenbrock,
+)
 from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
 from jaxbiped.variational._saltation import has_saltation, jump_surface_values, saltation_at
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
@@ -43,7 +45,7 @@ class VariationalField(eqx.Module):
         return Tangents(rate, as_columns(columns))
 
 
-class TangentSolver(diffrax.AbstractAdaptiveSolver):  # type: ignore[type-arg]
+class TangentSolver(AbstractMemorylessSolver):
     """Steps a state and its columns: the columns by the exact derivative of the solver's step.
 
     They share the step's Jacobian and factorisation. Their error estimate is the derivative of
@@ -59,26 +61,15 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):  # type: ignore[type-arg]
     watch: Watch
     solver: diffrax.AbstractAdaptiveSolver[PyTree]
     columns_only_choose_steps: bool = eqx.field(static=True, default=False)
-    term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar[type[diffrax.LocalLinearInterpolation]] = (
         diffrax.LocalLinearInterpolation
     )
 
     def order(self, terms: Any) -> int | None:
-        """Order of the solver."""
         return self.solver.order(terms)
 
     def error_order(self, terms: Any) -> RealScalarLike | None:
-        """Order of the solver's error estimate."""
         return self.solver.error_order(terms)
-
-    def init(self, terms: Any, t0: Time, t1: Time, y0: Tangents, args: Seeded) -> None:
-        """Nothing is carried from step to step."""
-        return None
-
-    def func(self, terms: Any, t0: Time, y0: Tangents, args: Seeded) -> Tangents:
-        """The vector field at a point."""
-        return terms.vf(t0, y0, args)
 
     def step(
         self,
@@ -151,29 +142,22 @@ def _tangent_step(
     return Tangents(y1, as_columns(columns)), Tangents(error, as_columns(column_errors))
 
 
-class TangentControl(AbstractWrappedControl):
+class TangentControl(AbstractMemorylessControl):
     """Lets the columns' errors into a controller's norm, with a tolerance of their own.
 
     An entry's error is measured against its own size, a share of the largest entry of its column,
     and the column's floor, each in its leaf's unit: a column that is zero, or fades away, must not
-    choose the steps.
+    choose the steps. The wrapped controller's norm is `worst_norm`.
 
     Attributes:
-        controller: decides every step's size; its norm is `worst_norm`.
         tangent_rtol: tolerance of the columns, relative.
         inverse_units: of the state's leaves, shape (c,).
     """
 
-    controller: StepControl
     tangent_rtol: RealScalarLike
     inverse_units: Scalar
 
-    def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
-        return self.controller.init(*request)
-
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does."""
         inverse = self.inverse_units[:, None]
         size = jnp.maximum(jnp.abs(attempt.y0.columns), jnp.abs(attempt.y1.columns)) * inverse
         floor = SHARE * jnp.max(size, axis=0) + attempt.args.floors

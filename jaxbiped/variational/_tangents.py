@@ -4,14 +4,16 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, VectorField
+from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.dynamics._switches import Switch
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import Units
 
 _ROUNDING = 1e-12
@@ -63,14 +65,10 @@ def along_columns(
     function: Callable[[PyTree, PyTree], PyTree], y: Tangents, args: Seeded
 ) -> tuple[PyTree, PyTree]:
     """`function(state, args)` and its derivatives along the columns, leaves of shape (n, …)."""
-    state, structure = jtu.tree_flatten(y.state)
-
-    def of_leaves(state: list[Scalar], parameters: list[Scalar]) -> PyTree:
-        return function(jtu.tree_unflatten(structure, state), with_active(args, parameters))
+    of_leaves, leaves = _of_leaves(function, y, args)
 
     def along(column: Scalar, seed: Scalar) -> PyTree:
-        tangents = (list(column), list(seed))
-        return jax.jvp(of_leaves, (state, active_leaves(args)), tangents)
+        return jax.jvp(of_leaves, leaves, (list(column), list(seed)))
 
     return jax.vmap(along, in_axes=-1, out_axes=(None, 0))(y.columns, args.seeds)
 
@@ -79,17 +77,26 @@ def along_columns_in_turn(
     function: Callable[[PyTree, PyTree], PyTree], y: Tangents, args: Seeded
 ) -> tuple[PyTree, PyTree]:
     """`along_columns`, one column after the other."""
+    of_leaves, leaves = _of_leaves(function, y, args)
+
+    def along(each: tuple[Scalar, Scalar]) -> PyTree:
+        tangents = tuple([part[i] for i in range(part.shape[0])] for part in each)
+        return jax.jvp(of_leaves, leaves, tangents)[1]
+
+    found = jax.lax.map(along, (y.columns.T, args.seeds.T))
+    return of_leaves(*leaves), found
+
+
+def _of_leaves(
+    function: Callable[[PyTree, PyTree], PyTree], y: Tangents, args: Seeded
+) -> tuple[Callable[..., PyTree], tuple[list[Scalar], list[Scalar]]]:
+    """A function of the state's and the active leaves, and these."""
     state, structure = jtu.tree_flatten(y.state)
 
     def of_leaves(state: list[Scalar], parameters: list[Scalar]) -> PyTree:
         return function(jtu.tree_unflatten(structure, state), with_active(args, parameters))
 
-    def along(each: tuple[Scalar, Scalar]) -> PyTree:
-        tangents = tuple([part[i] for i in range(part.shape[0])] for part in each)
-        return jax.jvp(of_leaves, (state, active_leaves(args)), tangents)[1]
-
-    found = jax.lax.map(along, (y.columns.T, args.seeds.T))
-    return of_leaves(state, active_leaves(args)), found
+    return of_leaves, (state, active_leaves(args))
 
 
 def as_columns(tangents: PyTree) -> Scalar:
@@ -126,6 +133,24 @@ class Watch(eqx.Module):
     )
     ending: Callable[[PyTree, PyTree], Scalar] | None = eqx.field(static=True, default=None)
     peak: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
+
+
+class SectionSolve(NamedTuple):
+    """How motions are followed: to a section, a failure or the end of their time.
+
+    Attributes:
+        watch: what steps end on, and what ends the solve.
+        solver: of the steps.
+        precision: tolerances of states and columns.
+        max_time: longest time [s].
+        max_solver_steps: cap on the attempted steps.
+    """
+
+    watch: Watch
+    solver: diffrax.AbstractAdaptiveSolver[PyTree]
+    precision: Precision
+    max_time: Time
+    max_solver_steps: int
 
 
 def surfaces_of(watch: Watch, peak: PyTree, scene: PyTree, state: PyTree) -> list[Switch]:

@@ -86,7 +86,6 @@ class AdaptiveColumns:
         self.term: diffrax.ODETerm[PyTree] = diffrax.ODETerm(watch.field)
 
     def program(self) -> Program:
-        """The program."""
         record = self.record if self.save_nodes else None
         return Program(self.start, self.attempt, self.finish, record=record)
 
@@ -134,7 +133,7 @@ class AdaptiveColumns:
         )
         limit = given.max_time
         t, next_t = clip_step(keep, t, next_t, limit, given.almost)
-        state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), step.end, now.state)
+        state = select(keep, step.end, now.state)
         columns, peaks, peak_shifts = now.columns, now.peak_columns, now.peak_shifts
         new_columns, shifts = self._met(given, now, landed.crossed_field, new_columns)
         if self.watch.peak is None:

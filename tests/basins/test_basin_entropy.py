@@ -77,20 +77,3 @@ def test_newtons_basins_are_fractal_and_a_disc_is_not():
     assert not disc.fractal
     assert disc.boundary + 3 * disc.boundary_error < np.log(2.0)
     assert disc.basin < newtons.basin
-
-
-@pytest.mark.parametrize(
-    ("labels", "box", "words"),
-    [
-        (np.zeros((9, 4), int), 5, ("box", "5", "at most 4")),
-        (np.zeros((9, 9), int), 1, ("box", "1", "at least 2")),
-        (np.zeros((9, 9), int), 2.5, ("box", "2.5", "whole")),
-        (np.full((9, 9), np.nan), 5, ("labels", "float64", "whole numbers")),
-        (np.zeros((9, 0), int), 5, ("labels", "(9, 0)", "at least one")),
-        (np.array([[0, -1], [0, 0]]), 2, ("labels", "1 pending entries of 4")),
-    ],
-)
-def test_bad_arguments_are_named(labels, box, words):
-    with pytest.raises(jb.ArgumentError) as caught:
-        jb.basins.entropy(labels, box=box)
-    assert all(word in str(caught.value) for word in words)

@@ -86,26 +86,6 @@ def test_boxes_share_their_faces_and_the_far_ends_are_left_out():
     np.testing.assert_array_equal(found.counts, [4, 1, 4, 1])
 
 
-@pytest.mark.parametrize(
-    ("labels", "options", "words"),
-    [
-        (np.zeros((65, 65), int), {}, ("boundary", "0 of 5", "at least 3")),
-        (np.eye(9, dtype=int), {}, ("2 of 2", "at least 3")),
-        (np.eye(65, dtype=int), {"skip": 5}, ("0 of 0", "at least 3")),
-        (np.eye(65, dtype=int), {"skip": -1}, ("skip", "-1", "at least 0")),
-        (np.eye(65, dtype=int), {"sides": (1, 2, 128)}, ("sides", "128", "at most 64")),
-        (np.eye(65, dtype=int), {"sides": (1, 2, 3, 4)}, ("sides", "divide the largest")),
-        (np.eye(65), {}, ("labels", "float64", "whole numbers")),
-        (np.zeros((0, 3), int), {}, ("labels", "(0, 3)", "at least one")),
-        (np.full((65, 65), -1), {}, ("labels", "4225 pending", "labelled")),
-    ],
-)
-def test_bad_arguments_are_named(labels, options, words):
-    with pytest.raises(jb.ArgumentError) as caught:
-        jb.basins.boundary_dimension(labels, **options)
-    assert all(word in str(caught.value) for word in words)
-
-
 def test_levels_set_the_sizes_of_a_refined_boundary():
     refined = jb.basins.refine_boundary(ball((0.0, 0.1), 0.5), *SQUARE, (4, 4), levels=3)
     with pytest.raises(jb.ArgumentError, match="sides"):
@@ -177,39 +157,3 @@ def test_asks_once_for_each_start_and_never_outside_the_box():
     two = jb.basins.sampled_uncertainty(label_of, lower, upper, batch=101, **options)
     np.testing.assert_array_equal(one.fractions, two.fractions)
     assert max(len(points) for points in label_of.calls[1:]) == 101
-
-
-@pytest.mark.parametrize(
-    ("labels", "distances", "words"),
-    [
-        (np.zeros((99, 99), int), None, ("labels", "0 of", "at least 3")),
-        (np.eye(99, dtype=int), (1, 2, 50), ("distances", "50", "below 49.5")),
-        (np.eye(99, dtype=int), (0, 1, 2), ("distances", "0", "at least 1")),
-        (np.int64(3), None, ("labels", "()", "grid")),
-        (np.full((9, 9), -1), None, ("labels", "81 pending")),
-    ],
-)
-def test_bad_grids_are_named(labels, distances, words):
-    with pytest.raises(jb.ArgumentError) as caught:
-        jb.basins.uncertainty_exponent(labels, distances=distances)
-    assert all(word in str(caught.value) for word in words)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"distances": (0.01, 0.6)}, ("distances", "0.6", "below 0.5")),
-        ({"distances": (0.01, -0.1)}, ("distances", "-0.1", "above 0")),
-        ({"distances": ()}, ("distances", "(0,)")),
-        ({"samples": 0}, ("samples", "0", "at least 1")),
-        ({"upper": (0.0, 1.0)}, ("lower[0] = 0", "below")),
-        ({"label_of": half_space((1.0, 0.0), 5.0)}, ("0 of 3", "at least 3")),
-    ],
-)
-def test_bad_samples_are_named(change, words):
-    right = {"lower": (0.0, 0.0), "upper": (1.0, 1.0), "distances": (0.01, 0.02, 0.1)}
-    with pytest.raises(jb.ArgumentError) as caught:
-        jb.basins.sampled_uncertainty(
-            **({"label_of": ball((0, 0), 0.5), "samples": 64} | right | change)
-        )
-    assert all(word in str(caught.value) for word in words)

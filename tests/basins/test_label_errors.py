@@ -4,7 +4,6 @@ import warnings
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import jaxbiped as jb
 from jaxbiped.basins._label_errors import Seen, estimate_label_errors
@@ -56,8 +55,3 @@ def test_nothing_seen_is_not_certain_and_an_excess_is_warned_of():
         warnings.simplefilter("error")
         none.warn()
     assert jb.basins.LabelErrors(**many.numbers()) == many
-
-
-def test_a_sweep_by_a_named_accuracy_tells_no_errors():
-    with pytest.raises(jb.ArgumentError, match="tells no errors of its labels"):
-        jb.basins.label_errors(xr.Dataset())

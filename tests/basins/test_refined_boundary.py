@@ -139,27 +139,3 @@ def test_a_grid_too_large_to_fill_is_refused():
     refined = jb.basins.refine_boundary(half_space((1.0, 0.3), 0.1), *SQUARE, (2, 2), levels=8)
     with pytest.raises(jb.ArgumentError, match=r"263169 points.*largest = 1000"):
         refined.on_grid(largest=1000)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"lower": (0.0, 2.0)}, ("lower[1] = 2", "below", "upper[1] = 1")),
-        ({"upper": (1.0, np.nan)}, ("upper", "nan", "finite")),
-        ({"upper": (1.0,)}, ("(2,)", "(1,)", "same")),
-        ({"lower": (), "upper": ()}, ("lower", "(0,)", "(d,)")),
-        ({"shape": (4, 0)}, ("shape", "0", "at least 1")),
-        ({"shape": (4,)}, ("shape", "1 entries", "2 dimensions")),
-        ({"shape": (4.5, 2)}, ("shape", "4.5", "whole")),
-        ({"levels": -1}, ("levels", "-1", "at least 0")),
-        ({"levels": 40}, ("levels", "40", "2^62")),
-        ({"batch": 0}, ("batch", "0", "at least 1")),
-        ({"label_of": lambda points: points[:, 0]}, ("label_of", "float64", "whole numbers")),
-        ({"label_of": lambda points: np.zeros(3, int)}, ("label_of", "(3,)", "(25,)")),
-    ],
-)
-def test_bad_arguments_are_named(change, words):
-    right = {"lower": (0.0, 0.0), "upper": (1.0, 1.0), "shape": (4, 4), "levels": 2}
-    with pytest.raises(jb.ArgumentError) as caught:
-        jb.basins.refine_boundary(**({"label_of": ball((0, 0), 1.0)} | right | change))
-    assert all(word in str(caught.value) for word in words)

@@ -1,10 +1,8 @@
-"""What becomes of starts, by SciPy's integrators and geometry alone."""
+"""What becomes of starts of the seed's walker, by SciPy's integrators and geometry alone."""
 
 import numpy as np
 from reference.compliant import SEED, foot
-from reference.rigid import rigid_walker
 from reference.scipy_solves import solution
-from scipy.integrate import solve_ivp
 
 _LENGTH = SEED["l"] - SEED["r"]
 
@@ -47,35 +45,3 @@ def seed_fate(start, most_time):
     met += list(zip(second, solved.y_events[3], strict=True))
     met.sort(key=lambda each: each[0])
     return "walking", most_time, np.array([y[1:] for _, y in met])
-
-
-def rigid_fate(scene, state, most):
-    """In words, with the number of footsteps; of a walk, angles and rates after each (n, 4)."""
-    walker, y, met = rigid_walker(scene), np.array([float(leaf) for leaf in state[1:]]), []
-    for count in range(most):
-
-        def strikes(t, y):
-            # Negative before the legs pass each other: what rises is no strike.
-            return y[0] + y[1] if y[0] > y[1] else -1.0
-
-        def forward(t, y):
-            return y[1] + 1.0
-
-        def back(t, y):
-            return y[1] - 1.0
-
-        for event in (strikes, forward, back):
-            event.terminal = True
-        strikes.direction = -1
-        solved = solve_ivp(
-            lambda t, y: walker.rates(y), (0.0, 50.0), y, "DOP853",
-            rtol=1e-8, atol=1e-10, events=(strikes, forward, back),
-        )  # fmt: skip
-        if len(solved.t_events[1]):
-            return "fell forward", count, None
-        if len(solved.t_events[2]):
-            return "fell back", count, None
-        # The leg that struck stands from now on, and is the second.
-        y = walker.after_impact(solved.y[:, -1])
-        met.append(y)
-    return "walking", most, np.array(met)

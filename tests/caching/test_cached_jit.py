@@ -113,8 +113,9 @@ def test_functions_of_a_notebook_are_compiled_as_ever(cache):
     np.testing.assert_array_equal(value, [2.0, 2.0])
     assert name == "b"
     assert disk_use()["xla"].entries == 0
-    assert double.result_shape(jnp.ones(3))[0].shape == (3,)
-    double.begin(jnp.ones(4))()
+    begun = double.begin(jnp.ones(3))
+    assert begun.result[0].shape == (3,)
+    begun.finish()
 
 
 def test_without_a_cache_it_is_compiled_as_ever(cache, monkeypatch):
@@ -137,10 +138,10 @@ print(float(just_before_end(2.0)) < 2.0)
 
 
 def test_its_shape_is_known_before_and_after(cache):
-    before = just_before_end.result_shape(np.ones(3))
-    just_before_end.begin(np.ones(3))()
+    before, finish = just_before_end.begin(np.ones(3))[::-1]
+    finish()
     just_before_end.clear()
-    after = just_before_end.result_shape(np.ones(3))
+    after = just_before_end.begin(np.ones(3)).result
     assert (before.shape, before.dtype) == (after.shape, after.dtype) == ((3,), np.float64)
 
 

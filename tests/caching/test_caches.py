@@ -6,7 +6,6 @@ import gc
 import threading
 import weakref
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -15,17 +14,16 @@ import jaxbiped as jb
 from jaxbiped.caching import _caches
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import Once, bounded_cache
-from jaxbiped.compiler.runtime import _compiled_program, _record_cache
+from jaxbiped.compiler.runtime import _compiled_program, _lane_call
 from jaxbiped.compiler.runtime._engine_interface import Request
 from jaxbiped.compiler.runtime._lane_engine import LaneEngine
 from jaxbiped.compiler.runtime._machine_code import _LOADED
-from jaxbiped.compiler.runtime._primitive import call_recording
-from jaxbiped.compiler.runtime._program import Program
+from jaxbiped.compiler.runtime._primitive import call
 from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.simulate._rigid_simulation import rigid_program
 from jaxbiped.solve._failure_events import WATCHES, ending_events
-from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk
-from tests.compiler.one_shot import compiled
+from tests.compiler.one_shot import compiled, stepped
 from tests.sweep.walkers import same
 
 POINTS = np.linspace(-1.0, 1.0, 5)
@@ -185,15 +183,13 @@ def test_the_environment_bounds_records_and_buffers(monkeypatch, limit):
     def record(given, carried, time):
         return carried > 0.0, [carried]
 
-    number = jax.ShapeDtypeStruct((), jnp.float64)
-    program = Program(jnp.zeros_like, attempt, lambda given, carried: carried, record=record)
-    program = _compiled_program.CompiledProgram(program, number)
+    program = stepped(attempt, start=jnp.zeros_like, record=record)
     jb.clear_caches()
     monkeypatch.setenv("JAXBIPED_CACHE_BYTES", limit)
-    _, recording = call_recording(program, jnp.asarray(1.0), room=6, quick=True)
+    _, recording = call(program, jnp.asarray(1.0), room=6, quick=True, keeps_records=True)
     half = {"0": 0, "100": 50}.get(limit, 1 << 29)
     # One input and five records of one number each are 48 bytes.
-    assert _record_cache._RECORDS.kept == (48 if half else 0)
+    assert _lane_call._RECORDS.kept == (48 if half else 0)
     (values,) = recording.columns(np.zeros(1))
     np.testing.assert_array_equal(values[:6], range(6))
     gc.collect()

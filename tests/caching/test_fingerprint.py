@@ -49,13 +49,16 @@ def test_another_process_knows_the_same():
 def test_things_that_differ_are_told_apart():
     stiffer = dataclasses.replace(SCENE, friction=jb.laws.Frictionless())
     things = [
-        *KNOWN.values(), (stiffer,), (1,), (1.0,), (True,), ("1",), (None,), ((),), ((1,),),
-        ([1],), ((1, 2),), ((1, (2,)),), ({"a": 1},), ({"b": 1},), (np.zeros(2),),
-        (np.zeros(2, np.float32),), (np.zeros((2, 1)),), (Leaf((2,), "float64", False),),
+        *KNOWN.values(), (stiffer,), (1,), (1.0,), (True,), ("1",), (None,), (0,), ((),), ((1,),),
+        ([1],), ((1, 2),), ((2, 1),), ((1, (2,)),), (((1, 2),),), ({"a": 1},), ({"b": 1},),
+        ({"a": 2},), (slice(0, 2),), (slice(0, 3),), (np.zeros(2),), (np.zeros(2, np.int32),),
+        (np.zeros(2, np.float32),), (np.zeros((2, 1)),), (np.zeros((2, 3)),), (np.zeros((3, 2)),),
+        (np.array([1.0, 2.0]),), (np.array([2.0, 1.0]),), (Leaf((2,), "float64", False),),
         (Leaf((2,), "float64", True),), (0.0,), (-0.0,), (jnp.sin,), (jnp.cos,),
         (functools.partial(jb.simulate, footsteps=2),),
     ]  # fmt: skip
     found = [fingerprint(*each) for each in things]
+    assert found == [fingerprint(*each) for each in things]
     assert None not in found
     assert len(set(found)) == len(found)
 
@@ -105,18 +108,6 @@ def test_traced_arrays_have_none():
     assert seen == [None]
 
 
-@pytest.mark.parametrize("setting", ["jax_numpy_dtype_promotion", "jax_default_matmul_precision"])
-def test_settings_count(setting):
-    before = fingerprint(1)
-    value = getattr(jax.config, setting)
-    jax.config.update(setting, "standard" if "promotion" in setting else "highest")
-    try:
-        assert fingerprint(1) != before
-    finally:
-        jax.config.update(setting, value)
-    assert fingerprint(1) == before
-
-
 def test_the_source_counts(monkeypatch):
     before = fingerprint(1)
     monkeypatch.setattr(_fingerprint, "_libraries", lambda: "another version")
@@ -159,27 +150,6 @@ def test_functions_are_told_apart_by(change):
 def test_the_line_of_a_function_is_no_part():
     moved = of_the_package(code=_scaled.__code__.replace(co_firstlineno=1))
     assert fingerprint(moved) == fingerprint(of_the_package())
-
-
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        (np.zeros(2, np.int32), np.zeros(2, np.float32)),
-        (np.zeros((2, 3)), np.zeros((3, 2))),
-        (np.array([1.0, 2.0]), np.array([2.0, 1.0])),
-        ((1, 2), (2, 1)),
-        ({"a": 1}, {"a": 2}),
-        ({"a": 1}, {"b": 1}),
-        (1, 1.0),
-        (True, 1),
-        (None, 0),
-        ((1, (2,)), ((1, 2),)),
-        (slice(0, 2), slice(0, 3)),
-    ],
-)
-def test_values_are_told_apart(one, other):
-    assert fingerprint(one) == fingerprint(one) is not None
-    assert fingerprint(one) != fingerprint(other)
 
 
 @pytest.mark.parametrize(

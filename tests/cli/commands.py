@@ -2,10 +2,13 @@
 
 import json
 import shlex
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import pytest
 
 from jaxbiped.cli import main
+from tests.drawn import saved_figures
 
 
 def run(*arguments):
@@ -19,6 +22,23 @@ def numbers_of(capsys, *arguments):
     """What a command that ends well writes as JSON."""
     assert run(*arguments, "--json", "-") == 0
     return json.loads(capsys.readouterr().out)
+
+
+class Outputs(NamedTuple):
+    """All that a command left: exit code, folder of its files, their figures, its numbers."""
+
+    code: int
+    folder: Path
+    figures: dict
+    numbers: Any
+
+
+def outputs_of(folder, *arguments):
+    """What a command leaves that is asked for every output; NaN and Infinity are no JSON."""
+    out, told = folder / "out", folder / "numbers.json"
+    with saved_figures() as figures:
+        code = run(*arguments, "--out", out, "--json", told)
+    return Outputs(code, out, figures, json.loads(told.read_text(), parse_constant=pytest.fail))
 
 
 def refused(command, capsys):

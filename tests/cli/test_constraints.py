@@ -10,32 +10,23 @@ from jaxbiped.cli import _constraint_comparison
 from jaxbiped.cli import _constraints as command
 from jaxbiped.cli._constraint_comparison import ConstraintRun, time_run
 from jaxbiped.cli._scene_options import SceneOptions
-from tests.cli.commands import run
-from tests.drawn import assert_is_drawn, points_of, saved_figures
+from tests.cli.commands import outputs_of, run
+from tests.drawn import assert_is_drawn, points_of
 
 
 @pytest.mark.slow
 def test_compares_methods_and_integrators(capsys, tmp_path):
     flags = ("--methods", "standard", "described", "--duration", "0.05")
     integrators = ("--integrators", "euler:dt=1e-5", "euler:dt=2e-3")
-    picture = tmp_path / "made" / "constraints.png"
-    out = ("--json", "-", "--out", str(picture.parent))
-    with saved_figures() as figures:
-        assert run("constraints", *flags, *integrators, *out) == 0
-    assert picture.is_file()
-    (figure,) = figures.values()
+    outputs = outputs_of(tmp_path, "constraints", *flags, *integrators)
+    assert outputs.code == 0
+    (figure,) = outputs.figures.values()
     assert_is_drawn(figure, unitless={"method"})
-    shown = capsys.readouterr()
-    assert "4/4" in shown.err
-    told = json.loads(shown.out)
-    runs = told["runs"]
-    assert told["complete"]
-    assert [(run["method"], run["rtol_or_dt"]) for run in runs] == [
-        ("standard", 1e-5),
-        ("described", 1e-5),
-        ("standard", 2e-3),
-        ("described", 2e-3),
-    ]
+    assert "4/4" in capsys.readouterr().err
+    assert outputs.numbers["complete"]
+    runs = outputs.numbers["runs"]
+    ran = [(run["method"], run["rtol_or_dt"]) for run in runs]
+    assert ran == [(name, dt) for dt in (1e-5, 2e-3) for name in ("standard", "described")]
     marks = points_of(figure.axes[0], "euler, steps of 1e-05 s")[0]
     np.testing.assert_allclose(marks[0, 0], runs[0]["max_violation_m"])
     for each in runs:
@@ -109,14 +100,13 @@ def test_flags_build_the_scene():
 
 @pytest.mark.slow
 def test_walk_tells_of_the_hip(tmp_path):
-    written = tmp_path / "walk.json"
     flags = ("--formulation", "redundant", "--method", "described", "--duration", "1.3")
-    assert run("walk", *flags, "--json", str(written), "--out", str(tmp_path)) == 0
-    numbers = json.loads(written.read_text())
-    assert numbers["steps"][0]["period_s"] == pytest.approx(0.4415, abs=5e-4)
-    held = numbers["constraints"]
+    outputs = outputs_of(tmp_path, "walk", *flags)
+    assert outputs.code == 0
+    assert outputs.numbers["steps"][0]["period_s"] == pytest.approx(0.4415, abs=5e-4)
+    held = outputs.numbers["constraints"]
     assert held["method"] == "described"
     assert held["max_violation_m"] < 1e-12
     assert held["max_hip_force_N"] == pytest.approx(150.0, rel=0.05)
-    assert (tmp_path / "strobe.png").exists()
-    assert (tmp_path / "trajectory.nc").exists()
+    assert (outputs.folder / "strobe.png").exists()
+    assert (outputs.folder / "trajectory.nc").exists()

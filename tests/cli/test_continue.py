@@ -1,33 +1,25 @@
 """`jaxbiped continue` as a user meets it, against the branch's own numbers."""
 
-import json
-
 import pytest
 import xarray
 
 import jaxbiped as jb
-from tests.cli.commands import numbers_of, run
-from tests.drawn import assert_is_drawn, saved_figures
+from tests.cli.commands import numbers_of, outputs_of, run
+from tests.drawn import assert_is_drawn
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def followed(tmp_path_factory):
-    """The command run once, with every output: exit code, folder, figures."""
-    folder = tmp_path_factory.mktemp("continue")
-    with saved_figures() as figures:
-        code = run(
-            "continue", "--model", "rigid", "--along", "slope", "--from", "0.01", "--to", "0.11",
-            "--out", folder / "out", "--json", folder / "branch.json",
-        )  # fmt: skip
-    return code, folder, figures
+    """The command run once, with every output."""
+    along = ["--along", "slope", "--from", "0.01", "--to", "0.11"]
+    return outputs_of(tmp_path_factory.mktemp("continue"), "continue", "--model", "rigid", *along)
 
 
 def test_the_numbers(followed):
-    code, folder, _ = followed
-    assert code == 0
-    numbers = json.loads((folder / "branch.json").read_text())
+    assert followed.code == 0
+    numbers = followed.numbers
     for point in numbers["points"]:
         assert set(point) == {
             "slope", "value", "period_s", "step_length_m", "multipliers", "multiplier_errors",
@@ -47,12 +39,12 @@ def test_the_numbers(followed):
 
 
 def test_figures_and_dataset(followed):
-    _, folder, figures = followed
+    figures = followed.figures
     assert set(figures) == {"branch.png", "spectral_radius.png"}
     for figure in figures.values():
         assert_is_drawn(figure)
     scene = jb.RigidScene(walker=jb.seed_scene().walker, ground=jb.Ground(slope=0.02))
-    branch = jb.continuation.open_branch(xarray.open_dataset(folder / "out" / "branch.nc"), scene)
+    branch = jb.continuation.open_branch(xarray.open_dataset(followed.folder / "branch.nc"), scene)
     assert len(branch.bifurcations) == 1
 
 

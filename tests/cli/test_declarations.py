@@ -16,6 +16,7 @@ from jaxbiped.cli._scene_options import SEED
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 from jaxbiped.solve._solvers import SOLVERS
 from jaxbiped.sweep._sweep import CHUNK
+from tests.cli.test_refusal import EARLY
 
 
 @pytest.mark.parametrize(
@@ -102,49 +103,38 @@ def test_help_is_ascii():
 
 
 _ASK = """
-import contextlib, io, sys
+import contextlib, io, shlex, sys
 from jaxbiped.cli import main
 for text in sys.stdin.read().splitlines():
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            main(text.split())
+            main(shlex.split(text))
         code = 0
     except SystemExit as ended:
         code = ended.code
-    print(code, "jax" in sys.modules, text)
+    print(code, sys.argv[1] in sys.modules, text)
 """
 _ANSWERED = ("--help", "walk --help", "gait --help", "basin --help", "--version", "version")
-_REFUSED = (
-    "wlak", "walk --slop 1", "walk --slope nan", "walk --slope 2", "walk --K -1", "walk --n x",
-    "walk --l 0.01", "walk --hip-z inf", "walk --normal glue", "walk --set K", "walk --dt 0",
-    "walk --model rigid --K 5", "walk --method index1", "walk --duration -1", "walk --solver rk",
-    "walk --accuracy rough", "walk --accuracy -1", "walk --hip-spring stiff",
-    "gait --friction nonsense", "gait --section foot", "gait --footsteps 0", "gait --engine gpu",
-    "continue --accuracy rough", "continue --from nan", "basin --x K", "basin --samples 0",
-    "basin --sampling best", "basin --workers 0", "fit missing.json --vary K",
-    "optimise --vary d --optimiser best", "constraints --methods glue",
-    "constraints --integrators euler", "trade --repeats 0", "models --json /nowhere/models.json",
-    "walk --json /nowhere/walk.json", "constraints --json /nowhere/constraints.json",
-)  # fmt: skip
+
+
+def _answers(module, asked):
+    """To each command line: exit code, and whether a module was imported by then."""
+    ran = subprocess.run(
+        [sys.executable, "-c", _ASK, module],
+        input="\n".join(asked), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    told = [line.split(" ", 2) for line in ran.stdout.splitlines()]
+    assert [text for _, _, text in told] == list(asked)
+    return {text: (int(code), imported == "True") for code, imported, text in told}
 
 
 def test_help_and_unknown_options_do_without_numpy():
-    asked = "--help\ngait --help\ngait --slopee 3\nwlak"
-    script = _ASK.replace('"jax" in', '"numpy" in')
-    ran = subprocess.run(
-        [sys.executable, "-c", script], input=asked, capture_output=True, text=True, check=True
-    )
-    imported = [line.split(" ", 2)[1] for line in ran.stdout.splitlines()]
-    assert imported == ["False"] * 4
+    answers = _answers("numpy", ("--help", "gait --help", "gait --slopee 3", "wlak"))
+    assert [imported for _, imported in answers.values()] == [False] * 4
 
 
 def test_help_and_refusals_do_without_jax():
-    asked = "\n".join((*_ANSWERED, *_REFUSED))
-    ran = subprocess.run(
-        [sys.executable, "-c", _ASK], input=asked, capture_output=True, text=True, check=True
-    )
-    answers = [line.split(" ", 2) for line in ran.stdout.splitlines()]
-    assert [text for _, _, text in answers] == [*_ANSWERED, *_REFUSED]
-    for code, imported, text in answers:
-        assert (code, imported) == ("0" if text in _ANSWERED else "2", "False"), text
+    refused = [row[0] for row in EARLY]
+    expected = dict.fromkeys(_ANSWERED, (0, False)) | dict.fromkeys(refused, (2, False))
+    assert _answers("jax", [*_ANSWERED, *refused]) == expected

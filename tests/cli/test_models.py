@@ -1,19 +1,19 @@
 """`jaxbiped models` and the flags of models, against the registries and their scenes."""
 
-import json
-import subprocess
-import sys
-
 import jax
 import pytest
 from reference.rigid import rigid_walker
 
 import jaxbiped as jb
 from jaxbiped.cli._scene_options import SEED, SceneOptions
-from tests.cli.commands import numbers_of, run
+from tests.cli.commands import numbers_of, outputs_of, run
 
 
 def test_lists_every_law_with_units_and_cost(capsys):
+    assert run("models") == 0
+    table = capsys.readouterr().out
+    assert "hunt-crossley" in table
+    assert "N·s/m²" in table
     listed = numbers_of(capsys, "models")
     assert {law["name"] for law in listed["normal"]} == set(jb.laws.NORMAL_LAWS)
     assert {law["name"] for law in listed["friction"]} == set(jb.laws.FRICTION_LAWS)
@@ -35,28 +35,6 @@ def test_help_tells_the_units_of_the_seeds_parameters():
         assert ("[" in said) == bool(quantity.unit)
 
 
-def test_prints_a_table(capsys):
-    assert run("models") == 0
-    out = capsys.readouterr().out
-    assert "hunt-crossley" in out
-    assert "N·s/m²" in out
-
-
-@pytest.mark.slow
-def test_who_reads_no_further_does_not_keep_files_from_being_written(tmp_path):
-    numbers = tmp_path / "numbers.json"
-    with subprocess.Popen(
-        [sys.executable, "-m", "jaxbiped", "models", "--json", str(numbers)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as command:
-        command.stdout.close()
-        said = command.stderr.read()
-    assert (command.returncode, "BrokenPipe" in said) == (0, False)
-    assert "normal" in json.loads(numbers.read_text())
-
-
 def test_flags_build_the_scene():
     scene = SceneOptions(
         normal="hunt-crossley", friction="coulomb", set=("hysteresis=2.5",)
@@ -74,27 +52,23 @@ def test_flags_build_the_scene():
 
 @pytest.mark.slow
 def test_rigid_walk_and_gait(tmp_path, capsys):
-    walk = tmp_path / "walk.json"
     flags = ("--model", "rigid", "--duration", "4")
-    assert run("walk", *flags, "--json", str(walk), "--out", str(tmp_path)) == 0
-    numbers = json.loads(walk.read_text())
-    assert numbers["ending"] == "walking"
-    assert numbers["model"] == "rigid"
+    code, folder, _, numbers = outputs_of(tmp_path, "walk", *flags)
+    assert code == 0
+    assert (numbers["ending"], numbers["model"]) == ("walking", "rigid")
     assert numbers["steps"][-1]["period_s"] == pytest.approx(0.4438, abs=2e-4)
     assert numbers["steps"][-1]["length_m"] == pytest.approx(0.1904, abs=2e-4)
-    assert (tmp_path / "leg_angles.png").exists()
+    assert (folder / "leg_angles.png").exists()
     assert numbers["solver"]["rtol"] == 1e-6
-    assert run("walk", *flags, "--accuracy", "tight", "--json", str(walk)) == 0
-    assert json.loads(walk.read_text())["solver"]["rtol"] == 1e-11
-    assert run("walk", *flags, "--accuracy", "1e-5", "--json", str(walk)) == 0
-    told = json.loads(walk.read_text())
+    capsys.readouterr()
+    assert numbers_of(capsys, "walk", *flags, "--accuracy", "tight")["solver"]["rtol"] == 1e-11
+    told = outputs_of(tmp_path, "walk", *flags, "--accuracy", "1e-5").numbers
     assert told["error"]["met"]
     assert told["error"]["relative"] <= 1e-5
     assert told["solver"]["rtol"] == told["error"]["rtol"]
     assert "of 1e-05 allowed" in capsys.readouterr().out
-    gait = tmp_path / "gait.json"
-    assert run("gait", "--model", "rigid", "--json", str(gait)) == 0
-    numbers = json.loads(gait.read_text())
+    code, _, _, numbers = outputs_of(tmp_path, "gait", "--model", "rigid")
+    assert code == 0
     assert numbers["period_s"] == pytest.approx(0.44378, abs=5e-6)
     assert set(numbers["state"]) == set(jb.dynamics.RigidState._fields)
     # By multipliers of Lagrange for the rolling foot, along an integration of their own.
@@ -106,8 +80,6 @@ def test_rigid_walk_and_gait(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_walk_with_other_laws(tmp_path):
-    walk = tmp_path / "walk.json"
+def test_walk_with_other_laws(capsys):
     flags = ("--normal", "hunt-crossley", "--friction", "viscous", "--duration", "1.2")
-    assert run("walk", *flags, "--json", str(walk)) == 0
-    assert json.loads(walk.read_text())["ending"] == "walking"
+    assert numbers_of(capsys, "walk", *flags)["ending"] == "walking"

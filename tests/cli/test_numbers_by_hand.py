@@ -14,7 +14,6 @@ from jaxbiped.cli._gait import _assumption_line, gait_numbers
 from jaxbiped.cli._walk_report import footstep_rows
 from jaxbiped.cli._walk_warnings import (
     cut_short,
-    friction_warnings,
     relative_residual,
     walk_warnings,
 )
@@ -125,10 +124,20 @@ def test_a_walk_warns_of_energy_above_a_thousand_tolerances_or_a_thousandth(shar
     assert "no foot touched the ground" in flight[0]
 
 
-def test_friction_that_grows_with_slip_is_warned_of():
-    assert friction_warnings(SCENE) == []
+def test_what_overflowed_is_no_accurate_walk():
+    """A ledger of nothing but overflow left no share to be compared with a bound."""
+    numbers = dict(
+        ending="fell forward", energy_residual_relative=None, energy_residual_J=np.nan,
+        solver={"accepted": 10, "rejected": 5},
+    )  # fmt: skip
+    coarse, overflowed = walk_warnings(SCENE, numbers, rtol=10.0)
+    assert "rtol = 10 is too coarse for v0" in coarse
+    assert "is no number" in overflowed
+    settled = numbers | {"energy_residual_J": 0.0}
+    assert walk_warnings(SCENE, settled, rtol=1e-6) == []
     grows = jb.with_parameters(SCENE, {"mu_kinetic": 0.6})
-    assert "mu_kinetic = 0.6 is above mu_static = 0.5" in friction_warnings(grows)[0]
+    (warning,) = walk_warnings(grows, settled, rtol=1e-6)
+    assert "mu_kinetic = 0.6 is above mu_static = 0.5" in warning
 
 
 def test_rows_of_a_table_of_footsteps_are_footsteps():

@@ -7,7 +7,7 @@ import pytest
 from tests.cli.commands import numbers_of, run
 
 pytestmark = pytest.mark.slow
-RIGID = (
+RIGID = [
     "optimise",
     "--model",
     "rigid",
@@ -17,7 +17,7 @@ RIGID = (
     "64",
     "--footsteps",
     "20",
-)
+]
 
 
 def test_numbers_and_tables(capsys, tmp_path):

@@ -1,5 +1,6 @@
 """What the command line refuses, against one sentence on stderr and exit code 2."""
 
+import importlib
 import json
 from pathlib import Path
 
@@ -7,146 +8,157 @@ import jax
 import numpy as np
 import pytest
 
-from jaxbiped.cli import Report, main
-from jaxbiped.cli._refusal import one_sentence
+from jaxbiped.cli import Report, main, one_sentence
 from tests.cli.commands import refused
 
-REFUSED = [
-    ("walk --slop 3", "--slop", "perhaps you meant --slope"),
-    ("walk --slope abc", "--slope", "'abc'", "float"),
-    ("walk --hip-z abc", "--hip-z", "'abc'", "FLOAT"),
-    ("basin --samples 1.5", "--samples", "'1.5'", "INT"),
-    ("walk --out", "--out", "missing value"),
-    ("wlak", "wlak", "walk, gait, continue, optimise, fit, basin"),
-    ("", "walk, gait, continue, optimise, fit, basin"),
-    ("walk --duration inf", "duration = inf", "finite"),
-    ("walk --model rigid --duration inf", "duration = inf", "finite"),
-    ("walk --duration 0", "duration", "0", "above 0"),
-    ("walk --max-solver-steps 0", "max_solver_steps = 0", "whole number above 0"),
-    ("walk --solver euler", "solver = euler", "dt = 1e-6"),
-    ("walk --solver euler9", "solver", "euler9", "rodas4"),
-    ("walk --solver euler --dt 1e-6", "10 s", "max_solver_steps = 1048576"),
-    ("walk --model rigid --dt 1e-6", "dt = 1e-06", "rigid"),
-    ("walk --n 0", "n = 0 is not allowed: it must be at least 1."),
-    ("walk --J 0", "J = 0", "hip_mass = 0"),
-    ("walk --set K=abc", "K must be a number", "'abc'"),
-    ("walk --set =3", "set = '=3'", "name=value"),
-    ("walk --set foo=3", "parameter = 'foo'"),
-    ("walk --set xi", "set = 'xi'"),
-    ("walk --set v0=-1", "v0 = -1"),
-    ("walk --model rigid --method index1", "method = index1", "rigid"),
-    ("walk --method index1", "method = index1", "--formulation redundant"),
-    ("walk --r 0.5", "l = 0.4 and r = 0.5", "l must be at least r"),
-    ("walk --l 0.05", "l", "0.05", "r = 0.08"),
-    ("walk --set K=1e6 --K 2e6", "K = 2e+06", "set = 'K=1e+06'", "one of them"),
-    ("walk --accuracy draft --rtol 1e-8", "rtol = 1e-08", "accuracy = draft"),
-    ("walk --dt 1e-6 --rtol 1e-8", "rtol = 1e-08", "dt = 1e-06"),
-    ("walk --rtol -1", "rtol", "-1", "above 0"),
-    ("walk --normal hertz --c 1", "c = 1", "normal = hertz"),
-    ("walk --json ~/no/such", "no/such' cannot be written"),
-    ("walk --json /no/such/folder/x.json", "--json", "/no/such/folder/x.json", "folder"),
-    ("walk --out /dev/null/pictures", "--out", "/dev/null/pictures", "directory"),
-    ("walk --hip-z 0.2", "hip_z = 0.2", "0.196 m below the ground", "0.3956"),
-    ("walk --hip-z 0", "hip_z = 0", "below the ground"),
-    ("walk --hip-z -5", "hip_z = -5", "below the ground"),
-    ("walk --theta-1 nan", "theta_1", "nan", "finite"),
-    ("walk --K -1", "K", "-1", "above 0"),
-    ("walk --model soft", "model = 'soft'"),
-    ("walk --normal hertzz", "normal = 'hertzz'"),
-    ("walk --model rigid --K 5", "K = 5.0 is not allowed with model"),
-    ("walk --model rigid --solver rodas5p", "solver = rodas5p"),
-    ("walk --formulation maximal", "formulation = 'maximal'"),
-    ("walk --formulation redundant --method glue", "method = 'glue'"),
-    ("walk --formulation redundant --model rigid", "formulation = redundant"),
-    ("walk --formulation redundant --orientation up", "orientation = 'up'"),
-    ("gait --footsteps -2", "footsteps = -2", "whole number above 0"),
-    ("gait --footsteps 0", "footsteps", "0", "above 0"),
-    ("gait --friction coulomb --xi 9", "xi = 9", "friction = coulomb"),
-    ("gait --friction glue", "friction = 'glue'"),
-    ("gait --model rigid --section mid-stance", "HeelStrike"),
-    ("gait --section lunch", "section", "lunch", "mid-stance"),
-    ("gait --accuracy nonsense", "accuracy", "nonsense", "balanced, tight"),
-    ("gait --K -1", "K", "-1", "above 0"),
-    ("gait --json /no/such/folder/x.json", "--json", "/no/such/folder/x.json", "folder"),
-    ("gait --method index1", "method = index1 is not allowed with formulation"),
-    ("gait --formulation redundant --engine lanes", "redundant coordinates are"),
-    ("gait --hip-spring q=1", "'q' is not known: choose one of k, b, theta_0"),
-    ("gait --hip-spring b=1", "hip-spring needs k=value"),
-    ("gait --hip-spring k", "write name=value"),
-    ("gait --hip-spring k=-1", "k = -1"),
-    ("gait --hip-torque torque=much", "'much' is none"),
-    ("gait --hip-torque torque=1,2", "torque"),
-    ("gait --hip-torque torque=1 reaction=hand", "reaction = 'hand'"),
-    ("gait --hip-spline torque=1", "two or more"),
-    ("gait --push-off impulse=1", "needs rigid"),
-    ("gait --model rigid --foot-preload extension=0.1", "needs compliant"),
-    ("continue --along slop", "along = 'slop' is not known"),
-    ("continue --from 0.1 --to 0.1", "the range is empty"),
-    ("continue --along K --from -1 --to 1e6", "K = -1 is not allowed"),
-    ("continue --formulation redundant", "redundant coordinates"),
-    ("continue --footsteps 0", "footsteps = 0"),
-    ("continue --accuracy fast", "accuracy = 'fast'"),
-    ("basin --x theta_swing=0.1:0.1:4", "axis 'theta_swing=0.1:0.1:4' is empty"),
-    ("basin --x theta_swing=0:1:0", "= 0 is not allowed"),
-    ("basin --x theta_swing", "write name=first:last:count"),
-    ("basin --x theta_swing=0:nan:3", "is empty"),
-    ("basin --x knee=0:1:3", "coordinate = 'knee' is not known"),
-    ("basin --x K=-1:1:3", "K = -1"),
-    ("basin --x g=1:2:3 --y g=1:2:3", "g is named by two axes"),
-    ("basin --model rigid --x hip_z=0:1:3", "coordinate = 'hip_z' is not known"),
-    ("basin --starts nowhere.csv", "starts = 'nowhere.csv' cannot be read"),
-    ("basin --starts nowhere.csv --x g=1:2:3", "name either"),
-    ("basin --formulation redundant", 'formulation = "redundant" is not allowed for a basin'),
-    ("basin --footsteps 0", "footsteps = 0"),
-    ("basin --accuracy 2", "accuracy = 2 is not allowed: it is the share of the labels"),
-    ("basin --accuracy high", "accuracy = 'high' is not known"),
-    ("basin --workers 0", "workers = 0"),
-    ("basin --chunk 0", "chunk = 0"),
-    ("basin --samples 0", "samples = 0"),
-    ("basin --sampling dice --samples 4", "sampling = 'dice' is not known"),
-    ("basin --store /dev/null", "store = '/dev/null' is a file"),
-    ("constraints --integrators euler:fast", "write SOLVER:TOLERANCE or SOLVER:dt=STEP"),
-    ("constraints --integrators euler", "integrator = 'euler'"),
-    ("constraints --methods glue", "methods = 'glue'"),
-    ("constraints --repeats 0", "repeats = 0 is not allowed"),
-    ("constraints --duration -1", "duration = -1 is not allowed"),
-    ("constraints --model rigid", "compliant and minimal are compared"),
-    ("constraints --out /proc/nowhere", "--out"),
-    ("trade --model rigid", "compliant and minimal are measured"),
-    ("trade --formulation redundant", "compliant and minimal are measured"),
-    ("trade --duration -1", "duration = -1"),
-    ("trade --repeats 0", "repeats = 0"),
-    ("trade --out /proc/nowhere", "--out"),
-    ("optimise --maximise speed --model rigid --vary q", "vary = 'q' is not known"),
-    (
-        "optimise --maximise speed --model rigid --vary d=0.2:0.1",
-        "bounds of d = (0.2, 0.1) are empty",
-    ),
-    ("optimise --maximise speed --model rigid --vary d=0.2", "write d=low:high"),
-    ("optimise --maximise speed --model rigid --vary hip_mass", "hip_mass needs bounds"),
-    (
-        "optimise --maximise speed --model rigid --vary d --minimise period",
-        "either maximise or minimise",
-    ),
-    (
-        "optimise --maximise speed --model rigid --vary d --subject-to 'speed<0.1' 'speed>0.2'",
-        "contradict",
-    ),
-    (
-        "optimise --maximise speed --model rigid --vary d --subject-to 'slip_distance<1'",
-        "roll without slip",
-    ),
-    ("optimise --vary d --optimiser magic", "optimiser = 'magic'"),
-    ("fit none.json --vary J", "none.json"),
-]
-"""Command lines, and words that stand in the sentence that refuses each."""
+MOVED = "the study of extreme cases is experiments/extremes.py in jaxbiped's repository."
 
 
-@pytest.mark.parametrize("refusal", REFUSED, ids=lambda row: row[0])
+def _rows(table):
+    """Command lines, and words that stand in the sentence that refuses each."""
+    return [tuple(line.split(" | ")) for line in table.strip("\n").splitlines()]
+
+
+MORE = ("", " --quick --json -", " --help")
+EARLY = _rows("""
+walk --slop 3 | --slop | perhaps you meant --slope
+walk --slope abc | --slope | 'abc' | float
+walk --hip-z abc | --hip-z | 'abc' | FLOAT
+basin --samples 1.5 | --samples | '1.5' | INT
+walk --out | --out | missing value
+wlak | wlak | walk, gait, continue, optimise, fit, basin
+ | walk, gait, continue, optimise, fit, basin
+walk --duration inf | duration = inf | finite
+walk --model rigid --duration inf | duration = inf | finite
+walk --duration 0 | duration | 0 | above 0
+walk --max-solver-steps 0 | max_solver_steps = 0 | whole number above 0
+walk --solver euler9 | solver | euler9 | rodas4
+walk --n 0 | n = 0 is not allowed: it must be at least 1.
+walk --set K=abc | K must be a number | 'abc'
+walk --set =3 | set = '=3' | name=value
+walk --set xi | set = 'xi'
+walk --model rigid --method index1 | method = index1 | rigid
+walk --method index1 | method = index1 | --formulation redundant
+walk --r 0.5 | l = 0.4 and r = 0.5 | l must be at least r
+walk --l 0.05 | l | 0.05 | r = 0.08
+walk --set K=1e6 --K 2e6 | K = 2e+06 | set = 'K=1e+06' | one of them
+walk --accuracy draft --rtol 1e-8 | rtol = 1e-08 | accuracy = draft
+walk --dt 1e-6 --rtol 1e-8 | rtol = 1e-08 | dt = 1e-06
+walk --rtol -1 | rtol | -1 | above 0
+walk --json ~/no/such | no/such' cannot be written
+walk --json /no/such/folder/x.json | --json | /no/such/folder/x.json | folder
+walk --theta-1 nan | theta_1 | nan | finite
+walk --K -1 | K | -1 | above 0
+walk --model soft | model = 'soft'
+walk --normal hertzz | normal = 'hertzz'
+walk --model rigid --K 5 | K = 5.0 is not allowed with model
+walk --formulation maximal | formulation = 'maximal'
+walk --formulation redundant --method glue | method = 'glue'
+walk --formulation redundant --model rigid | formulation = redundant
+walk --formulation redundant --orientation up | orientation = 'up'
+gait --footsteps -2 | footsteps = -2 | whole number above 0
+gait --footsteps 0 | footsteps | 0 | above 0
+gait --friction glue | friction = 'glue'
+gait --section lunch | section | lunch | mid-stance
+gait --accuracy nonsense | accuracy | nonsense | balanced, tight
+gait --K -1 | K | -1 | above 0
+gait --json /no/such/folder/x.json | --json | /no/such/folder/x.json | folder
+gait --method index1 | method = index1 is not allowed with formulation
+gait --hip-spring k | write name=value
+continue --footsteps 0 | footsteps = 0
+continue --accuracy fast | accuracy = 'fast'
+basin --x theta_swing=0.1:0.1:4 | axis 'theta_swing=0.1:0.1:4' is empty
+basin --x theta_swing=0:1:0 | = 0 is not allowed
+basin --x theta_swing | write name=first:last:count
+basin --x theta_swing=0:nan:3 | is empty
+basin --starts nowhere.csv --x g=1:2:3 | name either
+basin --formulation redundant | formulation = "redundant" is not allowed for a basin
+basin --footsteps 0 | footsteps = 0
+basin --accuracy high | accuracy = 'high' is not known
+basin --workers 0 | workers = 0
+basin --chunk 0 | chunk = 0
+basin --samples 0 | samples = 0
+basin --sampling dice --samples 4 | sampling = 'dice' is not known
+constraints --integrators euler:fast | write SOLVER:TOLERANCE or SOLVER:dt=STEP
+constraints --integrators euler | integrator = 'euler'
+constraints --methods glue | methods = 'glue'
+constraints --repeats 0 | repeats = 0 is not allowed
+constraints --duration -1 | duration = -1 is not allowed
+constraints --model rigid | compliant and minimal are compared
+trade --model rigid | compliant and minimal are measured
+trade --formulation redundant | compliant and minimal are measured
+trade --duration -1 | duration = -1
+trade --repeats 0 | repeats = 0
+optimise --vary d --optimiser magic | optimiser = 'magic'
+fit none.json --vary J | none.json
+walk --slope 2 | slope = 2
+walk --dt 0 | dt = 0 | above 0
+gait --engine gpu | engine = 'gpu'
+continue --from nan | from = nan | finite
+models --json /nowhere/models.json | --json | /nowhere/models.json
+constraints --json /nowhere/constraints.json | --json | /nowhere/constraints.json
+""") + [(f"extremes{more}", "extremes is no longer a command", MOVED) for more in MORE]
+"""Those that are refused before JAX is imported (see `test_declarations`)."""
+LATE = _rows("""
+walk --solver euler | solver = euler | dt = 1e-6
+walk --solver euler --dt 1e-6 | 10 s | max_solver_steps = 1048576
+walk --model rigid --dt 1e-6 | dt = 1e-06 | rigid
+walk --J 0 | J = 0 | hip_mass = 0
+walk --set foo=3 | parameter = 'foo'
+walk --set v0=-1 | v0 = -1
+walk --normal hertz --c 1 | c = 1 | normal = hertz
+walk --out /dev/null/pictures | --out | /dev/null/pictures | directory
+walk --hip-z 0.2 | hip_z = 0.2 | 0.196 m below the ground | 0.3956
+walk --hip-z 0 | hip_z = 0 | below the ground
+walk --hip-z -5 | hip_z = -5 | below the ground
+walk --model rigid --solver rodas5p | solver = rodas5p
+gait --friction coulomb --xi 9 | xi = 9 | friction = coulomb
+gait --model rigid --section mid-stance | HeelStrike
+gait --formulation redundant --engine lanes | redundant coordinates are
+gait --hip-spring q=1 | 'q' is not known: choose one of k, b, theta_0
+gait --hip-spring b=1 | hip-spring needs k=value
+gait --hip-spring k=-1 | k = -1
+gait --hip-torque torque=much | 'much' is none
+gait --hip-torque torque=1,2 | torque
+gait --hip-torque torque=1 reaction=hand | reaction = 'hand'
+gait --hip-spline torque=1 | two or more
+gait --push-off impulse=1 | needs rigid
+gait --model rigid --foot-preload extension=0.1 | needs compliant
+continue --along slop | along = 'slop' is not known
+continue --from 0.1 --to 0.1 | the range is empty
+continue --along K --from -1 --to 1e6 | K = -1 is not allowed
+continue --formulation redundant | redundant coordinates
+basin --x knee=0:1:3 | coordinate = 'knee' is not known
+basin --x K=-1:1:3 | K = -1
+basin --x g=1:2:3 --y g=1:2:3 | g is named by two axes
+basin --model rigid --x hip_z=0:1:3 | coordinate = 'hip_z' is not known
+basin --starts nowhere.csv | starts = 'nowhere.csv' cannot be read
+basin --accuracy 2 | accuracy = 2 is not allowed: it is the share of the labels
+basin --store /dev/null | store = '/dev/null' is a file
+constraints --out /proc/nowhere | --out
+trade --out /proc/nowhere | --out
+optimise --maximise speed --model rigid --vary q | vary = 'q' is not known
+optimise --maximise speed --model rigid --vary d=0.2:0.1 | bounds of d = (0.2, 0.1) are empty
+optimise --maximise speed --model rigid --vary d=0.2 | write d=low:high
+optimise --maximise speed --model rigid --vary hip_mass | hip_mass needs bounds
+optimise --maximise speed --model rigid --vary d --minimise period | either maximise or minimise
+optimise --maximise speed --model rigid --vary d --subject-to 'speed<0.1' 'speed>0.2' | contradict
+optimise --maximise speed --model rigid --vary d --subject-to 'slip_distance<1' | roll without slip
+""")
+"""Those that a scene, a start or a folder refuses."""
+
+
+@pytest.mark.parametrize("refusal", EARLY + LATE, ids=lambda row: row[0])
 def test_each_sentence_names_what_is_wrong(refusal, capsys):
     command, *words = refusal
     line = refused(command, capsys)
     assert [word for word in words if word not in line] == []
+
+
+def test_the_package_of_extremes_says_where_the_study_is():
+    with pytest.raises(ImportError, match=r"jaxbiped\.extremes is no longer part") as raised:
+        importlib.import_module("jaxbiped.extremes")
+    assert str(raised.value).endswith(MOVED)
 
 
 def test_a_box_with_borders_and_colours_is_the_same_sentence():

@@ -2,21 +2,18 @@
 
 import pytest
 
-from tests.cli.commands import numbers_of
-from tests.drawn import assert_is_drawn, saved_figures
+from tests.cli.commands import outputs_of
+from tests.drawn import assert_is_drawn
 
 
 @pytest.mark.nightly
-def test_errors_and_costs_of_the_named_accuracies(capsys, tmp_path):
-    made = tmp_path / "made"
-    with saved_figures() as figures:
-        numbers = numbers_of(capsys, "trade", "--duration", "0.5", "--out", made)
-    assert set(figures) == {
-        f"trade_{axis}.png"
-        for axis in ("state", "step_time", "energy", "period", "multiplier", "gradient")
-    }
+def test_errors_and_costs_of_the_named_accuracies(tmp_path):
+    code, folder, figures, numbers = outputs_of(tmp_path, "trade", "--duration", "0.5")
+    assert code == 0
+    axes = ("state", "step_time", "energy", "period", "multiplier", "gradient")
+    assert set(figures) == {f"trade_{axis}.png" for axis in axes}
     for name, figure in figures.items():
-        assert (made / name).is_file()
+        assert (folder / name).is_file()
         assert_is_drawn(figure)
     assert max(numbers["floors"]["walk"].values()) < 1e-9
     rows = numbers["rows"]
@@ -26,11 +23,8 @@ def test_errors_and_costs_of_the_named_accuracies(capsys, tmp_path):
         draft, balanced, tight = (
             row for row in rows if row["of"] == of and row["way"] == f"{solver} by lanes"
         )
-        assert [row["setting"] for row in (draft, balanced, tight)] == [
-            "draft",
-            "balanced",
-            "tight",
-        ]
+        settings = [row["setting"] for row in (draft, balanced, tight)]
+        assert settings == ["draft", "balanced", "tight"]
         assert draft["errors"][axis] > balanced["errors"][axis] > tight["errors"][axis]
     best = numbers["cheapest"]["walk"]["state"]
     assert best["1e-08"]["setting"] == "tight"

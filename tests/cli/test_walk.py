@@ -1,14 +1,13 @@
 """`jaxbiped walk` as a user meets it, against the published walk."""
 
 import json
-import re
 import subprocess
 import sys
 
 import pytest
 
 from tests.cli.commands import numbers_of, run
-from tests.drawn import leg_pixels
+from tests.drawn import leg_pixels, sent_in
 
 pytestmark = pytest.mark.slow
 
@@ -20,11 +19,6 @@ def _run(*arguments):
         text=True,
         check=False,
     )
-
-
-def _sent(page):
-    """What a page that plays walks was given."""
-    return json.loads(re.search(r'id="walks">(.*?)</script>', page)[1])
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +69,7 @@ def test_writes_a_page_that_plays_the_walk_and_says_so(walk):
     out, result = walk
     page = (out / "out" / "walk.html").read_text()
     assert f"wrote {out / 'out' / 'walk.html'}" in result.stdout
-    sent = _sent(page)
+    sent = sent_in(page)
     assert [each["ending"] for each in sent["walks"]] == ["walking"]
     assert len(page) < 1.5e6
 
@@ -83,7 +77,7 @@ def test_writes_a_page_that_plays_the_walk_and_says_so(walk):
 def test_a_long_rigid_walk_is_played_as_far_as_it_is_drawn(tmp_path, capsys):
     assert run("walk", "--model", "rigid", "--duration", "70", "--out", tmp_path) == 0
     assert f"wrote {tmp_path / 'walk.html'}" in capsys.readouterr().out
-    sent = _sent((tmp_path / "walk.html").read_text())
+    sent = sent_in((tmp_path / "walk.html").read_text())
     strikes = [each["t"] for each in sent["walks"][0]["footprints"]]
     assert 59.0 < strikes[-1] < 60.0
 

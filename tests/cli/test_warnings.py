@@ -1,11 +1,7 @@
 """What `jaxbiped walk` warns of, against walks that have it."""
 
-import math
-
 import pytest
 
-import jaxbiped as jb
-from jaxbiped.cli._walk_warnings import walk_warnings
 from tests.cli.commands import numbers_of
 
 pytestmark = pytest.mark.slow
@@ -39,27 +35,6 @@ def test_energy_left_open_is_a_warning_and_a_number(arguments, capsys):
     assert numbers["energy_residual_relative"] > 1e-3
     assert f"{numbers['energy_residual_relative']:.2g}" in warning
     assert "--rtol" in warning
-
-
-def test_what_overflowed_is_no_accurate_walk():
-    """A ledger of nothing but overflow left no share to be compared with a bound."""
-    numbers = {
-        "ending": "fell forward",
-        "solver": {"accepted": 10, "rejected": 5},
-        "energy_residual_relative": None,
-        "energy_residual_J": math.nan,
-    }
-    scene = jb.seed_scene()
-    coarse, overflowed = walk_warnings(scene, numbers, rtol=10.0)
-    assert "rtol = 10 is too coarse for v0" in coarse
-    assert "is no number" in overflowed
-    assert walk_warnings(scene, numbers | {"energy_residual_J": 0.0}, rtol=1e-6) == []
-
-
-def test_friction_that_grows_with_slip(capsys):
-    (warning,) = numbers_of(capsys, "walk", "--mu-kinetic", "0.6", "--duration", "0.1")["warnings"]
-    assert "mu_kinetic = 0.6" in warning
-    assert "mu_static = 0.5" in warning
 
 
 def test_a_cap_on_steps_bounds_a_walk_of_any_duration(capsys):

@@ -134,9 +134,6 @@ class FakeDriver:
         assert name.decode() == ENTRY
         return _give(function, module.value)
 
-    def cuFuncGetAttribute(self, value, which, function):
-        return _give(value, {3: 512, 4: 255}[which])
-
     def cuOccupancyMaxActiveBlocksPerMultiprocessor(self, blocks, function, threads, shared):
         return _give(blocks, 1)
 

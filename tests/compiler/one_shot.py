@@ -7,16 +7,28 @@ import numpy as np
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._program import Program
 
+NUMBER = jax.ShapeDtypeStruct((), jnp.float64)
+
+
+def two_zeros(_):
+    """What many programs carry at first."""
+    return jnp.zeros(()), jnp.zeros(())
+
+
+def stepped(attempt, inputs=NUMBER, *, start=lambda inputs: inputs, finish=None, **options):
+    """A program that carries its inputs, unless told what, and gives what it carries."""
+    finish = (lambda inputs, carried: carried) if finish is None else finish
+    return CompiledProgram.of(Program(start, attempt, finish, **options), inputs)
+
 
 def compiled(function, *shapes):
     """A program whose single attempt does nothing and whose output is `function(*inputs)`."""
-    inputs = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in shapes]
-    program = Program(
+    return stepped(
+        lambda inputs, carried: (carried, jnp.asarray(True)),
+        [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in shapes],
         start=lambda inputs: jnp.zeros(()),
-        attempt=lambda inputs, carried: (carried, jnp.asarray(True)),
         finish=lambda inputs, carried: function(*inputs),
     )
-    return CompiledProgram(program, inputs)
 
 
 def evaluate(function, *columns, **options):

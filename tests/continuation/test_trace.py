@@ -5,7 +5,8 @@ import pytest
 
 from jaxbiped._ending import Ending
 from jaxbiped.continuation._bifurcations import BranchEvent
-from jaxbiped.continuation._branch_point import NO_WALK, is_stable
+from jaxbiped.continuation._branch_point import is_stable
+from jaxbiped.continuation._cycle import NO_WALK
 from jaxbiped.continuation._trace import passed_before, trace
 from jaxbiped.gait._homotopy import BranchEnd
 from tests.continuation.maps import (
@@ -20,14 +21,47 @@ from tests.continuation.maps import (
 USUAL = dict(largest_step=0.05, max_points=200)
 
 
-def test_a_period_doubling_is_located():
-    curve, axis = logistic((2.0, 4.0))
-    found = trace(curve, axis, begin_at(curve, axis, [0.5], 2.0), **USUAL)
-    (event,) = found.bifurcations
-    assert event.kind is BranchEvent.PERIOD_DOUBLING
-    assert event.value == pytest.approx(3.0, abs=1e-9)
-    assert event.multiplier == pytest.approx(-1.0, abs=1e-9)
-    assert event.value_error < 1e-9
+def traced(curve, axis, point, value, *, way=1.0, **options):
+    """The curve from the fixed point near a point, towards larger values or the other `way`."""
+    begin = begin_at(curve, axis, point, value)
+    return trace(curve, axis, begin._replace(tangent=way * begin.tangent), **USUAL | options)
+
+
+LOWER_OF_TWO = (4.2 - np.sqrt(4.2 * 0.2)) / 6.4
+"""A point of the logistic map's cycle of two at 3.2."""
+
+
+@pytest.mark.parametrize(
+    ("family", "start", "kind", "value", "multiplier", "tolerance"),
+    [
+        (logistic((2.0, 4.0)), ([0.5], 2.0), BranchEvent.PERIOD_DOUBLING, 3.0, -1.0, 1e-9),
+        (
+            logistic((3.2, 3.6), footsteps=2),
+            ([LOWER_OF_TWO], 3.2),
+            *(BranchEvent.PERIOD_DOUBLING, 1.0 + np.sqrt(6.0), -1.0, 1e-9),
+        ),
+        (saddle_node((-0.5, 0.5)), ([0.5], 0.25), BranchEvent.FOLD, 0.0, 1.0, 1e-12),
+        (
+            delayed_logistic((1.5, 2.2)),
+            ([1.0 / 3.0] * 2, 1.5),
+            *(BranchEvent.NEIMARK_SACKER, 2.0, np.exp(1j * np.pi / 3.0), 1e-9),
+        ),
+        # Where branches cross is no fold.
+        (pitchfork((-0.5, 0.5)), ([0.0], -0.4), BranchEvent.BRANCH_POINT, 0.0, 1.0, 1e-8),
+    ],
+    ids=["doubling", "second doubling", "fold", "Neimark–Sacker", "crossing"],
+)
+def test_a_bifurcation_is_located(family, start, kind, value, multiplier, tolerance):
+    (event,) = traced(*family, *start, way=-1.0 if kind is BranchEvent.FOLD else 1.0).bifurcations
+    assert event.kind is kind
+    assert event.value == pytest.approx(value, abs=tolerance)
+    told = complex(event.multiplier.real, abs(event.multiplier.imag))
+    assert told == pytest.approx(multiplier, abs=max(tolerance, 1e-9))
+
+
+def test_the_points_beside_a_doubling_have_its_multipliers():
+    found = traced(*logistic((2.0, 4.0)), [0.5], 2.0)
+    assert found.bifurcations[0].value_error < 1e-9
     assert found.stop.end is BranchEnd.REACHED
     assert found.points[-1].value == pytest.approx(4.0, abs=1e-9)
     for point in found.points:
@@ -38,13 +72,11 @@ def test_a_period_doubling_is_located():
     assert stable == sorted(stable, key=[True, None, False].index)
 
 
-def test_a_cycle_of_two_doubles_at_one_plus_the_root_of_six():
-    curve, axis = logistic((3.2, 3.6), footsteps=2)
-    lower = (4.2 - np.sqrt(4.2 * 0.2)) / 6.4
-    found = trace(curve, axis, begin_at(curve, axis, [lower], 3.2), **USUAL)
-    (event,) = found.bifurcations
-    assert event.kind is BranchEvent.PERIOD_DOUBLING
-    assert event.value == pytest.approx(1.0 + np.sqrt(6.0), abs=1e-9)
+def test_a_fold_is_passed():
+    found = traced(*saddle_node((-0.5, 0.5)), [0.5], 0.25, way=-1.0)
+    assert found.points[0].stable is True
+    assert found.points[-1].stable is False
+    assert found.points[-1].recurring[0] == pytest.approx(-np.sqrt(0.5), abs=1e-9)
 
 
 def test_the_value_of_a_bifurcation_is_off_by_where_the_witness_has_it():
@@ -58,53 +90,19 @@ def test_the_value_of_a_bifurcation_is_off_by_where_the_witness_has_it():
         jacobian[1, 0, 0] *= 1.0 + part
         return exact._replace(seen=exact.seen._replace(jacobian=jacobian))
 
-    begin = begin_at(curve, axis, [0.5], 2.0)
-    found = trace(curve._replace(change=change), axis, begin, **USUAL)
-    (event,) = found.bifurcations
+    (event,) = traced(curve._replace(change=change), axis, [0.5], 2.0).bifurcations
     # The multiplier is 2 − r. Beside the bifurcation it is larger, and its error with it.
     assert event.value_error == pytest.approx(part, rel=0.1)
 
 
-def test_a_fold_is_passed_and_located():
-    curve, axis = saddle_node((-0.5, 0.5))
-    begin = begin_at(curve, axis, [0.5], 0.25)
-    found = trace(curve, axis, begin._replace(tangent=-begin.tangent), **USUAL)
-    (event,) = found.bifurcations
-    assert event.kind is BranchEvent.FOLD
-    assert event.value == pytest.approx(0.0, abs=1e-12)
-    assert event.multiplier == pytest.approx(1.0, abs=1e-9)
-    assert found.points[0].stable is True
-    assert found.points[-1].stable is False
-    assert found.points[-1].recurring[0] == pytest.approx(-np.sqrt(0.5), abs=1e-9)
-
-
-def test_a_neimark_sacker_point_is_located():
-    curve, axis = delayed_logistic((1.5, 2.2))
-    found = trace(curve, axis, begin_at(curve, axis, [1.0 / 3.0] * 2, 1.5), **USUAL)
-    (event,) = found.bifurcations
-    assert event.kind is BranchEvent.NEIMARK_SACKER
-    assert event.value == pytest.approx(2.0, abs=1e-9)
-    assert abs(event.multiplier) == pytest.approx(1.0, abs=1e-9)
-    assert abs(np.angle(event.multiplier)) == pytest.approx(np.pi / 3.0, abs=1e-9)
-
-
-def test_where_branches_cross_is_no_fold():
-    curve, axis = pitchfork((-0.5, 0.5))
-    found = trace(curve, axis, begin_at(curve, axis, [0.0], -0.4), **USUAL)
-    (event,) = found.bifurcations
-    assert event.kind is BranchEvent.BRANCH_POINT
-    assert event.value == pytest.approx(0.0, abs=1e-8)
-
-
 def test_two_real_multipliers_of_product_one_are_no_bifurcation():
     """Multipliers 2 and r: their product passes 1 at r = 1/2, where neither lies on the circle."""
-    curve, axis = curve_of(
+    family = curve_of(
         lambda x, r: np.array([2.0 * x[0], r * x[1]]),
         lambda x, r: np.array([[2.0, 0.0, 0.0], [0.0, r, x[1]]]),
         (0.2, 0.8),
     )
-    found = trace(curve, axis, begin_at(curve, axis, [0.0, 0.0], 0.3), **USUAL)
-    assert found.bifurcations == []
+    assert traced(*family, [0.0, 0.0], 0.3).bifurcations == []
 
 
 @pytest.mark.parametrize(
@@ -117,8 +115,8 @@ def test_two_real_multipliers_of_product_one_are_no_bifurcation():
     ],
 )
 def test_a_limit_of_the_model_is_named(code, end, words):
-    curve, axis = logistic((2.0, 4.0), code=lambda x, r: code if r > 2.5 else 0)
-    found = trace(curve, axis, begin_at(curve, axis, [0.5], 2.0), **USUAL)
+    family = logistic((2.0, 4.0), code=lambda x, r: code if r > 2.5 else 0)
+    found = traced(*family, [0.5], 2.0)
     (limit,) = found.bifurcations
     assert limit.kind is BranchEvent.LIMIT
     assert found.stop.end is end
@@ -128,12 +126,12 @@ def test_a_limit_of_the_model_is_named(code, end, words):
 
 
 def test_a_jump_of_the_map_is_named_grazing():
-    curve, axis = curve_of(
+    family = curve_of(
         lambda x, r: np.array([0.5 * x[0] + r + 10.0 * (r > 0.6)]),
         lambda x, r: np.array([[0.5, 1.0]]),
         (0.0, 1.0),
     )
-    found = trace(curve, axis, begin_at(curve, axis, [0.0], 0.0), **USUAL)
+    found = traced(*family, [0.0], 0.0)
     assert found.stop.end is BranchEnd.BREAKS_OFF
     assert "grazing" in found.stop.cause
     assert found.stop.value == pytest.approx(0.6, abs=1e-4)
@@ -142,13 +140,12 @@ def test_a_jump_of_the_map_is_named_grazing():
 def test_a_crossing_that_is_not_located_has_an_entry_all_the_same():
     """The multiplier jumps over 1 at r = 1/2: no point has it there."""
     slope = lambda r: 0.5 + (r > 0.5)
-    curve, axis = curve_of(
+    family = curve_of(
         lambda x, r: np.array([slope(r) * x[0]]),
         lambda x, r: np.array([[slope(r), 0.0]]),
         (0.0, 1.0),
     )
-    found = trace(curve, axis, begin_at(curve, axis, [0.0], 0.01), **USUAL)
-    (event,) = found.bifurcations
+    (event,) = traced(*family, [0.0], 0.01).bifurcations
     assert event.kind is BranchEvent.NOT_LOCATED
     assert event.beyond <= 0.5 <= event.value
     assert event.value_error == pytest.approx(event.value - event.beyond)
@@ -177,9 +174,7 @@ def test_a_closed_curve_is_passed_once_from_a_point_of_it_that_is_no_fold():
 
 def test_sheets_that_a_fold_joins_are_no_gait_twice():
     curve, axis = saddle_node((-1e-4, 0.5))
-    begin = begin_at(curve, axis, [0.5], 0.25)
-    there = begin._replace(tangent=-begin.tangent)
-    found = trace(curve, axis, there, largest_step=0.2, max_points=200)
+    found = traced(curve, axis, [0.5], 0.25, way=-1.0, largest_step=0.2)
     assert found.stop.end is BranchEnd.REACHED
     place = found.points[3].place + 1e-3 * found.points[3].tangent
     again = begin_at(curve, axis, place[:1], axis.value(place[-1]))
@@ -187,9 +182,7 @@ def test_sheets_that_a_fold_joins_are_no_gait_twice():
 
 
 def test_it_stops_at_the_first_of_a_kind():
-    curve, axis = logistic((2.0, 4.0))
-    begin = begin_at(curve, axis, [0.5], 2.0)
-    found = trace(curve, axis, begin, until=BranchEvent.PERIOD_DOUBLING, **USUAL)
+    found = traced(*logistic((2.0, 4.0)), [0.5], 2.0, until=BranchEvent.PERIOD_DOUBLING)
     assert found.points[-1].value == pytest.approx(3.0, abs=1e-9)
     assert found.stop.end is BranchEnd.UNFINISHED
 
@@ -206,9 +199,7 @@ def test_neighbouring_branches_are_not_mixed_up():
         by_x = 1.0 + 4.0 * (2.0 * x[0] - a - b)
         return np.array([[by_x, -4.0 * 2.0 * r * (2.0 * x[0] - a - b)]])
 
-    curve, axis = curve_of(step, slopes, (0.0, 1.0))
-    begin = begin_at(curve, axis, [0.0], 0.0)
-    found = trace(curve, axis, begin, largest_step=0.2, max_points=200)
+    found = traced(*curve_of(step, slopes, (0.0, 1.0)), [0.0], 0.0, largest_step=0.2)
     assert found.stop.end is BranchEnd.REACHED
     for point in found.points:
         assert point.recurring[0] == pytest.approx(point.value**2, abs=1e-7)

@@ -92,7 +92,7 @@ def test_a_distance_moves_with_the_bifurcation_and_against_the_gait(value, monke
     asked = []
     monkeypatch.setattr(distances, "continuation_setup", lambda *_, **__: None)
     monkeypatch.setattr(distances, "_both_ways", lambda *_: parts)
-    monkeypatch.setattr(distances, "_located", lambda _, event: asked.append(event) or located)
+    monkeypatch.setattr(distances, "_located_fold", lambda _, event: asked.append(event) or located)
     gait = SimpleNamespace(orbit=(np.zeros((1, 3)), None), engine="lanes")
     found = distances.bifurcation_distance(SCENE, gait)
     assert asked[0].value == value

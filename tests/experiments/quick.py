@@ -1,8 +1,8 @@
 """Experiments at their quick size, and the figures that they draw.
 
-A file of tests for each, so that workers share them. Most run in the tests' own process, which has
-the libraries imported and the programs compiled already. Those that settle cores or XLA's flags
-before JAX is imported run `alone`, in a process of their own.
+Those of one subject are tested in one file, which is what workers share. Most run in the tests' own
+process, which has the libraries imported and the programs compiled already. Those that settle cores
+or XLA's flags before JAX is imported run `alone`, in a process of their own.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import pytest
 from matplotlib.figure import Figure
 
-from tests.drawn import saved_figures
+from tests.drawn import assert_is_drawn, saved_figures
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "experiments"
@@ -29,6 +29,15 @@ class Run(NamedTuple):
 
     numbers: dict[str, Any]
     figures: dict[str, Figure]
+
+
+def drawn_run(name, folder, *, unitless=(), alone=False):
+    """A quick run, each of whose figures is drawn with its units; `unitless` as there."""
+    run = quick_run(name, folder, alone=alone)
+    assert run.figures
+    for figure in run.figures.values():
+        assert_is_drawn(figure, unitless=unitless)
+    return run
 
 
 def quick_run(name, folder, *, alone=False):

@@ -11,7 +11,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.gait._fixed_point_search import search
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, search
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
@@ -96,9 +96,9 @@ def test_an_orbit_with_its_multiplier_and_all_derivatives():
     @jax.jit
     def run(args):
         tight = precision_of("tight")
-        found = search(spec, args, (), guess, tight, Method(None, 40, 1e-10))
-        found = with_parameter_columns(spec, args, active, guess, tight, found)
-        return orbit_of(spec, args, active, guess, found, radius=True)
+        problem = FixedPointProblem(spec, args, (), guess, tight, Method(None, 40, 1e-10))
+        asked = problem._replace(active=active)
+        return orbit_of(asked, with_parameter_columns(asked, search(problem)), radius=True)
 
     found = run(jax.tree.map(jnp.asarray, SPRING))
     last, stability, slopes = found.found.last, found.stability, found.slopes

@@ -45,22 +45,21 @@ def test_both_find_the_same_gait_and_the_same_derivatives(scene):
     np.testing.assert_allclose(a, b, rtol=5e-4, atol=1e-7)
 
 
-def test_the_radius_of_a_cycle_of_two_is_that_of_one_squared():
-    names = ("K", "slope")
+@pytest.mark.parametrize(
+    ("scene", "names", "accuracy", "rtol"),
+    [
+        pytest.param(jb.seed_scene(), ("K", "slope"), "tight", 2e-5, id="seed"),
+        # An impact is no symmetry of the motion.
+        pytest.param(jb.ladder()["rigid"], ("d", "J", "slope"), "balanced", 1e-7, id="rigid"),
+    ],
+)
+def test_the_radius_of_a_cycle_of_two_is_that_of_one_squared(scene, names, accuracy, rtol):
+    """Its derivatives, too."""
     once, twice = (
-        jb.find_gait(jb.seed_scene(), footsteps=n, parameters=names, accuracy="tight")
-        for n in (1, 2)
+        jb.find_gait(scene, footsteps=n, parameters=names, accuracy=accuracy) for n in (1, 2)
     )
     expected = 2.0 * once.elasticities.spectral_radius
-    np.testing.assert_allclose(twice.elasticities.spectral_radius, expected, rtol=2e-5)
-
-
-def test_tight_is_tighter():
-    gait = jb.find_gait(
-        jb.seed_scene(), accuracy="tight", engine="lanes", radius_sensitivities=False
-    )
-    assert float(gait.unit_multiplier_error) < 1e-6
-    assert float(gait.measures.period) == pytest.approx(0.4408349, abs=1e-7)
+    np.testing.assert_allclose(twice.elasticities.spectral_radius, expected, rtol=rtol)
 
 
 def test_many_scenes_at_once_give_what_each_gives_alone(gait):

@@ -7,7 +7,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.gait import _gait
-from jaxbiped.gait._fixed_point_search import Found
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._orbit_derivatives import Orbit, Slopes
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import return_map_spec
@@ -65,7 +65,11 @@ def summary():
         patch.setattr(_gait, "orbit_of", lambda *_, **__: orbit)
         patch.setattr(_gait, "with_parameter_columns", lambda *given: given[-1])
         return _gait.summarise_gait.__wrapped__(
-            spec, scene, start, Precision(0.0, 0.0), orbit.found, NAMES, active, True, origin
+            FixedPointProblem(spec, scene, active, start, Precision(0.0, 0.0)),
+            orbit.found,
+            NAMES,
+            True,
+            origin,
         )
 
     yield summarised

@@ -1,4 +1,4 @@
-"""The line of parameters from the seed's scene to another, against its two ends."""
+"""Homotopy: its scenes against both ends, branches along it against curves in closed form."""
 
 import jax
 import jax.numpy as jnp
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait._homotopy import homotopy_to
+from jaxbiped.gait._homotopy import BranchEnd, follow_branch, homotopy_to
+from jaxbiped.gait._pseudo_arclength import Change
 
 SCENES = {
     "seed": jb.seed_scene(slope=0.05, K=1e8, hip_mass=2.0),
@@ -54,3 +55,69 @@ def test_laws_resemble_the_seeds_at_the_beginning():
     like = jb.laws.normal_law_like("tsuji", K=1e6, c=1e7, n=1.5, mass=2.0, g=9.8)
     assert float(begin.normal.K) == pytest.approx(float(like.K))
     assert float(begin.friction.mu_static) == float(seed.friction.mu_static)
+
+
+def branch_of(value, by_point, by_s, *, start=0.0, ends=lambda s: 0, scale=1.0):
+    """The branch of zeros of a function of x and s from x = `start`."""
+
+    def change(point, s):
+        x = float(point[0])
+        parts = np.array([value(x, s)]), np.array([[by_point(x)]]), np.array([by_s(s)])
+        return Change(*parts, ends(s))
+
+    return follow_branch(change, np.array([start]), scales=np.array([scale]))
+
+
+def test_a_smooth_branch_is_followed_to_its_end():
+    branch = branch_of(
+        lambda x, s: x - np.exp(2 * s), lambda x: 1.0, lambda s: -2 * np.exp(2 * s), start=1.0
+    )
+    assert branch.end is BranchEnd.REACHED
+    assert branch.s[-1] == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(branch.points[:, 0], np.exp(2.0 * branch.s), atol=1e-7)
+
+
+def test_a_fold_is_told_with_its_place():
+    """x² = 0.6 − s from x > 0 turns back at s = 0.6."""
+    branch = branch_of(
+        lambda x, s: x * x - 0.6 + s, lambda x: 2.0 * x, lambda s: 1.0, start=0.6**0.5
+    )
+    assert branch.end is BranchEnd.FOLD
+    assert branch.s[branch.farthest] == pytest.approx(0.6, abs=1e-6)
+    # The branch was followed around the fold, to the other sign of x.
+    assert branch.points[-1, 0] < 0.0
+    np.testing.assert_allclose(branch.points[:, 0] ** 2, 0.6 - branch.s, atol=1e-7)
+
+
+def test_two_folds_on_the_way_are_passed():
+    """A cubic in x: an S-shaped branch reaches s = 1 beyond both of its folds."""
+
+    def s_of(x):
+        return 8.0 * ((x - 0.5) ** 3 - 0.06 * (x - 0.5)) + 0.5
+
+    def slope(x):
+        return 8.0 * (3.0 * (x - 0.5) ** 2 - 0.06)
+
+    start = float(np.roots([8.0, 0.0, -0.48, 0.5]).real.min()) + 0.5
+    assert s_of(start) == pytest.approx(0.0, abs=1e-9)
+    branch = branch_of(lambda x, s: s_of(x) - s, slope, lambda s: -1.0, start=start, scale=0.2)
+    assert branch.end is BranchEnd.REACHED
+    assert np.sum(np.diff(np.sign(np.diff(branch.s))) != 0) == 2
+    assert s_of(branch.points[-1, 0]) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("jump", "ends", "end", "code", "place"),
+    [
+        (0.0, lambda s: 3 if s > 0.4 else 0, BranchEnd.WALK_ENDS, 3, 0.4),
+        (50.0, lambda s: 0, BranchEnd.BREAKS_OFF, 0, 0.3),
+        (0.0, lambda s: 2, BranchEnd.NO_BEGINNING, 2, 0.0),
+    ],
+    ids=["the walk ends", "the map jumps", "there is no beginning"],
+)
+def test_a_branch_ends_where_it_cannot_be_followed(jump, ends, end, code, place):
+    branch = branch_of(
+        lambda x, s: x - s - jump * (s > 0.3), lambda x: 1.0, lambda s: -1.0, ends=ends
+    )
+    assert (branch.end, branch.code) == (end, code)
+    assert branch.s[branch.farthest] == pytest.approx(place, abs=1e-3)

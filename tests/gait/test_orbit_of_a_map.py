@@ -12,7 +12,7 @@ import jaxbiped as jb
 from jaxbiped._types import Scalar
 from jaxbiped.gait import _orbit_derivatives
 from jaxbiped.gait._accurate_gait import judge_gait
-from jaxbiped.gait._fixed_point_search import Found, is_sound, walks_only
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, is_sound, walks_only
 from jaxbiped.gait._gait import Gait, Measures, _by_parameter, _elasticities, _measure_errors
 from jaxbiped.gait._gait_measures import _by_correction
 from jaxbiped.gait._newton import Method, Stage, initial_progress, newton_iteration
@@ -101,11 +101,12 @@ def test_sensitivities_are_differences_of_fixed_points(linear, monkeypatch):
 
     monkeypatch.setattr(_orbit_derivatives, "second_variation", second_variation)
     zero = jb.State(*[0.0] * 8)
+    problem = FixedPointProblem(None, tuple(P), (0, 1), None, None)
 
     @jax.jit
     def told(last):
         slopes, length = slopes_of(last), last.advance[0]
-        radius = _orbit_derivatives._radius_slopes(None, tuple(P), (0, 1), None, last)
+        radius = _orbit_derivatives._radius_slopes(problem, last)
         measured = Measures(last.period, length, length / last.period, last.peak, None, zero)
         seven = slopes._replace(recurring=jnp.concatenate([slopes.recurring, jnp.zeros((4, 2))]))
         found = _by_parameter(SimpleNamespace(), measured, seven, radius)

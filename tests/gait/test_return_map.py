@@ -2,7 +2,7 @@
 
 import functools
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.gait._fixed_point_search import search
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, search
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
@@ -127,9 +127,14 @@ def test_bouncing_ball_with_drag(mode, engine):
         assert np.asarray(ours)[:, column] == pytest.approx(expected, rel=2e-6)
 
 
+OMEGA, ZETA = 2.0, 0.1
+ROOT = math.sqrt(1.0 - ZETA**2)
+FACTOR, PERIOD = math.exp(-2 * math.pi * ZETA / ROOT), 2 * math.pi / (OMEGA * ROOT)
+"""From a crossing of x = 0 downwards to the next: v → v exp(−2π ζ/√(1−ζ²)), and the time."""
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_damped_oscillator_over_a_turn(mode):
-    """From a crossing of x = 0 downwards to the next: v → v exp(−2π ζ/√(1−ζ²))."""
 
     def turned(both):
         r = jb.return_map(
@@ -142,16 +147,13 @@ def test_damped_oscillator_over_a_turn(mode):
         )
         return jnp.stack([r.state[1], r.time])
 
-    v, omega, zeta = -1.5, 2.0, 0.1
-    root = math.sqrt(1.0 - zeta**2)
-    factor, period = math.exp(-2 * math.pi * zeta / root), 2 * math.pi / (omega * root)
-    point = jnp.array([v, omega, zeta])
-    reached, ours = value_and_derivative(turned, mode)(point)
-    assert reached == pytest.approx(np.array([v * factor, period]), rel=1e-7)
+    v = -1.5
+    reached, ours = value_and_derivative(turned, mode)(jnp.array([v, OMEGA, ZETA]))
+    assert reached == pytest.approx(np.array([v * FACTOR, PERIOD]), rel=1e-7)
     expected = np.array(
         [
-            [factor, 0.0, v * factor * (-2 * math.pi / root**3)],
-            [0.0, -period / omega, period * zeta / root**2],
+            [FACTOR, 0.0, v * FACTOR * (-2 * math.pi / ROOT**3)],
+            [0.0, -PERIOD / OMEGA, PERIOD * ZETA / ROOT**2],
         ]
     )
     assert np.asarray(ours) == pytest.approx(expected, rel=1e-5, abs=1e-6)
@@ -160,27 +162,47 @@ def test_damped_oscillator_over_a_turn(mode):
 @pytest.mark.parametrize("engine", ["xla", "lanes"])
 @pytest.mark.parametrize("solver", ["rodas3p", "rodas4p", "rodas5p"])
 def test_every_solver_carries_derivatives(solver, engine):
-    omega, zeta = 2.0, 0.1
-    root = math.sqrt(1.0 - zeta**2)
-    factor = math.exp(-2 * math.pi * zeta / root)
-
     def turned(v):
         start = (jnp.asarray(0.0), v)
         how = dict(section=DOWN, system=Oscillator(), gradient=jb.Forward())
-        args = (jnp.asarray(omega), jnp.asarray(zeta))
+        args = (jnp.asarray(OMEGA), jnp.asarray(ZETA))
         r = jb.return_map(args, start, solver=solver, engine=engine, **how)
         return r.state[1]
 
     reached, slope = jax.jvp(turned, (jnp.asarray(-1.5),), (jnp.asarray(1.0),))
-    assert float(reached) == pytest.approx(-1.5 * factor, rel=1e-5)
-    assert float(slope) == pytest.approx(factor, rel=1e-4)
+    assert float(reached) == pytest.approx(-1.5 * FACTOR, rel=1e-5)
+    assert float(slope) == pytest.approx(FACTOR, rel=1e-4)
+
+
+class Spring(NamedTuple):
+    omega: Any
+    zeta: Any
+
+
+@pytest.mark.parametrize("engine", ["xla", "lanes"])
+def test_a_linearised_turn_of_the_oscillator(engine):
+    start = (jnp.asarray(0.0), jnp.asarray(-1.5))
+    found = jb.gait.linearise_return_map(
+        Spring(OMEGA, ZETA), start, rtol=1e-9, tangent_rtol=1e-8, parameters=("zeta", "omega"),
+        section=DOWN, system=Oscillator(), engine=engine,
+    )  # fmt: skip
+    assert float(found.recurring[1]) == pytest.approx(-1.5 * FACTOR, rel=1e-7)
+    assert float(found.period) == pytest.approx(PERIOD, rel=1e-7)
+    by_zeta = -2 * math.pi / ROOT**3 * -1.5 * FACTOR
+    ours = np.asarray(found.jacobian)[1, 1:]
+    assert ours == pytest.approx([FACTOR, ZETA * by_zeta, 0.0], rel=1e-5, abs=1e-6)
+    times = np.asarray(found.period_row)[1:]
+    assert times == pytest.approx([0.0, PERIOD * ZETA**2 / ROOT**2, -PERIOD], rel=1e-5, abs=1e-6)
+    # Liouville: areas shrink by the field's divergence.
+    area = np.linalg.det(np.asarray(found.monodromy)[:, :2])
+    assert area == pytest.approx(math.exp(-2 * ZETA * OMEGA * PERIOD), rel=1e-5)
 
 
 def _orbit(spec, args, guess):
     tight = precision_of("tight")
-    found = search(spec, args, (), guess, tight, Method(None, 40, 1e-10))
-    found = with_parameter_columns(spec, args, (0,), guess, tight, found)
-    return orbit_of(spec, args, (0,), guess, found, radius=True)
+    problem = FixedPointProblem(spec, args, (), guess, tight, Method(None, 40, 1e-10))
+    asked = problem._replace(active=(0,))
+    return orbit_of(asked, with_parameter_columns(asked, search(problem)), radius=True)
 
 
 @pytest.mark.parametrize("engine", ["xla", "lanes"])
@@ -360,3 +382,22 @@ def test_derivatives_leap_where_the_force_jumps(mode, engine):
     assert np.asarray(turned(at)) == pytest.approx(np.asarray(truth(at)), rel=1e-8)
     ours, expected = derivative(turned, mode)(at), jax.jacfwd(truth)(at)
     assert np.asarray(ours) == pytest.approx(np.asarray(expected), rel=1e-6, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (dict(rtol=0.0), "rtol = 0 is not allowed"),
+        (dict(tangent_rtol=-1.0), "tangent_rtol = -1 is not allowed"),
+        (dict(parameters=("K2",)), "parameters = 'K2' is not known"),
+        (dict(max_time=0.0), "max_time = 0 is not allowed"),
+        (dict(footsteps=0), "footsteps = 0 is not allowed"),
+        (dict(max_solver_steps=0), "max_solver_steps = 0 is not allowed"),
+        (dict(args=jb.RedundantScene(jb.seed_scene())), "args = a RedundantScene"),
+    ],
+)
+def test_what_a_linearised_return_is_refused(change, said):
+    how = dict(args=jb.seed_scene(), state=jb.seed_state(), rtol=1e-6, tangent_rtol=1e-5) | change
+    with pytest.raises(jb.ArgumentError) as refused:
+        jb.gait.linearise_return_map(how.pop("args"), how.pop("state"), **how)
+    assert said in str(refused.value)

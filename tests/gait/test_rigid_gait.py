@@ -145,14 +145,6 @@ def test_sensitivities_equal_differences(measure):
         assert got == pytest.approx(expected, rel=1e-5, abs=1e-6)
 
 
-def test_the_radius_of_a_cycle_of_two_is_that_of_one_squared():
-    """Its derivatives, too, though an impact is no symmetry of the motion."""
-    names = ("d", "J", "slope")
-    once, twice = (jb.find_gait(rigid_seed(), footsteps=k, parameters=names) for k in (1, 2))
-    expected = 2.0 * np.asarray(once.elasticities.spectral_radius)
-    np.testing.assert_allclose(twice.elasticities.spectral_radius, expected, rtol=1e-7)
-
-
 def test_return_map_and_measures_differentiate():
     scene = rigid_seed()
     state = jb.find_gait(scene, **PLAIN).measures.state

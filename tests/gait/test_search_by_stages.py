@@ -7,12 +7,13 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.gait import _search_starts, _staged_search
-from jaxbiped.gait._fixed_point_search import Found
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.gait._search_starts import component_sizes, settle_walks
 from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
+from jaxbiped.solve._accuracy import Precision
 
 SCENE = jb.ladder()["rigid"]
 START = jb.dynamics.RigidState(0.0, -0.2, 0.3, -1.0, -2.0)
@@ -54,8 +55,8 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
         return SimpleNamespace(points=[np.full(4, 2.0)], s=np.array([0.5]), end=end, farthest=0,
                                code=0)  # fmt: skip
 
-    def search(spec, scene, start, patience):
-        mark = float(start.theta_1)
+    def search(problem, patience):
+        mark = float(problem.guess.theta_1)
         kind = {1.0: "walk", 2.0: "branch"}.get(mark, "scatter")
         if kind == "scatter" and "scatter" not in took:
             took.append("scatter")
@@ -64,9 +65,8 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
     monkeypatch.setattr(_staged_search, "settle_walks", walks)
     monkeypatch.setattr(_staged_search, "_follow_from_seed", follow)
     scout = SimpleNamespace(engine=engine)
-    return search_in_stages(
-        search, SimpleNamespace(steps=1), scout, SCENE, SCENE, first, 1e-9
-    ), took
+    problem = FixedPointProblem(SimpleNamespace(steps=1), SCENE, (), START, Precision(1e-9, 1e-8))
+    return search_in_stages(search, problem, scout, first), took
 
 
 def test_a_stable_gait_ends_the_search_and_an_unstable_one_does_not(monkeypatch):

@@ -1,5 +1,7 @@
 """The search without a guess, against walks that settle and gaits that are known."""
 
+import warnings
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -7,6 +9,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.gait._search_provenance import warn_of_grazing
 from tests.rigid_walkers import rigid_seed, simplest_walker
 
 pytestmark = pytest.mark.slow
@@ -153,3 +156,17 @@ def test_a_scene_with_bristles_is_searched_in_stages_too():
     assert bool(gait.stable)
     assert float(gait.measures.period) == pytest.approx(0.4464, abs=1e-3)
     assert gait.measures.state._fields[-1] == "bristle_2"
+
+
+def test_a_gait_that_grazes_a_switch_is_told():
+    scene = jb.ladder()["rigid"]
+    gait = jb.find_gait(scene, **PLAIN)
+    assert int(gait.grazes) == 0
+    assert "grazes" not in jb.gait.explain_search(scene, gait)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_grazing(gait)
+    grazing = eqx.tree_at(lambda each: each.grazes, gait, jnp.asarray(2))
+    assert "the gait grazes a switch 2 times" in jb.gait.explain_search(scene, grazing)
+    with pytest.warns(RuntimeWarning, match="its sensitivities not known"):
+        warn_of_grazing(grazing)

@@ -36,10 +36,7 @@ def test_a_file_gives_its_gaits(tmp_path):
         ("{", "is not JSON"),
         ({}, "it must hold"),
         ({"gaits": []}, "at least one"),
-        (
-            {"gaits": [{"period": [1.0, 0.1]}]},
-            "'period' is not known in a gait",
-        ),
+        ({"gaits": [{"period": [1.0, 0.1]}]}, "'period' is not known in a gait"),
         ({"gaits": [{"angles": {"time": []}}]}, "'time' is not known in angles"),
         ({"gaits": [{"period_s": 1.0}]}, "give the value and its standard deviation"),
         ({"gaits": [{"period_s": [1.0, 0.0]}]}, "standard deviation of period = 0"),

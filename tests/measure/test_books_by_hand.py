@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._contact_forces import Contacts, FootForce, FootForces
+from jaxbiped.dynamics._contacts import Contacts, Feet, Foot, FootForce, FootForces
 from jaxbiped.dynamics._energy import Energies, Powers
-from jaxbiped.dynamics._feet import Feet, Foot
 from jaxbiped.measure import _cost_of_transport, _energy_ledger, _footsteps
 from jaxbiped.measure._footsteps import HeelStrikes
 from jaxbiped.measure._samples import NODES, Samples

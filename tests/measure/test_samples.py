@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._contact_forces import contacts
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._samples import moments_of_change, sample
 
 HEIGHTS = np.array([0.5, 0.45, 0.42])

@@ -5,57 +5,36 @@ import pytest
 from scipy.optimize import lsq_linear
 
 import jaxbiped as jb
-from jaxbiped.optimise._design_problem import DesignProblem
-from jaxbiped.optimise._design_variables import requirements_of, variables_of
-from jaxbiped.optimise._ensemble import GaitSettings
-from jaxbiped.optimise._evaluations import Evaluations
+from jaxbiped.optimise._design_variables import variables_of
 from jaxbiped.optimise._multiplier_cluster import conditions, radius_of
-from jaxbiped.optimise._objectives import Evaluation
 from jaxbiped.optimise._optimality import optimality_of
-from jaxbiped.optimise._runs import Outcome, Runs
+from jaxbiped.optimise._runs import Outcome
+from tests.optimise.drawn_designs import SCENE, difference, drawn, solved
 
-SCENE = jb.ladder()["rigid"]
-NAMES = jb.parameter_names(SCENE)
 BOX = {"d": (0.05, 0.2), "J": (0.003, 0.02), "r": (0.04, 0.12), "m": (1.0, 3.0), "g": (9.0, 10.0)}
 
 
-class Drawn(DesignProblem):
-    """Measures and their gradients in u by a function, instead of a walker's."""
-
-    def _follow(self, u):
-        told, rates = self.function(u), self.variables.rates(u)
-        slopes = {name: np.zeros(len(NAMES)) for name in told}
-        for name, (_, gradient) in told.items():
-            slopes[name][self.variables.places] = np.asarray(gradient) / rates
-        values = {name: float(value) for name, (value, _) in told.items()}
-        small = {name: 1e-12 for name in told}, {name: 0.0 * row for name, row in slopes.items()}
-        nothing = np.zeros(4), np.zeros((4, len(NAMES)))
-        known = Evaluation(values, small[0], slopes, small[1], *nothing)
-        self.evaluations.add(u, known)
-        return known
-
-
-def solved(count, function, goal="speed", subject_to=None):
+def best_of(count, function, goal="speed", subject_to=None, iterations=300):
+    """The runs over a function of u whose gradients are in u."""
     vary = dict(list(BOX.items())[:count])
-    made = Drawn(
-        SCENE, variables_of(SCENE, vary), {goal: 1.0}, 1.0, requirements_of(SCENE, subject_to),
-        GaitSettings(), Evaluations(None, {}),
-    )  # fmt: skip
-    made.function = function
-    made.at(np.full(count, 0.3))
-    runs = Runs(made, 300, "trust-region", False)
-    runs.run(made.latest)
-    return made, runs
+
+    rates = variables_of(SCENE, vary).rates
+
+    def told(_, u):
+        return {name: (value, slope / rates(u)) for name, (value, slope) in function(u).items()}
+
+    return solved(drawn(told, vary, {goal: 1.0}, 1.0, subject_to, begin=0.3), iterations)
 
 
-def gained(made, best):
+def gained(runs, function):
     """By how much the best of the allowed designs all round is better, at three distances."""
+    made, best = runs.problem, runs.best
     random, own, gain = np.random.default_rng(1), made.objective(best.known)[0], 0.0
     for distance in (1e-4, 1e-3, 1e-2):
         for _ in range(200):
             aside = random.standard_normal(len(best.u))
             u = np.clip(best.u + distance * aside / np.linalg.norm(aside), 0.0, 1.0)
-            values = {name: float(value) for name, (value, _) in made.function(u).items()}
+            values = {name: float(value) for name, (value, _) in function(u).items()}
             if made.excess(best.known._replace(values=values)) <= 1e-6:
                 gain = max(gain, own - sum(w * values[n] for n, w in made.weights.items()))
     return gain
@@ -93,7 +72,7 @@ def curved(u):
     """Rosenbrock's valley with a sharp bottom."""
     s = u[1] - 2.0 * (u[0] - 0.2) ** 2 - 0.3
     by_first = 2.0 * (u[0] - 0.7) - 4.0 * np.sign(s) * (u[0] - 0.2)
-    return {"speed": (2.0 + (u[0] - 0.7) ** 2 + abs(s), [by_first, np.sign(s)])}
+    return {"speed": (2.0 + (u[0] - 0.7) ** 2 + abs(s), np.array([by_first, np.sign(s)]))}
 
 
 def rooted(u):
@@ -114,16 +93,23 @@ def rooted(u):
     ],
 )
 def test_no_design_round_the_end_is_better(count, function):
-    made, runs = solved(count, function)
+    runs = best_of(count, function)
     assert runs.outcome() in (Outcome.CONVERGED, Outcome.CORNER)
-    assert gained(made, runs.best) < 2e-6
+    assert gained(runs, function) < 2e-6
 
 
 def test_a_ridge_ends_at_its_foot():
     """On u₁ = u₂ the derivative along it is that of (u₁ − ½)² + 0.3 (u₁ − ½)."""
-    _, runs = solved(2, ridge(1.0))
+    runs = best_of(2, ridge(1.0))
     assert runs.best.u == pytest.approx([0.35, 0.35], abs=2e-3)
     assert runs.outcome() is Outcome.CONVERGED
+
+
+def test_designs_that_are_scattered_count_as_iterations():
+    """After 34 it would scatter ten about the best, when two more are allowed."""
+    runs = best_of(4, largest_of(4, 6, 2), iterations=36)
+    assert len(runs.history) == 1 + 36
+    assert not runs.ended.converged
 
 
 @pytest.mark.parametrize("kind", ["real", "conjugate"])
@@ -138,50 +124,30 @@ def test_the_conditions_hold_where_all_three_multipliers_lie_inside(kind):
         told = conditions(symmetric, 0.4)
         assert (np.min(told.values) > 0.0) == (np.max(np.abs(three)) < 0.4)
         assert radius_of(symmetric) == pytest.approx(np.max(np.abs(three)), rel=1e-6)
-        h, along = 1e-6, random.standard_normal(3)
-        ends = [conditions(symmetric + s * h * along, 0.4).values for s in (1.0, -1.0)]
-        np.testing.assert_allclose(
-            told.by_symmetric @ along, (ends[0] - ends[1]) / (2 * h), atol=1e-7
-        )
-        ends = [conditions(symmetric, 0.4 + s * h).values for s in (1.0, -1.0)]
-        np.testing.assert_allclose(told.by_radius, (ends[0] - ends[1]) / (2 * h), atol=1e-6)
-
-
-def companion(trace, product, third):
-    """Measures of a gait with λ² − trace λ + product and a third multiplier, gradients in u."""
-
-    def function(u):
-        (t, by_t), (q, by_q), (c, by_c) = trace(u), product(u), third(u)
-        values = np.append(np.roots([1.0, -t, q]), c)
-        one = (t + c, by_t + by_c)
-        two = (q + t * c, by_q + t * by_c + c * by_t)
-        three = (q * c, q * by_c + c * by_q)
-        told = dict(
-            zip(("symmetric_1", "symmetric_2", "symmetric_3"), (one, two, three), strict=True)
-        )
-        radius = (float(np.max(np.abs(values))), np.full(len(u), np.nan))
-        speed = (1.0 + u[0] + 0.5 * u[1], np.append([1.0, 0.5], np.zeros(len(u) - 2)))
-        return told | {
-            "spectral_radius": radius, "next_modulus": (0.0, np.zeros(len(u))), "speed": speed
-        }  # fmt: skip
-
-    return function
+        along = random.standard_normal(3)
+        by_symmetric = difference(lambda h, s=symmetric, a=along: conditions(s + h * a, 0.4).values)
+        np.testing.assert_allclose(told.by_symmetric @ along, by_symmetric, atol=1e-7)
+        by_radius = difference(lambda h, s=symmetric: conditions(s, 0.4 + h).values)
+        np.testing.assert_allclose(told.by_radius, by_radius, atol=1e-6)
 
 
 def test_a_radius_is_least_where_two_multipliers_meet():
     """λ = 0.6 ± √(u₁ − ½ + (u₂ − ½)²) + (u₂ − 0.7)²: least, 0.6, at u₂ = 0.7 on the parabola."""
 
-    def trace(u):
-        return 2.0 * (0.6 + (u[1] - 0.7) ** 2), np.array([0.0, 4.0 * (u[1] - 0.7)])
+    def function(u):
+        mean, by_mean = 0.6 + (u[1] - 0.7) ** 2, np.array([0.0, 2.0 * (u[1] - 0.7)])
+        inside, by_inside = u[0] - 0.5 + (u[1] - 0.5) ** 2, np.array([1.0, 2.0 * (u[1] - 0.5)])
+        product, by_product = mean**2 - inside, 2.0 * mean * by_mean - by_inside
+        roots = np.roots([1.0, -2.0 * mean, product])
+        return {  # beside a third multiplier of 0.1
+            "symmetric_1": (2.0 * mean + 0.1, 2.0 * by_mean),
+            "symmetric_2": (product + 0.2 * mean, by_product + 0.2 * by_mean),
+            "symmetric_3": (0.1 * product, 0.1 * by_product),
+            "spectral_radius": (np.max(np.abs([*roots, 0.1])), np.full(2, np.nan)),
+            "next_modulus": (0.0, np.zeros(2)),
+        }
 
-    def product(u):
-        mean = 0.6 + (u[1] - 0.7) ** 2
-        inside = u[0] - 0.5 + (u[1] - 0.5) ** 2
-        by_second = 4.0 * mean * (u[1] - 0.7) - 2.0 * (u[1] - 0.5)
-        return mean**2 - inside, np.array([-1.0, by_second])
-
-    function = companion(trace, product, lambda u: (0.1, np.zeros(2)))
-    _, runs = solved(2, function, "spectral_radius")
+    runs = best_of(2, function, "spectral_radius")
     # A conjugate pair's modulus is √(mean² − inside): it is least where `inside` is zero.
     assert runs.best.known.values["spectral_radius"] == pytest.approx(0.6, abs=1e-4)
     assert runs.best.u == pytest.approx([0.46, 0.7], abs=0.02)
@@ -204,10 +170,10 @@ def test_a_bound_holds_at_a_triple_multiplier_to_a_millionth():
             "speed": (2.0 - w[0] - 0.5 * w[1] - 0.2 * w[2], np.array([-1.0, -0.5, -0.2])),
         }  # fmt: skip
 
-    made, runs = solved(3, function, "speed", "spectral_radius<0.5")
+    runs = best_of(3, function, "speed", "spectral_radius<0.5")
     assert runs.best.known.values["spectral_radius"] <= 0.5 * (1.0 + 1e-6)
     assert runs.best.known.values["speed"] == pytest.approx(2.0, abs=0.01)
-    told = optimality_of(made, runs.best)
+    told = optimality_of(runs.problem, runs.best)
     assert told.residual < 1e-3
     # The vertex moves with the bound ρ as λ = ρ does: w = (3, 0, 0) (ρ − ½) to first order.
     (held, _) = told.requirements
@@ -253,7 +219,7 @@ def test_a_walkers_bound_is_kept_where_three_multipliers_meet():
     assert best.optimality.residual < 1e-3
     tight = jb.find_gait(best.scene, best.gait.measures.state, accuracy="tight", parameters=())
     assert float(tight.measures.spectral_radius) <= 0.4 * (1.0 + 1e-6)
-    names, step = list(own), 1e-3
+    names = list(own)
 
     def told(shift):
         values = {n: best.variables[n] * np.exp(x) for n, x in zip(names, shift, strict=True)}
@@ -265,7 +231,7 @@ def test_a_walkers_bound_is_kept_where_three_multipliers_meet():
         three = three[np.argsort(-np.abs(three))][:3]
         return np.append(np.real(np.poly(three))[1:] * [-1, 1, -1], float(gait.measures.speed))
 
-    slopes = np.stack([(told(e) - told(-e)) / (2.0 * step) for e in step * np.eye(3)], axis=1)
+    slopes = np.stack([difference(lambda h, e=e: told(h * e), 1e-3) for e in np.eye(3)], axis=1)
     centre = conditions(told(np.zeros(3))[:3], 0.4)
     # Multipliers of the active conditions, at least zero, balance the speed.
     active = centre.by_symmetric[centre.values < 0.1]

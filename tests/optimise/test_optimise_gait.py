@@ -9,9 +9,8 @@ import optax
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem
-from jaxbiped.optimise._design_variables import variables_of
-from jaxbiped.optimise._ensemble import GaitSettings
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import Evaluation
 from jaxbiped.optimise._optimise_gait import _problem_settings
@@ -251,20 +250,6 @@ def test_ctrl_c_keeps_the_best(monkeypatch):
 def test_a_start_outside_the_bounds_is_moved_onto_them():
     best = best_of(vary={"d": (0.11, 0.12)}, iterations=1)
     assert best.history[0].variables["d"] == pytest.approx(0.11)
-
-
-def test_variables_keep_their_bounds_exactly():
-    variables = variables_of(RIGID, {"d": (0.05, 0.2), "hip_mass": (0.0, 1.0)})
-    for u in (np.zeros(2), np.ones(2)):
-        values = variables.values(u)
-        assert values.tolist() == [[0.05, 0.2][int(u[0])], [0.0, 1.0][int(u[1])]]
-        assert np.allclose(variables.positions(values), u)
-    u, step = np.array([0.3, 0.7]), 1e-6
-    slopes = [
-        (variables.values(u + step * e) - variables.values(u - step * e)) / (2 * step)
-        for e in np.eye(2)
-    ]
-    assert np.allclose(np.diag(slopes), variables.rates(u), rtol=1e-8)
 
 
 @pytest.mark.parametrize(

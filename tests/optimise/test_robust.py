@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.optimise._ensemble import GaitSettings, ensemble_of, evaluate_ensemble
+from jaxbiped.optimise._design_gaits import GaitSettings
+from jaxbiped.optimise._ensemble import ensemble_of, evaluate_ensemble
 from jaxbiped.optimise._objectives import evaluate
 
 pytestmark = pytest.mark.slow

@@ -1,4 +1,4 @@
-"""What holds for every figure, against units, labels and the axes' limits."""
+"""What holds for every figure of a walk, against words, units and the axes' limits."""
 
 import dataclasses
 import subprocess
@@ -11,15 +11,20 @@ from matplotlib.figure import Figure
 
 import jaxbiped as jb
 from jaxbiped import plot
-from tests.drawn import assert_is_drawn, points_of
+from tests.drawn import assert_is_drawn, labels_of, points_of
 
-FIGURES = [
-    plot.gait_strobe,
-    plot.phase_portrait,
-    plot.leg_angles,
-    plot.penetrations,
-    plot.contact_forces,
-]
+ANGLE, TIME = r"leg angle, $\theta$ (rad)", "time, $t$ (s)"
+LABELS = {
+    plot.gait_strobe: {"horizontal position, $X$ (m)", "height, $Z$ (m)"},
+    plot.phase_portrait: {ANGLE, r"leg rate, $\omega$ (rad/s)"},
+    plot.leg_angles: {TIME, ANGLE},
+    plot.penetrations: {TIME, r"penetration, $\delta$ (mm)"},
+    plot.contact_forces: {
+        TIME, "time after the foot touches, $t$ (ms)", "normal force, $F_N$ (N)",
+        "tangential force, $F_T$ (N)",
+    },
+}  # fmt: skip
+FIGURES = list(LABELS)
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +45,7 @@ def test_motions_that_end_early_are_drawn(draw, endings):
         figure = draw(scene, walk)
         assert isinstance(figure, Figure)
         assert_is_drawn(figure)
+        assert labels_of(figure) == LABELS[draw]
         if draw is plot.gait_strobe:
             continue  # its poses are those of test_strobe.py
         first, end = points_of(figure.axes[0])[0], walk.final

@@ -14,8 +14,7 @@ from jaxbiped.continuation import (
     BranchStop,
 )
 from jaxbiped.plot import bifurcation_curves, branch
-from jaxbiped.plot._branch import _value
-from tests.drawn import assert_is_drawn, points_of
+from tests.drawn import assert_is_drawn, legend_of, points_of
 
 STOP = BranchStop(jb.gait.BranchEnd.REACHED, "the range ends", 0.0)
 
@@ -51,15 +50,9 @@ def _branch(points, events=(), footsteps=1, name="slope", log=False):
     )
 
 
-POINTS = [
-    _point(0.02, 0.5),
-    _point(0.04, -0.9),
-    _point(0.05, -1.0),
-    _point(0.06, -1.1),
-    _point(0.07, -1.2),
-    _point(0.08, -1.2, error=0.5),
-    _point(0.09, -1.1, error=0.5),
-]
+LEADING = {0.02: 0.5, 0.04: -0.9, 0.05: -1.0, 0.06: -1.1, 0.07: -1.2}
+POINTS = [_point(value, leading) for value, leading in LEADING.items()]
+POINTS += [_point(0.08, -1.2, error=0.5), _point(0.09, -1.1, error=0.5)]
 DOUBLING = BifurcationPoint(BranchEvent.PERIOD_DOUBLING, POINTS[2], -1.0 + 0j, 1e-9)
 
 
@@ -75,8 +68,7 @@ def test_stability_is_told_by_the_kind_of_line():
     assert lines[1][:, 0].tolist() == [0.05, 0.06, 0.07, 0.08]
     assert lines[2][:, 0].tolist() == [0.08, 0.09]
     assert mark.get_marker() == "D"
-    words = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert words == ["stable", "unstable", "undecided", "period doubling"]
+    assert legend_of(ax) == ["stable", "unstable", "undecided", "period doubling"]
     assert ax.get_xlabel() == r"slope, $\alpha$ (rad)"
     assert ax.get_ylabel() == "step length, $L$ (m)"
 
@@ -89,22 +81,9 @@ def test_a_longer_cycle_is_drawn_by_its_footsteps():
     assert_is_drawn(figure)
     (ax,) = figure.axes
     assert points_of(ax)[3][:, 1].tolist() == [0.1, 0.2]
-    words = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert {"1 footstep", "2 footsteps"} <= set(words)
+    assert {"1 footstep", "2 footsteps"} <= set(legend_of(ax))
     marks = [line.get_xdata()[0] for line in ax.lines if line.get_marker() == "D"]
     assert marks == [0.05, 0.06]
-
-
-@pytest.mark.parametrize(
-    "measure", ["period", "speed", "peak_normal", "spectral_radius", "theta_2"]
-)
-def test_every_measure_has_its_unit(measure):
-    assert_is_drawn(branch(_branch(POINTS), measure))
-
-
-def test_a_logarithmic_axis():
-    figure = branch(_branch(POINTS, name="m", log=True))
-    assert figure.axes[0].get_xscale() == "log"
 
 
 def test_curves_of_bifurcations():
@@ -131,9 +110,13 @@ def test_what_cannot_be_drawn():
         branch(_branch(POINTS), "hip_z")
 
 
-def test_measures_are_of_a_footstep():
-    found = _branch([_point(0.02, 0.5, length=0.3)], footsteps=2)
+def test_measures_are_of_a_footstep_and_have_their_units():
+    """Here on a logarithmic axis."""
+    found = _branch([_point(0.02, 0.5, length=0.3)], footsteps=2, name="m", log=True)
     measures = {"speed": 0.3 / 0.4, "period": 0.2, "step_length": 0.15, "peak_normal": 20.0,
                 "spectral_radius": 0.5, "omega_1": -1.0}  # fmt: skip
     for name, value in measures.items():
-        assert _value(name, found, found.points[0]) == pytest.approx(value), name
+        figure = branch(found, name)
+        assert_is_drawn(figure)
+        assert figure.axes[0].get_xscale() == "log"
+        assert points_of(figure.axes[0])[0] == pytest.approx(np.array([[0.02, value]])), name

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._contact_forces import contacts
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._samples import evaluate_along, evaluate_at
 from jaxbiped.plot._samples import sample, sampled_forces, state_at
 

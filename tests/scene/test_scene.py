@@ -139,12 +139,10 @@ def test_what_is_no_scene_is_of_no_kind():
 
 
 class Wheel(AbstractScene):
-    """A kind of scene of one's own: a rimless wheel's hub on its slope."""
+    """A kind of scene of one's own, without a walker: a rimless wheel on its slope."""
 
     compliant: ClassVar[bool] = False
     redundant: ClassVar[bool] = False
-    walker: jb.Walker
-    ground: jb.Ground
     spokes: float = jb.laws.parameter("spokes", "$n$", positive=True)
 
     @property
@@ -154,19 +152,15 @@ class Wheel(AbstractScene):
     def with_minimal(self, minimal):
         return minimal
 
-    @property
-    def has_bristles(self):
-        return False
 
-
-def test_a_kind_of_ones_own_registers_its_formulation():
+def test_a_kind_of_ones_own_registers_its_formulation_and_needs_no_walker():
     @state_type.register
     def _(scene: Wheel):
         return tuple
 
-    wheel = Wheel(SEED.walker, SEED.ground, 8.0)
+    wheel = Wheel(8.0)
     assert state_type(wheel) is tuple
-    assert is_rigid(wheel)
-    assert "spokes" in jb.parameter_names(wheel)
+    assert not is_rigid(wheel)
+    assert jb.parameter_names(wheel) == ("spokes",)
     assert jb.parameter_quantities(wheel)["spokes"].words == "spokes"
     assert float(jb.with_parameters(wheel, {"spokes": 9.0}).spokes) == 9.0

@@ -1,7 +1,6 @@
 """Error bars of walks, against witnesses made by hand; what lanes are asked; doors."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -51,30 +50,6 @@ def test_a_witness_that_ends_otherwise_leaves_the_error_open(place):
     )
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (dict(duration=-1.0), "duration = -1 is not allowed"),
-        (dict(duration=np.nan), "duration = nan is not allowed"),
-        (dict(duration=None), "say how long to simulate"),
-        (dict(footsteps=0), "footsteps = 0 is not allowed"),
-        (dict(rtol=0.0), "rtol = 0 is not allowed"),
-        (dict(atol=-1e-9), "atol = -1e-09 is not allowed"),
-        (dict(max_solver_steps=0), "max_solver_steps = 0 is not allowed"),
-        (dict(max_arrivals=0), "max_arrivals = 0 is not allowed"),
-        (dict(watch=("falls",)), "watch = 'falls' is not known"),
-        (dict(save="last"), "save = 'last' is not known"),
-        (dict(accuracy="best"), "accuracy = 'best' is not known"),
-        (dict(save=jnp.array([0.2, 0.1])), "save"),
-        (dict(save=jnp.array([0.5, 1.5])), "save"),
-    ],
-)
-def test_what_cannot_be_simulated_is_refused_before_anything_is_compiled(change, said):
-    with pytest.raises(jb.ArgumentError) as refused:
-        Simulation.prepare(SCENE, STATE, **dict(duration=1.0) | change)
-    assert said in str(refused.value)
-
-
 def test_lanes_are_asked_for_what_the_user_said():
     run = Simulation.prepare(SCENE, STATE, footsteps=3, rtol=1e-5, max_solver_steps=77, save="end")
     asked = lane_request(run).inputs
@@ -84,14 +59,3 @@ def test_lanes_are_asked_for_what_the_user_said():
     assert float(asked.patience) == float(asked.duration) == 300.0
     assert 300.0 * (1.0 - 1e-12) < float(asked.almost) < 300.0
     assert [float(leaf) for leaf in asked.state] == [float(leaf) for leaf in STATE]
-
-
-def test_a_linkage_takes_as_many_coordinates_as_it_has():
-    linkage = jb.constraints.Linkage(
-        (jb.constraints.Body(1.0, 0.1),), (jb.constraints.Joint((0.0, 0.5), (0.0, 0.0), 0, None),)
-    )
-    scene = jb.LinkageScene(linkage, jb.constraints.Standard())
-    for count in (2, 4):
-        wrong = jb.dynamics.LinkageState((0.0,) * count, (0.0,) * 3)
-        with pytest.raises(jb.ArgumentError, match=f"state.q has {count} entries: this linkage"):
-            jb.swing(scene, wrong, times=[1.0])

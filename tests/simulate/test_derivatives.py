@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from tests.compliant_walkers import held_walker
 
 pytestmark = pytest.mark.slow
 
@@ -19,6 +20,12 @@ LEAVES = {
     "slope": lambda scene: scene.ground.slope,
     "l": lambda scene: scene.walker.l,
 }
+
+
+def _central(function, at, h):
+    """Central difference of a function of a number, or of whatever this step is added to."""
+    ends = [np.asarray(function(at + sign * h)) for sign in (1.0, -1.0)]
+    return (ends[0] - ends[1]) / (2.0 * h)
 
 
 def _final(logs, omega=0.0, *, duration=0.8, **options):
@@ -38,21 +45,20 @@ ZEROS = {name: jnp.asarray(0.0) for name in LEAVES}
 
 def test_forward_mode_against_central_differences():
     by_log = jax.jacfwd(_final)(ZEROS)
+    # Tighter by far: their errors are divided by the step.
+    exact = dict(rtol=1e-12, atol=1e-14)
     for name in LEAVES:
-        h = 3e-5
-        # Tighter by far: their errors are divided by h.
-        exact = dict(rtol=1e-12, atol=1e-14)
-        ends = [np.array(_final({name: jnp.asarray(s * h)}, **exact)) for s in (1.0, -1.0)]
-        difference = (ends[0] - ends[1]) / (2.0 * h)
+        difference = _central(lambda log, n=name: _final({n: log}, **exact), jnp.zeros(()), 3e-5)
         scale = np.max(np.abs(difference))
         np.testing.assert_allclose(by_log[name], difference, atol=1e-4 * scale)
 
 
 def test_derivatives_by_the_start_against_central_differences():
-    by_rate = jax.jacfwd(lambda omega: _final({}, omega))(jnp.asarray(0.0))
-    h = 1e-6
-    ends = [np.array(_final({}, jnp.asarray(s * h))) for s in (1.0, -1.0)]
-    difference = (ends[0] - ends[1]) / (2.0 * h)
+    by_start = lambda omega: _final({}, omega)
+    by_rate, difference = (
+        jax.jacfwd(by_start)(jnp.zeros(())),
+        _central(by_start, jnp.zeros(()), 1e-6),
+    )
     np.testing.assert_allclose(by_rate, difference, atol=1e-3 * np.max(np.abs(difference)))
 
 
@@ -90,16 +96,15 @@ def test_gradients_under_vmap_and_jit():
 
 RATE = float(jb.seed_state().omega_1)
 STEEP = jb.seed_scene(slope=0.06)
-HELD = eqx.tree_at(lambda scene: scene.clearance, jb.seed_scene(), jb.laws.AlwaysTouching())
-STOPS = jb.seed_state()._replace(omega_2=-1.3137, theta_1=-0.4124, hip_vx=0.3559)
-TRIPS = jb.seed_state()._replace(omega_2=-0.8266, theta_1=-0.2752, hip_vx=0.1941)
 SEED, START, TIMES = jb.seed_scene(), jb.seed_state(), jnp.array([0.2, 0.9])
+STOPS = START._replace(omega_2=-1.3137, theta_1=-0.4124, hip_vx=0.3559)
+TRIPS = START._replace(omega_2=-0.8266, theta_1=-0.2752, hip_vx=0.1941)
 ENDS = {
     "duration": (SEED, START, RATE, dict(duration=0.9)),
     "footsteps": (SEED, START, RATE, dict(footsteps=2)),
     "fell forward": (STEEP, START, RATE, dict(duration=9.0)),
     "stopped": (SEED, STOPS, 0.5139, dict(duration=9.0)),
-    "stumbled": (HELD, TRIPS, -1.7282, dict(duration=9.0)),
+    "stumbled": (held_walker(), TRIPS, -1.7282, dict(duration=9.0)),
     "arrivals": (SEED, START, RATE, dict(duration=0.9, save=jb.HeelStrike())),
     "times": (SEED, START, RATE, dict(duration=0.9, save=TIMES)),
 }
@@ -118,10 +123,8 @@ def _moments(name, rate, accuracy="balanced"):
 
 @pytest.mark.parametrize("name", ENDS)
 def test_derivatives_follow_what_ends_or_saves_a_simulation(name):
-    rate, h = jnp.asarray(ENDS[name][2]), 1e-5
-    walk = partial(_moments, name)
-    ends = [np.asarray(walk(rate + s * h, "tight")) for s in (1.0, -1.0)]
-    right = (ends[0] - ends[1]) / (2.0 * h)
+    rate, walk = jnp.asarray(ENDS[name][2]), partial(_moments, name)
+    right = _central(partial(walk, accuracy="tight"), rate, 1e-5)
     forward, reverse = jax.jacfwd(walk)(rate), jax.jacrev(walk)(rate)
     np.testing.assert_allclose(forward, right, atol=1e-4 * np.max(np.abs(right)))
     np.testing.assert_allclose(reverse, forward, rtol=1e-12)
@@ -141,10 +144,8 @@ def test_derivatives_of_a_rigid_walk(how):
             [*found.t, *found.final[:4], *arrivals[: 4 * bool(how.get("max_arrivals"))]]
         )
 
-    slope, h = jnp.asarray(0.02), 1e-5
-    right = (np.asarray(walk(slope + h, "tight")) - np.asarray(walk(slope - h, "tight"))) / (
-        2.0 * h
-    )
+    slope = jnp.asarray(0.02)
+    right = _central(partial(walk, accuracy="tight"), slope, 1e-5)
     forward, reverse = jax.jit(jax.jacfwd(walk))(slope), jax.jacrev(walk)(slope)
     np.testing.assert_allclose(forward, right, atol=1e-5 * np.max(np.abs(right)))
     np.testing.assert_allclose(reverse, forward, rtol=1e-9, atol=1e-9)
@@ -155,13 +156,13 @@ def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name, draft):
     law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
     scene = eqx.tree_at(lambda scene: scene.normal, jb.seed_scene(), law)
 
-    def end(rate, accuracy):
+    def end(rate, accuracy="tight"):
         state = jb.seed_state()._replace(omega_2=rate)
         walk = jb.simulate(scene, state, duration=0.6, save="end", accuracy=accuracy)
         return jnp.stack([walk.final.hip_x, walk.final.theta_1, walk.final.omega_1])
 
-    rate, h = jb.seed_state().omega_2, 1e-4
-    right = (np.asarray(end(rate + h, "tight")) - np.asarray(end(rate - h, "tight"))) / (2.0 * h)
+    rate = jb.seed_state().omega_2
+    right = _central(end, rate, 1e-4)
     for accuracy, error in (("draft", draft), ("balanced", draft / 4.0)):
         told = jax.jacfwd(lambda rate, accuracy=accuracy: end(rate, accuracy))(rate)
         np.testing.assert_allclose(told, right, atol=error * np.max(np.abs(right)))

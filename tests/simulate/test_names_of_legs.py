@@ -60,10 +60,8 @@ def test_heel_strikes_of_twins_are_the_footsteps(kind):
     scene = SCENE
     if kind == "bristle":
         scene = dataclasses.replace(SCENE, friction=jb.laws.Dahl(mu=0.45, sigma_0=2e4))
-    steps = [
-        float(jb.simulate(scene, STATE, footsteps=n, save="end", engine="lanes").t[-1])
-        for n in (1, 2)
-    ]
+    how = dict(save="end", engine="lanes")
+    steps = [float(jb.simulate(scene, STATE, footsteps=n, **how).t[-1]) for n in (1, 2)]
     for state in (STATE, TWIN):
         found = _arrivals(scene, state, jb.HeelStrike())
         np.testing.assert_allclose(found[:2], steps, atol=1e-3)
@@ -74,39 +72,36 @@ def test_heel_strikes_of_twins_are_the_footsteps(kind):
 @pytest.mark.slow
 @pytest.mark.parametrize("section", [jb.HeelStrike(), jb.MidStance()])
 def test_return_maps_of_twins_agree_and_go_on_from_the_section(section):
-    first, second = (jb.return_map(SCENE, state, section=section) for state in (STATE, TWIN))
+    def returned(state):
+        return jb.return_map(SCENE, state, section=section)
+
+    def slope(state, name):
+        time = lambda w: returned(state._replace(**{name: w})).time
+        return float(jax.jvp(time, (getattr(state, name),), (jnp.ones(()),))[1])
+
+    first, second = returned(STATE), returned(TWIN)
     assert float(first.time) == float(second.time)
     np.testing.assert_array_equal(np.array(first.state), np.array(second.state))
-    assert float(jb.return_map(SCENE, first.state, section=section).time) == pytest.approx(
-        0.4415, abs=2e-3
-    )
-    slope = jax.jvp(
-        lambda w: jb.return_map(SCENE, TWIN._replace(omega_2=w), section=section).time,
-        (TWIN.omega_2,),
-        (jnp.ones(()),),
-    )[1]
-    other = jax.jvp(
-        lambda w: jb.return_map(SCENE, STATE._replace(omega_1=w), section=section).time,
-        (STATE.omega_1,),
-        (jnp.ones(()),),
-    )[1]
-    assert float(slope) == pytest.approx(float(other), rel=1e-12)
+    assert float(returned(first.state).time) == pytest.approx(0.4415, abs=2e-3)
+    assert slope(TWIN, "omega_2") == pytest.approx(slope(STATE, "omega_1"), rel=1e-12)
 
 
 @pytest.mark.nightly
 def test_a_return_in_redundant_coordinates_is_that_of_its_twin():
     scene = jb.RedundantScene(SCENE, jb.constraints.Index1())
-    first, second = (
-        jb.return_map(scene, state, section=jb.HeelStrike()) for state in (STATE, TWIN)
+    first, second, plain = (
+        jb.return_map(*each, section=jb.HeelStrike())
+        for each in ((scene, STATE), (scene, TWIN), (SCENE, STATE))
     )
-    plain = jb.return_map(SCENE, STATE, section=jb.HeelStrike())
     assert float(second.time) == pytest.approx(float(first.time), rel=1e-9)
     assert float(first.time) == pytest.approx(float(plain.time), rel=1e-6)
 
 
 @pytest.mark.slow
 def test_a_gait_is_found_from_a_twin():
-    found = jb.find_gait(SCENE, TWIN, parameters=(), radius_sensitivities=False)
-    expected = jb.find_gait(SCENE, STATE, parameters=(), radius_sensitivities=False)
+    found, expected = (
+        jb.find_gait(SCENE, start, parameters=(), radius_sensitivities=False)
+        for start in (TWIN, STATE)
+    )
     assert float(found.measures.period) == float(expected.measures.period)
     assert int(found.evaluations) == int(expected.evaluations)

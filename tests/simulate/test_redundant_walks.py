@@ -81,20 +81,6 @@ def test_all_walk_at_the_minimal_ones_pace(long_walks):
         assert abs(float(final.theta_2 - truth.theta_2)) < 1e-2
 
 
-def test_what_is_not_allowed_is_one_sentence():
-    scene, start = jb.RedundantScene(jb.seed_scene()), jb.seed_state()
-    for change, said in (
-        (dict(engine="lanes"), "redundant coordinates are diffrax's, but for save"),
-        (dict(solver="euler"), "dt = None is not allowed for solver = euler"),
-        (dict(dt=0.0), "dt = 0 is not allowed"),
-        (dict(dt=1e-9), "more than max_solver_steps = 65536"),
-        (dict(save=jb.HeelStrike()), "save = HeelStrike() is not allowed here"),
-    ):
-        with pytest.raises(jb.ArgumentError) as refused:
-            jb.simulate(scene, start, duration=1.0, **change)
-        assert said in str(refused.value)
-
-
 @pytest.mark.parametrize("method", ["penalty", "described"])
 def test_lanes_take_the_same_footsteps(method):
     """Against the minimal formulation at a tight tolerance."""
@@ -106,20 +92,21 @@ def test_lanes_take_the_same_footsteps(method):
     assert found.correction is not None
     truth = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.9, save="end", rtol=1e-10)
     final = jb.dynamics.minimal_state(scene, found.final)
-    for name in truth.final._fields:
-        assert float(getattr(final, name)) == pytest.approx(
-            float(getattr(truth.final, name)), abs=1e-4
-        )
+    np.testing.assert_allclose(np.array(final), np.array(truth.final), rtol=0.0, atol=1e-4)
     bound = 1e-14 if method == "described" else 1e-7
     assert 0.0 < float(found.highest.position) < bound
 
 
+def damped(change):
+    """The seed's scene in coordinates of each leg, its contact's damping changed by a share."""
+    scene = jb.with_parameters(jb.seed_scene(), {"c": 1e7 * (1.0 + change)})
+    return jb.RedundantScene(scene, "described")
+
+
 def test_lanes_batch_redundant_walks_and_have_no_derivatives():
     def end(change):
-        scene = jb.with_parameters(jb.seed_scene(), {"c": 1e7 * (1.0 + change)})
-        held = jb.RedundantScene(scene, "described")
-        walk = jb.simulate(held, jb.seed_state(), duration=0.1, save="end", engine="lanes")
-        return walk.final.theta_2
+        how = dict(duration=0.1, save="end", engine="lanes")
+        return jb.simulate(damped(change), jb.seed_state(), **how).final.theta_2
 
     several = jax.vmap(end)(jnp.asarray([0.0, 0.2]))
     np.testing.assert_allclose(several, [end(0.0), end(0.2)], rtol=1e-13)
@@ -132,11 +119,9 @@ def test_projected_walks_differentiate_and_batch():
     """By the contact's damping, through 20 projected steps, against central differences."""
 
     def end(change):
-        scene = jb.with_parameters(jb.seed_scene(), {"c": 1e7 * (1.0 + change)})
-        held = jb.RedundantScene(scene, "described")
         how = dict(solver="euler", dt=1e-6, save="end", watch=(), max_solver_steps=64)
         of_steps = diffrax.RecursiveCheckpointAdjoint()
-        walk = jb.simulate(held, jb.seed_state(), duration=2e-5, adjoint=of_steps, **how)
+        walk = jb.simulate(damped(change), jb.seed_state(), duration=2e-5, adjoint=of_steps, **how)
         return 1e3 * walk.final.vz_2
 
     both = jax.jit(jax.vmap(jax.value_and_grad(end)))

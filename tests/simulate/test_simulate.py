@@ -10,42 +10,27 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.solve._accuracy import ACCURACIES
+from tests.compliant_walkers import frictionless_walker
 
 pytestmark = pytest.mark.slow
+
+
+def _walk(**how):
+    return jb.simulate(jb.seed_scene(), jb.seed_state(), **{"save": "end"} | how)
 
 
 def _error(trajectory, state):
     return np.abs(np.array(trajectory.final) - state).max()
 
 
-def test_tight_state_error_is_below_1e_6(seed_walk, reference):
-    times, states = reference
-    _, walk = seed_walk
-    assert walk.outcome == jb.Ending.WALKING
-    assert _error(walk, states[-1]) < 1e-6
-    between = np.array(walk.at(times)).T
-    assert np.abs(between - states).max() < 1e-5
-
-
-@pytest.mark.parametrize(
-    ("solver", "bound"), [("rodas4", 2e-4), ("rodas4p", 2e-4), ("rodas5p", 2e-4)]
-)
-def test_balanced_state_errors(solver, bound, reference):
-    walk = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=2.0, solver=solver, save="end")
-    assert _error(walk, reference[1][-1]) < bound
+@pytest.mark.parametrize("solver", ["rodas4", "rodas4p", "rodas5p"])
+def test_balanced_state_errors(solver, reference):
+    assert _error(_walk(duration=2.0, solver=solver), reference[1][-1]) < 2e-4
 
 
 def test_the_reference_itself(reference):
     """Two programs, two integrators, one answer: at their tightest they agree to 1e-8."""
-    walk = jb.simulate(
-        jb.seed_scene(),
-        jb.seed_state(),
-        duration=2.0,
-        solver="rodas5p",
-        rtol=1e-11,
-        atol=1e-13,
-        save="end",
-    )
+    walk = _walk(duration=2.0, solver="rodas5p", rtol=1e-11, atol=1e-13)
     assert _error(walk, reference[1][-1]) < 1e-8
 
 
@@ -55,10 +40,7 @@ def test_error_falls_with_the_tolerance_where_the_field_is_smooth(reference):
     at = int(np.searchsorted(times, 0.35))
     errors = []
     for rtol in (1e-4, 1e-6, 1e-8):
-        walk = jb.simulate(
-            jb.seed_scene(), jb.seed_state(), duration=times[at], rtol=rtol, save="end"
-        )
-        errors.append(_error(walk, states[at]))
+        errors.append(_error(_walk(duration=times[at], rtol=rtol), states[at]))
     slope = np.polyfit([-4, -6, -8], np.log10(errors), 1)[0]
     assert slope > 0.7
     assert errors[-1] < 1e-7
@@ -66,9 +48,7 @@ def test_error_falls_with_the_tolerance_where_the_field_is_smooth(reference):
 
 def test_other_solvers_stay_available(reference):
     """diffrax's implicit ones solve the walk; its explicit ones are there for soft scenes."""
-    walk = jb.simulate(
-        jb.seed_scene(), jb.seed_state(), duration=0.35, solver="kvaerno5", save="end"
-    )
+    walk = _walk(duration=0.35, solver="kvaerno5")
     at = int(np.searchsorted(reference[0], 0.35))
     assert _error(walk, reference[1][at]) < 1e-4
     high = jb.seed_state()._replace(hip_z=jnp.asarray(5.0))
@@ -81,14 +61,7 @@ def test_other_solvers_stay_available(reference):
 
 def test_energy_is_kept_without_damper_and_friction():
     """The seed's walker bouncing on Hertz feet, frictionless."""
-    seed = jb.seed_scene()
-    scene = jb.Scene(
-        seed.walker,
-        seed.ground,
-        jb.laws.Hertz(K=1e5),
-        jb.laws.Frictionless(),
-        jb.laws.AlwaysTouching(),
-    )
+    scene = frictionless_walker(K=1e5)
     start = jb.seed_state()._replace(hip_z=jnp.asarray(0.45))
     motion = jb.simulate(scene, start, duration=0.6, accuracy="tight", watch=())
     assert float(jnp.max(jb.dynamics.foot_forces(scene, motion.state).foot_2.normal)) > 50.0
@@ -103,14 +76,7 @@ def _upright(speed_x=0.0, speed_z=0.0, height=0.0):
 
 def test_a_drop_on_the_hertz_law():
     """Largest penetration and rebound speed from the balance of energy, both feet at once."""
-    seed = jb.seed_scene(slope=0.0)
-    scene = jb.Scene(
-        seed.walker,
-        seed.ground,
-        jb.laws.Hertz(K=1e6),
-        jb.laws.Frictionless(),
-        jb.laws.AlwaysTouching(),
-    )
+    scene = frictionless_walker(K=1e6, slope=0.0)
     drop = jb.simulate(scene, _upright(speed_z=-0.5), duration=0.05, accuracy="tight", watch=())
     times = np.linspace(0.0, 0.05, 20001)
     states = drop.at(times)
@@ -132,50 +98,46 @@ BLOCK = dict(accuracy="tight", watch=(), save="end")
 """By lanes, which compile sooner; test_engines.py has them agree with XLA."""
 
 
-def _settled(scene, speed):
-    depth = float((9.8 * jnp.cos(scene.ground.slope) / 1e6) ** (2 / 3))
-    return _upright(speed_x=speed, height=-depth)
+def _final_speed(friction, slope, speed, duration):
+    """Of a block, that slides on along its ground."""
+    scene = _block(friction, slope)
+    settled = _upright(speed_x=speed, height=-float((9.8 * np.cos(slope) / 1e6) ** (2 / 3)))
+    return float(jb.simulate(scene, settled, duration=duration, **BLOCK).final.hip_vx)
 
 
 def test_a_block_without_friction_slides_down_freely():
-    scene = _block(jb.laws.Frictionless(), 0.1)
-    end = jb.simulate(scene, _settled(scene, 0.2), duration=0.5, **BLOCK).final
-    assert float(end.hip_vx) == pytest.approx(0.2 + 9.8 * np.sin(0.1) * 0.5, rel=1e-8)
+    speed = _final_speed(jb.laws.Frictionless(), 0.1, 0.2, 0.5)
+    assert speed == pytest.approx(0.2 + 9.8 * np.sin(0.1) * 0.5, rel=1e-8)
 
 
 def test_a_block_on_regularised_coulomb_friction():
     """v' = −μ g tanh(v/v_d) on the level: sinh(v/v_d) decays exponentially."""
     v_d, mu, t = 0.05, 0.4, 0.06
-    scene = _block(jb.laws.RegularisedCoulomb(mu=mu, v_d=v_d), 0.0)
-    end = jb.simulate(scene, _settled(scene, 0.3), duration=t, **BLOCK).final
+    speed = _final_speed(jb.laws.RegularisedCoulomb(mu=mu, v_d=v_d), 0.0, 0.3, t)
     expected = v_d * np.arcsinh(np.sinh(0.3 / v_d) * np.exp(-mu * 9.8 * t / v_d))
-    assert float(end.hip_vx) == pytest.approx(expected, rel=1e-6)
+    assert speed == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("law", [jb.laws.BengisuAkay, jb.laws.SmoothBengisuAkay])
 def test_a_block_on_bengisu_akay_friction(law):
     """Fast: the kinetic coefficient brakes it. On a slope: it creeps where F = m g sin α."""
     friction = law(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
-    flat = _block(friction, 0.0)
-    end = jb.simulate(flat, _settled(flat, 0.5), duration=0.1, **BLOCK).final
-    assert float(end.hip_vx) == pytest.approx(0.5 - 0.4 * 9.8 * 0.1, rel=1e-6)
-    tilted = _block(friction, 0.1)
-    end = jb.simulate(tilted, _settled(tilted, 0.0), duration=0.1, **BLOCK).final
+    assert _final_speed(friction, 0.0, 0.5, 0.1) == pytest.approx(0.5 - 0.4 * 9.8 * 0.1, rel=1e-6)
+    speed = _final_speed(friction, 0.1, 0.0, 0.1)
     if law is jb.laws.BengisuAkay:
         creep = 1e-4 * (1 - np.sqrt(1 - np.tan(0.1) / 0.5))
-        assert float(end.hip_vx) == pytest.approx(creep, rel=1e-4)
-    force = friction.force(jnp.asarray(9.8 * np.cos(0.1)), end.hip_vx)
+        assert speed == pytest.approx(creep, rel=1e-4)
+    force = friction.force(jnp.asarray(9.8 * np.cos(0.1)), jnp.asarray(speed))
     assert float(force) == pytest.approx(-9.8 * np.sin(0.1), rel=1e-4)
 
 
 def test_saving_only_the_end_or_given_times_changes_nothing():
     """By lanes; `test_engines` holds XLA's ends, times and steps against theirs."""
-    scene = jb.seed_scene()
-    options = dict(duration=2.0, accuracy="tight", engine="lanes")
-    walk = jb.simulate(scene, jb.seed_state(), **options)
-    end = jb.simulate(scene, jb.seed_state(), save="end", **options)
     times = jnp.array([0.5, 1.0, 2.0])
-    some = jb.simulate(scene, jb.seed_state(), save=times, **options)
+    walk, end, some = (
+        _walk(duration=2.0, accuracy="tight", engine="lanes", save=save)
+        for save in ("steps", "end", times)
+    )
     np.testing.assert_allclose(np.array(end.final), np.array(walk.final), atol=1e-9)
     np.testing.assert_allclose(np.array(some.state), np.array(walk.at(times)), atol=1e-9)
     assert end.dense is None
@@ -250,7 +212,7 @@ def test_single_precision_is_the_users_choice_and_refused_where_too_coarse():
     start = jax.tree_util.tree_map(lambda leaf: leaf.astype(jnp.float32), jb.seed_state())
     walk = jb.simulate(jb.seed_scene(), start, duration=0.3, accuracy="draft", save="end")
     assert walk.final.theta_1.dtype == jnp.float32
-    full = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.3, save="end")
+    full = _walk(duration=0.3)
     np.testing.assert_allclose(np.array(walk.final), np.array(full.final), atol=2e-2)
     with pytest.raises(jb.ArgumentError, match=r"float32.*float64"):
         jb.simulate(jb.seed_scene(K=1e10), start, duration=0.3)
@@ -259,7 +221,7 @@ def test_single_precision_is_the_users_choice_and_refused_where_too_coarse():
 def test_compiling_apart_from_running():
     request = jb.Simulation.prepare(jb.seed_scene(), jb.seed_state(), duration=0.1, save="end")
     run = request.compile()
-    same = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.1, save="end")
+    same = _walk(duration=0.1)
     np.testing.assert_array_equal(np.array(run().final), np.array(same.final))
 
 

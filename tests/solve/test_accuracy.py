@@ -14,10 +14,8 @@ SEED, START = jb.seed_scene(), jb.seed_state()
 @pytest.mark.parametrize("accuracy", ACCURACIES)
 def test_the_seeds_tolerances_are_those_of_the_name(accuracy):
     found = tolerances(accuracy, None, None, SEED)
-    assert (float(found.rtol), float(found.atol)) == (
-        ACCURACIES[accuracy].walk,
-        1e-2 * ACCURACIES[accuracy].walk,
-    )
+    walk = ACCURACIES[accuracy].walk
+    assert (float(found.rtol), float(found.atol)) == (walk, 1e-2 * walk)
 
 
 BOUNDS = {"draft": 1e-5, "balanced": 6e-7, "tight": 7e-10}

@@ -7,9 +7,10 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.solve._failure_events import WATCHES, ending_code, ending_events
+from tests.compliant_walkers import held_walker
 
 SEED = jb.seed_scene()
-ALWAYS = jb.Scene(SEED.walker, SEED.ground, SEED.normal, SEED.friction, jb.laws.AlwaysTouching())
+ALWAYS = held_walker()
 REACH, RADIUS = 0.32, 0.08
 SPEED, RATE = np.sqrt(9.8 * 0.4), np.sqrt(9.8 / 0.4)
 Ending = jb.Ending

@@ -6,10 +6,14 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.compiler import CUDA, LANES, XLA
 from jaxbiped.solve._engine_names import engine_for, engine_named
-from jaxbiped.sweep._labelling_settings import effort_of
+from jaxbiped.sweep._labelling_preparation import effort_of
 from tests.compiler.fake_driver import install
 
 SCENE, STATE = jb.seed_scene(), jb.seed_state()
+
+
+def by_device(**how):
+    return jb.simulate(SCENE, STATE, duration=0.1, engine="cuda", **how)
 
 
 def test_names():
@@ -22,8 +26,8 @@ def test_devices_are_refused_where_there_is_none(monkeypatch):
         r'^engine = "cuda" is not allowed here: there is no CUDA device; use engine="lanes"\.$'
     )
     for ask in (
-        lambda: jb.simulate(SCENE, STATE, duration=0.1, engine="cuda"),
-        lambda: jb.simulate(SCENE, STATE, duration=0.1, save=jb.MidStance(), engine="cuda"),
+        by_device,
+        lambda: by_device(save=jb.MidStance()),
         lambda: jb.labelling(SCENE, engine="cuda"),
     ):
         with pytest.raises(jb.ArgumentError, match=sentence):
@@ -34,16 +38,8 @@ def test_devices_are_refused_where_there_is_none(monkeypatch):
     ("ask", "why"),
     [
         (lambda: jb.find_gait(SCENE, engine="cuda"), "run walks and labels, no searches"),
-        (
-            lambda: jb.simulate(SCENE, STATE, duration=0.1, solver="tsit5", engine="cuda"),
-            "Tsit5 is not one of its solvers",
-        ),
-        (
-            lambda: jb.simulate(
-                SCENE, STATE, duration=0.1, adjoint=diffrax.ForwardMode(), engine="cuda"
-            ),
-            "an adjoint is diffrax's",
-        ),
+        (lambda: by_device(solver="tsit5"), "Tsit5 is not one of its solvers"),
+        (lambda: by_device(adjoint=diffrax.ForwardMode()), "an adjoint is diffrax's"),
         (
             lambda: engine_for("cuda", obstacle="it computes in 64 bits", by_device=True),
             'in 64 bits; use engine="xla"',

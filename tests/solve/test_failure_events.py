@@ -1,9 +1,9 @@
 """Every ending by its name, against walks that end so."""
 
-import jax.numpy as jnp
 import pytest
 
 import jaxbiped as jb
+from tests.compliant_walkers import astride_at_rest, held_walker, seed_state
 
 Ending = jb.Ending
 
@@ -39,22 +39,14 @@ def test_it_still_walks_after_a_hundred_footsteps():
 
 def test_out_of_steps():
     assert _walk(0.02, max_solver_steps=50).outcome == Ending.OUT_OF_STEPS
-    assert (
-        _walk(0.02, duration=None, footsteps=100, max_solver_steps=50).outcome
-        == Ending.OUT_OF_STEPS
-    )
+    few = _walk(0.02, duration=None, footsteps=100, max_solver_steps=50)
+    assert few.outcome == Ending.OUT_OF_STEPS
 
 
 @pytest.mark.parametrize("engine", ["lanes", pytest.param("xla", marks=pytest.mark.slow)])
 def test_waiting_in_vain_is_not_the_cap_on_steps(engine):
-    """Let down on both feet, legs astride, nothing ever comes down again."""
-    seed = jb.seed_scene(slope=0.0)
-    coulomb = jb.laws.RegularisedCoulomb(mu=0.8, v_d=1e-3)
-    scene = jb.Scene(seed.walker, seed.ground, seed.normal, coulomb, jb.laws.AlwaysTouching())
-    start = _state(
-        theta_1=0.3, theta_2=-0.3, omega_1=0.0, omega_2=0.0, hip_vx=0.0, hip_vz=0.0,
-        hip_z=float(jb.dynamics.standing_height(scene, jnp.asarray(0.3), 4e-4)),
-    )  # fmt: skip
+    """Let down on both feet, nothing ever comes down again."""
+    scene, start = astride_at_rest()
     options = {"save": "end", "watch": ("fall",), "engine": engine}
     waiting = jb.simulate(scene, start, footsteps=1, **options)
     assert waiting.outcome is Ending.TIMED_OUT
@@ -65,41 +57,27 @@ def test_waiting_in_vain_is_not_the_cap_on_steps(engine):
     assert bounded.outcome is Ending.WALKING
 
 
-def _state(**values):
-    return jb.seed_state()._replace(**{name: jnp.asarray(v) for name, v in values.items()})
-
-
 def test_fell_back():
     """Both feet far ahead of a hip that moves uphill, on ground that always holds."""
-    seed = jb.seed_scene()
-    scene = jb.Scene(seed.walker, seed.ground, seed.normal, seed.friction, jb.laws.AlwaysTouching())
-    start = _state(
+    start = seed_state(
         theta_1=0.6, theta_2=0.65, omega_1=1.5, omega_2=1.5, hip_vx=-0.5, hip_vz=-0.3,
         hip_z=0.08 + 0.32 * 0.8253,
     )  # fmt: skip
-    fall = jb.simulate(scene, start, duration=2.0, save="end", watch=("fall",))
+    fall = jb.simulate(held_walker(), start, duration=2.0, save="end", watch=("fall",))
     assert fall.outcome == Ending.FELL_BACK
     assert float(fall.final.hip_vx) < 0.0
 
 
 def test_stopped_on_ground_that_always_holds():
     """Let down on both feet, legs astride, it comes to rest and is told so."""
-    seed = jb.seed_scene(slope=0.0)
-    coulomb = jb.laws.RegularisedCoulomb(mu=0.8, v_d=1e-3)
-    scene = jb.Scene(seed.walker, seed.ground, seed.normal, coulomb, jb.laws.AlwaysTouching())
-    start = _state(
-        theta_1=0.3, theta_2=-0.3, omega_1=0.0, omega_2=0.0, hip_vx=0.0, hip_vz=0.0,
-        hip_z=float(jb.dynamics.standing_height(scene, jnp.asarray(0.3), 4e-4)),
-    )  # fmt: skip
-    rest = jb.simulate(scene, start, duration=50.0, save="end")
+    rest = jb.simulate(*astride_at_rest(), duration=50.0, save="end")
     assert rest.outcome == Ending.STOPPED
     assert float(rest.t[-1]) < 50.0
 
 
 def test_a_scuffing_foot_is_a_stumble():
     """Without the clearance rule the swinging foot catches the ground at mid-stance."""
-    seed = jb.seed_scene()
-    scene = jb.Scene(seed.walker, seed.ground, seed.normal, seed.friction, jb.laws.AlwaysTouching())
+    scene = held_walker()
     walk = jb.simulate(scene, jb.seed_state(), duration=2.0, save="end")
     assert walk.outcome == Ending.STUMBLED
     unwatched = jb.simulate(scene, jb.seed_state(), duration=0.3, save="end", watch=("fall",))
@@ -107,16 +85,7 @@ def test_a_scuffing_foot_is_a_stumble():
 
 
 def test_names_in_words():
+    failures = "fell forward, fell back, stopped, stumbled, out of steps, solver failed"
     names = [str(ending) for ending in Ending]
-    assert names == [
-        "walking",
-        "fell forward",
-        "fell back",
-        "stopped",
-        "stumbled",
-        "out of steps",
-        "solver failed",
-        "timed out",
-        "finished",
-    ]
+    assert names == ["walking", *failures.split(", "), "timed out", "finished"]
     assert [int(ending) for ending in Ending] == [0, 1, 2, 3, 4, 5, 6, 9, 10]

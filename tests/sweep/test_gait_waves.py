@@ -7,8 +7,8 @@ import pytest
 import xarray
 
 import jaxbiped as jb
-from jaxbiped.sweep import _gait_waves
-from jaxbiped.sweep._gait_waves import find_each
+from jaxbiped.sweep import _gait_sweep, _gait_waves
+from jaxbiped.sweep._gait_sweep import find_each
 from jaxbiped.sweep._store_files import consolidate
 
 pytestmark = pytest.mark.slow
@@ -55,7 +55,7 @@ def test_a_batch_rounds_as_a_single_search_whatever_is_beside():
 
 
 def test_a_killed_sweep_continues_to_the_same_bits(swept, tmp_path, monkeypatch):
-    path, find, calls = tmp_path / "gaits", _gait_waves.find_each, []
+    path, find, calls = tmp_path / "gaits", _gait_sweep.find_each, []
 
     def interrupted(*args):
         if len(calls) == 5:
@@ -63,7 +63,7 @@ def test_a_killed_sweep_continues_to_the_same_bits(swept, tmp_path, monkeypatch)
         calls.append(args)
         return find(*args)
 
-    monkeypatch.setattr(_gait_waves, "find_each", interrupted)
+    monkeypatch.setattr(_gait_sweep, "find_each", interrupted)
     with pytest.raises(KeyboardInterrupt):
         jb.gait_sweep(jb.seed_scene(), OVER, store=path, **PLAIN)
     known = int(np.isfinite(xarray.open_zarr(path).period).sum())
@@ -74,7 +74,7 @@ def test_a_killed_sweep_continues_to_the_same_bits(swept, tmp_path, monkeypatch)
         searched.append(len(args[2]))
         return find(*args)
 
-    monkeypatch.setattr(_gait_waves, "find_each", counted)
+    monkeypatch.setattr(_gait_sweep, "find_each", counted)
     again = jb.gait_sweep(jb.seed_scene(), OVER, store=path, **PLAIN).load()
     assert sum(searched) == 64 - known
     xarray.testing.assert_equal(again.drop_attrs(), swept.drop_attrs())
@@ -95,14 +95,6 @@ def test_what_a_wave_misses_its_neighbours_find(swept, monkeypatch):
     np.testing.assert_allclose(again.period, swept.period, rtol=1e-6)
 
 
-def test_where_there_is_no_gait_the_branch_end_is_told():
-    over = {"slope": np.array([0.006, *np.linspace(0.015, 0.03, 64)])}
-    found = jb.gait_sweep(jb.seed_scene(), over, **PLAIN)
-    assert int(found.branch_end[0]) == int(jb.gait.BranchEnd.FOLD)
-    assert np.isnan(float(found.period[0]))
-    assert np.all(found.spectral_radius[1:] < 1.0)
-
-
 def test_gaits_of_a_batch_that_graze_are_told(tmp_path):
     """At that damping the foot that strikes rebounds until it all but leaves the ground."""
     grazing, path = 152234.28, tmp_path / "gaits"
@@ -116,9 +108,11 @@ def test_gaits_of_a_batch_that_graze_are_told(tmp_path):
         jb.gait_sweep(jb.seed_scene(), over, store=path, **PLAIN)  # all of it known
 
 
-def test_a_store_that_kept_less_is_refused(tmp_path):
+def test_a_store_of_another_sweep_or_that_kept_less_is_refused(tmp_path):
     path, over = tmp_path / "gaits", {"slope": [0.02]}
     jb.gait_sweep(jb.seed_scene(), over, store=path, **PLAIN)
+    with pytest.raises(jb.ArgumentError, match="other settings"):
+        jb.gait_sweep(jb.seed_scene(), {"slope": [0.021]}, store=path, **PLAIN)
     shutil.rmtree(path / "grazes")
     consolidate(path)
     with pytest.raises(jb.ArgumentError, match="kept no grazes"):

@@ -8,7 +8,7 @@ from extreme_cases.case import check_numbers
 from extreme_cases.grazing import START, grazing_scene, lowest
 
 import jaxbiped as jb
-from jaxbiped.sweep._labelling_settings import effort_of
+from jaxbiped.sweep._labelling_preparation import effort_of
 
 pytestmark = pytest.mark.slow
 

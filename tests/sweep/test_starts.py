@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped.sweep.starts._samples import sequence_points
-from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same
 
 SCENE = jb.seed_scene()
@@ -71,6 +70,18 @@ def test_a_sample_is_the_same_whichever_chunk_it_is_made_in(method, seed, cuts):
     assert not np.array_equal(other.columns["hip_vx"], whole.columns["hip_vx"])
 
 
+@pytest.mark.parametrize("method", jb.starts.SAMPLINGS)
+def test_samples_fill_their_bounds(method):
+    batch = jb.starts.sample(SCENE, BOUNDS, 256, method=method).batch(LABELLING, 0, 256)
+    for name, (low, high) in BOUNDS.items():
+        column = batch.columns[name]
+        assert column.min() < low + 0.02 * (high - low)
+        assert high - 0.02 * (high - low) < column.max()
+    leaves = batch.states.theta_2, batch.states.omega_2, batch.states.hip_vx
+    for leaf, name in zip(leaves, BOUNDS, strict=True):
+        np.testing.assert_array_equal(leaf, batch.columns[name])
+
+
 def test_low_discrepancy_samples_fill_every_slice():
     numbers = np.arange(64)
     for method in ("sobol", "latin-hypercube"):
@@ -91,42 +102,3 @@ def test_given_starts_are_told_apart_by_all_their_numbers():
     assert first != second
     assert len(str(first)) < 200
     assert jb.starts.GivenStarts(state).described() == first
-
-
-_STATE = jb.State(*[np.zeros(2)] * 8)
-
-
-@pytest.mark.parametrize(
-    ("make", "reason"),
-    [
-        (lambda: jb.starts.grid(SCENE, {"theta": [0.1]}), "coordinate = 'theta' is not known"),
-        (lambda: jb.starts.grid(SCENE, {}), "name at least one"),
-        (lambda: jb.starts.grid(SCENE, {"hip_vx": []}), r"hip_vx has values of shape \(0,\)"),
-        (lambda: jb.starts.grid(SCENE, {"hip_vx": [[0.1]]}), "must be"),
-        (
-            lambda: jb.starts.grid(SCENE, {"hip_vx": [0.1, np.nan]}),
-            "hip_vx = nan .* a finite number",
-        ),
-        (lambda: jb.starts.grid(SCENE, {"hip_vx": ["fast"]}), "hip_vx = .* is not a number"),
-        (lambda: jb.starts.grid(SCENE, {"K": [1e6, -1.0]}), "K = -1 .* above 0"),
-        (lambda: jb.starts.grid(simplest_walker(0.009), {"hip_z": [0.1]}), "'hip_z' is not known"),
-        (
-            lambda: jb.starts.sample(SCENE, {"hip_vx": (0.5, 0.1)}, 4),
-            "hip_vx = 0.5:0.1 .* be less than",
-        ),
-        (lambda: jb.starts.sample(SCENE, {"hip_vx": (0.5,)}, 4), "hip_vx = .* two numbers"),
-        (lambda: jb.starts.sample(SCENE, {"hip_vx": (0.5, np.inf)}, 4), "hip_vx = inf"),
-        (lambda: jb.starts.sample(SCENE, BOUNDS, 0), "count = 0 .* whole number of at least 1"),
-        (lambda: jb.starts.sample(SCENE, BOUNDS, 4, method="best"), "method = 'best' .* sobol"),
-        (lambda: jb.starts.sample(SCENE, {"c": (-5.0, 1.0)}, 4), "c = -5"),
-        (lambda: jb.starts.GivenStarts([1.0]), "states = .* must be a State"),
-        (
-            lambda: jb.starts.GivenStarts(_STATE._replace(hip_z=np.zeros(3))),
-            r"leaves of shapes \[\(2,\)",
-        ),
-        (lambda: jb.starts.GivenStarts(simplest_state(*STABLE)), r"all of them must be \(n,\)"),
-    ],
-)
-def test_what_cannot_be_a_start_is_refused(make, reason):
-    with pytest.raises(jb.ArgumentError, match=reason):
-        make()

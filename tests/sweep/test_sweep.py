@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.sweep._zarr_store import ZarrStore
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
-from tests.sweep.walkers import gaitless, same_results, simplest_grid
+from tests.sweep.walkers import gaitless, killed_at, same_results, simplest_grid
 
 pytestmark = pytest.mark.slow
 
@@ -55,10 +54,6 @@ def test_starts_keep_their_numbers_in_the_results():
     np.testing.assert_array_equal(again.time, found.time)
 
 
-class _Killed(BaseException):
-    pass
-
-
 @pytest.mark.parametrize("writes", [0, 1])
 def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, writes):
     """After the labels comes a second round; wherever it is cut off, the results are the same."""
@@ -67,30 +62,14 @@ def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, write
     expected = jb.sweep(LABELLING, STARTS, chunk=8)
     assert jb.basins.Label.WALKING in expected.label
     assert len(json.loads(expected.attrs["gaits"])[0]["gaits"]) == 1
-    write, count = ZarrStore.write, []
-
-    def killing(self, chunk, fields, **settled):
-        count.append(chunk)
-        if len(count) > self.layout.chunks + writes:
-            # As if amid its arrays: some are new, others old, and the chunk is not complete.
-            self._mark(chunk, 0)
-            self._group["label"][self.layout.region(chunk)] = 77
-            raise _Killed
-        write(self, chunk, fields, **settled)
-
-    monkeypatch.setattr(ZarrStore, "write", killing)
-    with pytest.raises(_Killed):
+    with killed_at(monkeypatch, 9 + writes):
         jb.sweep(LABELLING, STARTS, store=path, chunk=8)
-    monkeypatch.setattr(ZarrStore, "write", write)
     same_results(jb.sweep(LABELLING, STARTS, store=path, chunk=8), expected)
 
 
 def test_positions_of_gaits_follow_when_more_are_met():
     def gait(length):
-        nothing = np.zeros(0)
-        return jb.Attractor(
-            length, 1.0, 1.0, None, nothing, nothing, 0.5, 0.1, nothing, nothing, nothing
-        )
+        return jb.Attractor(length, *[np.zeros(0)] * 10)
 
     rows = ((),), ((gait(1),), (gait(2),)), ((gait(1), gait(1)), (gait(2),))
     few, one, two = (LABELLING.family._replace(rows=each) for each in rows)

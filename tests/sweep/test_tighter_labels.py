@@ -9,9 +9,8 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.basins._label_errors import estimate_label_errors
-from jaxbiped.sweep._zarr_store import ZarrStore
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
-from tests.sweep.walkers import gaitless, same_results, simplest_grid
+from tests.sweep.walkers import gaitless, killed_at, same_results, simplest_grid
 
 pytestmark = pytest.mark.slow
 
@@ -25,10 +24,6 @@ def _never_met(seen, *, wanted, rtol):
     """As if many were wrong at the first tolerance."""
     found = estimate_label_errors(seen, wanted=wanted, rtol=rtol)
     return found if rtol < 1e-5 else found._replace(met=False, wrong=0.5)
-
-
-class _Killed(BaseException):
-    pass
 
 
 def test_labels_are_those_of_a_tight_solve_whatever_the_chunks():
@@ -55,22 +50,10 @@ def test_all_starts_are_labelled_again_where_too_many_may_be_wrong(tmp_path, mon
     np.testing.assert_allclose(json.loads(whole.attrs["label_tolerances"]), [3e-5, 3e-6])
     with ThreadPoolExecutor(2) as pool:
         same_results(jb.sweep(LABELLING, STARTS, chunk=16, executor=pool, workers=2), whole)
-    path, write, count = tmp_path / "store", ZarrStore.write, []
-
-    def killing(self, chunk, fields, **mark):
-        count.append(mark.get("mark"))
-        if len(count) == 12:
-            # Amid the second round: this chunk is half written.
-            self._mark(chunk, 0)
-            self._group["label"][self.layout.region(chunk)] = 77
-            raise _Killed
-        write(self, chunk, fields, **mark)
-
-    monkeypatch.setattr(ZarrStore, "write", killing)
-    with pytest.raises(_Killed):
+    path = tmp_path / "store"
+    with killed_at(monkeypatch, 12) as marks:  # amid the second round
         jb.sweep(LABELLING, STARTS, store=path, chunk=8)
-    assert count[-1] == 3
-    monkeypatch.setattr(ZarrStore, "write", write)
+    assert marks[-1] == 3
     again = jb.sweep(LABELLING, STARTS, store=path, chunk=8)
     same_results(again, whole)
     assert jb.basins.label_errors(again) == jb.basins.label_errors(whole)
@@ -78,17 +61,3 @@ def test_all_starts_are_labelled_again_where_too_many_may_be_wrong(tmp_path, mon
     same_results(jb.sweep(LABELLING, STARTS, store=path, chunk=8), whole)
     with pytest.raises(jb.ArgumentError, match="made with other settings"):
         jb.sweep(gaitless(SCENE, simplest_state(*STABLE), accuracy="draft"), STARTS, store=path)
-
-
-@pytest.mark.parametrize(
-    ("how", "words"),
-    [
-        (dict(accuracy=0.0), "accuracy = 0 is not allowed"),
-        (dict(accuracy=2.0), "accuracy = 2 is not allowed: it is the share of the labels"),
-        (dict(accuracy=1e-3, rtol=1e-6), "rtol = 1e-06 is not allowed beside accuracy = 0.001"),
-        (dict(accuracy="fine"), "accuracy = 'fine' is not known: choose one of draft"),
-    ],
-)
-def test_bad_accuracies_cost_one_sentence(how, words):
-    with pytest.raises(jb.ArgumentError, match=words):
-        jb.labelling(SCENE, **how)

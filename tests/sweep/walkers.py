@@ -1,11 +1,14 @@
 """Starts of sweeps, and labellings that need no gait to be found."""
 
+import contextlib
+
 import jax.tree_util as jtu
 import numpy as np
 
 import jaxbiped as jb
 from jaxbiped.sweep._attractor import component_scales
-from jaxbiped.sweep._labelling_settings import effort_of
+from jaxbiped.sweep._labelling_preparation import effort_of
+from jaxbiped.sweep._store import Store
 
 
 def gaitless(scene, state, **options):
@@ -26,18 +29,9 @@ def with_attractor(labelling):
     size = len(state) - 1
     metric = np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0][:-1]
     point = np.array([[float(leaf) for leaf in state[1:]]])
+    multipliers, model = np.full(size - 1, 0.5), 0.5 * np.eye(size - 1)
     gait = jb.Attractor(
-        1,
-        3.88,
-        0.398,
-        state,
-        np.full(size - 1, 0.5),
-        metric,
-        0.75,
-        1e-2,
-        0.5 * np.eye(size - 1),
-        metric[:2],
-        point,
+        1, 3.88, 0.398, state, multipliers, metric, 0.75, 1e-2, model, metric[:2], point
     )
     family = labelling.family._replace(rows=((gait,),))
     return jb.Labelling(labelling.scene, family, labelling.effort)
@@ -75,3 +69,26 @@ def simplest_grid(scene, count=8):
         "omega_stance": np.linspace(-0.25, -0.17, count),
     }
     return jb.starts.grid(scene, axes)
+
+
+class _Killed(BaseException):
+    pass
+
+
+@contextlib.contextmanager
+def killed_at(monkeypatch, number):
+    """Kills a sweep amid the write of this number of its store, whose chunk is half new then."""
+    write, marks = Store.write, []
+
+    def killing(self, chunk, fields, **mark):
+        marks.append(mark.get("mark"))
+        if len(marks) == number:
+            self._mark(chunk, 0)
+            self._data["label"][self.layout.region(chunk)] = 77
+            raise _Killed
+        write(self, chunk, fields, **mark)
+
+    with monkeypatch.context() as patched, contextlib.suppress(_Killed):
+        patched.setattr(Store, "write", killing)
+        yield marks
+    assert len(marks) == number

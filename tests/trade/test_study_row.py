@@ -24,28 +24,23 @@ TRUTH = truth_of({"state": np.array([1.0, 0.0])}, {})
 WORK = Work(1.0, 2.0, 3.0)
 
 
-def _row(value, outcome="ok"):
+@pytest.mark.parametrize(
+    ("value", "ended", "told", "error"),
+    [
+        (1.001, "ok", "ok", pytest.approx(1e-3)),
+        (1.5, "ok", "wrong", 0.5),
+        (np.nan, "ok", "wrong", None),
+        (1.5, "out of steps", "out of steps", 0.5),
+    ],
+)
+def test_a_solve_that_ends_far_off_is_wrong_and_kept(value, ended, told, error):
+    """One that says that it failed keeps its word."""
     found = {"state": np.array([value, 0.0])}
-    return row_of("a", "rtol=1", outcome, TRUTH, found, WORK, attempted=7)
-
-
-def test_a_solve_that_is_close_is_ok():
-    row = _row(1.001)
-    assert row.outcome == "ok"
-    assert row.errors["state"] == pytest.approx(1e-3)
-    assert (row.seconds, row.cpu_s, row.compile_s, row.attempted) == (1.0, 2.0, 3.0, 7)
-
-
-@pytest.mark.parametrize(("value", "error"), [(1.5, 0.5), (np.nan, None)])
-def test_a_solve_that_ends_far_off_is_wrong_and_kept(value, error):
-    row = _row(value)
-    assert row.outcome == "wrong"
+    row = row_of("a", "rtol=1", ended, TRUTH, found, WORK, attempted=7)
+    assert row.outcome == told
     assert row.errors == {"state": error}
+    assert (row.seconds, row.cpu_s, row.compile_s, row.attempted) == (1.0, 2.0, 3.0, 7)
     assert json.loads(json.dumps(row.numbers()))["errors"] == {"state": error}
-
-
-def test_a_solve_that_says_that_it_failed_keeps_its_word():
-    assert _row(1.5, "out of steps").outcome == "out of steps"
 
 
 def test_what_never_ran_has_no_errors_and_took_no_time():
@@ -77,17 +72,13 @@ def test_a_power_law_is_followed_between_settings():
         assert cost_at(rows, "state", error, _steps) == pytest.approx(error**-0.25)
 
 
-def test_an_error_that_is_never_reached_has_no_cost():
-    rows = [_cheap_row(1e-2, 10), _cheap_row(1e-4, 20)]
+def test_an_error_that_is_never_reached_has_no_cost_and_failures_are_not_on_the_way():
+    rows = [_cheap_row(1e-2, 10), _cheap_row(1e-9, 1, outcome="wrong"), _cheap_row(1e-4, 40)]
     assert cost_at(rows, "state", 1e-5, _steps) is None
     assert cost_at(rows, "state", 1e-1, _steps) == pytest.approx(10)
+    assert cost_at(rows, "state", 1e-3, _steps) == pytest.approx(20)
     assert cost_at(rows, "energy", 1e-3, _steps) is None
     assert cost_at([], "state", 1e-3, _steps) is None
-
-
-def test_failures_are_not_on_the_way():
-    rows = [_cheap_row(1e-2, 10), _cheap_row(1e-9, 1, outcome="wrong"), _cheap_row(1e-4, 40)]
-    assert cost_at(rows, "state", 1e-3, _steps) == pytest.approx(20)
 
 
 def test_the_cheapest_row_that_reaches_the_error():

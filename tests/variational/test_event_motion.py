@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.variational._tangents import Seeded, Tangents
-from jaxbiped.variational._tangents_at_times import follow_event
+from jaxbiped.variational._variational_solve import follow_event
 
 GRAVITY, SPEED, TIME = 9.8, 5.0, 0.3
 

@@ -7,9 +7,10 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.gait._fixed_point_search import Found
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._orbit_derivatives import orbit_of, slopes_of
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.solve._accuracy import Precision
 
 pytestmark = pytest.mark.slow
 
@@ -141,7 +142,8 @@ def test_an_orbit_that_grazes_has_no_sensitivities_and_multipliers_of_infinite_e
             sound=jnp.asarray(True),
         )
         spec = ReturnMapSpec(Pulled(), ABOVE, jb.solvers.Rodas4(), 10.0, 1, 4096, "lanes")
-        return orbit_of(spec, args, (0, 1), start(depth), found, radius=False)
+        problem = FixedPointProblem(spec, args, (0, 1), start(depth), Precision(1e-9, 1e-8))
+        return orbit_of(problem, found, radius=False)
 
     known, grazing = orbit(1e-3), orbit(1e-12)
     assert np.all(np.isfinite(known.stability.errors))

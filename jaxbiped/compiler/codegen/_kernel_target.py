@@ -35,7 +35,6 @@ class KernelTarget(NamedTuple):
         scales: whether it multiplies by powers of two in one instruction.
         architecture: the CPU's, in LLVM's words; empty for others (see `begin_flushing`).
         convention: LLVM's word for how its kernels are called.
-        attributes: of the kernel's function, as LLVM writes them.
         votes: whether the threads of a warp go on together (see `WARP_ANY`).
         library: what the names of the C library's functions begin with.
         rest: what the module holds besides the kernel; `declared` what that calls, `defined` the
@@ -47,7 +46,6 @@ class KernelTarget(NamedTuple):
     scales: bool
     architecture: str = ""
     convention: str = ""
-    attributes: str = ""
     votes: bool = False
     library: str = ""
     rest: str = ""

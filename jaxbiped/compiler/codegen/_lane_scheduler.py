@@ -44,6 +44,14 @@ class Rooms(NamedTuple):
     next_time: str
 
 
+class Stretch(NamedTuple):
+    """Numbers in memory, from the `first` one behind `pointer` on, each `step` further."""
+
+    pointer: str
+    first: str
+    step: int
+
+
 _MARKS = {"done": 1, "live": 1, "fresh": 0, "wants": 0}
 """Marks of each lane, and what they are at first."""
 
@@ -87,14 +95,10 @@ class LaneScheduler:
         has = t.assign(f"icmp sge i64 {index}, 0")
         t.line(f"br i1 {has}, label %{give}, label %{take}")
         t.begin(give)
-        self._copy(
-            self.sizes.outputs, self.rooms.given, lane, self.field["outputs"], index, out=True
-        )
+        self._copy_column(self.sizes.outputs, self.rooms.given, lane, "outputs", index)
         if self.sizes.recorded:
             count = t.assign(f"load i64, ptr {count_at}")
-            t.line(
-                f"store i64 {count}, ptr {t.address(self.field['record_counts'], Kind.I64, index)}"
-            )
+            self._put(count, self.field["record_counts"], index)
         t.line(f"br label %{take}")
         t.begin(take)
         queue = self.field["queue"]
@@ -108,12 +112,10 @@ class LaneScheduler:
         t.line(f"store i8 1, ptr {fresh_at}")
         t.line(f"store i64 0, ptr {count_at}")
         if self.sizes.row:
-            t.line(f"store i64 0, ptr {t.address(self.bits['rows'], Kind.I64, lane)}")
+            self._put("0", self.bits["rows"], lane)
         if self.scheduled:
             self._schedule(lane, "0")
-        self._copy(
-            self.sizes.inputs, self.rooms.taken, lane, self.field["inputs"], following, out=False
-        )
+        self._copy_column(self.sizes.inputs, self.rooms.taken, lane, "inputs", following)
         t.line(f"br label %{after}")
         t.begin(rest)
         t.line(f"store i64 -1, ptr {index_at}")
@@ -127,34 +129,45 @@ class LaneScheduler:
         t = self.text
         at = t.address(self.bits["rows"], Kind.I64, lane)
         place = t.assign(f"load i64, ptr {at}")
-        index = t.assign(f"load i64, ptr {t.address(self.bits['index'], Kind.I64, lane)}")
-        first = t.assign(f"load i64, ptr {t.address(self.field['streams'], Kind.I64, index)}")
-        first = t.assign(f"inttoptr i64 {first} to ptr")
+        index = self._get(self.bits["index"], lane)
+        first = t.assign(f"inttoptr i64 {self._get(self.field['streams'], index)} to ptr")
         row = t.assign(f"mul i64 {place}, {self.field['stream_stride']}")
-        for k in range(self.sizes.row):
-            there = t.address(first, Kind.F64, t.assign(f"add i64 {row}, {k}"))
-            number = t.assign(f"load double, ptr {there}")
-            here = t.assign(f"add i64 {lane}, {k * self.width}")
-            t.line(f"store double {number}, ptr {t.address(self.rooms.row, Kind.F64, here)}")
+        target = Stretch(self.rooms.row, lane, self.width)
+        self._copy_numbers(self.sizes.row, Stretch(first, row, 1), target)
         following = t.assign(f"add i64 {place}, 1")
-        length = t.assign(
-            f"load i64, ptr {t.address(self.field['stream_lengths'], Kind.I64, index)}"
-        )
+        length = self._get(self.field["stream_lengths"], index)
         more = t.assign(f"icmp slt i64 {following}, {length}")
         t.line(f"store i64 {t.assign(f'select i1 {more}, i64 {following}, i64 {place}')}, ptr {at}")
 
-    def _copy(self, many: int, own: str, lane: str, array: str, index: str, *, out: bool) -> None:
+    def _get(self, array: str, place: str) -> str:
+        """A whole number of an array."""
+        return self.text.assign(f"load i64, ptr {self.text.address(array, Kind.I64, place)}")
+
+    def _put(self, number: str, array: str, place: str) -> None:
+        self.text.line(f"store i64 {number}, ptr {self.text.address(array, Kind.I64, place)}")
+
+    def _copy_numbers(self, many: int, source: Stretch, target: Stretch) -> None:
+        """Copies numbers one after the other, each written out."""
+        for k in range(many):
+            number = self.text.assign(f"load double, ptr {self._entry(source, k)}")
+            self.text.line(f"store double {number}, ptr {self._entry(target, k)}")
+
+    def _entry(self, numbers: Stretch, k: int) -> str:
+        place = self.text.assign(f"add i64 {numbers.first}, {k * numbers.step}")
+        return self.text.address(numbers.pointer, Kind.F64, place)
+
+    def _copy_column(self, many: int, own: str, lane: str, field: str, index: str) -> None:
         """Copies one lane's numbers to or from its column of an array (numbers, simulations)."""
         if not many:
             return
-        t = self.text
+        t, array = self.text, self.field[field]
         with t.loop(t.fresh("copy"), t.fresh("copied"), many, index="k") as k:
             own_row = t.assign(f"mul i64 {k}, {self.width}")
             here = t.assign(f"add i64 {own_row}, {lane}")
             row = t.assign(f"mul i64 {k}, {self.field['count']}")
             there = t.assign(f"add i64 {row}, {index}")
             source, target = t.address(own, Kind.F64, here), t.address(array, Kind.F64, there)
-            if not out:
+            if field == "inputs":
                 source, target = target, source
             number = t.assign(f"load double, ptr {source}")
             t.line(f"store double {number}, ptr {target}")
@@ -198,15 +211,13 @@ class LaneScheduler:
         fits = t.assign(f"icmp slt i64 {count}, {self.field['record_room']}")
         t.line(f"br i1 {fits}, label %{write}, label %{after}")
         t.begin(write)
-        index = t.assign(f"load i64, ptr {t.address(self.bits['index'], Kind.I64, lane)}")
-        row = t.assign(f"mul i64 {index}, {self.field['record_room']}")
+        row = t.assign(
+            f"mul i64 {self._get(self.bits['index'], lane)}, {self.field['record_room']}"
+        )
         row = t.assign(f"add i64 {row}, {count}")
         row = t.assign(f"mul i64 {row}, {self.sizes.recorded}")
-        for place in range(self.sizes.recorded):
-            here = t.assign(f"add i64 {lane}, {place * self.width}")
-            value = t.assign(f"load double, ptr {t.address(self.rooms.noted, Kind.F64, here)}")
-            there = t.assign(f"add i64 {row}, {place}")
-            t.line(f"store double {value}, ptr {t.address(self.field['records'], Kind.F64, there)}")
+        source = Stretch(self.rooms.noted, lane, self.width)
+        self._copy_numbers(self.sizes.recorded, source, Stretch(self.field["records"], row, 1))
         t.line(f"br label %{after}")
         t.begin(after)
         more = t.assign(f"add i64 {count}, 1")

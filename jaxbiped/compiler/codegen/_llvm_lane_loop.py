@@ -56,8 +56,7 @@ class _Kernel:
         t.begin("leave")
         end_flushing(t, self.target.architecture, found)
         t.line("ret void")
-        before, behind = self.target.convention, self.target.attributes
-        entry = f"define {before}void @{ENTRY}(ptr noalias %fields) {behind}{{"
+        entry = f"define {self.target.convention}void @{ENTRY}(ptr noalias %fields) {{"
         head = [*self.target.declarations(t.declarations), entry, "entry:"]
         return "\n".join([*head, *t.allocations, *t.lines, "}", WEIGHTS]) + "\n" + self.target.rest
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from jaxbiped.compiler.ir._array_primitives import padded as padded
 from jaxbiped.compiler.ir._powers import whole_power
 
 
@@ -34,27 +35,7 @@ def remainder(a: Any, b: Any) -> Any:
 
 def power_of(a: Any, exponent: int) -> Any:
     """A whole power; see `whole_power`."""
-    result = whole_power(a, abs(exponent), operator.mul)
-    if result is None:
-        return np.ones_like(a)[()]
-    return 1.0 / result if exponent < 0 else result
-
-
-def padded(value: Any, fill: Any, config: Sequence[tuple[int, int, int]]) -> np.ndarray:
-    """An array with room of `fill` at both ends of its axes and between entries."""
-    sizes = [
-        low + high + n + max(0, n - 1) * between
-        for n, (low, high, between) in zip(value.shape, config, strict=True)
-    ]
-    whole = np.full([max(0, n) for n in sizes], fill, value.dtype)
-    source, target = [], []
-    for n, size, (low, _, between) in zip(value.shape, sizes, config, strict=True):
-        places = low + np.arange(n) * (1 + between)
-        inside = (places >= 0) & (places < size)
-        source.append(np.flatnonzero(inside))
-        target.append(places[inside])
-    whole[np.ix_(*target)] = value[np.ix_(*source)]
-    return whole
+    return whole_power(a, exponent, operator.mul, operator.truediv, np.ones_like)[()]
 
 
 def dynamic_slice(operand: np.ndarray, sizes: tuple[int, ...], *starts: Any) -> np.ndarray:

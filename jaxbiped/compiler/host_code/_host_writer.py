@@ -48,7 +48,8 @@ class Block:
     known: dict[str, "tuple[Value, ...]"] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.depth: int = 0 if self.outer is None else 1 + self.outer.depth
+        self.lineage: list[Block] = [self, *(() if self.outer is None else self.outer.lineage)]
+        self.depth = len(self.lineage)
         innermost = self.branch or self.outer is None
         self.least: int = self.depth if innermost or self.outer is None else self.outer.least
 
@@ -106,6 +107,11 @@ class Operation(NamedTuple):
         return [(shape, dtype, shape) for shape, dtype in found]
 
 
+def listed(count: int, first: int = 0) -> str:
+    """Inputs in a form, one after the other."""
+    return ", ".join(f"{{{i}}}" for i in range(first, first + count))
+
+
 class HostWriter:
     """A text under way."""
 
@@ -123,7 +129,9 @@ class HostWriter:
     def constant(self, value: Any, dtype: Any = None) -> Value:
         """A number or array that is the same in every run."""
         known = np.asarray(value, dtype=dtype)
-        return Value(self._outermost(), known.shape, known.dtype, known.shape, constant=known[()])
+        return Value(
+            self.block.lineage[-1], known.shape, known.dtype, known.shape, constant=known[()]
+        )
 
     def thing(self, value: Any, key: Hashable = None) -> str:
         """The name of a constant, or of what is no array; equal ones of a `key` have one."""
@@ -159,6 +167,10 @@ class HostWriter:
         """What an expression gives, in whose `form` the inputs belong at {0}, {1}, …"""
         return self.emit_all(form, inputs, [(shape, dtype, shape if held is None else held)])[0]
 
+    def emit_whole(self, form: str, op: Operation) -> list[Value]:
+        """What an expression of an operation's inputs gives, all held in their whole shapes."""
+        return [self.emit(form, [self.full(each) for each in op.inputs], *op.result())]
+
     def later(self, form: str, base: Value, shape: Sequence[int]) -> Value:
         """`emit` of one input, where it turns out to be needed."""
         if base.constant is not None:
@@ -185,7 +197,7 @@ class HostWriter:
                 found = eval(form.format(*names), NAMES | self.constants | given)
             found = (found,) if len(results) == 1 else tuple(found)
             return tuple(
-                Value(self._outermost(), tuple(shape), dtype, tuple(held), constant=each)
+                Value(self.block.lineage[-1], tuple(shape), dtype, tuple(held), constant=each)
                 for each, (shape, dtype, held) in zip(found, results, strict=True)
             )
         text = form.format(*map(self.text, inputs))
@@ -219,7 +231,8 @@ class HostWriter:
 
         def read(atom: Any) -> Value:
             if isinstance(atom, Literal):
-                return self.constant(atom.val, _dtype(atom))
+                aval: Any = atom.aval
+                return self.constant(atom.val, np.dtype(aval.dtype))
             return known[atom]
 
         wanted = [True] * len(jaxpr.outvars) if wanted is None else wanted
@@ -244,12 +257,7 @@ class HostWriter:
     @staticmethod
     def _known(block: Block, text: str) -> tuple[Value, ...] | None:
         """What an expression gave that was written in a block or around it."""
-        at: Block | None = block
-        while at is not None:
-            if text in at.known:
-                return at.known[text]
-            at = at.outer
-        return None
+        return next((at.known[text] for at in block.lineage if text in at.known), None)
 
     def _add(
         self, block: Block, text: str, results: Sequence[tuple[Any, Any, Any]]
@@ -266,25 +274,11 @@ class HostWriter:
     def _block_for(self, inputs: Sequence[Value]) -> Block:
         """The outermost block where an operation on these may stand."""
         depth = max([self.block.least, *(each.block.depth for each in inputs)])
-        block = self.block
-        while block.depth > depth:
-            assert block.outer is not None
-            block = block.outer
-        return block
-
-    def _outermost(self) -> Block:
-        block = self.block
-        while block.outer is not None:
-            block = block.outer
-        return block
+        return next(block for block in self.block.lineage if block.depth <= depth)
 
 
 Rule = Callable[[HostWriter, Operation], Sequence[Value | None]]
 """Writes one operation: its results, of which only some are needed."""
-
-
-def _dtype(atom: Any) -> np.dtype:
-    return np.dtype(atom.aval.dtype)
 
 
 def _needed(jaxpr: Jaxpr, wanted: Sequence[bool]) -> list[tuple[JaxprEqn, list[bool]]]:

@@ -11,12 +11,13 @@ from jaxbiped.compiler.host_code._host_writer import (
     Rule,
     UnwrittenError,
     Value,
+    listed,
 )
 from jaxbiped.compiler.host_code._moves import part_of
 
 
 def _dynamic_slice(w: HostWriter, op: Operation) -> list[Value]:
-    shape, dtype = op.result()
+    shape, _ = op.result()
     sizes = tuple(map(int, op.params["slice_sizes"]))
     if all(each.constant is not None for each in op.inputs[1:]):
         starts = [
@@ -27,9 +28,7 @@ def _dynamic_slice(w: HostWriter, op: Operation) -> list[Value]:
         return [
             op.inputs[0] if shape == op.inputs[0].shape else part_of(w, op.inputs[0], parts, shape)
         ]
-    names = ", ".join(f"{{{1 + i}}}" for i in range(len(sizes)))
-    form = f"dynamic_slice({{0}}, {sizes!r}, {names})"
-    return [w.emit(form, [w.full(each) for each in op.inputs], shape, dtype)]
+    return w.emit_whole(f"dynamic_slice({{0}}, {sizes!r}, {listed(len(sizes), 1)})", op)
 
 
 def _gather(w: HostWriter, op: Operation) -> list[Value]:
@@ -49,10 +48,9 @@ def _gather(w: HostWriter, op: Operation) -> list[Value]:
             return [w.emit("{0}.take({1})", [operand, places], shape, dtype)]
     axis = _whole_rows(operand.shape, numbers, sizes)
     if axis is not None and fill is None:
-        form = f"{{0}}.take({{1}}[..., 0], {axis}, mode='clip')"
-        return [w.emit(form, [operand, indices], shape, dtype)]
+        return w.emit_whole(f"{{0}}.take({{1}}[..., 0], {axis}, mode='clip')", op)
     form = f"gather({{0}}, {{1}}, {w.thing(numbers)}, {sizes!r}, {w.thing(fill)})"
-    return [w.emit(form, [operand, indices], shape, dtype)]
+    return w.emit_whole(form, op)
 
 
 def _fill_value(params: dict[str, Any], dtype: np.dtype) -> Any:
@@ -86,20 +84,17 @@ def _whole_rows(shape: tuple[int, ...], numbers: Any, sizes: tuple[int, ...]) ->
 
 def _scatter_rule(adds: bool) -> Rule:
     def rule(w: HostWriter, op: Operation) -> list[Value]:
-        shape, dtype = op.result()
         p = op.params
         mode = p["mode"].name
         if mode not in ("CLIP", "FILL_OR_DROP", "PROMISE_IN_BOUNDS"):
             raise UnwrittenError(f"a scatter that may {mode}")
         numbers = p["dimension_numbers"]
-        given = [w.full(each) for each in op.inputs]
-        axes = tuple(range(len(shape)))
+        axes = tuple(range(len(op.result()[0])))
         one = numbers.inserted_window_dims == axes == numbers.scatter_dims_to_operand_dims
-        if one and given[1].shape == (len(axes),) and not adds and mode != "CLIP":
-            return [w.emit("replaced({0}, {1}, {2})", given, shape, dtype)]
+        if one and op.inputs[1].shape == (len(axes),) and not adds and mode != "CLIP":
+            return w.emit_whole("replaced({0}, {1}, {2})", op)
         options = f"clips={mode == 'CLIP'}, adds={adds}"
-        form = f"scatter({{0}}, {{1}}, {{2}}, {w.thing(numbers)}, {options})"
-        return [w.emit(form, given, shape, dtype)]
+        return w.emit_whole(f"scatter({listed(3)}, {w.thing(numbers)}, {options})", op)
 
     return rule
 

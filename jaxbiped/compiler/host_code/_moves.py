@@ -5,15 +5,15 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from jaxbiped.compiler.host_code._host_writer import (
     HostWriter,
     Operation,
     Rule,
     UnwrittenError,
     Value,
+    listed,
 )
+from jaxbiped.compiler.ir._array_primitives import iota
 
 
 def single_number(value: Value, shape: tuple[int, ...]) -> Value:
@@ -159,11 +159,8 @@ def _split(w: HostWriter, op: Operation) -> list[Any]:
 
 
 def _stack(w: HostWriter, op: Operation) -> list[Value]:
-    shape, dtype = op.result()
-    names = ", ".join(f"{{{i}}}" for i in range(len(op.inputs)))
-    axis = op.params["axis"]
-    form = f"stacked(({names},), {axis})" if axis else f"array(({names},))"
-    return [w.emit(form, [w.full(each) for each in op.inputs], shape, dtype)]
+    axis, names = op.params["axis"], listed(len(op.inputs))
+    return w.emit_whole(f"stacked(({names},), {axis})" if axis else f"array(({names},))", op)
 
 
 def _concatenate(w: HostWriter, op: Operation) -> list[Value]:
@@ -177,12 +174,10 @@ def _concatenate(w: HostWriter, op: Operation) -> list[Value]:
         if not key:
             pieces += [w.full(each) for each in run]
             continue
-        names = ", ".join(f"{{{i}}}" for i in range(len(run)))
-        pieces.append(w.emit(f"array(({names},))", run, (len(run),), dtype))
+        pieces.append(w.emit(f"array(({listed(len(run))},))", run, (len(run),), dtype))
     if len(pieces) == 1:
         return pieces
-    names = ", ".join(f"{{{i}}}" for i in range(len(pieces)))
-    return [w.emit(f"concatenate(({names}), {axis})", pieces, shape, dtype)]
+    return [w.emit(f"concatenate(({listed(len(pieces))}), {axis})", pieces, shape, dtype)]
 
 
 def _single(value: Value) -> bool:
@@ -190,20 +185,14 @@ def _single(value: Value) -> bool:
 
 
 def _iota(w: HostWriter, op: Operation) -> list[Value]:
-    p = op.params
-    places = [1] * len(p["shape"])
-    places[p["dimension"]] = -1
-    numbers = np.arange(p["shape"][p["dimension"]], dtype=p["dtype"]).reshape(places)
-    return [w.constant(np.broadcast_to(numbers, p["shape"]))]
+    return [w.constant(iota(**op.params))]
 
 
 def _pad(w: HostWriter, op: Operation) -> list[Value]:
-    shape, dtype = op.result()
     config = tuple(tuple(map(int, each)) for each in op.params["padding_config"])
     if not any(itertools.chain(*config)):
         return [op.inputs[0]]
-    form = f"padded({{0}}, {{1}}, {config!r})"
-    return [w.emit(form, [w.full(each) for each in op.inputs], shape, dtype)]
+    return w.emit_whole(f"padded({{0}}, {{1}}, {config!r})", op)
 
 
 MOVES: dict[str, Rule] = {

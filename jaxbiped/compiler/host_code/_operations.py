@@ -10,6 +10,7 @@ from jaxbiped.compiler.host_code._host_writer import (
     Rule,
     UnwrittenError,
     Value,
+    listed,
 )
 from jaxbiped.compiler.host_code._moves import reshaped, transposed
 
@@ -139,10 +140,9 @@ def _reduce_rule(name: str) -> Rule:
         axis = axes[0] if len(axes) == 1 else axes
         # Of small whole numbers NumPy would make larger ones.
         kept = f", {dtype.name}" if dtype.kind == "i" and name in ("add", "multiply") else ""
-        form = f"{name}.reduce({{0}}, {axis}{kept})"
         if name.startswith("logical") and dtype.kind != "b":
             raise UnwrittenError("a reduction of bits")
-        return [w.emit(form, [w.full(op.inputs[0])], shape, dtype)]
+        return w.emit_whole(f"{name}.reduce({{0}}, {axis}{kept})", op)
 
     return rule
 
@@ -153,19 +153,16 @@ def _place_rule(method: str) -> Rule:
         (axis,) = op.params["axes"]
         if op.inputs[0].shape[axis] == 1:
             return [w.constant(np.zeros(shape, dtype))]
-        form = f"{{0}}.{method}({int(axis)}).astype({dtype.name})"
-        return [w.emit(form, [w.full(op.inputs[0])], shape, dtype)]
+        return w.emit_whole(f"{{0}}.{method}({int(axis)}).astype({dtype.name})", op)
 
     return rule
 
 
 def _sort(w: HostWriter, op: Operation) -> Sequence[Value]:
     axis, keys = op.params["dimension"], op.params["num_keys"]
-    names = ", ".join(f"{{{i}}}" for i in range(len(op.inputs)))
-    results = [(each.shape, each.dtype, each.shape) for each in op.inputs]
     only = "[0]" if len(op.inputs) == 1 else ""
-    form = f"sorted_by(({names},), {axis}, {keys}){only}"
-    return w.emit_all(form, [w.full(each) for each in op.inputs], results)
+    form = f"sorted_by(({listed(len(op.inputs))},), {axis}, {keys}){only}"
+    return w.emit_all(form, [w.full(each) for each in op.inputs], op.results())
 
 
 OPERATIONS: dict[str, Rule] = (
@@ -218,12 +215,11 @@ def _factors(w: HostWriter, op: Operation) -> Sequence[Value]:
 
 
 def _triangular(w: HostWriter, op: Operation) -> list[Value]:
-    shape, dtype = op.result()
     p = op.params
-    a, b = _square_matrix(w, op.inputs[0]), w.full(op.inputs[1])
+    _square_matrix(w, op.inputs[0])
     how = dict(left=p["left_side"], lower=p["lower"], transposed=p["transpose_a"])
     options = ", ".join(f"{k}={bool(v)}" for k, v in (how | {"unit": p["unit_diagonal"]}).items())
-    return [w.emit(f"triangular({{0}}, {{1}}, {options})", [a, b], shape, dtype)]
+    return w.emit_whole(f"triangular({{0}}, {{1}}, {options})", op)
 
 
 def _eigensystem(w: HostWriter, op: Operation) -> Sequence[Value]:

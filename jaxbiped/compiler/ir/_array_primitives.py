@@ -3,9 +3,10 @@
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from jaxbiped.compiler.ir._elementwise_primitives import ELEMENTWISE, Array, array_of, elementwise
 from jaxbiped.compiler.ir._graph import Block
@@ -37,37 +38,50 @@ def _slice(
     return a[tuple(slice(*part) for part in parts)]
 
 
-def _pad(
-    a: Array, filler: Array, *, padding_config: Sequence[tuple[int, int, int]], **_: object
-) -> Array:
-    """Filled up before, behind and between the entries; cut off where the filling is negative."""
-    for axis, (before, behind, between) in enumerate(padding_config):
-        size = (a.shape[axis] - 1) * (between + 1) + 1 if a.shape[axis] else 0
-        shape = list(a.shape)
-        shape[axis] = max(before, 0) + size + max(behind, 0)
-        whole = np.full(shape, filler.item(), dtype=object)
-        rows = np.moveaxis(whole, axis, 0)
-        rows[max(before, 0) : max(before, 0) + size : between + 1] = np.moveaxis(a, axis, 0)
-        end = len(rows) + min(behind, 0)
-        a = np.moveaxis(rows[-min(before, 0) : end], 0, axis)
-    return a
+def padded(value: np.ndarray, fill: Any, config: Sequence[tuple[int, int, int]]) -> np.ndarray:
+    """An array with room of `fill` before, behind and between its entries, along each axis.
+
+    Where the room is negative, entries are cut off.
+    """
+    sizes = [
+        low + high + n + max(0, n - 1) * between
+        for n, (low, high, between) in zip(value.shape, config, strict=True)
+    ]
+    whole = np.full([max(0, n) for n in sizes], fill, value.dtype)
+    source, target = [], []
+    for n, size, (low, _, between) in zip(value.shape, sizes, config, strict=True):
+        places = low + np.arange(n) * (1 + between)
+        inside = (places >= 0) & (places < size)
+        source.append(np.flatnonzero(inside))
+        target.append(places[inside])
+    whole[np.ix_(*target)] = value[np.ix_(*source)]
+    return whole
 
 
-def _concatenate(*arrays: Array, dimension: int, **_: object) -> Array:
-    return np.concatenate(arrays, axis=dimension)
+def iota(
+    *, shape: tuple[int, ...], dimension: int, dtype: npt.DTypeLike, **_: object
+) -> np.ndarray:
+    """Places along one axis, as numbers."""
+    places = [1] * len(shape)
+    places[dimension] = -1
+    return np.broadcast_to(np.arange(shape[dimension], dtype=dtype).reshape(places), shape)
 
 
-MOVES: dict[str, Callable[..., Array]] = {
+MOVES: dict[str, Callable[..., Array | list[Array]]] = {
     "broadcast_in_dim": _broadcast,
     "reshape": lambda a, *, new_sizes, **_: a.reshape(new_sizes),
     "squeeze": lambda a, *, dimensions, **_: np.squeeze(a, axis=tuple(dimensions)),
     "expand_dims": lambda a, *, dimensions, **_: np.expand_dims(a, tuple(dimensions)),
     "transpose": lambda a, *, permutation, **_: np.transpose(a, permutation),
     "slice": _slice,
-    "concatenate": _concatenate,
-    "pad": _pad,
+    "concatenate": lambda *arrays, dimension, **_: np.concatenate(arrays, axis=dimension),
+    "pad": lambda a, fill, *, padding_config, **_: padded(a, fill.item(), padding_config),
     "stack": lambda *arrays, axis=0, **_: np.stack(arrays, axis=axis),
     "rev": lambda a, *, dimensions, **_: np.flip(a, tuple(dimensions)),
+    "split": lambda a, *, sizes, axis, **_: np.split(a, np.cumsum(sizes)[:-1], axis),
+    "unstack": lambda a, *, axis, **_: [
+        np.asarray(part, object) for part in np.moveaxis(a, axis, 0)
+    ],
 }
 
 

@@ -44,8 +44,12 @@ def elementwise(function: Callable[..., Value], *arrays: Array) -> Array:
 # Elementwise rules: (block, *values, **parameters of the primitive) -> value.
 
 
-def _arithmetic(float_op: str, int_op: str) -> Rule:
-    return lambda block, a, b, **_: block.add(float_op if a.kind.is_float else int_op, a, b)
+def _operation(of_floats: str, of_others: str | None = None) -> Rule:
+    """One operation of the graph, by another name for whole numbers and truth values."""
+    others = of_floats if of_others is None else of_others
+    return lambda block, a, *rest, **_: block.add(
+        of_floats if a.kind.is_float else others, a, *rest
+    )
 
 
 def _comparison(float_name: str, int_name: str) -> Rule:
@@ -85,10 +89,6 @@ def _extreme(float_how: str, int_how: str) -> Rule:
     return rule
 
 
-def _logical(op: str) -> Rule:
-    return lambda block, a, b, **_: block.add(op, a, b)
-
-
 def _negative(block: Block, a: Value, **_: object) -> Value:
     if a.kind.is_float:
         return block.add("fneg", a)
@@ -118,10 +118,6 @@ def _round(block: Block, a: Value, *, rounding_method: enum.IntEnum, **_: object
     return block.add("rint", a)
 
 
-def _direct(op: str) -> Rule:
-    return lambda block, a, **_: block.add(op, a)
-
-
 def _invert(block: Block, a: Value, **_: object) -> Value:
     if a.kind is Kind.BOOL:
         return block.add("not", a)
@@ -134,14 +130,9 @@ def _is_finite(block: Block, a: Value, **_: object) -> Value:
 
 
 def _whole_power(block: Block, a: Value, *, y: int, **_: object) -> Value:
-    multiply = functools.partial(block.add, "fmul" if a.kind.is_float else "mul")
-    result, one = powers.whole_power(a, abs(y), multiply), block.const(1, a.kind)
-    result = one if result is None else result
-    return result if y >= 0 else block.add("fdiv", one, result)
-
-
-def _square(block: Block, a: Value, **_: object) -> Value:
-    return block.add("fmul" if a.kind.is_float else "mul", a, a)
+    multiply = functools.partial(ELEMENTWISE["mul"], block)
+    divide = functools.partial(block.add, "fdiv")
+    return powers.whole_power(a, y, multiply, divide, lambda a: block.const(1, a.kind))
 
 
 def convert(block: Block, a: Value, kind: Kind) -> Value:
@@ -248,20 +239,20 @@ def _same(block: Block, a: Value, **_: object) -> Value:
 
 _SAME: dict[str, Rule] = dict.fromkeys((*_PASSED_ON, *_OVER_LANES), _same)
 ELEMENTWISE: dict[str, Rule] = {
-    "add": _arithmetic("fadd", "add"),
-    "add_any": _arithmetic("fadd", "add"),
-    "sub": _arithmetic("fsub", "sub"),
-    "mul": _arithmetic("fmul", "mul"),
+    "add": _operation("fadd", "add"),
+    "add_any": _operation("fadd", "add"),
+    "sub": _operation("fsub", "sub"),
+    "mul": _operation("fmul", "mul"),
     "div": _divide,
     "neg": _negative,
     "abs": _size,
     "sign": _sign,
     "max": _extreme("gt", "sgt"),
     "min": _extreme("lt", "slt"),
-    "sqrt": _direct("sqrt"),
+    "sqrt": _operation("sqrt"),
     "round": _round,
-    "floor": _direct("floor"),
-    "ceil": _direct("ceil"),
+    "floor": _operation("floor"),
+    "ceil": _operation("ceil"),
     "exp": _exponential,
     "log": _logarithm,
     "log2": _binary_logarithm,
@@ -272,16 +263,16 @@ ELEMENTWISE: dict[str, Rule] = {
     "tanh": _elementary(elementary.hyperbolic_tangent),
     "pow": _elementary(powers.power),
     "integer_pow": _whole_power,
-    "square": _square,
+    "square": lambda block, a, **_: ELEMENTWISE["mul"](block, a, a),
     "eq": _comparison("oeq", "eq"),
     "ne": _comparison("une", "ne"),
     "lt": _comparison("olt", "slt"),
     "le": _comparison("ole", "sle"),
     "gt": _comparison("ogt", "sgt"),
     "ge": _comparison("oge", "sge"),
-    "and": _logical("and"),
-    "or": _logical("or"),
-    "xor": _logical("xor"),
+    "and": _operation("and"),
+    "or": _operation("or"),
+    "xor": _operation("xor"),
     "not": _invert,
     "is_finite": _is_finite,
     "select_n": _select,

@@ -13,7 +13,7 @@ from jax.extend.core import Jaxpr, JaxprEqn, Literal, Var
 from jaxbiped._checks import ArgumentError
 from jaxbiped._jax_versions import ClosedJaxpr, called_program, scan_counts
 from jaxbiped._types import Numbers
-from jaxbiped.compiler.ir._array_primitives import MOVES, REDUCTIONS, product, reduce
+from jaxbiped.compiler.ir._array_primitives import MOVES, REDUCTIONS, iota, product, reduce
 from jaxbiped.compiler.ir._elementwise_primitives import (
     ELEMENTWISE,
     KINDS,
@@ -100,23 +100,14 @@ def _apply(block: Block, equation: JaxprEqn, inputs: list[Array]) -> list[Array]
             inputs = [np.broadcast_to(inputs[0], inputs[1].shape), *inputs[1:]]
         return [elementwise(lambda *values: rule(block, *values, **params), *inputs)]
     if name in MOVES:
-        return [MOVES[name](*inputs, **params)]
+        moved = MOVES[name](*inputs, **params)
+        return moved if isinstance(moved, list) else [moved]
     if name in REDUCTIONS:
         return [reduce(block, name, inputs[0], params["axes"])]
     if name == "dot_general":
         return [product(block, *inputs, **params)]
     if name == "iota":
-        numbers = np.arange(params["shape"][params["dimension"]], dtype=params["dtype"])
-        places = [1] * len(params["shape"])
-        places[params["dimension"]] = -1
-        return [_constant(block, np.broadcast_to(numbers.reshape(places), params["shape"]))]
-    if name == "split":
-        cuts = np.cumsum(params["sizes"])[:-1]
-        return list(np.split(inputs[0], cuts, axis=params["axis"]))
-    if name == "unstack":
-        return [
-            np.asarray(part, dtype=object) for part in np.moveaxis(inputs[0], params["axis"], 0)
-        ]
+        return [_constant(block, iota(**params))]
     if name == "cond":
         return _branches(block, params["branches"], inputs)
     if name == "scan":

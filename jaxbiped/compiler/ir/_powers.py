@@ -32,16 +32,24 @@ _MOST = 1e4
 """Of an exponent, far beyond where powers of e overflow."""
 
 
-def whole_power(a: _T, exponent: int, multiply: Callable[[_T, _T], _T]) -> _T | None:
-    """A power by repeated multiplication, as XLA takes it; None for the power zero."""
-    result, base = None, a
-    while exponent:
-        if exponent & 1:
+def whole_power(
+    a: _T,
+    exponent: int,
+    multiply: Callable[[_T, _T], _T],
+    divide: Callable[[_T, _T], _T],
+    one_like: Callable[[_T], _T],
+) -> _T:
+    """A whole power by repeated multiplication, as XLA takes it."""
+    result, base, left = None, a, abs(exponent)
+    while left:
+        if left & 1:
             result = base if result is None else multiply(result, base)
-        exponent >>= 1
-        if exponent:
+        left >>= 1
+        if left:
             base = multiply(base, base)
-    return result
+    one = one_like(a)
+    result = one if result is None else result
+    return result if exponent >= 0 else divide(one, result)
 
 
 def power(m: Arithmetic, x: Value, y: Value) -> Value:

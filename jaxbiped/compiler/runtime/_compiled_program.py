@@ -1,9 +1,9 @@
 """Compiled programs, run over many simulations at once: queues, threads and arrays."""
 
 import contextlib
+import dataclasses
 import pickle
 import threading
-import weakref
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -19,16 +19,9 @@ from jaxbiped.compiler.runtime._processor import (
     Launch,
     input_streams_of,
 )
-from jaxbiped.compiler.runtime._program import Program, Recorded, leaves_of
+from jaxbiped.compiler.runtime._program import Program, Recorded, outputs_of
 
 HOST = HostProcessor()
-_KNOWING = threading.Lock()
-_KNOWN: "weakref.WeakValueDictionary[tuple[str, str], CompiledProgram]" = (
-    weakref.WeakValueDictionary()
-)
-"""Programs that somebody has, by their fingerprints and processors."""
-_KERNELS: "weakref.WeakValueDictionary[str, Kernel]" = weakref.WeakValueDictionary()
-"""What is traced once for all processors, by fingerprints."""
 
 
 class Ran(NamedTuple):
@@ -38,68 +31,40 @@ class Ran(NamedTuple):
     recorded: Recorded | None
 
 
+@dataclasses.dataclass(frozen=True)
 class CompiledProgram:
-    """A program compiled for inputs of one structure.
+    """A program compiled for inputs of one structure. Traced when that is needed.
 
     Attributes:
         kernel: what runs it.
+        processor: what that runs on.
     """
 
-    def __init__(
-        self, program: Program, inputs: PyTree, processor: AbstractProcessor = HOST
-    ) -> None:
-        """A program is traced when it is needed; `inputs` are one simulation's, or their shapes."""
-        self._hold(Kernel.of_program(program, inputs), processor)
-
-    def _hold(self, kernel: Kernel, processor: AbstractProcessor) -> None:
-        self.kernel, self._processor = kernel, processor
-        self._begun: set[int] = set()
-        self._lock = threading.Lock()
+    kernel: Kernel
+    processor: AbstractProcessor = HOST
 
     @staticmethod
     def of(
         program: Program, inputs: PyTree, processor: AbstractProcessor = HOST
     ) -> "CompiledProgram":
-        """The one of a program, which may be in use already without having been traced."""
-        made = CompiledProgram(program, inputs, processor)
-        digest = made.kernel.digest
-        if digest is None:
-            return made
-        fresh = made.kernel
-        with _KNOWING:
-            known = _KNOWN.setdefault((digest, processor.name), made)
-            kernel = _KERNELS.setdefault(digest, known.kernel)
-            if known is made:
-                made.kernel = kernel
-            known.kernel.trace_from(fresh)
-        return known
+        """Of a program; `inputs` are one simulation's, or their shapes."""
+        return CompiledProgram(Kernel.of_program(program, inputs), processor)
 
     @staticmethod
     def kept(digest: str, processor: AbstractProcessor = HOST) -> "CompiledProgram":
-        """The one with this fingerprint.
-
-        Raises:
-            KeyError: neither the process nor the disk keeps it.
-        """
-        with _KNOWING:
-            known = _KNOWN.get((digest, processor.name))
-            if known is None:
-                known = CompiledProgram.__new__(CompiledProgram)
-                kernel = _KERNELS.get(digest) or Kernel.kept(digest)
-                known._hold(_KERNELS.setdefault(digest, kernel), processor)
-                _KNOWN[digest, processor.name] = known
-        return known
+        """The one with this fingerprint; see `Kernel.kept`."""
+        return CompiledProgram(Kernel.kept(digest), processor)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Another process has it by its fingerprint."""
         if self.kernel.digest is None:
             raise pickle.PicklingError("a program that has no fingerprint")
-        return CompiledProgram.kept, (self.kernel.digest, self._processor)
+        return CompiledProgram.kept, (self.kernel.digest, self.processor)
 
     def __fingerprint__(self) -> object:
         """See `jaxbiped.caching._fingerprint`."""
         digest = self.kernel.digest
-        return object() if digest is None else (digest, self._processor.name)
+        return object() if digest is None else (digest, self.processor.name)
 
     @property
     def size(self) -> int:
@@ -116,23 +81,20 @@ class CompiledProgram:
 
     def runs_at_once(self, count: int) -> bool:
         """Whether it can run `count` simulations without being traced or compiled."""
-        return self._processor.ready(self.kernel, self.width(count, default_threads()))
+        return self.processor.ready(self.kernel, self.width(count, default_threads()))
 
     def width(self, count: int, threads: int) -> int:
         """Simulations in one vector; see `AbstractProcessor.width`."""
-        return self._processor.width(self.kernel, count, threads)
+        return self.processor.width(self.kernel, count, threads)
 
     def prepare(self, width: int) -> None:
         """Traces and compiles what vectors of this width need."""
-        self._processor.prepare(self.kernel, width)
+        self.processor.prepare(self.kernel, width)
 
     def make_ready(self, count: int) -> None:
         """Begins to trace and compile, in the background, what running `count` of them needs."""
-        width = self.width(count, default_threads())
-        with self._lock:
-            begun = width in self._begun
-            self._begun.add(width)
-        if not begun:
+        width, own = self.width(count, default_threads()), object()
+        if self.kernel.begun.setdefault((self.processor.name, width), own) is own:
             threading.Thread(target=self._begin, args=(width,)).start()
 
     def _begin(self, width: int) -> None:
@@ -153,7 +115,13 @@ class CompiledProgram:
             for leaf, shape in zip(leaves, jtu.tree_leaves(self.kernel.inputs), strict=True)
         ]
         found, recorded = self.run_table(np.concatenate(rows).astype(np.float64), **options)
-        return Ran(self._outputs(found), recorded)
+        with np.errstate(invalid="ignore"):
+            outputs = outputs_of(
+                self.kernel.outline.outputs,
+                found,
+                lambda part, dtype: np.moveaxis(part, -1, 0).astype(dtype),
+            )
+        return Ran(outputs, recorded)
 
     def run_table(
         self,
@@ -213,7 +181,7 @@ class CompiledProgram:
         )
         if count:
             launch = Launch(arrays, numbers, streams)
-            job = self._processor.job(self.kernel, launch, chosen, many)
+            job = self.processor.job(self.kernel, launch, chosen, many)
             run_in_threads(job.run, job.workers, stop, quick=quick)
             job.finish()
         recorded = Recorded(records, record_counts) if signature.records else None
@@ -228,13 +196,3 @@ class CompiledProgram:
         whole[list(constants)] = np.array(list(constants.values()))[:, None]
         whole[[i for i in range(len(whole)) if i not in constants]] = varying
         return whole
-
-    def _outputs(self, table: np.ndarray) -> PyTree:
-        shapes, structure = jtu.tree_flatten(self.kernel.outline.outputs)
-        parts = leaves_of(self.kernel.outline.outputs, table)
-        with np.errstate(invalid="ignore"):
-            leaves = [
-                np.moveaxis(part, -1, 0).astype(shape.dtype)
-                for part, shape in zip(parts, shapes, strict=True)
-            ]
-        return jtu.tree_unflatten(structure, leaves)

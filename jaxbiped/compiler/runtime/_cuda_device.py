@@ -19,7 +19,6 @@ from jaxbiped.compiler.runtime._cuda_driver import CudaDriver, CudaError, load_l
 from jaxbiped.compiler.runtime._kernel import Kernel
 
 _MULTIPROCESSORS, _MAJOR, _MINOR = 16, 75, 76
-_REGISTERS = 4
 _NON_BLOCKING, _OUT_OF_MEMORY = 1, 2
 _POLL = 2e-4
 """How long to wait before looking whether a kernel is over [s]."""
@@ -47,12 +46,10 @@ class LoadedKernel(NamedTuple):
 
     Attributes:
         function: the driver's handle.
-        registers: of each thread.
         blocks: that one multiprocessor runs at once.
     """
 
     function: ctypes.c_void_p
-    registers: int
     blocks: int
 
 
@@ -81,18 +78,16 @@ class CudaDevice:
         ptx = kernel.ptx(self.architecture)
         with self._lock:
             if kernel not in self._loaded:
-                self._loaded[kernel] = self.load_ptx(ptx, ENTRY)
+                self._loaded[kernel] = self._load(ptx)
             return self._loaded[kernel]
 
-    def load_ptx(self, ptx: str, entry: str) -> LoadedKernel:
-        """A function of a module."""
+    def _load(self, ptx: str) -> LoadedKernel:
         driver = self._driver
         driver.call("cuCtxSetCurrent", self._context)
         module = driver.handle("cuModuleLoadData", ptx.encode())
-        function = driver.handle("cuModuleGetFunction", module, entry.encode())
-        registers = driver.number("cuFuncGetAttribute", _REGISTERS, function)
+        function = driver.handle("cuModuleGetFunction", module, ENTRY.encode())
         blocks = driver.number("cuOccupancyMaxActiveBlocksPerMultiprocessor", function, THREADS, 0)
-        return LoadedKernel(function, registers, blocks)
+        return LoadedKernel(function, blocks)
 
     def run(self, kernel: LoadedKernel, part: DevicePart, stop: np.ndarray) -> None:
         """Launches a kernel over a part and waits for its end; `stop` not zero ends it early.

@@ -21,7 +21,6 @@ _SIGNATURES: dict[str, list[Any]] = {
     "cuCtxSetCurrent": [c_void_p],
     "cuModuleLoadData": [_HANDLE, c_char_p],
     "cuModuleGetFunction": [_HANDLE, c_void_p, c_char_p],
-    "cuFuncGetAttribute": [POINTER(c_int), c_int, c_void_p],
     "cuOccupancyMaxActiveBlocksPerMultiprocessor": [POINTER(c_int), c_void_p, c_int, c_size_t],
     "cuMemAlloc_v2": [POINTER(c_uint64), c_size_t],
     "cuMemFree_v2": [c_uint64],

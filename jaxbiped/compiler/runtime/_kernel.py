@@ -1,7 +1,14 @@
-"""Kernel: a program's signature and machine code, kept by the disk or else traced and compiled."""
+"""Kernel: a program's signature and machine code, kept by the disk or else traced and compiled.
+
+With what the disk keeps, a program that some process had traced runs in another one that never
+traces it.
+"""
 
 import dataclasses
 import threading
+import weakref
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.tree_util as jtu
@@ -9,6 +16,7 @@ from jaxtyping import PyTree
 
 from jaxbiped.caching._caches import Once
 from jaxbiped.caching._collector_pause import long_trace
+from jaxbiped.caching._disk_cache import read_entry, read_object, write_entry, write_object
 from jaxbiped.caching._fingerprint import as_leaves, fingerprint
 from jaxbiped.compiler.codegen._kernel_target import host_target
 from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY, kernel_text
@@ -20,32 +28,60 @@ from jaxbiped.compiler.codegen._ptx_kernel import (
     ptx_text,
 )
 from jaxbiped.compiler.runtime._host_cpu import host
-from jaxbiped.compiler.runtime._machine_code import MachineCode, assembly, code_name, machine_code
-from jaxbiped.compiler.runtime._program import Graph, Outline, Program, graph_of, outline_of
-from jaxbiped.compiler.runtime._program_store import (
-    Signature,
-    read_code,
-    read_ptx,
-    read_signature,
-    signature_of,
-    write_code_name,
-    write_ptx,
-    write_signature,
+from jaxbiped.compiler.runtime._machine_code import (
+    MachineCode,
+    assembly,
+    code_name,
+    machine_code,
+    stored_code,
 )
+from jaxbiped.compiler.runtime._program import Graph, Outline, Program, graph_of, outline_of
 
+_T = TypeVar("_T")
+_KIND = "programs"
 _TRACING = threading.Lock()
+_KNOWING = threading.Lock()
+_KNOWN: "weakref.WeakValueDictionary[str, Kernel]" = weakref.WeakValueDictionary()
+"""Kernels that somebody has, by their fingerprints."""
+
+
+class Signature(NamedTuple):
+    """What a program's callers have to know of its operations.
+
+    Attributes:
+        inputs: pytree of the inputs, with shapes and dtypes.
+        outline: what leaves it.
+        outputs: how many numbers differ between simulations, `constants` those that do not, by
+            their places.
+        row: numbers in each row of the stream that it reads.
+        recorded: numbers in each record, `records` whether it makes any.
+        maps: whether it loops over entries of arrays.
+        backwards: whether it reads streams from the last row on.
+    """
+
+    inputs: Any
+    outline: Outline
+    outputs: int
+    constants: dict[int, float]
+    row: int
+    recorded: int
+    records: bool
+    maps: bool
+    backwards: bool
 
 
 class Kernel:
     """What runs a program for inputs of one structure.
 
     Attributes:
-        digest: fingerprint of the program and its inputs; None where it has none.
         inputs: pytree of shapes and dtypes.
+        digest: fingerprint of the program and its inputs; None where it has none.
+        begun: what began to be compiled for it in the background.
     """
 
     def __init__(self, program: Program | None, inputs: PyTree, digest: str | None) -> None:
         self._program, self.inputs, self.digest = program, inputs, digest
+        self.begun: dict[tuple[str, int], object] = {}
         self._code: dict[int, MachineCode] = {}
         self._ptx: dict[str, str] = {}
         self._making = threading.Lock()
@@ -55,7 +91,7 @@ class Kernel:
 
     @staticmethod
     def of_program(program: Program, inputs: PyTree) -> "Kernel":
-        """Of a program; `inputs` are one simulation's, or their shapes."""
+        """The one of a program, which may be in use already; `inputs` of one, or their shapes."""
         shapes = jtu.tree_map(lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype), inputs)
         digest = fingerprint(Kernel, program, as_leaves(shapes))
         # The outline and the graph need these: compiled by themselves, they are traced once.
@@ -65,30 +101,35 @@ class Kernel:
             finish=jax.jit(program.finish),
             record=None if program.record is None else jax.jit(program.record),
         )
-        return Kernel(once, shapes, digest)
+        made = Kernel(once, shapes, digest)
+        if digest is None:
+            return made
+        with _KNOWING:
+            known = _KNOWN.setdefault(digest, made)
+            known._program = known._program or once
+        return known
 
     @staticmethod
     def kept(digest: str) -> "Kernel":
-        """What the disk keeps of a program; it cannot be traced.
+        """The one with this fingerprint; what the disk keeps of a program cannot be traced.
 
         Raises:
-            KeyError: that is nothing.
+            KeyError: neither the process nor the disk has it.
         """
-        signature = read_signature(digest)
-        if signature is None:
-            raise KeyError(digest)
-        kernel = Kernel(None, signature.inputs, digest)
-        kernel._kept(lambda: signature)
-        return kernel
-
-    def trace_from(self, other: "Kernel") -> None:
-        """Knows from here on how to trace itself."""
-        self._program = self._program or other._program
+        with _KNOWING:
+            known = _KNOWN.get(digest)
+            if known is None:
+                signature = read_object(_KIND, digest, Signature)
+                if signature is None:
+                    raise KeyError(digest)
+                known = _KNOWN[digest] = Kernel(None, signature.inputs, digest)
+                known._kept(lambda: signature)
+        return known
 
     @property
     def signature(self) -> Signature:
         """What its callers have to know of its operations."""
-        return self._signed(self._sign)
+        return self._signed(lambda: self._kept_signature() or self._sign())
 
     @property
     def outline(self) -> Outline:
@@ -115,17 +156,14 @@ class Kernel:
     def code(self, width: int) -> MachineCode:
         """The machine code, for vectors of this width."""
         with self._making:
-            if width not in self._code:
-                self._code[width] = self._read_code(width) or self._make_code(width)
+            if self._known_code(width) is None:
+                self._code[width] = self._make_code(width)
             return self._code[width]
 
     def has_code(self, width: int) -> bool:
         """Whether `code` takes no tracing and no compiling."""
         with self._making:
-            code = self._code.get(width) or self._read_code(width)
-            if code is not None:
-                self._code[width] = code
-            return code is not None
+            return self._known_code(width) is not None
 
     def device_text(self, threads: int = THREADS, blocks: int = BLOCKS) -> str:
         """The program as LLVM's text for devices; see `device_target`."""
@@ -136,31 +174,36 @@ class Kernel:
     def ptx(self, architecture: Architecture) -> str:
         """The program as PTX for a kind of device."""
         with self._making:
-            if not self._has_ptx(architecture):
-                text = ptx_text(self.device_text(), architecture)
-                self._ptx[architecture.name] = text
-                if self.digest is not None:
-                    write_ptx(self.digest, architecture, text)
+            if self._known_ptx(architecture) is None:
+                text = self._ptx[architecture.name] = ptx_text(self.device_text(), architecture)
+                self._write(architecture.name, text)
             return self._ptx[architecture.name]
 
     def has_ptx(self, architecture: Architecture) -> bool:
         """Whether `ptx` takes no tracing and no compiling."""
         with self._making:
-            return self._has_ptx(architecture)
+            return self._known_ptx(architecture) is not None
 
     def _kept_signature(self) -> Signature | None:
         """What the disk knew of it when it was first asked."""
         digest = self.digest
-        return self._kept(lambda: None if digest is None else read_signature(digest))
+        return self._kept(lambda: None if digest is None else read_object(_KIND, digest, Signature))
 
     def _sign(self) -> Signature:
-        kept = self._kept_signature()
-        if kept is not None:
-            return kept
-        program = self._own_program()
-        found = signature_of(self.graph, self.inputs, self.outline, backwards=program.backwards)
+        program, graph = self._own_program(), self.graph
+        found = Signature(
+            inputs=self.inputs,
+            outline=self.outline,
+            outputs=len(graph.outputs),
+            constants=graph.constants,
+            row=len(graph.row),
+            recorded=len(graph.recorded),
+            records=graph.recording is not None,
+            maps=any(value.op == "map" for value in graph.body.values),
+            backwards=program.backwards,
+        )
         if self.digest is not None:
-            write_signature(self.digest, found)
+            write_object(_KIND, self.digest, *found)
         return found
 
     def _sketch(self) -> Outline:
@@ -175,27 +218,34 @@ class Kernel:
         with _TRACING, long_trace():
             return graph_of(self._own_program(), self.inputs)
 
-    def _has_ptx(self, architecture: Architecture) -> bool:
+    def _known_ptx(self, architecture: Architecture) -> str | None:
         name = architecture.name
-        if name not in self._ptx and self.digest is not None:
-            kept = read_ptx(self.digest, architecture)
-            if kept is not None:
-                self._ptx[name] = kept
-        return name in self._ptx
+        return _remembered(self._ptx, name, lambda: self._read(name))
 
-    def _read_code(self, width: int) -> MachineCode | None:
-        if self.digest is None or self._traced.done:
-            return None
-        kept = self._kept_signature()
-        return None if kept is None else read_code(self.digest, width, host(), maps=kept.maps)
+    def _known_code(self, width: int) -> MachineCode | None:
+        def read() -> MachineCode | None:
+            signature = None if self._traced.done else self._kept_signature()
+            name = None if signature is None else self._read(_code_entry(width))
+            if name is None or signature is None:
+                return None
+            return stored_code(name, ENTRY, host(), as_written=signature.maps)
+
+        return _remembered(self._code, width, read)
 
     def _make_code(self, width: int) -> MachineCode:
         text, maps = self.text(width), self.signature.maps
         code = machine_code(text, ENTRY, host(), as_written=maps)
-        if self.digest is not None:
-            name = code_name(text, ENTRY, host(), as_written=maps)
-            write_code_name(self.digest, width, host(), name)
+        self._write(_code_entry(width), code_name(text, ENTRY, host(), as_written=maps))
         return code
+
+    def _read(self, what: str) -> str | None:
+        """A text that the disk keeps of it."""
+        kept = None if self.digest is None else read_entry(_KIND, f"{self.digest}-{what}")
+        return None if kept is None else kept.decode()
+
+    def _write(self, what: str, text: str) -> None:
+        if self.digest is not None:
+            write_entry(_KIND, f"{self.digest}-{what}", text.encode())
 
     def _own_program(self) -> Program:
         if self._program is None:
@@ -204,3 +254,16 @@ class Kernel:
                 "and the call compiles it again."
             )
         return self._program
+
+
+def _code_entry(width: int) -> str:
+    return f"{host().cpu}-{host().width}-{width}"
+
+
+def _remembered(known: dict[Any, _T], key: object, read: Callable[[], _T | None]) -> _T | None:
+    """What is known by a key, or else read."""
+    found = known.get(key)
+    found = read() if found is None else found
+    if found is not None:
+        known[key] = found
+    return found

@@ -14,7 +14,7 @@ from jaxbiped.compiler.passes._vertex_elimination import jacobian
 from jaxbiped.compiler.runtime._compiled_program import HOST, CompiledProgram
 from jaxbiped.compiler.runtime._engine_interface import AbstractEngine, Request, Result, Shapes
 from jaxbiped.compiler.runtime._lane_call import Schedule
-from jaxbiped.compiler.runtime._primitive import call, call_recording
+from jaxbiped.compiler.runtime._primitive import Recording, call
 from jaxbiped.compiler.runtime._processor import AbstractProcessor
 from jaxbiped.compiler.runtime._program import Program
 
@@ -47,12 +47,12 @@ class LaneEngine(AbstractEngine):
         how: Any = dict(stream=request.stream, room=request.room, quick=request.quick)
         if request.batch:
             return Result(*compiled.run(inputs, schedule=request.times, **how))
-        if request.keeps_records:
-            once = request.reads_once
-            outputs, recording = call_recording(compiled, inputs, once=once, **how)
-            return Result(outputs, recording=recording)
         schedule = None if request.times is None else Schedule(request.times)
-        return Result(*call(compiled, inputs, schedule, **how))
+        how |= dict(keeps_records=request.keeps_records, reads_once=request.reads_once)
+        outputs, found = call(compiled, inputs, schedule, **how)
+        if isinstance(found, Recording):
+            return Result(outputs, recording=found)
+        return Result(outputs, found)
 
     def jacobian(
         self, function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]

@@ -19,11 +19,10 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._host_call import host_call, lower_host_call
 from jaxbiped._types import Numbers, as_array
 from jaxbiped.compiler.host_code._host_jit import register_rule
-from jaxbiped.compiler.host_code._host_writer import HostWriter, Operation, Value
+from jaxbiped.compiler.host_code._host_writer import HostWriter, Operation, Value, listed
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._lane_call import LaneCall, LaneRun, Part, Schedule
-from jaxbiped.compiler.runtime._program import Recorded, leaves_of
-from jaxbiped.compiler.runtime._record_cache import Recorder
+from jaxbiped.compiler.runtime._program import Recorded, outputs_of
 
 _UNTRACED: contextvars.ContextVar[list[CompiledProgram] | None] = contextvars.ContextVar(
     "programs that may not be expressible", default=None
@@ -49,24 +48,23 @@ class Recording(eqx.Module):
 
     Attributes:
         numbers: the inputs' leaves one behind the other, and then those of what was read, (k,).
-        recorder: how it was run.
+        how: it was run.
     """
 
     numbers: Numbers
-    recorder: Recorder = eqx.field(static=True)
+    how: LaneRun = eqx.field(static=True)
 
     @property
     def room(self) -> int:
         """For how many records there was room."""
-        return self.recorder.room
+        return self.how.room
 
     def columns(self, first: Numbers) -> list[Array]:
         """For each of the first k numbers `first`'s and then those recorded, NaN beyond the last.
 
         `first` has shape (k,), the arrays (1 + room,).
         """
-        how = LaneRun(self.recorder.compiled, recorder=self.recorder, wants=Part.COLUMNS)
-        return _bind([self.numbers, first], how)
+        return _bind([self.numbers, first], self.how, Part.COLUMNS)
 
 
 def call(
@@ -77,39 +75,29 @@ def call(
     stream: PyTree = None,
     room: int = 0,
     quick: bool = False,
-) -> tuple[PyTree, Recorded | None]:
+    keeps_records: bool = False,
+    reads_once: bool = False,
+) -> tuple[PyTree, Recorded | Recording | None]:
     """Runs one simulation, or under `vmap` many at once, each in a lane.
 
     There is room for `room` records, or for one at each time of a schedule. A `stream`, shape
-    (rows, numbers) or the `Recording` of another simulation, is for programs that read one.
+    (rows, numbers) or the `Recording` of another simulation, is for programs that read one. Where
+    it `keeps_records`, they stay on the host; not for longer where one `reads_once`.
 
     It has no derivative of its own. Outside of `jit` it runs at once and an
     interrupt ends it; inside, it is called back from the compiled program, and an interrupt waits.
     A single simulation that is `quick` is over before a user could interrupt, and needs no thread.
     """
-    recorder, rows = None, [] if stream is None else [stream]
+    reads, rows = None, [] if stream is None else [stream]
     if isinstance(stream, Recording):
-        recorder, rows = stream.recorder, [stream.numbers]
-    how = LaneRun(compiled, schedule, room, quick, recorder=recorder)
-    table, *rest = _bind([_numbers(inputs), *rows], how)
+        reads, rows, inputs = stream.how, [], (inputs, stream.numbers)
+    numbers = _numbers(inputs)
+    how = LaneRun(compiled, room, quick, reads_once, reads, schedule)
+    if keeps_records:
+        (table,) = _bind([numbers], how, Part.OUTPUTS)
+        return _outputs(compiled, table), Recording(numbers, how)
+    table, *rest = _bind([numbers, *rows], how, Part.ALL)
     return _outputs(compiled, table), Recorded(*rest) if rest else None
-
-
-def call_recording(
-    compiled: CompiledProgram,
-    inputs: PyTree,
-    *,
-    room: int,
-    quick: bool,
-    stream: Recording | None = None,
-    once: bool = False,
-) -> tuple[PyTree, Recording]:
-    """`call`, but the records stay on the host; not for longer where they are read but `once`."""
-    reads = None if stream is None else stream.recorder
-    recorder = Recorder(compiled, room, quick, once, reads)
-    numbers = _numbers(inputs if stream is None else (inputs, stream.numbers))
-    (table,) = _bind([numbers], LaneRun(compiled, recorder=recorder, wants=Part.OUTPUTS))
-    return _outputs(compiled, table), Recording(numbers, recorder)
 
 
 def _numbers(inputs: PyTree) -> Numbers:
@@ -129,58 +117,55 @@ def _is_traced(leaf: object) -> bool:
     return isinstance(leaf, jax.core.Tracer)
 
 
-def _bind(given: list[Numbers], how: LaneRun) -> list[Any]:
+def _bind(given: list[Numbers], how: LaneRun, wants: Part) -> list[Any]:
     """The operation's results for one simulation."""
     if any(map(_is_traced, given)):
         rows = [jax.lax.expand_dims(x, (0,)) for x in given]
-        return [jax.lax.squeeze(leaf, (0,)) for leaf in _RUN.bind(*rows, how=how)]
-    found = how.run(*[np.asarray(x)[None] for x in given])
+        return [jax.lax.squeeze(leaf, (0,)) for leaf in _RUN.bind(*rows, how=how, wants=wants)]
+    found = LaneCall(1, how, wants)(*[np.asarray(x)[None] for x in given])
     return [as_array(leaf[0]) for leaf in found]
 
 
 def _outputs(compiled: CompiledProgram, table: Array) -> PyTree:
-    shapes, structure = jtu.tree_flatten(compiled.kernel.outline.outputs)
+    shapes, convert = compiled.kernel.outline.outputs, jax.lax.convert_element_type
     if not _is_traced(table):
         # By NumPy: JAX would compile a program for each of these.
-        parts = leaves_of(compiled.kernel.outline.outputs, np.asarray(table))
-        leaves = [as_array(p.astype(s.dtype)) for p, s in zip(parts, shapes, strict=True)]
-        return jtu.tree_unflatten(structure, leaves)
-    if all(s.ndim == 0 for s in shapes):
+        own = np.asarray(table)
+        return outputs_of(shapes, own, lambda part, dtype: as_array(part.astype(dtype)))
+    if all(leaf.ndim == 0 for leaf in jtu.tree_leaves(shapes)):
         # The same as what follows, by one operation.
-        parts = list(jnp.unstack(table))
-    else:
-        parts = leaves_of(compiled.kernel.outline.outputs, table)
-    leaves = [jax.lax.convert_element_type(p, s.dtype) for p, s in zip(parts, shapes, strict=True)]
-    return jtu.tree_unflatten(structure, leaves)
+        numbers = iter(jnp.unstack(table))
+        return jtu.tree_map(lambda leaf: convert(next(numbers), leaf.dtype), shapes)
+    return outputs_of(shapes, table, convert)
 
 
-def _implementation(*leaves: Array, how: LaneRun) -> list[Array]:
-    return [jnp.asarray(leaf) for leaf in how.run(*leaves)]
+def _implementation(*leaves: Array, how: LaneRun, wants: Part) -> list[Array]:
+    return [jnp.asarray(leaf) for leaf in LaneCall(len(leaves[0]), how, wants)(*leaves)]
 
 
-def _abstract_evaluation(*leaves: jax.core.ShapedArray, how: LaneRun) -> list[jax.core.ShapedArray]:
+def _abstract_evaluation(
+    *leaves: jax.core.ShapedArray, how: LaneRun, wants: Part
+) -> list[jax.core.ShapedArray]:
     count, outline = leaves[0].shape[0], how.compiled.kernel.outline
-    if how.wants is Part.COLUMNS:
-        assert how.recorder is not None
-        column = jax.core.ShapedArray((count, 1 + how.recorder.room), jnp.float64)
+    if wants is Part.COLUMNS:
+        column = jax.core.ShapedArray((count, 1 + how.room), jnp.float64)
         return [column] * leaves[1].shape[1]
     size = sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(outline.outputs))
     found = [jax.core.ShapedArray((count, size), jnp.float64)]
-    if outline.recorded is not None and how.wants is Part.ALL:
+    if outline.recorded is not None and wants is Part.ALL:
         room = how.room if how.schedule is None else len(how.schedule.times)
         found.append(jax.core.ShapedArray((count, room, outline.recorded), jnp.float64))
         found.append(jax.core.ShapedArray((count,), jnp.int64))
     return found
 
 
-def _lowering(context: Any, *operands: Any, how: LaneRun) -> Any:
+def _lowering(context: Any, *operands: Any, how: LaneRun, wants: Part) -> Any:
     """A call of the host from the compiled program, with arrays of NumPy.
 
     `jax.pure_callback` would make arrays of JAX of them, which copies, and where they are large
     waits for a thread of the same pool that this call holds: for ever, on few cores.
     """
-    count = context.avals_in[0].shape[0]
-    run = _begun_call(count, how)
+    run = _begun_call(context.avals_in[0].shape[0], how, wants)
     if tuple(context.module_context.platforms) == ("cpu",):
         return lower_host_call(context, host_call(run), operands)
     results, _, _ = mlir.emit_python_callback(
@@ -196,25 +181,26 @@ def _lowering(context: Any, *operands: Any, how: LaneRun) -> Any:
     return results
 
 
-def _begun_call(count: int, how: LaneRun) -> LaneCall:
+def _begun_call(count: int, how: LaneRun, wants: Part) -> LaneCall:
     """The call of a program, which is compiled while the rest is."""
-    if how.wants is not Part.COLUMNS:
+    if wants is not Part.COLUMNS:
         compiled, waiting = how.compiled, _UNTRACED.get()
         compiled.make_ready(count)
         if waiting is None:
             compiled.check()
         else:
             waiting.append(compiled)
-    return LaneCall(count, how)
+    return LaneCall(count, how, wants)
 
 
 def _write_on_host(writer: HostWriter, op: Operation) -> Sequence[Value]:
     """The call in a host program."""
     given = [writer.full(each) for each in op.inputs]
-    name = writer.thing(_begun_call(given[0].shape[0], op.params["how"]), object())
-    names = ", ".join(f"{{{i}}}" for i in range(len(given)))
+    run = _begun_call(given[0].shape[0], op.params["how"], op.params["wants"])
+    name = writer.thing(run, object())
     only = "[0]" if len(op.results()) == 1 else ""
-    return writer.emit_all(f"{name}({names}){only}", given, op.results(), computed=False)
+    form = f"{name}({listed(len(given))}){only}"
+    return writer.emit_all(form, given, op.results(), computed=False)
 
 
 def _refuse_derivative(primals: object, tangents: object, **params: object) -> NoReturn:
@@ -224,7 +210,7 @@ def _refuse_derivative(primals: object, tangents: object, **params: object) -> N
     )
 
 
-def _batching(leaves: Any, axes: Any, *, how: LaneRun) -> tuple[list[Array], list[int]]:
+def _batching(leaves: Any, axes: Any, **params: Any) -> tuple[list[Array], list[int]]:
     size = next(
         leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None
     )
@@ -234,7 +220,7 @@ def _batching(leaves: Any, axes: Any, *, how: LaneRun) -> tuple[list[Array], lis
     ]
     count = aligned[0].shape[1]
     merged = [leaf.reshape(size * count, *leaf.shape[2:]) for leaf in aligned]
-    found = _RUN.bind(*merged, how=how)
+    found = _RUN.bind(*merged, **params)
     return [leaf.reshape(size, count, *leaf.shape[1:]) for leaf in found], [0] * len(found)
 
 

@@ -171,14 +171,15 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
     return graph
 
 
-def leaves_of(structure: PyTree, table: Numbers) -> list[Any]:
-    """A table of outputs (numbers, …) cut into arrays of the leaves' shapes, (*shape, …)."""
+def outputs_of(shapes: PyTree, table: Numbers, convert: Callable[[Any, np.dtype], Any]) -> PyTree:
+    """A table of outputs (numbers, …) cut into arrays (*shape, …), converted to their dtypes."""
     leaves, place = [], 0
-    for leaf in jax.tree.leaves(structure):
+    for leaf in jtu.tree_leaves(shapes):
         size = int(np.prod(leaf.shape))
-        leaves.append(table[place : place + size].reshape((*leaf.shape, *table.shape[1:])))
+        part = table[place : place + size].reshape((*leaf.shape, *table.shape[1:]))
+        leaves.append(convert(part, leaf.dtype))
         place += size
-    return leaves
+    return jtu.tree_unflatten(jtu.tree_structure(shapes), leaves)
 
 
 def inputs_of(block: Block, leaf: jax.ShapeDtypeStruct | jax.Array) -> Array:

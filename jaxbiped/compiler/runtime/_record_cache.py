@@ -1,7 +1,7 @@
 """Record cache: what simulations recorded waits on the host until somebody asks for it.
 
-A recorder is a program whose records are kept so; another program may read them. They lie in memory
-that is used again: the first touch of a page takes longer than what is written there.
+Another program may read them. They lie in memory that is used again: the first touch of a page
+takes longer than what is written there.
 """
 
 import collections
@@ -9,13 +9,9 @@ import math
 import threading
 import weakref
 from collections.abc import Callable, Hashable
-from typing import NamedTuple, Optional, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-
-from jaxbiped.caching._caches import half_of_cache_bytes, register_bytes
-from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._host_cpu import default_threads
 
 BLOCK = 512
 """Simulations that record, or read records, at once: all together would take much memory."""
@@ -97,68 +93,10 @@ class RecordCache:
             self._records.clear()
             self._size = 0
 
-    def ran(
-        self, program: Hashable, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
-    ) -> np.ndarray:
-        """Outputs of what `run` finds for inputs (numbers, n); its records are then known."""
-        return self._ran(program, inputs, run)[0]
-
-    def rows(
-        self,
-        program: Hashable,
-        inputs: np.ndarray,
-        run: Callable[[np.ndarray], Tables],
-        *,
-        once: bool = False,
-    ) -> list[np.ndarray]:
-        """Records of each simulation (records, numbers), or zeros where it made none.
-
-        Those asked for but `once` are then held no longer.
-        """
-        known = self._known(program, inputs, run)
-        if once:
-            with self._lock:
-                for column in inputs.T:
-                    self._drop((program, column.tobytes()))
-        return [each if len(each) else np.zeros((1, each.shape[1])) for each in known]
-
-    def columns(
-        self,
-        program: Hashable,
-        inputs: np.ndarray,
-        first: np.ndarray,
-        room: int,
-        run: Callable[[np.ndarray], Tables],
-    ) -> list[np.ndarray]:
-        """The first k numbers in a record, each as an array (n, 1 + room), NaN beyond the last.
-
-        Before those recorded comes that of `first`, shape (n, k).
-        """
-        known = self._known(program, inputs, run)
-        found = [np.empty((len(known), 1 + room)) for _ in first.T]
-        for i, records in enumerate(known):
-            for column, start, values in zip(found, first[i], records.T, strict=False):
-                column[i, 0], column[i, 1 : 1 + len(values)] = start, values
-                column[i, 1 + len(values) :] = np.nan
-        return found
-
-    def _known(
-        self, program: Hashable, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
-    ) -> list[np.ndarray]:
-        """Records of each simulation; what is not known `run` finds."""
-        keys = [(program, column.tobytes()) for column in inputs.T]
-        with self._lock:
-            known = {key: self._records[key] for key in keys if key in self._records}
-        missing = [i for i, key in enumerate(keys) if key not in known]
-        if missing:
-            _, found = self._ran(program, inputs[:, missing], run)
-            known |= {keys[i]: each for i, each in zip(missing, found, strict=True)}
-        return [known[key] for key in keys]
-
-    def _ran(
+    def run(
         self, program: Hashable, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
     ) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Outputs and records of each simulation, which are held from now on."""
+        """Outputs of what `run` finds for inputs (numbers, n), and its records, now known."""
         every, found = [], []
         for first in range(0, inputs.shape[1], BLOCK):
             outputs, records, counts = run(inputs[:, first : first + BLOCK])
@@ -167,7 +105,6 @@ class RecordCache:
             filled = 2 * np.sum(counts) >= records.shape[0] * records.shape[1]
             own = [each[:n] for each, n in zip(records, counts, strict=True)]
             found += own if filled else [each.copy() for each in own]
-        outputs = np.concatenate(every, axis=1)
         with self._lock:
             for column, each in zip(inputs.T, found, strict=True):
                 key = program, column.tobytes()
@@ -177,7 +114,26 @@ class RecordCache:
             most = self._most()
             while self._size > most:
                 self._drop(next(iter(self._records)))
-        return outputs, found
+        return np.concatenate(every, axis=1), found
+
+    def records(
+        self, program: Hashable, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
+    ) -> list[np.ndarray]:
+        """Records of each simulation (records, numbers); those that are not known `run` finds."""
+        keys = [(program, column.tobytes()) for column in inputs.T]
+        with self._lock:
+            known = {key: self._records[key] for key in keys if key in self._records}
+        missing = [i for i, key in enumerate(keys) if key not in known]
+        if missing:
+            _, found = self.run(program, inputs[:, missing], run)
+            known |= {keys[i]: each for i, each in zip(missing, found, strict=True)}
+        return [known[key] for key in keys]
+
+    def forget(self, program: Hashable, inputs: np.ndarray) -> None:
+        """Holds the records of these no longer."""
+        with self._lock:
+            for column in inputs.T:
+                self._drop((program, column.tobytes()))
 
     def _drop(self, key: _Key) -> None:
         records = self._records.pop(key, None)
@@ -186,62 +142,3 @@ class RecordCache:
 
 def _bytes_of(key: _Key, records: np.ndarray) -> int:
     return len(key[1]) + records.nbytes
-
-
-_RECORDS = RecordCache(most=half_of_cache_bytes)
-_BUFFERS = BufferPool(most=half_of_cache_bytes)
-register_bytes("records of simulations", _RECORDS)
-register_bytes("buffers for records", _BUFFERS)
-
-
-class Recorder(NamedTuple):
-    """How simulations were run whose records are kept on the host. Hashable.
-
-    Their numbers are their own inputs and behind them the numbers of what they read.
-
-    Attributes:
-        compiled: the program; `room` for how many records, at most one for each row that it reads.
-        quick: see `call`.
-        once: whether its records are read only once.
-        reads: what recorded its stream, if it reads one.
-    """
-
-    compiled: CompiledProgram
-    room: int
-    quick: bool
-    once: bool = False
-    reads: Optional["Recorder"] = None
-
-    def outputs(self, numbers: np.ndarray) -> np.ndarray:
-        """Outputs of simulations with these numbers (n, k); their records are then known."""
-        return _RECORDS.ran(self, numbers.T, self._run_for(len(numbers)))
-
-    def rows(self, numbers: np.ndarray) -> list[np.ndarray]:
-        """Their records, as `RecordCache.rows`."""
-        run = self._run_for(len(numbers))
-        return _RECORDS.rows(self, numbers.T, run, once=self.once)
-
-    def columns(self, numbers: np.ndarray, first: np.ndarray) -> list[np.ndarray]:
-        """Each number in their records, as `RecordCache.columns`."""
-        run = self._run_for(len(numbers))
-        return _RECORDS.columns(self, numbers.T, first, self.room, run)
-
-    def _run_for(self, count: int) -> Callable[[np.ndarray], Tables]:
-        """Runs those of `count` simulations that nobody ran yet."""
-        # Also where these are few: another width would have to be compiled.
-        width = self.compiled.width(count, default_threads())
-
-        def run(table: np.ndarray) -> Tables:
-            own, others = np.split(table, [self.compiled.size])
-            rows, room = None, self.room
-            if self.reads is not None:
-                rows = self.reads.rows(others.T)
-                room = min(room, max(len(each) for each in rows))
-            alone = self.quick and table.shape[1] == 1
-            found, recorded = self.compiled.run_table(
-                own, stream=rows, room=room, memory=_BUFFERS.array, quick=alone, width=width
-            )
-            assert recorded is not None
-            return found, *recorded
-
-        return run

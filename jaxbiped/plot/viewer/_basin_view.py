@@ -1,6 +1,5 @@
 """Views of basins: a picture of labels, in which a start that is picked shows its walk."""
 
-import base64
 import dataclasses
 import warnings
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,7 @@ from jaxbiped._checks import ArgumentError, check_count, check_type
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import label_names
 from jaxbiped.plot.style import in_order, label_colour, view_colours
-from jaxbiped.plot.viewer._page import AbstractPage, frame_of, page_of
+from jaxbiped.plot.viewer._page import AbstractPage, base64_of, frame_of, page_of
 from jaxbiped.plot.viewer._recording import Recording, record_walk
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene
@@ -102,7 +101,7 @@ def view_basin(
         "yLabel": _axis_words(quantities[y]),
         "names": names,
         "colours": [label_colour(name) for name in names],
-        "cells": _base64_of(np.vectorize(names.index)(words)),
+        "cells": base64_of(np.vectorize(names.index)(words), "<u1"),
         "columns": columns.tolist(),
         "rows": rows.tolist(),
         "first": _first_shown(words[np.ix_(rows, columns)]),
@@ -151,7 +150,3 @@ def _first_shown(words: np.ndarray) -> list[int]:
 
 def _axis_words(quantity: Any) -> str:
     return f"{quantity.words} ({quantity.unit})" if quantity.unit else quantity.words
-
-
-def _base64_of(cells: np.ndarray) -> str:
-    return base64.b64encode(cells.astype(np.uint8).tobytes()).decode("ascii")

@@ -33,18 +33,11 @@ class Tolerances(NamedTuple):
 def adaptive_knots(
     evaluate: Callable[[np.ndarray], Channels], first: np.ndarray, tolerances: Tolerances
 ) -> tuple[np.ndarray, Channels]:
-    """Times [s], shape (n,), and the channels at them.
+    """Increasing times [s], shape (n,), and the channels at them.
 
-    Intervals are quartered until interpolation has the channels right at the quarters; then knots
-    are left out that their neighbours make up for.
-
-    Args:
-        evaluate: the channels at increasing times [s].
-        first: times to begin with, increasing: close enough to see everything that happens.
-        tolerances: the errors allowed.
-
-    Returns:
-        Increasing times and channels, arrays of shape (n,).
+    Intervals of the `first` times, which must see everything that happens, are quartered until
+    interpolation has the channels right at the quarters; then knots are left out that their
+    neighbours make up for.
     """
     t, values = first, evaluate(first)
     fresh = np.diff(t) > tolerances.shortest

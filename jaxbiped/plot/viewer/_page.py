@@ -1,11 +1,15 @@
 """Page and scripts of the viewer: one file of HTML that needs no network."""
 
 import abc
+import base64
 import html
 import json
 import re
 from importlib.resources import files
 from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
 
 from jaxbiped._files import check_writable_file
 from jaxbiped._types import JsonObject
@@ -70,15 +74,9 @@ class AbstractPage(abc.ABC):
 
 
 def page_of(sent: JsonObject, title: str, *, computes: bool = False) -> str:
-    """A page of HTML that holds everything: what it shows, its script and its look.
+    """A page of HTML that holds everything: what `showWalks` is sent, its script and its look.
 
-    Args:
-        sent: what `showWalks` takes, ready for JSON.
-        title: of the page.
-        computes: whether it runs WebAssembly.
-
-    Returns:
-        The page's text.
+    A page that `computes` may run WebAssembly.
     """
     return _PAGE.format(
         policy=_POLICY.format(more=" 'wasm-unsafe-eval'" if computes else ""),
@@ -96,6 +94,11 @@ def frame_of(page: str, title: str, height: int) -> str:
         f'<iframe srcdoc="{html.escape(page)}" sandbox="allow-scripts" '
         f'title="{html.escape(title)}" style="width: 100%; height: {height}px; border: 0"></iframe>'
     )
+
+
+def base64_of(values: npt.ArrayLike, kind: str) -> str:
+    """Numbers as they are sent, of a kind such as "<f8"."""
+    return base64.b64encode(np.asarray(values, dtype=kind).tobytes()).decode("ascii")
 
 
 def widget_script() -> str:

@@ -14,7 +14,7 @@ from jaxbiped._checks import check_count, check_type
 from jaxbiped._ending import Ending
 from jaxbiped._types import JsonObject, Scalar
 from jaxbiped.compiler import LANES, Program, Request, web_module
-from jaxbiped.dynamics._contact_forces import contacts
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._energy import Energies, energies
 from jaxbiped.dynamics._state import State
 from jaxbiped.plot.style import view_colours

@@ -1,6 +1,5 @@
 """Recordings: walks as the viewer plays them, a few thousand numbers each."""
 
-import base64
 import dataclasses
 import math
 from typing import Any, NamedTuple
@@ -9,14 +8,15 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._contact_forces import Contacts, contacts
+from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._energy import energies
-from jaxbiped.dynamics._redundant_state import CompliantState, minimal_state
+from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state import State
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._samples import at_steps, evaluate_along
 from jaxbiped.plot._samples import end_time, state_at
 from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots
+from jaxbiped.plot.viewer._page import base64_of
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -75,8 +75,8 @@ class Recording:
         """What is sent, ready for JSON: times in 64 bits, channels in 32, by base64."""
         plain = ("name", "ending", "slope", "l", "r", "weight", "driven")
         return {name: getattr(self, name) for name in plain} | {
-            "t": _base64_of(self.t, "<f8"),
-            "channels": {name: _base64_of(each, "<f4") for name, each in self.channels.items()},
+            "t": base64_of(self.t, "<f8"),
+            "channels": {name: base64_of(each, "<f4") for name, each in self.channels.items()},
             "footprints": [each._asdict() for each in self.footprints],
         }
 
@@ -129,10 +129,6 @@ def tolerances_for(scene: Any, exact: float) -> Tolerances:
     )
 
 
-def _base64_of(values: np.ndarray, kind: str) -> str:
-    return base64.b64encode(np.asarray(values, dtype=kind).tobytes()).decode("ascii")
-
-
 _EXACT, _LOOKS_RIGHT = 1e-5, 1e-4
 """Errors allowed of angles [rad], and of lengths in parts of the legs'."""
 _EVEN, _MOST = 0.05, 20_000
@@ -144,20 +140,10 @@ _STEPS = 5e-3
 def record_walk(
     scene: Any, trajectory: Trajectory, name: str, *, motion_only: bool = False
 ) -> Recording:
-    """A recording of a compliant walk.
+    """A recording of a walk of a `Scene` or a `RedundantScene`, as long as its trajectory.
 
-    Args:
-        scene: what was simulated, a `Scene` or a `RedundantScene`.
-        trajectory: the motion, saved step by step.
-        name: what it is called.
-        motion_only: whether to leave out forces and energies, and to be content with a motion that
-            looks right.
-
-    Returns:
-        The recording, as long as the trajectory.
-
-    Raises:
-        ValueError: the trajectory was not saved step by step, or this is a batch.
+    With `motion_only` it has no forces or energies, and its motion need only look right. Raises
+    `ValueError` for a trajectory that was not saved step by step, or a batch.
     """
     if end_time(trajectory) <= 0.0:
         raise ArgumentError("trajectory ends where it begins: there is no motion to look at.")
@@ -166,7 +152,8 @@ def record_walk(
 
     def evaluate(t: np.ndarray) -> Channels:
         states = state_at(trajectory, t)
-        motion = _motion(scene, states)
+        hip = minimal_state(scene, states)
+        motion = {field: np.asarray(getattr(hip, field)) for field in State._fields}
         if motion_only:
             return motion
         now = evaluate_along(scene, states, energies)
@@ -195,11 +182,6 @@ def _first_times(scene: Scene, trajectory: Trajectory) -> np.ndarray:
     times = times[(times >= 0.0) & (times <= last)]
     apart = np.diff(times) > 1e-6 * unit
     return times[np.concatenate([[True], apart[:-1] | (times[1:-1] == last), [True]])]
-
-
-def _motion(scene: Scene, states: CompliantState) -> Channels:
-    hip = minimal_state(scene, states)
-    return {field: np.asarray(getattr(hip, field)) for field in State._fields}
 
 
 def _forces(found: Contacts) -> Channels:

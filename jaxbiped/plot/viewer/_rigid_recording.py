@@ -31,19 +31,9 @@ def record_rigid_walk(
 ) -> Recording:
     """A recording of a rigid walk, from its start, or else from its first heel strike.
 
-    Args:
-        scene: what walked.
-        walk: with its heel strikes, by `max_arrivals`; what comes after the last that it kept is
-            left out where there were more.
-        start: of the walk, leg 2 standing.
-        name: what it is called.
-
-    Returns:
-        The recording. At a heel strike both legs' rates jump; before it, leg 2 stands, as at the
-        start.
-
-    Raises:
-        ArgumentError: arguments of the wrong type, or neither heel strikes nor a start.
+    What comes after the last heel strike that the walk kept (`max_arrivals`) is left out where
+    there were more. At a heel strike both legs' rates jump; before it, leg 2 stands, as at the
+    start. Raises `ArgumentError` for neither heel strikes nor a start.
     """
     check_type("trajectory.state", walk.state, RigidState)
     began, starts, end = _footsteps(walk, start)

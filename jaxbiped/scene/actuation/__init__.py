@@ -1,9 +1,10 @@
 """Actuation: what drives a walker beside gravity.
 
-A line below is a part's registration: `ACTUATORS` and the command line have it by its `name`, in
-the order of the lines.
+A part enters `ACTUATORS` by its `name` as it is defined. The command line has those of the lines
+below.
 """
 
+from jaxbiped.scene.actuation._abstract_actuator import ACTUATORS as ACTUATORS
 from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator as AbstractActuator
 from jaxbiped.scene.actuation._abstract_actuator import AbstractHipActuator as AbstractHipActuator
 from jaxbiped.scene.actuation._abstract_actuator import AbstractPhaseTorque as AbstractPhaseTorque
@@ -18,6 +19,3 @@ from jaxbiped.scene.actuation._actuators import HipSpline as HipSpline
 # At the feet: rigid ones, compliant ones.
 from jaxbiped.scene.actuation._actuators import PushOff as PushOff
 from jaxbiped.scene.actuation._actuators import FootPreload as FootPreload
-
-# What is made of them: behind the parts, which the catalogue looks up here.
-from jaxbiped.scene.actuation._catalogue import ACTUATORS as ACTUATORS

@@ -8,18 +8,20 @@ import abc
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple, Self, TypeAlias, cast
 
-import equinox as eqx
 import jax.numpy as jnp
 from equinox import AbstractVar
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type
-from jaxbiped._parameter_declaration import check_parameters
+from jaxbiped._parameter_declaration import AbstractNamedPart
 from jaxbiped._types import Scalar
 
 LegTorques: TypeAlias = tuple[Scalar, Scalar]
 """Torques on leg 1 and leg 2 that increase their angles [N·m]."""
 
 REACTIONS = ("swing", "trunk")
+
+ACTUATORS: dict[str, type["AbstractActuator"]] = {}
+"""Each actuator by name."""
 
 
 class HipMotion(NamedTuple):
@@ -37,20 +39,15 @@ class HipMotion(NamedTuple):
     load: tuple[Scalar | None, Scalar | None]
 
 
-class AbstractActuator(eqx.Module):
-    """Something that drives the walker, or stores energy for it.
+class AbstractActuator(AbstractNamedPart):
+    """Something that drives the walker, or stores energy for it; in `ACTUATORS` by its `name`.
 
     Attributes:
-        name: what `ACTUATORS` and the command line call it; None for one that is not among them. A
-            property of the class.
         feet: the feet that it needs, "rigid" or "compliant", None for any. A property of the class.
     """
 
-    name: ClassVar[str | None] = None
+    catalogue: ClassVar[dict[str, Any]] = ACTUATORS
     feet: ClassVar[str | None] = None
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
 
     @abc.abstractmethod
     def idle(self) -> Self:

@@ -1,8 +1,8 @@
 """Laws of contact and rules of clearance: normal forces, friction, bristles.
 
-`parameter` declares what laws have for parameters, a `Quantity` is what is known of one. A law's
-line below is its registration: `NORMAL_LAWS`, `FRICTION_LAWS` and the command line have it by its
-`name`, in the order of the lines.
+`parameter` declares what laws have for parameters, a `Quantity` is what is known of one. A law
+enters `NORMAL_LAWS` or `FRICTION_LAWS` by its `name` as it is defined. The command line has those
+of the lines below, in the order of the lines.
 """
 
 from jaxbiped._parameter_declaration import parameter as parameter
@@ -38,9 +38,9 @@ from jaxbiped.scene.laws.friction._stribeck import BrownMcPhee as BrownMcPhee
 from jaxbiped.scene.laws.friction._bristles import Dahl as Dahl
 from jaxbiped.scene.laws.friction._bristles import LuGre as LuGre
 
-# What is made of them: behind the laws, which the catalogue looks up here.
-from jaxbiped.scene.laws._catalogue import FRICTION_LAWS as FRICTION_LAWS
-from jaxbiped.scene.laws._catalogue import NORMAL_LAWS as NORMAL_LAWS
+# What is made of them: behind the laws, whose order the catalogue looks up here.
+from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS as FRICTION_LAWS
+from jaxbiped.scene.laws._abstract_laws import NORMAL_LAWS as NORMAL_LAWS
 from jaxbiped.scene.laws._catalogue import friction_law_like as friction_law_like
 from jaxbiped.scene.laws._catalogue import normal_law_like as normal_law_like
 from jaxbiped.scene.laws.normal._hertz import hertz_stiffness as hertz_stiffness

@@ -1,31 +1,33 @@
 """Interfaces of the laws of contact: normal force, friction, and friction by bristles."""
 
 import abc
-from typing import ClassVar
+from typing import Any, ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._parameter_declaration import check_parameters
+from jaxbiped._parameter_declaration import AbstractNamedPart
 from jaxbiped._types import Scalar
 
+NORMAL_LAWS: dict[str, type["AbstractNormalLaw"]] = {}
+"""Each law of the normal force by name."""
 
-class AbstractNormalLaw(eqx.Module):
+FRICTION_LAWS: dict[str, type["AbstractFrictionLaw | AbstractBristleLaw"]] = {}
+"""Each law of the tangential force by name. Those with bristles have states of their own."""
+
+
+class AbstractNormalLaw(AbstractNamedPart):
     """Normal force of the ground on a foot as a function of penetration and its rate.
 
+    A law with a `name` is in `NORMAL_LAWS`, and has a classmethod `like_seed(seed, standing)`,
+    which makes the law that resembles the seed's `RistowSchafer`.
+
     Attributes:
-        name: what `NORMAL_LAWS` and the command line call it; None for a law that is not among
-            them. One that is has a classmethod `like_seed(seed, standing)`, which makes the law
-            that resembles the seed's `RistowSchafer`. A property of the class.
         jumps_at_touchdown: whether the force itself, not its derivatives alone, jumps where a
             foot that comes down begins to touch. A property of the class.
     """
 
-    name: ClassVar[str | None] = None
+    catalogue: ClassVar[dict[str, Any]] = NORMAL_LAWS
     jumps_at_touchdown: ClassVar[bool] = False
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
 
     @abc.abstractmethod
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
@@ -51,23 +53,20 @@ class AbstractNormalLaw(eqx.Module):
         """Energy stored in the contact [J]: the integral of `elastic_force`."""
 
 
-class AbstractFrictionLaw(eqx.Module):
+class AbstractFrictionLaw(AbstractNamedPart):
     """Tangential force of the ground on a foot as a function of normal force and slip speed.
 
+    A law with a `name` is in `FRICTION_LAWS`, and has a classmethod `like_seed(seed)`, which makes
+    the law that resembles the seed's `BengisuAkay`.
+
     Attributes:
-        name: what `FRICTION_LAWS` and the command line call it; None for a law that is not among
-            them. One that is has a classmethod `like_seed(seed)`, which makes the law that
-            resembles the seed's `BengisuAkay`. A property of the class.
         builds_up_over: name of the parameter that is the slip speed [m/s] over which the force
             builds up from rest, which steps must resolve; None for a law without one. A property
             of the class.
     """
 
-    name: ClassVar[str | None] = None
+    catalogue: ClassVar[dict[str, Any]] = FRICTION_LAWS
     builds_up_over: ClassVar[str | None] = None
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
 
     @abc.abstractmethod
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
@@ -110,7 +109,7 @@ def smooth_ramp(x: Scalar, width: Scalar) -> Scalar:
     return x * (t * t * t * (10.0 + t * (6.0 * t - 15.0)))
 
 
-class AbstractBristleLaw(eqx.Module):
+class AbstractBristleLaw(AbstractNamedPart):
     """Friction by bristles whose deflection is a state of its own, one number for each foot.
 
     The number is what the bristles' stiffness makes of their deflection, as a share of the normal
@@ -119,16 +118,11 @@ class AbstractBristleLaw(eqx.Module):
 
         ḃ = w (rate of the law) − (1 − w) relaxation b
 
-    so that a foot lands with straight bristles and nothing jumps as it does.
-
-    Attributes:
-        name: as an `AbstractFrictionLaw` has it, with `like_seed`. A property of the class.
+    so that a foot lands with straight bristles and nothing jumps as it does. With a `name` it is in
+    `FRICTION_LAWS` and has `like_seed`, as an `AbstractFrictionLaw`.
     """
 
-    name: ClassVar[str | None] = None
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
+    catalogue: ClassVar[dict[str, Any]] = FRICTION_LAWS
 
     @abc.abstractmethod
     def engagement(self) -> tuple[Scalar, Scalar]:

@@ -1,56 +1,26 @@
 """Catalogue of the laws of contact by name, each made to resemble the seed's."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Any, ClassVar, Protocol, cast
+from typing import Any, cast
 
 from jaxbiped._checks import check_choice, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._types import Parameter, as_float
 from jaxbiped.scene import laws
 from jaxbiped.scene.laws._abstract_laws import (
+    FRICTION_LAWS,
+    NORMAL_LAWS,
     AbstractBristleLaw,
     AbstractFrictionLaw,
     AbstractNormalLaw,
 )
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
-from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
-from jaxbiped.scene.laws.normal._weight_on_law import Standing
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
 
-
-class NamedNormalLaw(Protocol):
-    """The class of a normal law in the catalogue."""
-
-    name: ClassVar[str]
-
-    @classmethod
-    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> AbstractNormalLaw:
-        """The law that resembles the seed's, on which that mass stands as told."""
-
-
-class NamedFrictionLaw(Protocol):
-    """The class of a friction law in the catalogue."""
-
-    name: ClassVar[str]
-
-    @classmethod
-    def like_seed(cls, seed: BengisuAkay) -> AbstractFrictionLaw | AbstractBristleLaw:
-        """The law that resembles the seed's."""
-
-
-def _by_name(*kinds: type) -> Mapping[str, type]:
-    """The laws of a kind that `jaxbiped.laws` exports under a name, in the order of its lines."""
-    classes: list[Any] = [each for each in vars(laws).values() if isinstance(each, type)]
-    found = [law for law in classes if issubclass(law, kinds)]
-    return MappingProxyType({law.name: law for law in found if law.name is not None})
-
-
-NORMAL_LAWS: Mapping[str, type[AbstractNormalLaw]] = _by_name(AbstractNormalLaw)
-"""Each law of the normal force by name."""
-
-FRICTION_LAWS: Mapping[str, type[AbstractFrictionLaw | AbstractBristleLaw]] = _by_name(
-    AbstractFrictionLaw, AbstractBristleLaw
-)
-"""Each law of the tangential force by name. Those with bristles have states of their own."""
+_CATALOGUES: tuple[dict[str, Any], ...] = (NORMAL_LAWS, FRICTION_LAWS)
+for _law in list(vars(laws).values()):
+    # In the order of the lines that export them, not of the modules that define them.
+    for _known in _CATALOGUES:
+        if _law in _known.values():
+            _known[_law.name] = _known.pop(_law.name)
 
 
 def normal_law_like(
@@ -86,15 +56,12 @@ def normal_law_like(
         ArgumentError: an unknown name, or a value that is not allowed.
     """
     check_choice("name", name, NORMAL_LAWS)
-    seed = RistowSchafer(K=K, c=c, n=n)
-    law = cast("type[NamedNormalLaw]", NORMAL_LAWS[name])
-    return law.like_seed(seed, _standing_of(seed, as_float(mass), as_float(g)))
-
-
-def _standing_of(law: RistowSchafer, mass: Scalar, g: Scalar) -> Standing:
-    check_positive("mass", mass, "kg")
-    check_positive("g", g, "m/s^2")
-    return Standing(law, mass, g)
+    seed, law = RistowSchafer(K=K, c=c, n=n), cast("Any", NORMAL_LAWS[name])
+    standing = Standing(seed, as_float(mass), as_float(g))
+    check_positive("mass", standing.mass, "kg")
+    check_positive("g", standing.g, "m/s^2")
+    made: AbstractNormalLaw = law.like_seed(seed, standing)
+    return made
 
 
 def friction_law_like(
@@ -134,5 +101,7 @@ def friction_law_like(
         (0.4, 5e-05)
     """
     check_choice("name", name, FRICTION_LAWS)
-    law = cast("type[NamedFrictionLaw]", FRICTION_LAWS[name])
-    return law.like_seed(BengisuAkay(mu_static, mu_kinetic, v0, xi))
+    law = cast("Any", FRICTION_LAWS[name])
+    made: AbstractFrictionLaw | AbstractBristleLaw
+    made = law.like_seed(BengisuAkay(mu_static, mu_kinetic, v0, xi))
+    return made

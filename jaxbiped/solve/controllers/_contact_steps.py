@@ -19,15 +19,15 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._contacts import Foot, feet
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import (
+    AbstractMemorylessControl,
     AbstractWrappedControl,
     Adapted,
     Attempt,
-    StepControl,
     try_again,
 )
 
@@ -50,20 +50,11 @@ _LARGEST = 0.95
 """The next attempt, at most, as a share of the rejected one."""
 
 
-class ShallowContact(AbstractWrappedControl):
+class ShallowContact(AbstractMemorylessControl):
     """Wraps a controller; a step within which a foot dips into the ground is tried again, to there.
 
     The solve's `args` must be the scene.
-
-    Attributes:
-        controller: decides every step's size.
     """
-
-    controller: StepControl
-
-    def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
-        return self.controller.init(*request)
 
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, but for shallow contacts."""
@@ -126,20 +117,11 @@ def _part_above(
     return jnp.where(contact, fusion_barrier(contact, touchdown), lowest)
 
 
-class TouchdownAhead(AbstractWrappedControl):
+class TouchdownAhead(AbstractMemorylessControl):
     """Wraps a controller; what is tried after a rejected step may be longer than that says.
 
     The solve's `args` must be the scene.
-
-    Attributes:
-        controller: decides every step's size.
     """
-
-    controller: StepControl
-
-    def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
-        return self.controller.init(*request)
 
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does; the next one's size differs."""
@@ -172,15 +154,9 @@ class MissedContacts(AbstractWrappedControl):
     """Wraps a controller; its state carries how many contacts lie between two steps.
 
     The solve's `args` must be the scene.
-
-    Attributes:
-        controller: decides every step's size.
     """
 
-    controller: StepControl
-
     def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(*request)
         return first, (inner, jnp.zeros((), dtype=jnp.int32))
 

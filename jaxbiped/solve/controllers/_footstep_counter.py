@@ -6,12 +6,11 @@ import diffrax
 import jax.numpy as jnp
 
 from jaxbiped._types import RealScalarLike, Scalar
-from jaxbiped.dynamics._feet import feet, landings, standing_foot
+from jaxbiped.dynamics._contacts import feet, landings, standing_foot
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractWrappedControl,
     Adapted,
     Attempt,
-    StepControl,
 )
 
 PATIENCE = 100.0
@@ -25,15 +24,12 @@ class FootstepLimit(AbstractWrappedControl):
     how many strikes there were. The solve's `args` must be the scene.
 
     Attributes:
-        controller: decides every step's size.
         limit: number of heel strikes after which the solve ends.
     """
 
-    controller: StepControl
     limit: RealScalarLike
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(*request)
         _, _, _, y0, _, args, *_ = request
         last = standing_foot(feet(args, y0))

@@ -1,7 +1,5 @@
 """Located ending: a step-size controller that ends a solve at the event, not a step past it."""
 
-from typing import Any
-
 import diffrax
 import equinox as eqx
 import jax
@@ -13,10 +11,9 @@ from jaxbiped._types import Scalar
 from jaxbiped.solve._failure_events import ending_events, ending_surface
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.controllers._wrapped_control import (
-    AbstractWrappedControl,
+    AbstractMemorylessControl,
     Adapted,
     Attempt,
-    StepControl,
     try_again,
 )
 
@@ -26,26 +23,21 @@ _MARGIN = 1e-12
 """Time that it may do besides [s]: on which side it ends must be beyond doubt."""
 
 
-class LocatedEnding(AbstractWrappedControl):
+class LocatedEnding(AbstractMemorylessControl):
     """Wraps a controller; a step within which the solve ends is tried again, to just past that.
 
     Where to, comes from the secant of the ending's surface, which a few attempts narrow. A step
-    whose ends do not lie on both sides of it stays as it is. The solve's `args` must be the scene.
+    whose ends do not lie on both sides of it stays as it is. After the last footstep the wrapped
+    controller ends the solve. The solve's `args` must be the scene.
 
     Attributes:
-        controller: decides every step's size, and ends the solve after the last footstep.
         watch: failures that end it.
         probe: a state near the step's end at which failures are looked for first, where that costs
             less. None: there is none.
     """
 
-    controller: StepControl
     watch: tuple[str, ...] = eqx.field(static=True)
     probe: PyTree = None
-
-    def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
-        return self.controller.init(*request)
 
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, but for the last one."""

@@ -1,7 +1,7 @@
 """Step size of solves that carry derivatives with the state: how diffrax chooses it."""
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import cast
 
 import diffrax
 import jax.tree_util as jtu
@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._wrapped_control import (
-    AbstractWrappedControl,
+    AbstractMemorylessControl,
     Adapted,
     Attempt,
     StepControl,
@@ -50,23 +50,16 @@ def step_control(
     return found if units is None else InUnits(found, units.inverse)
 
 
-class InUnits(AbstractWrappedControl):
+class InUnits(AbstractMemorylessControl):
     """Wraps a controller; shows it states and errors in units of their own.
 
     Attributes:
-        controller: decides every step's size.
         inverse: one over the unit of each leaf of the state.
     """
 
-    controller: StepControl
     inverse: PyTree
 
-    def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
-        return self.controller.init(*request)
-
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does."""
         before, after, error = (
             jtu.tree_map(lambda leaf, inverse: leaf * inverse, y, self.inverse)
             for y in (attempt.y0, attempt.y1, attempt.error)

@@ -19,8 +19,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, RealScalarLike, Scalar
-from jaxbiped.dynamics._contact_forces import foot_force
-from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._contacts import Foot, feet, foot_force
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 from jaxbiped.solve._accuracy import rms_norm
@@ -29,7 +28,7 @@ from jaxbiped.solve.controllers._contact_steps import ShallowContact, TouchdownA
 from jaxbiped.solve.controllers._tangent_step_size import SAFETY, SMALLEST_STEP
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractControl,
-    AbstractWrappedControl,
+    AbstractMemorylessControl,
     Adapted,
     Attempt,
     StepControl,
@@ -83,12 +82,7 @@ class ErrorControl(AbstractControl):
         """Of errors in units of the tolerance."""
         return rms_norm
 
-    def wrap(self, direction: RealScalarLike) -> "ErrorControl":
-        """As diffrax asks; walks are never solved backwards."""
-        return self
-
     def init(self, *request: Any) -> tuple[Scalar, Scalar]:
-        """The first step's end and the controller's state, as diffrax asks."""
         _, t0, _, _, dt0, *_ = request
         return jnp.asarray(t0 + dt0), jnp.asarray(False)
 
@@ -165,25 +159,18 @@ def _root(square: Scalar, order: RealScalarLike | None) -> Scalar:
     return square ** (0.5 / order)
 
 
-class CrossedSwitches(AbstractWrappedControl):
+class CrossedSwitches(AbstractMemorylessControl):
     """Wraps a controller; errors of steps that cross a switch of the contact count `weight` times.
 
     The solve's `args` must be the scene.
 
     Attributes:
-        controller: decides every step's size.
         weight: of those errors [–].
     """
 
-    controller: StepControl
     weight: float
 
-    def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
-        return self.controller.init(*request)
-
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does."""
         weighed = weigh_crossed(attempt.args, self.weight, attempt.y0, attempt.y1, attempt.error)
         return attempt.by(self.controller, error=weighed)
 

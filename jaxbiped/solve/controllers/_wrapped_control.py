@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, Time
+from jaxbiped._types import RealScalarLike, Scalar, Time, select
 from jaxbiped.solve._accuracy import rms_norm
 
 if TYPE_CHECKING:  # which takes the adaptive one's abstract attributes for arguments
@@ -87,6 +87,10 @@ class AbstractControl(_Control):  # type: ignore[type-arg]
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step."""
 
+    def wrap(self, direction: RealScalarLike) -> Self:
+        """As diffrax asks; direction makes no difference, for walks are never solved backwards."""
+        return self
+
     def adapt_step_size(self, *step: Any) -> Adapted:
         """Accepts or rejects a step, as diffrax asks."""
         return self.adapt(Attempt(*step))
@@ -100,7 +104,7 @@ def try_again(attempt: Attempt, adapted: Adapted, again: Scalar, target: Scalar)
     """
     sooner = jnp.where(adapted.keep, target, jnp.minimum(adapted.t1, target))
     return adapted._replace(
-        memory=jtu.tree_map(lambda a, b: jnp.where(again, a, b), attempt.memory, adapted.memory),
+        memory=select(again, attempt.memory, adapted.memory),
         keep=adapted.keep & ~again,
         t0=jnp.where(again, attempt.t0, adapted.t0),
         t1=jnp.where(again, sooner, adapted.t1),
@@ -114,7 +118,7 @@ class AbstractWrappedControl(AbstractControl):
         controller: decides every step's size.
     """
 
-    controller: eqx.AbstractVar[StepControl]
+    controller: StepControl
 
     @property
     def rtol(self) -> RealScalarLike:
@@ -132,9 +136,12 @@ class AbstractWrappedControl(AbstractControl):
         norm: Callable[[PyTree], RealScalarLike] = getattr(self.controller, "norm", rms_norm)
         return norm
 
-    def wrap(self, direction: RealScalarLike) -> Self:
-        """As diffrax asks; direction makes no difference to what is wrapped here."""
-        return self
+
+class AbstractMemorylessControl(AbstractWrappedControl):
+    """Wraps a controller, whose state is all that is carried from step to step."""
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        return self.controller.init(*request)
 
 
 class Extremes(AbstractWrappedControl):
@@ -143,15 +150,12 @@ class Extremes(AbstractWrappedControl):
     Exact for every solver, and without room for the steps themselves. The start counts as an end.
 
     Attributes:
-        controller: decides every step's size.
         function: of (args, state).
     """
 
-    controller: StepControl
     function: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(*request)
         _, _, _, y0, _, args, *_ = request
         value = self.function(args, y0)
@@ -185,19 +189,15 @@ class GivenFirstStep(AbstractWrappedControl):
     cannot be kept on disk. Sizes are checked before a solve begins.
 
     Attributes:
-        controller: decides every step's size but the first's.
         size: of the first step, or of all where the controller keeps it [s].
     """
 
-    controller: StepControl
     size: RealScalarLike
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
         terms, t0, t1, y0, _, *rest = request
         size = jnp.asarray(self.size, dtype=jnp.result_type(t0))
         return self.controller.init(terms, t0, t1, y0, size, *rest)
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does."""
         return attempt.by(self.controller)

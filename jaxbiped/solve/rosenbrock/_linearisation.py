@@ -79,15 +79,18 @@ Components: TypeAlias = list[Scalar]
 
 
 class AbstractLinearisation(eqx.Module):
-    """A vector field that can be linearised about one point, its state split into components."""
+    """A vector field about one point, its state split into components.
 
-    @abc.abstractmethod
-    def evaluate(self, t: Scalar, y: Components) -> Components:
-        """The vector field at any point."""
+    Attributes:
+        run: the field, of the time and the components.
+        structure: of that program.
+        t, y: the point.
+    """
 
-    @abc.abstractmethod
-    def time_derivative(self) -> list[Entry]:
-        """∂f/∂t at the point of linearisation; None for a component that has none."""
+    run: Callable[..., Components]
+    structure: Structure
+    t: Scalar
+    y: tuple[Scalar, ...]
 
     @abc.abstractmethod
     def jacobian(self) -> PyTree:
@@ -111,13 +114,44 @@ class AbstractLinearisation(eqx.Module):
         `right` holds r of the kept components, `direct_right` of the direct ones.
         """
 
-    @abc.abstractmethod
+    def evaluate(self, t: Scalar, y: Components) -> Components:
+        """The vector field at any point."""
+        return self.run(t, *y)
+
+    def time_derivative(self) -> list[Entry]:
+        """∂f/∂t at the point of linearisation; None for a component that has none."""
+        return self._column(0)
+
     def direct(self) -> dict[int, int]:
         """Components whose rate *is* another, kept component, each with that one."""
+        direct: dict[int, int] = {}
+        for i, copied in enumerate(self.structure.copies):
+            source = None if copied is None else copied - 1
+            if source is None or source < 0 or source == i:
+                continue
+            if source not in direct and i not in direct.values():
+                direct[i] = source
+        return direct
 
-    @abc.abstractmethod
     def kept(self) -> list[int]:
         """The other components, which remain when the direct ones are eliminated."""
+        direct = self.direct()
+        return [i for i in range(len(self.y)) if i not in direct]
+
+    def _column(self, position: int) -> list[Entry]:
+        """Derivatives of all rates with respect to one input (0: time, 1 on: components)."""
+        inputs = [self.t, *self.y]
+        if not any(position in used for used in self.structure.depends):
+            return [None] * len(self.y)
+
+        def along(value: Scalar) -> list[Scalar]:
+            return self.run(*inputs[:position], value, *inputs[position + 1 :])
+
+        _, tangents = jax.jvp(along, (inputs[position],), (jnp.ones_like(inputs[position]),))
+        return [
+            tangent if position in used else None
+            for tangent, used in zip(tangents, self.structure.depends, strict=True)
+        ]
 
 
 def split(
@@ -151,32 +185,21 @@ def linearise(
     field: Callable[[Scalar, Components], Components], t: Scalar, y: Components
 ) -> AbstractLinearisation:
     """Linearises a vector field of components (as `split` makes them) about (t, y)."""
-    if len(y) == 1 and jnp.ndim(y[0]) == 1:
-        return _DenseLinearisation(lambda t, y: field(t, [y])[0], t, y[0])
     program = jax.make_jaxpr(lambda t, *y: field(t, list(y)))(t, *y)
     run = jax.extend.core.jaxpr_as_fun(program)
-    return _ScalarLinearisation(run, structure_of(program), t, tuple(y))
+    dense = len(y) == 1 and jnp.ndim(y[0]) == 1
+    kind = _DenseLinearisation if dense else _ScalarLinearisation
+    return kind(run, structure_of(program), t, tuple(y))
 
 
 class _DenseLinearisation(AbstractLinearisation):
     """One vector, one dense matrix."""
 
-    field: Callable[[Scalar, Scalar], Scalar]
-    t: Scalar
-    y: Scalar
-
-    def evaluate(self, t: Scalar, y: Components) -> Components:
-        return [self.field(t, y[0])]
-
-    def time_derivative(self) -> list[Entry]:
-        one = jnp.ones_like(self.t)
-        return [jax.jvp(lambda t: self.field(t, self.y), (self.t,), (one,))[1]]
-
     def jacobian(self) -> PyTree:
-        return jax.jacfwd(lambda y: self.field(self.t, y))(self.y)
+        return jax.jacfwd(lambda y: self.run(self.t, y)[0])(self.y[0])
 
     def factorise(self, jacobian: PyTree, step: Scalar) -> PyTree:
-        identity = jnp.eye(self.y.size, dtype=self.y.dtype)
+        identity = jnp.eye(self.y[0].size, dtype=self.y[0].dtype)
         return jax.scipy.linalg.lu_factor(identity - step * jacobian)
 
     def solve_kept(
@@ -189,12 +212,6 @@ class _DenseLinearisation(AbstractLinearisation):
     ) -> Components:
         return [jax.scipy.linalg.lu_solve(factors, right[0])]
 
-    def direct(self) -> dict[int, int]:
-        return {}
-
-    def kept(self) -> list[int]:
-        return [0]
-
 
 class _ScalarLinearisation(AbstractLinearisation):
     """Scalars one by one, with what is zero by structure left out.
@@ -203,17 +220,6 @@ class _ScalarLinearisation(AbstractLinearisation):
     eliminated by hand: its row of (I − g J) u = r reads u_i = r_i + g u_j. A second-order system
     of n coordinates so costs an n × n elimination, not 2n × 2n.
     """
-
-    run: Callable[..., list[Scalar]]
-    structure: Structure
-    t: Scalar
-    y: tuple[Scalar, ...]
-
-    def evaluate(self, t: Scalar, y: Components) -> Components:
-        return self.run(t, *y)
-
-    def time_derivative(self) -> list[Entry]:
-        return self._column(0)
 
     def jacobian(self) -> Matrix:
         columns = [self._column(1 + j) for j in range(len(self.y))]
@@ -236,35 +242,6 @@ class _ScalarLinearisation(AbstractLinearisation):
             terms = [entry * value for entry, value in entries if entry is not None]
             reduced.append(own + step * sum(terms[1:], terms[0]) if terms else own)
         return matmul(factors, reduced)
-
-    def direct(self) -> dict[int, int]:
-        direct: dict[int, int] = {}
-        for i, copied in enumerate(self.structure.copies):
-            source = None if copied is None else copied - 1
-            if source is None or source < 0 or source == i:
-                continue
-            if source not in direct and i not in direct.values():
-                direct[i] = source
-        return direct
-
-    def kept(self) -> list[int]:
-        direct = self.direct()
-        return [i for i in range(len(self.y)) if i not in direct]
-
-    def _column(self, position: int) -> list[Entry]:
-        """Derivatives of all rates with respect to one input (0: time, 1 on: components)."""
-        inputs = [self.t, *self.y]
-        if not any(position in used for used in self.structure.depends):
-            return [None] * len(self.y)
-
-        def along(value: Scalar) -> list[Scalar]:
-            return self.run(*inputs[:position], value, *inputs[position + 1 :])
-
-        _, tangents = jax.jvp(along, (inputs[position],), (jnp.ones_like(inputs[position]),))
-        return [
-            tangent if position in used else None
-            for tangent, used in zip(tangents, self.structure.depends, strict=True)
-        ]
 
 
 def _reduced_matrix(

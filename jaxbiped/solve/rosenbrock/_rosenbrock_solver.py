@@ -63,31 +63,43 @@ class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
         return jtu.tree_map(value, self.y0, self.y1, *self.coefficients)
 
 
-class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):  # type: ignore[type-arg]
-    """A Rosenbrock method: every step solves a few linear systems with one exact Jacobian.
-
-    Works on any pytree of real arrays. Where the leaves are scalars, entries of the Jacobian
-    that are zero by structure are left out, and a second-order system is reduced to the size of
-    its velocities. A subclass only declares its tableau and order.
+class AbstractMemorylessSolver(diffrax.AbstractAdaptiveSolver):  # type: ignore[type-arg]
+    """A one-step solver that carries nothing from step to step.
 
     Attributes:
-        tableau: the method's coefficients.
-        switch_weight: how often the error estimate of a walk's step counts that crosses a switch.
-        term_structure, interpolation_cls: as diffrax asks of its solvers.
+        term_structure: as diffrax asks of its solvers.
     """
 
-    tableau: AbstractClassVar[RosenbrockTableau]
-    switch_weight: ClassVar[float] = 1.0
     term_structure: ClassVar = diffrax.AbstractTerm
-    interpolation_cls: ClassVar[Callable[..., RosenbrockInterpolation]] = RosenbrockInterpolation
 
     def init(self, terms: Any, t0: Time, t1: Time, y0: PyTree, args: PyTree) -> None:
-        """Rosenbrock methods carry nothing from step to step."""
         return None
 
     def func(self, terms: Any, t0: Time, y0: PyTree, args: PyTree) -> PyTree:
         """The vector field at a point."""
         return terms.vf(t0, y0, args)
+
+
+class AbstractRosenbrock(AbstractMemorylessSolver):
+    """A Rosenbrock method: every step solves a few linear systems with one exact Jacobian.
+
+    Works on any pytree of real arrays. Where the leaves are scalars, entries of the Jacobian
+    that are zero by structure are left out, and a second-order system is reduced to the size of
+    its velocities. A subclass only declares its tableau.
+
+    Attributes:
+        tableau: the method's coefficients.
+        switch_weight: how often the error estimate of a walk's step counts that crosses a switch.
+        interpolation_cls: as diffrax asks of its solvers.
+    """
+
+    tableau: AbstractClassVar[RosenbrockTableau]
+    switch_weight: ClassVar[float] = 1.0
+    interpolation_cls: ClassVar[Callable[..., RosenbrockInterpolation]] = RosenbrockInterpolation
+
+    def order(self, terms: Any) -> int:
+        """Order of convergence."""
+        return self.tableau.order
 
     def step(
         self,

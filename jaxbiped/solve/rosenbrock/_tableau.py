@@ -15,6 +15,7 @@ class RosenbrockTableau(NamedTuple):
     Source of the form: Hairer and Wanner, Solving Ordinary Differential Equations II, eq. IV.7.25.
 
     Attributes:
+        order: of convergence.
         gamma: diagonal coefficient γ.
         a: rows a_ij of the stages from the second on.
         c: rows c_ij of the stages from the second on.
@@ -24,6 +25,7 @@ class RosenbrockTableau(NamedTuple):
         error: weights that make the error estimate from the stages; u_s where left empty.
     """
 
+    order: int
     gamma: float
     a: tuple[Row, ...]
     c: tuple[Row, ...]

@@ -11,7 +11,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state import BristleState, RigidState, State, state_type
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, with_parameters
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 
 COORDINATES = {
     "theta_stance": "theta_2",
@@ -86,13 +86,9 @@ def axis_values(name: str, values: npt.ArrayLike) -> np.ndarray:
 
 
 def parameter_axes(
-    scene: AbstractScene, given: Mapping[str, npt.ArrayLike], argument: str
+    scene: AbstractWalkerScene, given: Mapping[str, npt.ArrayLike], argument: str
 ) -> dict[str, np.ndarray]:
-    """`axis_values` of parameters by name, of an `argument` of that name.
-
-    Raises:
-        ArgumentError: what is no parameter of the scene, or values that it must not have.
-    """
+    """`axis_values` of parameters that the scene has and allows, of an `argument` of that name."""
     axes = {}
     for name, values in given.items():
         check_choice(argument, name, parameter_names(scene))
@@ -113,7 +109,7 @@ def state_at(base: PyTree, columns: Mapping[str, np.ndarray]) -> PyTree:
 
 
 def place_states(
-    scene: AbstractScene, base: PyTree, states: PyTree, named: Collection[str]
+    scene: AbstractWalkerScene, base: PyTree, states: PyTree, named: Collection[str]
 ) -> PyTree:
     """States whose stance foot is as deep, and rolls and slips, as the base's does.
 

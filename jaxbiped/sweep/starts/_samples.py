@@ -30,17 +30,9 @@ MOST_SOBOL = 1 << 30
 def sequence_points(
     method: str, dimensions: int, count: int, seed: int, numbers: np.ndarray
 ) -> np.ndarray:
-    """The points with these numbers of a sample of `count`, whatever else is drawn.
+    """The points with these numbers of a sample of `count` in a cube, whatever else is drawn.
 
-    Args:
-        method: one of `SAMPLINGS`.
-        dimensions: d of the cube.
-        count: size of the whole sample.
-        seed: of the sequence.
-        numbers: increasing, shape (n,).
-
-    Returns:
-        Shape (n, d).
+    `numbers` increase, shape (n,); the points have shape (n, dimensions).
     """
     if method == "latin-hypercube":
         return np.asarray(_latin_hypercube(dimensions, count, seed)[numbers])

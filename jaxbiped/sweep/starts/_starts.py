@@ -17,7 +17,7 @@ from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state import BristleState, RigidState, State
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.sweep._labelling import Labelling
+from jaxbiped.sweep._labelling import Labelling, check_leaves_of_starts
 from jaxbiped.sweep.starts._coordinates import (
     axis_values,
     check_coordinates,
@@ -202,10 +202,7 @@ class GivenStarts(AbstractStarts):
 
     def __check_init__(self) -> None:
         check_type("states", self.states, State, BristleState, RigidState)
-        shapes = {np.shape(leaf) for leaf in self.states}
-        if len(shapes) > 1 or len(shapes.pop()) != 1:
-            shown = sorted({np.shape(leaf) for leaf in self.states})
-            raise ArgumentError(f"states has leaves of shapes {shown}: all of them must be (n,).")
+        check_leaves_of_starts(self.states)
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -33,8 +33,8 @@ def kernel():
 @pytest.mark.parametrize("architecture", ARCHITECTURES.values(), ids=lambda each: each.name)
 def test_it_assembles_without_spills(architecture):
     found = assembled(kernel().ptx(architecture), architecture)
-    assert found.registers <= 255
-    assert found.spill_stores == found.spill_loads == 0
+    assert found["registers"] <= 255
+    assert found["spill_stores"] == found["spill_loads"] == 0
 
 
 def test_sums_and_products_are_rounded_one_by_one():

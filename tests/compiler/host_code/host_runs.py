@@ -9,8 +9,8 @@ from jaxbiped.compiler.host_code._host_jit import write_host_program
 def check_against_xla(function, *arrays, rtol=1e-14):
     """The results of a host program, held against XLA's: shapes, types and entries."""
     given = [np.asarray(each) for each in arrays]
-    program = write_host_program(lambda leaves: function(*leaves), given, None)
-    found = jax.tree.leaves(program(given, list))
+    program = write_host_program(lambda leaves: function(*leaves), given)
+    found = jax.tree.leaves(program(given))
     wanted = jax.tree.leaves(jax.jit(function)(*given))
     assert len(found) == len(wanted)
     for ours, theirs in zip(found, wanted, strict=True):

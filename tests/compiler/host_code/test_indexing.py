@@ -10,7 +10,7 @@ from tests.compiler.host_code.host_runs import check_against_xla
 X = np.arange(24.0).reshape(4, 6) ** 1.5
 PLACES = np.array([3, 0, 2])
 
-READING = {
+CASES = {
     "rows": lambda x, i: x[i],
     "columns": lambda x, i: x[:, i],
     "entries": lambda x, i: x[i, i + 1],
@@ -27,34 +27,23 @@ READING = {
     )(x[:3], i),
     "along an axis": lambda x, i: jnp.take_along_axis(x[:3], i[:, None], axis=1),
     "transposed rows": lambda x, i: jax.vmap(lambda column: column[i], in_axes=1)(x),
-}
-WRITING = {
-    "rows": lambda x, i: x.at[i].set(1.0),
-    "entries": lambda x, i: x.at[i, i].set(x[0, :3]),
-    "one entry": lambda x, i: x.at[i[0], i[1]].set(-1.0),
-    "one of a row": lambda x, i: x[0].at[i[0]].set(jnp.nan),
-    "none": lambda x, i: x[0].at[i[0] + 20].set(-1.0),
-    "beyond the end": lambda x, i: x.at[i + 2].set(-1.0),
-    "moved inwards": lambda x, i: x.at[i[0] + 9].set(-1.0, mode="clip"),
-    "sums": lambda x, i: x.at[i - i].add(x[:3]),
-    "columns": lambda x, i: x.at[:, i].set(x[:, :3]),
-    "each row its own": lambda x, i: jax.vmap(lambda row, k: row.at[k].set(0.5))(x[:3], i),
+    "set: rows": lambda x, i: x.at[i].set(1.0),
+    "set: entries": lambda x, i: x.at[i, i].set(x[0, :3]),
+    "set: one entry": lambda x, i: x.at[i[0], i[1]].set(-1.0),
+    "set: one of a row": lambda x, i: x[0].at[i[0]].set(jnp.nan),
+    "set: none": lambda x, i: x[0].at[i[0] + 20].set(-1.0),
+    "set: beyond the end": lambda x, i: x.at[i + 2].set(-1.0),
+    "set: moved inwards": lambda x, i: x.at[i[0] + 9].set(-1.0, mode="clip"),
+    "set: sums": lambda x, i: x.at[i - i].add(x[:3]),
+    "set: columns": lambda x, i: x.at[:, i].set(x[:, :3]),
+    "set: each row its own": lambda x, i: jax.vmap(lambda row, k: row.at[k].set(0.5))(x[:3], i),
 }
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["known places", "told places"])
-@pytest.mark.parametrize("name", READING)
-def test_reading(name, known):
+@pytest.mark.parametrize("name", CASES)
+def test_reading_and_writing(name, known):
     if known:
-        check_against_xla(lambda x: READING[name](x, jnp.asarray(PLACES)), X)
+        check_against_xla(lambda x: CASES[name](x, jnp.asarray(PLACES)), X)
     else:
-        check_against_xla(READING[name], X, PLACES)
-
-
-@pytest.mark.parametrize("known", [True, False], ids=["known places", "told places"])
-@pytest.mark.parametrize("name", WRITING)
-def test_writing(name, known):
-    if known:
-        check_against_xla(lambda x: WRITING[name](x, jnp.asarray(PLACES)), X)
-    else:
-        check_against_xla(WRITING[name], X, PLACES)
+        check_against_xla(CASES[name], X, PLACES)

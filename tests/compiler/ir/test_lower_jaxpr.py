@@ -8,10 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
-from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._host_cpu import host
-from jaxbiped.compiler.runtime._program import Program
-from tests.compiler.one_shot import compiled, evaluate
+from tests.compiler.one_shot import compiled, evaluate, stepped
 
 POINTS = np.concatenate([np.linspace(-3.0, 3.0, 21), [0.0, np.inf, -np.inf, np.nan]])
 
@@ -129,13 +127,8 @@ def test_the_same_bits_at_every_width(name):
 
 
 def test_a_loop_computes_once_what_is_the_same_in_each_run():
-    shape = jax.ShapeDtypeStruct((), jnp.float64)
-    program = Program(
-        start=lambda x: x,
-        attempt=lambda x, carried: (_partly_the_same(carried), jnp.asarray(True)),
-        finish=lambda x, carried: carried,
-    )
-    block = CompiledProgram(program, shape).kernel.graph.body
+    program = stepped(lambda x, carried: (_partly_the_same(carried), jnp.asarray(True)))
+    block = program.kernel.graph.body
     (loop,) = (value for value in block.values if value.op == "map")
     inside = {value.op for value in loop.args[1].values}
     assert inside <= {"taken", "part", "fmul", "fadd"}

@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.compiler.ir._graph import Block
-from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._program import Program
-
-NUMBER = jax.ShapeDtypeStruct((), jnp.float64)
+from tests.compiler.one_shot import NUMBER, stepped
 
 
 def _compiled(function):
@@ -18,8 +15,7 @@ def _compiled(function):
     def attempt(given, carried):
         return (function(*carried), carried[1]), jnp.asarray(True)
 
-    program = Program(lambda given: given, attempt, lambda _, carried: carried[0])
-    return CompiledProgram(program, (NUMBER, NUMBER))
+    return stepped(attempt, (NUMBER, NUMBER), finish=lambda _, carried: carried[0])
 
 
 def _where(block, op):

@@ -8,7 +8,7 @@ import threading
 import types
 
 import distributed
-import jax
+import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
@@ -18,15 +18,13 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
-from jaxbiped.compiler import LANES
+from jaxbiped.compiler import LANES, Request
 from jaxbiped.compiler.runtime import _compiled_program, _host_cpu
-from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._host_cpu import default_threads, host
-from jaxbiped.compiler.runtime._program import Program
-from jaxbiped.solve._adaptive_program import Solve
-from jaxbiped.solve._lane_solve import Setting, request_of
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._first_and_last_step import just_before_end
+from tests.compiler.one_shot import stepped
 
 SCENE = jb.seed_scene()
 SEED = np.array([float(leaf) for leaf in jb.seed_state()])
@@ -34,9 +32,9 @@ WATCH = ("fall", "stop", "stumble")
 
 
 def _program():
-    setting = Setting(jb.solvers.Rodas4(), WATCH, counting=False, quick=True)
+    steps = AdaptiveSolve(jb.solvers.Rodas4(), WATCH, counting=False, located=True)
     one = jtu.tree_map(lambda leaf: leaf[0], _inputs([SEED]))
-    return LANES.compile(request_of(one, setting))
+    return LANES.compile(Request(adaptive_program(steps), one, quick=True))
 
 
 def _inputs(starts, duration=0.3, most=20000.0, scene=SCENE):
@@ -126,30 +124,16 @@ def test_a_lane_without_numbers_fails_alone():
 
 
 def test_parameters_are_inputs_of_each_lane():
-    starts = np.repeat(SEED[None], 4, axis=0)
-    inputs = _inputs(starts)
-    slopes = np.array([0.01, 0.015, 0.02, 0.025])
-    scene = jb.seed_scene()
-    varied = jtu.tree_map(lambda leaf: np.full(4, float(leaf)), scene)
-    names = [".".join(str(k) for k in path) for path, _ in jtu.tree_leaves_with_path(scene)]
-    place = next(i for i, name in enumerate(names) if "slope" in name)
-    leaves, structure = jtu.tree_flatten(varied)
-    leaves[place] = slopes
-    found = _program().run(inputs._replace(scene=jtu.tree_unflatten(structure, leaves))).outputs
+    starts, slopes = np.repeat(SEED[None], 4, axis=0), np.array([0.01, 0.015, 0.02, 0.025])
+    varied = eqx.tree_at(lambda inputs: inputs.scene.ground.slope, _inputs(starts), slopes)
+    found = _program().run(varied).outputs
     assert len(set(found.state.hip_x)) == 4
     alone = _program().run(_inputs(starts[:1])).outputs
     assert found.state.hip_x[2] == alone.state.hip_x[0]
 
 
 def _endless():
-    return CompiledProgram(
-        Program(
-            start=lambda inputs: inputs,
-            attempt=lambda inputs, carried: (carried + 1.0, carried < 0.0),
-            finish=lambda inputs, carried: carried,
-        ),
-        jax.ShapeDtypeStruct((), jnp.float64),
-    )
+    return stepped(lambda inputs, carried: (carried + 1.0, carried < 0.0))
 
 
 @pytest.fixture
@@ -208,13 +192,8 @@ def test_an_interrupt_is_heard_at_the_first_look(monkeypatch):
 @pytest.mark.parametrize("attempts", [1, 2, 1000])
 def test_a_run_that_is_stopped_attempts_nothing_more(attempts, monkeypatch):
     """Each simulation would be done after so many; threads that come after a stop do none."""
-    program = CompiledProgram(
-        Program(
-            start=lambda inputs: jnp.zeros_like(inputs),
-            attempt=lambda inputs, carried: (carried + 1.0, carried + 1.0 >= inputs),
-            finish=lambda inputs, carried: carried,
-        ),
-        jax.ShapeDtypeStruct((), jnp.float64),
+    program = stepped(
+        lambda inputs, carried: (carried + 1.0, carried + 1.0 >= inputs), start=jnp.zeros_like
     )
     inputs = np.full(20, float(attempts))
     np.testing.assert_array_equal(program.run(inputs).outputs, inputs)
@@ -262,18 +241,11 @@ def test_the_environment_chooses_the_threads(monkeypatch):
 
 
 def test_records_at_the_times_of_a_schedule():
-    def halves(inputs, carried):
-        return carried + 0.5, carried + 0.5 >= inputs
-
-    program = CompiledProgram(
-        Program(
-            start=lambda inputs: jnp.zeros_like(inputs),
-            attempt=halves,
-            finish=lambda inputs, carried: carried,
-            record=lambda inputs, carried, time: (time <= carried, [time, carried]),
-            scheduled=True,
-        ),
-        jax.ShapeDtypeStruct((), jnp.float64),
+    program = stepped(
+        lambda inputs, carried: (carried + 0.5, carried + 0.5 >= inputs),
+        start=jnp.zeros_like,
+        record=lambda inputs, carried, time: (time <= carried, [time, carried]),
+        scheduled=True,
     )
     times = np.array([0.1, 0.2, 0.9, 2.0])
     ran = program.run(np.array([1.0, 3.0, 0.5]), schedule=times, room=4)

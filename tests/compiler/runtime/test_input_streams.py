@@ -5,17 +5,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._primitive import call
-from jaxbiped.compiler.runtime._program import Program
+from tests.compiler.one_shot import NUMBER, stepped, two_zeros
 
 
 def _summing(backwards=False):
     """Σ weight (a + 2 b) over as many rows (a, b) as the inputs say."""
-
-    def start(given):
-        return jnp.zeros(()), jnp.zeros(())
 
     def attempt(given, carried, row):
         weight, steps = given
@@ -23,9 +19,7 @@ def _summing(backwards=False):
         count = count + 1.0
         return (total + weight * (row[0] + 2.0 * row[1]), count), count >= steps
 
-    number = jax.ShapeDtypeStruct((), jnp.float64)
-    program = Program(start, attempt, lambda _, c: c, stream=2, backwards=backwards)
-    return CompiledProgram(program, (number, number))
+    return stepped(attempt, (NUMBER, NUMBER), start=two_zeros, stream=2, backwards=backwards)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 19])
@@ -39,11 +33,6 @@ def test_every_simulation_reads_its_own_rows(count):
         expected = weight * np.sum((stream[..., 0] + 2.0 * stream[..., 1]) * rows, axis=1)
         np.testing.assert_allclose(total, expected, rtol=1e-12, atol=1e-14)
         np.testing.assert_array_equal(read, steps)
-
-
-def test_behind_the_last_row_comes_that_row_again():
-    total, _ = _summing().run((np.ones(1), np.full(1, 5.0)), stream=np.ones((1, 2, 2))).outputs
-    assert total[0] == 15.0
 
 
 def test_streams_under_jit_and_vmap():

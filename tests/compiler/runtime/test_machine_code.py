@@ -48,15 +48,3 @@ def test_other_programs_have_code_of_their_own(cache):
     _run()
     _run(4.0)
     assert len(list(cache.iterdir())) == 2
-
-
-def test_nothing_is_stored_where_nothing_is_wanted(cache, monkeypatch):
-    monkeypatch.setenv(CACHE_VARIABLE, "")
-    _run()
-    assert not cache.exists()
-
-
-def test_a_folder_that_cannot_be_written_does_no_harm(cache, monkeypatch):
-    cache.parent.joinpath("file").write_text("in the way")
-    monkeypatch.setenv(CACHE_VARIABLE, str(cache.parent / "file"))
-    _run()

@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._primitive import Recording, call, call_recording
-from jaxbiped.compiler.runtime._program import Program
+from jaxbiped.compiler.runtime._primitive import Recording, call
 from jaxbiped.compiler.runtime._record_cache import RecordCache
+from tests.compiler.one_shot import NUMBER, stepped, two_zeros
 
 ROOM = 8
-NUMBER = jax.ShapeDtypeStruct((), jnp.float64)
 
 
-def _powers():
+def _record(given, carried, time):
+    return carried[1] > 0.0, [carried[1], carried[0]]
+
+
+@pytest.fixture(scope="module")
+def powers():
     """Records factor, factor², … up to as high a power as the inputs say; gives the last."""
 
     def attempt(given, carried):
@@ -22,12 +26,9 @@ def _powers():
         power, count = carried
         return (power * factor, count + 1.0), count + 1.0 >= steps
 
-    def record(given, carried, time):
-        return carried[1] > 0.0, [carried[1], carried[0]]
-
     start = lambda given: (jnp.ones(()), jnp.zeros(()))
-    program = Program(start, attempt, lambda _, carried: carried[0], record=record)
-    return CompiledProgram(program, (NUMBER, NUMBER))
+    finish = lambda given, carried: carried[0]
+    return stepped(attempt, (NUMBER, NUMBER), start=start, finish=finish, record=_record)
 
 
 def _doubled():
@@ -37,48 +38,37 @@ def _doubled():
         count = carried[1] + 1.0
         return (2.0 * row[1], count), count >= steps
 
-    def record(steps, carried, time):
-        return carried[1] > 0.0, [carried[1], carried[0]]
-
-    start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
-    return CompiledProgram(
-        Program(start, attempt, lambda _, c: c[1], record=record, stream=2), NUMBER
-    )
+    finish = lambda steps, carried: carried[1]
+    return stepped(attempt, start=two_zeros, finish=finish, record=_record, stream=2)
 
 
-def _last_sum(*, backwards=False):
+def _last_sum():
     """Σ of the second numbers in as many rows as the input says."""
 
     def attempt(steps, carried, row):
         total, count = carried
         return (total + row[1], count + 1.0), count + 1.0 >= steps
 
-    start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
-    program = Program(start, attempt, lambda _, c: c[0], stream=2, backwards=backwards)
-    return CompiledProgram(program, NUMBER)
-
-
-@pytest.fixture(scope="module")
-def powers():
-    return _powers()
+    return stepped(attempt, start=two_zeros, finish=lambda steps, c: c[0], stream=2)
 
 
 @pytest.fixture
 def runs(powers, monkeypatch):
     """How many simulations each run of the program took."""
-    counts, run_table = [], powers.run_table
+    counts, run_table = [], CompiledProgram.run_table
 
-    def counted(table, **options):
-        counts.append(table.shape[1])
-        return run_table(table, **options)
+    def counted(program, table, **options):
+        if program == powers:
+            counts.append(table.shape[1])
+        return run_table(program, table, **options)
 
-    monkeypatch.setattr(powers, "run_table", counted)
+    monkeypatch.setattr(CompiledProgram, "run_table", counted)
     return counts
 
 
 def _recording(powers, factor, steps):
     given = (jnp.asarray(factor), jnp.asarray(steps))
-    return call_recording(powers, given, room=ROOM, quick=True)
+    return call(powers, given, room=ROOM, quick=True, keeps_records=True)
 
 
 def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
@@ -94,7 +84,7 @@ def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
 
 
 def test_what_is_no_longer_held_is_run_again(powers, runs, monkeypatch):
-    monkeypatch.setattr("jaxbiped.compiler.runtime._record_cache._RECORDS", RecordCache(lambda: 0))
+    monkeypatch.setattr("jaxbiped.compiler.runtime._lane_call._RECORDS", RecordCache(lambda: 0))
     _, recording = _recording(powers, 1.5, 2.0)
     _, values = recording.columns(np.array([0.0, 1.0]))
     np.testing.assert_array_equal(values[:3], [1.0, 1.5, 2.25])
@@ -119,35 +109,23 @@ def test_a_recording_is_another_programs_stream(powers, runs):
 
 def test_what_is_read_but_once_is_then_no_longer_held(powers, runs):
     given = (jnp.asarray(0.25), jnp.asarray(2.0))
-    _, recording = call_recording(powers, given, room=ROOM, quick=True, once=True)
+    _, recording = call(powers, given, room=ROOM, quick=True, keeps_records=True, reads_once=True)
     reader = _last_sum()
     sums = [float(call(reader, jnp.asarray(2.0), stream=recording)[0]) for _ in range(3)]
     assert sums == [0.3125] * 3
     assert runs == [1, 1, 1]
 
 
-def test_a_recording_can_be_read_backwards(powers):
-    reader = _last_sum(backwards=True)
-
-    def last_two(factor, steps):
-        _, recording = _recording(powers, factor, steps)
-        return call(reader, jnp.asarray(2.0), stream=recording)[0]
-
-    factors, steps = jnp.array([2.0, 3.0, 0.5]), jnp.array([3.0, 4.0, 5.0])
-    sums = jax.jit(jax.vmap(last_two))(factors, steps)
-    np.testing.assert_allclose(sums, [12.0, 108.0, 0.09375])
-
-
 @pytest.mark.parametrize("most", [0, 1 << 20])
 def test_what_reads_a_recording_may_record_as_well(powers, monkeypatch, most):
-    monkeypatch.setattr(
-        "jaxbiped.compiler.runtime._record_cache._RECORDS", RecordCache(lambda: most)
-    )
+    monkeypatch.setattr("jaxbiped.compiler.runtime._lane_call._RECORDS", RecordCache(lambda: most))
     doubled, reader = _doubled(), _last_sum()
 
     def total(factor, steps):
         _, recording = _recording(powers, factor, steps)
-        count, twice = call_recording(doubled, steps, room=ROOM, quick=True, stream=recording)
+        count, twice = call(
+            doubled, steps, room=ROOM, quick=True, stream=recording, keeps_records=True
+        )
         return count, call(reader, steps, stream=twice)[0], twice.columns(jnp.zeros(1))[0]
 
     factors, steps = jnp.array([2.0, 3.0]), jnp.array([3.0, 2.0])
@@ -186,13 +164,13 @@ def test_what_came_first_goes_first():
     # An input and two records of one number each: 24 bytes a simulation.
     held = RecordCache(lambda: 50)
     for number in (1.0, 2.0, 3.0):
-        np.testing.assert_array_equal(held.ran("program", np.array([[number]]), run), [[number]])
-    held.rows("program", np.array([[3.0, 2.0]]), run)
+        np.testing.assert_array_equal(held.run("program", np.array([[number]]), run)[0], [[number]])
+    held.records("program", np.array([[3.0, 2.0]]), run)
     assert ran == [1.0, 2.0, 3.0]
-    rows = held.rows("program", np.array([[1.0, 3.0]]), run)
+    rows = held.records("program", np.array([[1.0, 3.0]]), run)
     assert [each.shape for each in rows] == [(2, 1), (2, 1)]
     assert ran == [1.0, 2.0, 3.0, 1.0]
-    held.rows("another", np.array([[3.0]]), run)
+    held.records("another", np.array([[3.0]]), run)
     assert ran == [1.0, 2.0, 3.0, 1.0, 3.0]
 
 
@@ -203,7 +181,7 @@ def test_simulations_without_records_take_room_as_well():
         n = table.shape[1]
         return table, np.zeros((n, 3, 1)), np.zeros(n, dtype=int)
 
-    held.ran("program", np.arange(1000.0)[None], run)
+    held.run("program", np.arange(1000.0)[None], run)
     assert held.kept == 800
     held.clear()
     assert held.kept == 0

@@ -2,7 +2,6 @@
 
 import base64
 import dataclasses
-import json
 import re
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.plot.viewer._basin_view import _even_choice
-from tests.browser import chromium
+from tests.drawn import sent_in
 
 pytestmark = pytest.mark.slow
 
@@ -43,44 +42,42 @@ def test_the_choice_is_even_and_no_more_than_asked():
 def test_cells_are_the_labels(basin):
     found, view = basin
     names = jb.basins.label_names(found.label.values, found.cycle_footsteps.values)
-    page = view.html()
-    sent = json.loads(re.search(r'id="walks">(.*?)</script>', page)[1])
+    sent = sent_in(view.html())
     cells = np.frombuffer(base64.b64decode(sent["basin"]["cells"]), np.uint8)
     assert [sent["basin"]["names"][k] for k in cells] == names.ravel().tolist()
 
 
-def test_a_start_that_is_picked_shows_its_walk(basin, tmp_path):
+def test_a_start_that_is_picked_shows_its_walk(basin, browser, tmp_path):
     _, view = basin
-    with chromium() as page:
-        page.open(view.save(tmp_path / "basin.html"))
-        picture = page.find(".basin .chart")
-        ring = "return Number(document.querySelector('.ring').getAttribute('cx'))"
+    page = browser.open(view.save(tmp_path / "basin.html"))
+    picture = page.find(".basin .chart")
+    ring = "return Number(document.querySelector('.ring').getAttribute('cx'))"
 
-        def assert_shows_its_start():
-            told = page.find(".picture .told").text
-            angle, rate = map(float, re.findall(r"\) (-?[\d.]+)", told))
-            page.run(REWIND)
-            reading = page.find(".reading").text.replace("−", "-")
-            shown = float(re.search(r"leg 1: (-?[\d.]+)", reading)[1])
-            assert shown == pytest.approx(angle, abs=6e-4)
-            assert rate in AXES["omega_swing"].round(4)
-            return angle, rate
+    def assert_shows_its_start():
+        told = page.find(".picture .told").text
+        angle, rate = map(float, re.findall(r"\) (-?[\d.]+)", told))
+        page.run(REWIND)
+        reading = page.find(".reading").text.replace("−", "-")
+        shown = float(re.search(r"leg 1: (-?[\d.]+)", reading)[1])
+        assert shown == pytest.approx(angle, abs=6e-4)
+        assert rate in AXES["omega_swing"].round(4)
+        return angle, rate
 
-        first = assert_shows_its_start()
-        page.press(picture, -150, 40)
-        second = assert_shows_its_start()
-        assert second != first
-        at = page.run(ring)
-        page.keys("\ue014")
-        third = assert_shows_its_start()
-        assert third[0] > second[0]
-        assert third[1] == second[1]
-        assert page.run(ring) > at
-        page.keys("\ue013")
-        assert assert_shows_its_start()[1] > third[1]
-        page.open(tmp_path / "basin.html", width=400, dark=True)
-        assert page.run("return document.documentElement.scrollWidth") <= 400
-        assert page.errors() == []
+    first = assert_shows_its_start()
+    page.press(picture, -150, 40)
+    second = assert_shows_its_start()
+    assert second != first
+    at = page.run(ring)
+    page.keys("\ue014")
+    third = assert_shows_its_start()
+    assert third[0] > second[0]
+    assert third[1] == second[1]
+    assert page.run(ring) > at
+    page.keys("\ue013")
+    assert assert_shows_its_start()[1] > third[1]
+    page.open(tmp_path / "basin.html", width=400, dark=True)
+    assert page.run("return document.documentElement.scrollWidth") <= 400
+    assert page.errors() == []
 
 
 def test_what_cannot_be_viewed_is_told(seed, basin):

@@ -5,7 +5,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.plot._animation import poses
-from tests.browser import chromium, require_chromium
+from tests.browser import require_chromium
 from tests.drawn import leg_pixels
 
 pytestmark = pytest.mark.slow
@@ -34,12 +34,6 @@ new PerformanceObserver((list) => {
 
 
 @pytest.fixture(scope="module")
-def page():
-    with chromium() as page:
-        yield page
-
-
-@pytest.fixture(scope="module")
 def walk():
     require_chromium()
     scene = jb.seed_scene(slope=0.02)
@@ -49,6 +43,13 @@ def walk():
 @pytest.fixture(scope="module")
 def file(walk, tmp_path_factory):
     return jb.plot.view(*walk, name="seed").save(tmp_path_factory.mktemp("view") / "walk.html")
+
+
+@pytest.fixture
+def page(browser, file):
+    """The walk's page as it opens; what is done to it leaves no message on the console."""
+    yield browser.open(file)
+    assert browser.errors() == []
 
 
 def assert_is_there(page, walk):
@@ -73,21 +74,17 @@ def test_it_weighs_little_and_shows_its_first_frame_within_a_second(page, file):
         painted.append(page.driver.execute_async_script(FIRST_PAINT))
     assert min(painted) < 1000.0
     assert page.run("return performance.getEntriesByType('resource').length") == 0
-    assert page.errors() == []
 
 
-def test_scrubbed_positions_are_those_of_the_walk(page, file, walk):
-    page.open(file)
+def test_scrubbed_positions_are_those_of_the_walk(page, walk):
     end = float(walk[1].t[-1])
     strike = jb.footsteps(*walk).time_s[3]
     for time in (0.0, 0.123, strike - 1e-3, strike + 5e-4, 4.321, end):
         page.run(SCRUB, time)
         assert assert_is_there(page, walk) == pytest.approx(time, abs=1e-9)
-    assert page.errors() == []
 
 
-def test_it_plays_and_pauses(page, file, walk):
-    page.open(file)
+def test_it_plays_and_pauses(page, walk):
     assert page.find(".play").text == "Play"
     page.find(".play").click()
     page.driver.set_script_timeout(20)
@@ -105,7 +102,6 @@ def test_it_plays_and_pauses(page, file, walk):
     frames = "const done = arguments[0]; setTimeout(done, 100)"
     page.driver.execute_async_script(frames)
     assert page.run(WHERE)["time"] == stopped
-    assert page.errors() == []
 
 
 def test_it_plays_by_itself_unless_motion_is_to_be_reduced(page, file):
@@ -113,8 +109,7 @@ def test_it_plays_by_itself_unless_motion_is_to_be_reduced(page, file):
     assert page.open(file, reduced=True).find(".play").text == "Play"
 
 
-def test_keys_do_what_the_page_says(page, file, walk):
-    page.open(file)
+def test_keys_do_what_the_page_says(page, walk):
     strikes = [p["t"] for p in jb.plot.view(*walk).sent()["walks"][0]["footprints"] if p["strike"]]
     time = lambda: page.run(WHERE)["time"]
     left, right, home, end = "\ue012", "\ue014", "\ue011", "\ue010"
@@ -136,11 +131,9 @@ def test_keys_do_what_the_page_says(page, file, walk):
     assert page.find(".play").text == "Pause"
     page.keys(" ")
     assert page.find(".play").text == "Play"
-    assert page.errors() == []
 
 
-def test_a_press_on_a_chart_moves_every_cursor(page, file, walk):
-    page.open(file)
+def test_a_press_on_a_chart_moves_every_cursor(page, walk):
     chart = page.find(".chart.picks")
     page.press(chart, 0, 0)
     time = assert_is_there(page, walk)
@@ -154,7 +147,6 @@ def test_a_press_on_a_chart_moves_every_cursor(page, file, walk):
     page.run("document.querySelectorAll('select')[1].dispatchEvent(new Event('change'))")
     ticks = page.run("return [...document.querySelectorAll('.picks .axes text')][0].textContent")
     assert float(ticks) == pytest.approx(time, abs=0.01)
-    assert page.errors() == []
 
 
 @pytest.mark.parametrize("dark", [False, True])
@@ -175,8 +167,7 @@ def test_it_fits_any_width_by_day_and_by_night(page, file, tmp_path, dark, width
         assert min(leg_pixels(picture)) > 100
 
 
-def test_screen_readers_are_told(page, file):
-    page.open(file)
+def test_screen_readers_are_told(page):
     page.run(SCRUB, 1.0)
     page.driver.execute_async_script("setTimeout(arguments[0], 600)")
     told = page.find("[aria-live]").get_attribute("textContent")

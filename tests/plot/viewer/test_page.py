@@ -1,6 +1,5 @@
 """The page, against what it was given: one file, whole, and its text safe."""
 
-import json
 import re
 import shutil
 import subprocess
@@ -11,6 +10,7 @@ import pytest
 from jaxbiped.plot.style import view_colours
 from jaxbiped.plot.viewer import _page
 from jaxbiped.plot.viewer._page import page_of, script, style
+from tests.drawn import sent_in
 
 ASSETS = sorted((Path(_page.__file__).parent / "assets").iterdir())
 
@@ -19,8 +19,7 @@ def test_names_within_the_page_stay_text():
     name = '</script><b> & "'
     page = page_of({"walks": [{"name": name}]}, name)
     assert name not in page
-    held = re.search(r'<script type="application/json" id="walks">(.*?)</script>', page)[1]
-    assert json.loads(held) == {"walks": [{"name": name}]}
+    assert sent_in(page) == {"walks": [{"name": name}]}
     assert "<title>&lt;/script&gt;" in page
 
 

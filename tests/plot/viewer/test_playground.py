@@ -12,7 +12,6 @@ import jaxbiped as jb
 from jaxbiped.compiler import LANES
 from jaxbiped.plot.viewer._page import page_of, script
 from jaxbiped.plot.viewer._playground import STEPS, played_request
-from tests.browser import chromium
 
 pytestmark = pytest.mark.slow
 
@@ -36,12 +35,6 @@ TOLD = "return document.querySelector('.told')?.textContent ?? ''"
 @pytest.fixture(scope="module")
 def playground():
     return jb.plot.playground(jb.seed_scene(slope=0.02), jb.seed_state(), footsteps=FOOTSTEPS)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as page:
-        yield page
 
 
 def moved(slope=0.02, stiffness=1e6, omega=-0.0052):

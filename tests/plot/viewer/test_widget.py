@@ -7,7 +7,6 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.plot.viewer._page import style, widget_script
-from tests.browser import chromium
 
 pytestmark = pytest.mark.slow
 
@@ -39,31 +38,30 @@ def viewed(seed_walk):
     return jb.plot.view(*seed_walk, name="seed")
 
 
-def test_time_is_shared_with_python(viewed, tmp_path):
+def test_time_is_shared_with_python(viewed, browser, tmp_path):
     (tmp_path / "empty.html").write_text("<!doctype html><title>notebook</title>")
     script = base64.b64encode(widget_script().encode()).decode()
-    with chromium() as page:
-        page.open(tmp_path / "empty.html")
-        assert page.driver.execute_async_script(MODEL, script, style(), viewed.sent())
-        assert page.run(TIME) == 0.25
-        # A notebook's cell has no lower edge in sight: the player is above the walker, and charts
-        # stand beside it only where the cell, not the window, is wide.
-        assert page.run(TOP, ".player") < page.run(TOP, ".stage")
-        assert page.run(TOP, ".charts") < page.run(TOP, ".reading")
-        page.run("document.body.style.width = '900px'")
-        assert page.run(TOP, ".charts") > page.run(TOP, ".reading")
-        page.run("model.set('time', 1.5)")
-        assert page.run(TIME) == 1.5
-        page.find(".play").send_keys("\ue010")
-        page.driver.execute_async_script("setTimeout(arguments[0], 600)")
-        assert page.run("return model.get('time')") == pytest.approx(2.0)
-        assert page.run("return model.saved") > 0
-        both = jb.plot.side_by_side(viewed, viewed)
-        page.run("model.set('sent', arguments[0])", both.sent())
-        assert page.run("return document.querySelectorAll('.stage').length") == 2
-        assert page.run(TIME) == pytest.approx(2.0)
-        assert page.run("end(); return Object.keys(model.heard).length") == 0
-        assert page.errors() == []
+    page = browser.open(tmp_path / "empty.html")
+    assert page.driver.execute_async_script(MODEL, script, style(), viewed.sent())
+    assert page.run(TIME) == 0.25
+    # A notebook's cell has no lower edge in sight: the player is above the walker, and charts
+    # stand beside it only where the cell, not the window, is wide.
+    assert page.run(TOP, ".player") < page.run(TOP, ".stage")
+    assert page.run(TOP, ".charts") < page.run(TOP, ".reading")
+    page.run("document.body.style.width = '900px'")
+    assert page.run(TOP, ".charts") > page.run(TOP, ".reading")
+    page.run("model.set('time', 1.5)")
+    assert page.run(TIME) == 1.5
+    page.find(".play").send_keys("\ue010")
+    page.driver.execute_async_script("setTimeout(arguments[0], 600)")
+    assert page.run("return model.get('time')") == pytest.approx(2.0)
+    assert page.run("return model.saved") > 0
+    both = jb.plot.side_by_side(viewed, viewed)
+    page.run("model.set('sent', arguments[0])", both.sent())
+    assert page.run("return document.querySelectorAll('.stage').length") == 2
+    assert page.run(TIME) == pytest.approx(2.0)
+    assert page.run("end(); return Object.keys(model.heard).length") == 0
+    assert page.errors() == []
 
 
 def test_a_notebook_shows_the_widget(viewed):

@@ -1,5 +1,7 @@
 """Laws of the normal force, against stated properties, derivatives and constructors."""
 
+import operator
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from tests.scene.laws.derivatives import Force
 from tests.scene.laws.drop import restitutions
+from tests.scene.laws.refusals import assert_refused
 
 
 def numbers(low, high):
@@ -40,6 +43,7 @@ LAWS = [
     jb.laws.HuntCrossley(K=1e6, hysteresis=3.0),
 ]
 DAMPED = LAWS[1:]
+SEED, SMOOTH = (kind(K=1e6, c=1e7) for kind in (jb.laws.RistowSchafer, jb.laws.SmoothRistowSchafer))
 OWN_EXPONENT = ("Hertz", "RistowSchafer", "HuntCrossley")
 depths, rates = numbers(-1e-2, 1e-2), numbers(-2.0, 2.0)
 name = lambda law: type(law).__name__
@@ -124,7 +128,7 @@ def test_switches_are_where_the_reaction_reaches_zero(law):
     assert jb.laws.Hertz(K=1.0).switches(jnp.asarray(1e-3), jnp.asarray(0.0)) == ()
 
 
-@pytest.mark.parametrize("law", [*LAWS, jb.laws.SmoothRistowSchafer(K=1e6, c=1e7)], ids=name)
+@pytest.mark.parametrize("law", [*LAWS, SMOOTH], ids=name)
 def test_elastic_energy_is_the_integral_of_elastic_force(law):
     depth = jnp.array([-1e-4, 0.0, 1e-7, 3e-6, 1e-5, 1e-4, 7e-4])
     slope = jax.vmap(jax.grad(law.elastic_energy))(depth)
@@ -132,7 +136,7 @@ def test_elastic_energy_is_the_integral_of_elastic_force(law):
     assert float(law.elastic_energy(jnp.asarray(0.0))) == 0.0
 
 
-@pytest.mark.parametrize("law", LAWS, ids=name)
+@pytest.mark.parametrize("law", [*LAWS, SMOOTH], ids=name)
 def test_gradients_equal_differences(law):
     """At random, out of contact, and on both sides of touchdown and of the lift-off."""
     draw, function = np.random.default_rng(3), Force(law)
@@ -153,7 +157,7 @@ def test_gradients_equal_differences(law):
         np.testing.assert_allclose(exact, one_sided, 1e-6, 1e-9)
 
 
-@pytest.mark.parametrize("law", LAWS, ids=name)
+@pytest.mark.parametrize("law", [*LAWS, SMOOTH], ids=name)
 def test_derivatives_are_finite_at_the_switches(law):
     function = Force(law)
     points = [(0.0, r) for r in (-0.3, 0.0, 0.3)] + [(1e-300, 0.0), (-1e-3, 0.3)]
@@ -228,47 +232,39 @@ def test_hertz_stiffness_of_known_pairs():
     np.testing.assert_allclose(rigid, 2 * steel, rtol=1e-12)
 
 
+WEIGHT = dict(mass=1.0, penetration=1e-3)
+
+
 @pytest.mark.parametrize(
-    ("make", "words"),
+    ("make", "numbers", "words"),
     [
-        (lambda: jb.laws.KelvinVoigt(K=0.0, D=1.0), ("K", "0", "N/m")),
-        (lambda: jb.laws.KelvinVoigt(K=1.0, D=-1.0), ("D", "-1")),
-        (lambda: jb.laws.KuwabaraKono(K=-2.0, gamma=1.0), ("K", "-2")),
-        (lambda: jb.laws.KuwabaraKono(K=1.0, gamma=-3.0), ("gamma", "-3")),
-        (lambda: jb.laws.Tsuji(K=float("inf"), gamma=1.0), ("K", "inf")),
-        (lambda: jb.laws.Tsuji(K=1.0, gamma="much"), ("gamma", "much", "number")),
-        (lambda: jb.laws.HuntCrossley(K=1.0, hysteresis=-1.0), ("hysteresis", "-1", "s/m")),
-        (lambda: jb.laws.HuntCrossley(K=1.0, hysteresis=1.0, n=0.9), ("n", "0.9", "at least")),
-        (lambda: jb.laws.Hertz.from_weight(mass=0.0, penetration=1e-3), ("mass", "0", "kg")),
-        (lambda: jb.laws.Hertz.from_weight(mass=1.0, penetration=-1.0), ("penetration", "-1")),
-        (lambda: jb.laws.Hertz.from_weight(mass=1.0, penetration=1e-3, n=0.5), ("n", "0.5")),
+        ("KelvinVoigt", dict(K=0.0, D=1.0), ("K", "0", "N/m")),
+        ("KelvinVoigt", dict(K=1.0, D=-1.0), ("D", "-1")),
+        ("KuwabaraKono", dict(K=-2.0, gamma=1.0), ("K", "-2")),
+        ("KuwabaraKono", dict(K=1.0, gamma=-3.0), ("gamma", "-3")),
+        ("Tsuji", dict(K=float("inf"), gamma=1.0), ("K", "inf")),
+        ("Tsuji", dict(K=1.0, gamma="much"), ("gamma", "much", "number")),
+        ("HuntCrossley", dict(K=1.0, hysteresis=-1.0), ("hysteresis", "-1", "s/m")),
+        ("HuntCrossley", dict(K=1.0, hysteresis=1.0, n=0.9), ("n", "0.9", "at least")),
+        ("Hertz.from_weight", WEIGHT | dict(mass=0.0), ("mass", "0", "kg")),
+        ("Hertz.from_weight", WEIGHT | dict(penetration=-1.0), ("penetration", "-1")),
+        ("Hertz.from_weight", WEIGHT | dict(n=0.5), ("n", "0.5")),
+        ("Tsuji.from_weight", WEIGHT | dict(damping_ratio=-0.1), ("damping_ratio", "-0.1")),
+        ("Tsuji.from_weight", WEIGHT | dict(damping_ratio=0.1, g=0.0), ("g", "0", "m/s^2")),
         (
-            lambda: jb.laws.Tsuji.from_weight(mass=1.0, penetration=1e-3, damping_ratio=-0.1),
-            ("damping_ratio", "-0.1"),
-        ),
-        (
-            lambda: jb.laws.Tsuji.from_weight(mass=1.0, penetration=1e-3, damping_ratio=0.1, g=0.0),
-            ("g", "0", "m/s^2"),
-        ),
-        (
-            lambda: jb.laws.hertz_stiffness(
-                radius=0.1, **STEEL, ground_modulus=1e9, ground_poisson=0.6
-            ),
+            "hertz_stiffness",
+            STEEL | dict(radius=0.1, ground_modulus=1e9, ground_poisson=0.6),
             ("ground_poisson", "0.6", "above -1", "at most 0.5"),
         ),
         (
-            lambda: jb.laws.hertz_stiffness(
-                radius=0.0, **STEEL, ground_modulus=1e9, ground_poisson=0.3
-            ),
+            "hertz_stiffness",
+            STEEL | dict(radius=0.0, ground_modulus=1e9, ground_poisson=0.3),
             ("radius", "0", "above 0"),
         ),
     ],
 )
-def test_bad_arguments_are_named(make, words):
-    with pytest.raises(jb.ArgumentError) as caught:
-        make()
-    assert str(caught.value).startswith(words[0] + " = ")
-    assert all(word in str(caught.value) for word in words)
+def test_bad_arguments_are_named(make, numbers, words):
+    assert_refused(lambda: operator.attrgetter(make)(jb.laws)(**numbers), *words)
 
 
 def test_the_smooth_laws_force_rises_from_zero_by_a_ramp():
@@ -277,3 +273,30 @@ def test_the_smooth_laws_force_rises_from_zero_by_a_ramp():
     for force, ramped in ((0.5, 0.25), (0.25, 0.25 * 0.25**3 * (10 - 3.75 + 0.375)), (2.0, 2.0)):
         depth = jnp.asarray((force / 1e6) ** (2.0 / 3.0))
         assert float(law.force(depth, jnp.asarray(0.0))) == pytest.approx(ramped)
+
+
+def test_the_smooth_law_never_pulls_and_is_the_seeds_away_from_its_corners():
+    depth, rate = jnp.meshgrid(jnp.linspace(-1e-3, 1e-3, 41), jnp.linspace(-2.0, 2.0, 41))
+    force = SMOOTH.force(depth, rate)
+    assert bool(jnp.all(force >= 0.0))
+    assert bool(jnp.all(force[depth <= 0.0] == 0.0))
+    depth, rate = jnp.array([1.1e-5, 5e-4]), jnp.array([0.3, 0.0])
+    np.testing.assert_allclose(SMOOTH.force(depth, rate), SEED.force(depth, rate))
+
+
+def _jump(law, rate, depth, order):
+    """Difference of a derivative's limits from the two sides, relative to its size nearby."""
+    function = lambda d: law.force(d, jnp.asarray(rate))
+    for _ in range(order):
+        function = jax.grad(function)
+    side = 1e-7 * abs(depth) if depth else 1e-12
+    nearby = depth + jnp.linspace(-1e-4, 1e-4, 41)
+    found = jax.vmap(function)(jnp.concatenate([jnp.array([depth - side, depth + side]), nearby]))
+    return abs(float(found[1] - found[0])) / float(jnp.max(jnp.abs(found[2:])))
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_the_smooth_law_is_twice_differentiable(order):
+    for rate, depth in ((0.3, 0.0), (0.3, 1e-5), (0.0, 1e-5), (-2.64e-3, 7e-4)):
+        assert _jump(SMOOTH, rate, depth, order) < 1e-3
+    assert _jump(SEED, 0.3, 0.0, 1) > 0.5  # which has a corner there

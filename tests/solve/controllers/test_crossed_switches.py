@@ -8,7 +8,7 @@ import pytest
 from reference.walks import reference_states
 
 import jaxbiped as jb
-from jaxbiped.dynamics._feet import feet
+from jaxbiped.dynamics._contacts import feet
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._walk_step_size import CrossedSwitches, ErrorControl, crosses
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._feet import feet
+from jaxbiped.dynamics._contacts import feet
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers import _walk_step_size
 from jaxbiped.solve.controllers._contact_steps import TouchdownAhead

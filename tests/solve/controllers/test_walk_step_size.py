@@ -1,5 +1,7 @@
 """Error control, against its formula: which steps are kept, how large the next is."""
 
+import dataclasses
+
 import diffrax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -18,20 +20,25 @@ UNITS = units_of(jb.seed_scene(), STATE)
 ORDER = 4
 
 
-def _adapted(error, *, rejected=False, span=SPAN, order=4, at=0.5, scene=None):
-    """What becomes of a step all of whose errors are so many tolerances."""
-    scene = jb.seed_scene() if scene is None else scene
-    state = jb.seed_state()
-    units = units_of(scene, state)
-    control = ErrorControl(RTOL, 1e-2 * RTOL, units)
-    errors = jb.State(
-        *(
-            error * (1e-2 * RTOL / inverse + RTOL * abs(leaf))
-            for leaf, inverse in zip(state, units.inverse, strict=True)
-        )
+def _adapted(error, *, rejected=False, span=SPAN, order=ORDER, at=0.5, grown=1.0, dtype=float):
+    """What becomes of a step from the start to `grown` times it, with errors of so many tolerances.
+
+    One number for all leaves, or one for each.
+    """
+    y0, y1, tolerance = (
+        np.array([float(x) for x in each])
+        for each in (STATE, [grown * x for x in STATE], [1.0 / x for x in UNITS.inverse])
     )
-    rest = (scene, errors, order, jnp.asarray(rejected))
-    return control.adapt_step_size(jnp.asarray(at), jnp.asarray(at + span), state, state, *rest)
+    errors = error * (1e-2 * RTOL * tolerance + RTOL * np.maximum(np.abs(y0), np.abs(y1)))
+    units = jtu.tree_map(lambda unit: jnp.asarray(unit, dtype), UNITS)
+    before, after, errors = (
+        jb.State(*(jnp.asarray(x, dtype) for x in each)) for each in (y0, y1, errors)
+    )
+    times = jnp.asarray(at, dtype), jnp.asarray(at + span, dtype)
+    control = ErrorControl(RTOL, 1e-2 * RTOL, units)
+    return control.adapt_step_size(
+        *times, before, after, None, errors, order, jnp.asarray(rejected)
+    )
 
 
 @pytest.mark.parametrize("order", [3, 4, 5])
@@ -69,59 +76,37 @@ def test_the_smallest_step_is_taken_whatever_its_error(error):
 
 
 def test_tolerances_are_in_units_of_the_scene():
-    large = jb.seed_scene()
-    large = large.__class__(
-        walker=jb.Walker(m=1.0, J=0.0096 * 1e4, l=40.0, d=10.0, r=8.0),
-        ground=large.ground,
-        normal=large.normal,
-        friction=large.friction,
-    )
-    keep, *_ = _adapted(0.9, scene=large)
-    assert keep
-    keep, *_ = _adapted(1.1, scene=large)
-    assert not keep
-
-
-def _after(error, dtype=np.float64):
-    units = jtu.tree_map(lambda unit: jnp.asarray(unit, dtype), UNITS)
+    walker = jb.Walker(m=1.0, J=0.0096 * 1e4, l=40.0, d=10.0, r=8.0)
+    units = units_of(dataclasses.replace(jb.seed_scene(), walker=walker), STATE)
     control = ErrorControl(RTOL, 1e-2 * RTOL, units)
-    y0, y1, error = (
-        jb.State(*(jnp.asarray(x, dtype) for x in each))
-        for each in (STATE, [1.1 * float(x) for x in STATE], error)
-    )
-    zero, rejected = jnp.asarray(0.0, dtype), jnp.asarray(False)
-    kept, _, end, *_ = control.adapt_step_size(
-        zero, jnp.asarray(1e-3, dtype), y0, y1, None, error, ORDER, rejected
-    )
-    return bool(kept), float(end)
-
-
-def _size(error):
-    """Root mean square of the error in units of the tolerance."""
-    inverse = np.array([float(x) for x in UNITS.inverse])
-    largest = 1.1 * np.abs([float(x) for x in STATE])
-    return np.sqrt(np.mean((np.asarray(error) / (1e-2 * RTOL / inverse + RTOL * largest)) ** 2))
+    pairs = list(zip(STATE, units.inverse, strict=True))
+    for share, kept in ((0.9, True), (1.1, False)):
+        error = jb.State(*(share * (1e-2 * RTOL / i + RTOL * abs(leaf)) for leaf, i in pairs))
+        times = jnp.asarray(0.5), jnp.asarray(0.5 + SPAN)
+        step = (STATE, STATE, None, error, ORDER, jnp.asarray(False))
+        assert bool(control.adapt_step_size(*times, *step)[0]) is kept
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("wanted", [1e-3, 0.5, 0.9, 1.1, 30.0])
 def test_step_size_is_that_of_the_root_mean_square(wanted, dtype):
     direction = np.random.default_rng(3).standard_normal(8) * np.logspace(-3, 2, 8)
-    error = direction * wanted / _size(direction)
-    kept, end = _after(error, dtype)
-    assert kept == (wanted < 1.0)
-    size = end - 1e-3 if kept else end
+    errors = wanted * direction / np.sqrt(np.mean(direction**2))
+    kept, start, end, *_ = _adapted(errors, at=0.0, grown=1.1, dtype=dtype)
+    assert bool(kept) is (wanted < 1.0)
     most = 10.0 if kept else 1.0
-    expected = 1e-3 * np.clip(0.8 * wanted ** (-1.0 / ORDER), 0.2, most)
-    np.testing.assert_allclose(size, expected, rtol=1e-12 if dtype is np.float64 else 1e-3)
+    expected = SPAN * np.clip(0.8 * wanted ** (-1.0 / ORDER), 0.2, most)
+    rounding = 1e-12 if dtype is np.float64 else 1e-3
+    np.testing.assert_allclose(end - start, expected, rtol=rounding)
 
 
 @pytest.mark.parametrize("place", range(8))
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_what_is_no_number_is_rejected(place, bad):
-    error = np.zeros(8)
-    error[place] = bad
-    assert _after(error) == (False, pytest.approx(0.2e-3))
+    errors = np.zeros(8)
+    errors[place] = bad
+    kept, _, end, *_ = _adapted(errors, at=0.0)
+    assert (bool(kept), float(end)) == (False, pytest.approx(0.2e-3))
 
 
 def test_four_tolerances_share_a_division():

@@ -9,18 +9,10 @@ import pytest
 import jaxbiped as jb
 
 SOLVERS = [jb.solvers.Rodas3P, jb.solvers.Rodas4, jb.solvers.Rodas4P, jb.solvers.Rodas5P]
-DENSE_ORDER = {
-    jb.solvers.Rodas3P: 3,
-    jb.solvers.Rodas4: 3,
-    jb.solvers.Rodas4P: 3,
-    jb.solvers.Rodas5P: 4,
-}
-STIFF_ORDER = {
-    jb.solvers.Rodas3P: 3,
-    jb.solvers.Rodas4: 2,
-    jb.solvers.Rodas4P: 4,
-    jb.solvers.Rodas5P: 4,
-}
+DENSE_ORDER = dict(zip(SOLVERS, (3, 3, 3, 4), strict=True))
+STIFF_ORDER = dict(zip(SOLVERS, (3, 2, 4, 4), strict=True))
+STEPS = dict(zip(SOLVERS, ((16, 32, 64), (48, 96, 192), (48, 96, 192), (32, 64, 128)), strict=True))
+"""Of which the orders of convergence are measured."""
 each_solver = pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: solver.__name__)
 
 
@@ -170,10 +162,8 @@ BETWEEN = jnp.linspace(0.003, 0.997, 150)
 def _solve(field, solver, y0, args, steps):
     """Values between steps and, last, at the end of `steps` equal steps over [0, 1]."""
     term, dt0 = diffrax.ODETerm(field), 1.0 / steps
-    saveat = diffrax.SaveAt(ts=BETWEEN, t1=True)
-    return diffrax.diffeqsolve(
-        term, solver, 0.0, 1.0, dt0, y0, args, saveat=saveat, max_steps=512
-    ).ys
+    how = dict(saveat=diffrax.SaveAt(ts=BETWEEN, t1=True), max_steps=512)
+    return diffrax.diffeqsolve(term, solver, 0.0, 1.0, dt0, y0, args, **how).ys
 
 
 def _kaps(t, y, mu):
@@ -198,9 +188,7 @@ def _slope(steps, errors):
 
 @each_solver
 def test_orders_of_convergence(solver):
-    steps = {jb.solvers.Rodas3P: (16, 32, 64), jb.solvers.Rodas5P: (32, 64, 128)}.get(
-        solver, (48, 96, 192)
-    )
+    steps = STEPS[solver]
     ends, dense = [], []
     truth = _kaps_solution(np.append(np.asarray(BETWEEN), 1.0))
     start = tuple(map(jnp.asarray, _kaps_solution(0.0)))
@@ -223,13 +211,8 @@ def test_orders_on_prothero_robinson_problems(solver):
     dense = np.zeros(3)
     for i, number in enumerate(steps):
         for j, stiffness in enumerate(stiffnesses):
-            values = _solve(
-                _prothero_robinson,
-                solver(),
-                jnp.sin(jnp.asarray(0.3)),
-                jnp.asarray(stiffness),
-                jnp.asarray(float(number)),
-            )
+            start, *numbers = map(jnp.asarray, (np.sin(0.3), stiffness, float(number)))
+            values = _solve(_prothero_robinson, solver(), start, *numbers)
             error = np.abs(values - np.sin(np.append(np.asarray(BETWEEN), 1.0) + 0.3))
             errors[i, j] = error[-1]
         dense[i] = error[:-1].max()

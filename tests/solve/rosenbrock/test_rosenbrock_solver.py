@@ -73,29 +73,24 @@ def _final_x(adjoint):
 POINT = (jnp.asarray(1.0), jnp.asarray(SPRING))
 
 
-@pytest.mark.slow
+BACKSOLVE = diffrax.BacksolveAdjoint(solver=jb.solvers.Rodas4(), stepsize_controller=CONTROLLER)
+
+
 @pytest.mark.parametrize(
-    "adjoint",
+    ("transform", "adjoint"),
     [
-        diffrax.RecursiveCheckpointAdjoint(),
-        diffrax.DirectAdjoint(),
-        diffrax.BacksolveAdjoint(solver=jb.solvers.Rodas4(), stepsize_controller=CONTROLLER),
+        *(
+            pytest.param(jax.grad, each, marks=pytest.mark.slow)
+            for each in (diffrax.RecursiveCheckpointAdjoint(), diffrax.DirectAdjoint(), BACKSOLVE)
+        ),
+        (jax.jacfwd, diffrax.ForwardMode()),
+        (jax.jacfwd, diffrax.DirectAdjoint()),
     ],
-    ids=lambda adjoint: type(adjoint).__name__,
+    ids=lambda each: getattr(each, "__name__", type(each).__name__),
 )
-def test_reverse_gradients(adjoint):
-    gradient = jax.jit(jax.grad(_final_x(adjoint), argnums=(0, 1)))(*POINT)
-    np.testing.assert_allclose(gradient, TRUE_GRADIENT, rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    "adjoint",
-    [diffrax.ForwardMode(), diffrax.DirectAdjoint()],
-    ids=lambda adjoint: type(adjoint).__name__,
-)
-def test_forward_derivatives(adjoint):
-    jacobian = jax.jit(jax.jacfwd(_final_x(adjoint), argnums=(0, 1)))(*POINT)
-    np.testing.assert_allclose(jacobian, TRUE_GRADIENT, rtol=1e-6)
+def test_derivatives_by_every_adjoint(transform, adjoint):
+    found = jax.jit(transform(_final_x(adjoint), argnums=(0, 1)))(*POINT)
+    np.testing.assert_allclose(found, TRUE_GRADIENT, rtol=1e-6)
 
 
 def test_implicit_gradient_of_a_steady_state():

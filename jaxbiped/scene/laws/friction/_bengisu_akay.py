@@ -9,16 +9,8 @@ from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, smooth_ramp
 
 
-class BengisuAkay(AbstractFrictionLaw):
-    """Regularised dry friction that rises to its static peak at v0 and decays to kinetic.
-
-    With F_S = mu_static F_N, F_C = mu_kinetic F_N and s = |V_T|:
-
-    - s < v0: F = F_S − (F_S/v0²)(s − v0)²
-    - s ≥ v0: F = F_C + (F_S − F_C) exp(−xi (s − v0))
-
-    Source: the seed paper, section 2.2, after Bengisu and Akay. Its printed first branch lost a
-    minus sign, a square and a bracket; this reading alone is zero at rest and continuous at v0.
+class AbstractPeakedFriction(AbstractFrictionLaw):
+    """Friction that peaks at the slip speed v0 and decays beyond, with the rate xi.
 
     Attributes (leaves of any batch shape):
         mu_static: static coefficient, reached at v0 [–].
@@ -30,12 +22,26 @@ class BengisuAkay(AbstractFrictionLaw):
         ArgumentError: a coefficient or xi below 0, or v0 not above 0.
     """
 
-    name: ClassVar[str] = "bengisu-akay"
     builds_up_over: ClassVar[str | None] = "v0"
     mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
     mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
     v0: Parameter = parameter("slip at the peak", "$v_0$", "m/s", positive=True)
     xi: Parameter = parameter("decay of friction", r"$\xi$", "s/m", minimum=0.0)
+
+
+class BengisuAkay(AbstractPeakedFriction):
+    """Regularised dry friction that rises to its static peak at v0 and decays to kinetic.
+
+    With F_S = mu_static F_N, F_C = mu_kinetic F_N and s = |V_T|:
+
+    - s < v0: F = F_S − (F_S/v0²)(s − v0)²
+    - s ≥ v0: F = F_C + (F_S − F_C) exp(−xi (s − v0))
+
+    Source: the seed paper, section 2.2, after Bengisu and Akay. Its printed first branch lost a
+    minus sign, a square and a bracket; this reading alone is zero at rest and continuous at v0.
+    """
+
+    name: ClassVar[str] = "bengisu-akay"
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         u = slip_speed / self.v0
@@ -57,7 +63,7 @@ class BengisuAkay(AbstractFrictionLaw):
         return seed
 
 
-class SmoothBengisuAkay(AbstractFrictionLaw):
+class SmoothBengisuAkay(AbstractPeakedFriction):
     """`BengisuAkay` made twice continuously differentiable, with the same four parameters.
 
     With u = V_T/v0, F_S = mu_static F_N and F_C = mu_kinetic F_N:
@@ -67,23 +73,9 @@ class SmoothBengisuAkay(AbstractFrictionLaw):
       argument from v0 on.
 
     From 2 v0 on it is the original. `docs/laws.md` tells how much it changes the gait.
-
-    Attributes (leaves of any batch shape):
-        mu_static: static coefficient, reached at v0 [–].
-        mu_kinetic: kinetic coefficient, reached far above v0 [–].
-        v0: slip speed of the peak [m/s].
-        xi: Stribeck rate, the decay above v0 [s/m].
-
-    Raises:
-        ArgumentError: a coefficient or xi below 0, or v0 not above 0.
     """
 
     name: ClassVar[str] = "smooth-bengisu-akay"
-    builds_up_over: ClassVar[str | None] = "v0"
-    mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
-    mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
-    v0: Parameter = parameter("slip at the peak", "$v_0$", "m/s", positive=True)
-    xi: Parameter = parameter("decay of friction", r"$\xi$", "s/m", minimum=0.0)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         u = jnp.clip(slip_speed / self.v0, -1.0, 1.0)

@@ -12,48 +12,62 @@ from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, power
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
 
-def stribeck_coefficient(
-    mu_static: Scalar, mu_kinetic: Scalar, v_s: Scalar, p: Scalar, slip_speed: Scalar
-) -> Scalar:
-    """mu_kinetic + (mu_static − mu_kinetic) exp(−(|V_T|/v_s)^p) [–], at rest mu_static.
+class AbstractStribeckCurve(AbstractFrictionLaw):
+    """Friction with the coefficient μ = mu_kinetic + (mu_static − mu_kinetic) exp(−(|V_T|/v_s)^p).
 
-    Even in V_T. Its slope at rest is reported as zero, which is what matters in a product with
-    a factor that vanishes there: for p < 1 it has none.
-    """
-    speed = jnp.abs(slip_speed)
-    slips = speed > 0.0
-    fallen = power(jnp.where(slips, speed, v_s) / v_s, p)
-    decay = jnp.where(slips, jnp.exp(-fallen), 1.0)
-    return mu_kinetic + (mu_static - mu_kinetic) * decay
-
-
-def stribeck_switches(p: Scalar, slip_speed: Scalar) -> tuple[Scalar, ...]:
-    """Rest, where V_T times the curve has a corner in its first derivative: for p up to 1.
-
-    For a steeper p there is none, and the function that is returned has no zero.
-    """
-    return (jnp.where(p <= 1.0, slip_speed, 1.0),)
-
-
-class Stribeck(AbstractFrictionLaw):
-    """Friction that falls from static to kinetic and rises again with the speed of slip.
-
-    F = F_N (μ tanh(V_T/v_d) + k_v V_T), opposing V_T, with
-    μ = mu_kinetic + (mu_static − mu_kinetic) exp(−(|V_T|/v_s)^p).
-
-    The tanh regularises rest. Where v_d is well below v_s (p = 2) the peak lies at a few v_d and
-    reaches all but mu_static. The viscous part is proportional to the load, so that it fades with
-    contact. For p = 1 the second derivative jumps at rest and for p < 1 it is without bound there;
-    above, the law has no switch.
-
-    Source: Bo and Pavelescu, Wear 82 (1982) 277; Armstrong-Hélouvry, Dupont and Canudas de Wit,
-    Automatica 30 (1994) 1083.
+    For p = 1 the second derivative jumps at rest and for p < 1 it is without bound there; above,
+    the law has no switch.
 
     Attributes (leaves of any batch shape):
         mu_static: static coefficient, which the curve starts from [–].
         mu_kinetic: kinetic coefficient, which the curve falls to [–].
         v_s: Stribeck speed, over which it falls [m/s].
         p: exponent of the fall, usually from 0.5 to 2 [–].
+    """
+
+    mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
+    mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
+    v_s: Parameter = parameter("Stribeck speed", "$v_s$", "m/s", positive=True)
+    p: Parameter = parameter("exponent of the fall", "$p$", positive=True)
+
+    def coefficient(self, slip_speed: Scalar) -> Scalar:
+        """μ [–], even in V_T and at rest mu_static.
+
+        Its slope at rest is reported as zero, which is what matters in a product with a factor
+        that vanishes there: for p < 1 it has none.
+        """
+        speed = jnp.abs(slip_speed)
+        slips = speed > 0.0
+        fallen = power(jnp.where(slips, speed, self.v_s) / self.v_s, self.p)
+        decay = jnp.where(slips, jnp.exp(-fallen), 1.0)
+        return self.mu_kinetic + (self.mu_static - self.mu_kinetic) * decay
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        """Rest, where p ≤ 1; for a steeper p a function that has no zero."""
+        return (jnp.where(self.p <= 1.0, slip_speed, 1.0),)
+
+    @staticmethod
+    def curve_like_seed(seed: BengisuAkay) -> dict[str, Parameter]:
+        """Both coefficients and the fall over 1/xi (p = 1)."""
+        check_positive("xi", seed.xi, "s/m")
+        v_s = by_numpy(lambda _, xi: 1.0 / xi, seed.xi)
+        return dict(mu_static=seed.mu_static, mu_kinetic=seed.mu_kinetic, v_s=v_s, p=1.0)
+
+
+class Stribeck(AbstractStribeckCurve):
+    """Friction that falls from static to kinetic and rises again with the speed of slip.
+
+    F = F_N (μ tanh(V_T/v_d) + k_v V_T), opposing V_T, with the curve μ of `AbstractStribeckCurve`
+    and its parameters.
+
+    The tanh regularises rest. Where v_d is well below v_s (p = 2) the peak lies at a few v_d and
+    reaches all but mu_static. The viscous part is proportional to the load, so that it fades with
+    contact.
+
+    Source: Bo and Pavelescu, Wear 82 (1982) 277; Armstrong-Hélouvry, Dupont and Canudas de Wit,
+    Automatica 30 (1994) 1083.
+
+    Attributes (leaves of any batch shape):
         k_v: viscous friction per load and slip speed [s/m].
         v_d: slip speed over which friction builds up from rest [m/s].
 
@@ -63,51 +77,28 @@ class Stribeck(AbstractFrictionLaw):
 
     name: ClassVar[str] = "stribeck"
     builds_up_over: ClassVar[str | None] = "v_d"
-    mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
-    mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
-    v_s: Parameter = parameter("Stribeck speed", "$v_s$", "m/s", positive=True)
-    p: Parameter = parameter("exponent of the fall", "$p$", positive=True)
     k_v: Parameter = parameter("viscous friction", "$k_v$", "s/m", minimum=0.0)
     v_d: Parameter = parameter("build-up speed", "$v_d$", "m/s", positive=True)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
-        coefficient = stribeck_coefficient(
-            self.mu_static, self.mu_kinetic, self.v_s, self.p, slip_speed
-        )
-        dry = coefficient * tanh(slip_speed / self.v_d)
+        dry = self.coefficient(slip_speed) * tanh(slip_speed / self.v_d)
         return -normal_force * (dry + self.k_v * slip_speed)
-
-    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
-        """Rest, where p ≤ 1."""
-        return stribeck_switches(self.p, slip_speed)
 
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
         """Both coefficients, the slope 2 mu/v0 at rest (v_d = v0/2), the fall over 1/xi (p = 1)."""
-        check_positive("xi", seed.xi, "s/m")
-        return cls(
-            mu_static=seed.mu_static,
-            mu_kinetic=seed.mu_kinetic,
-            v_s=by_numpy(lambda _, xi: 1.0 / xi, seed.xi),
-            p=1.0,
-            k_v=0.0,
-            v_d=by_numpy(lambda _, v0: 0.5 * v0, seed.v0),
-        )
+        v_d = by_numpy(lambda _, v0: 0.5 * v0, seed.v0)
+        return cls(**cls.curve_like_seed(seed), k_v=0.0, v_d=v_d)
 
 
-class Andersson(AbstractFrictionLaw):
+class Andersson(AbstractStribeckCurve):
     """F = F_N μ tanh(k V_T), opposing V_T: a Stribeck curve, regularised at rest.
 
-    μ = mu_kinetic + (mu_static − mu_kinetic) exp(−(|V_T|/v_s)^p). For p = 1 the second
-    derivative jumps at rest and for p < 1 it is without bound there; above, the law has no switch.
+    The curve μ and its parameters are those of `AbstractStribeckCurve`.
 
     Source: Andersson, Söderberg and Björklund, Tribology International 40 (2007) 580.
 
     Attributes (leaves of any batch shape):
-        mu_static: static coefficient, which the curve starts from [–].
-        mu_kinetic: kinetic coefficient, which the curve falls to [–].
-        v_s: Stribeck speed, over which it falls [m/s].
-        p: exponent of the fall [–].
         k: how sharply friction builds up from rest [s/m].
 
     Raises:
@@ -115,33 +106,15 @@ class Andersson(AbstractFrictionLaw):
     """
 
     name: ClassVar[str] = "andersson"
-    mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
-    mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
-    v_s: Parameter = parameter("Stribeck speed", "$v_s$", "m/s", positive=True)
-    p: Parameter = parameter("exponent of the fall", "$p$", positive=True)
     k: Parameter = parameter("friction per slip", "$k$", "s/m", positive=True)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
-        coefficient = stribeck_coefficient(
-            self.mu_static, self.mu_kinetic, self.v_s, self.p, slip_speed
-        )
-        return -normal_force * coefficient * tanh(self.k * slip_speed)
-
-    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
-        """Rest, where p ≤ 1."""
-        return stribeck_switches(self.p, slip_speed)
+        return -normal_force * self.coefficient(slip_speed) * tanh(self.k * slip_speed)
 
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
         """Both coefficients, the slope 2 mu/v0 at rest (k = 2/v0), the fall over 1/xi (p = 1)."""
-        check_positive("xi", seed.xi, "s/m")
-        return cls(
-            mu_static=seed.mu_static,
-            mu_kinetic=seed.mu_kinetic,
-            v_s=by_numpy(lambda _, xi: 1.0 / xi, seed.xi),
-            p=1.0,
-            k=by_numpy(lambda _, v0: 2.0 / v0, seed.v0),
-        )
+        return cls(**cls.curve_like_seed(seed), k=by_numpy(lambda _, v0: 2.0 / v0, seed.v0))
 
 
 class BrownMcPhee(AbstractFrictionLaw):

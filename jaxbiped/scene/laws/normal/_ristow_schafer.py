@@ -1,12 +1,13 @@
 """The seed's normal law, Hertz stiffness with damping that grows with depth; its smooth twin."""
 
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractNormalLaw,
     depth_in_contact,
@@ -16,7 +17,7 @@ from jaxbiped.scene.laws._abstract_laws import (
     pushing,
     smooth_ramp,
 )
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractHertzianLaw, Standing
+from jaxbiped.scene.laws.normal._weight_on_law import AbstractHertzianLaw
 
 
 class RistowSchafer(AbstractHertzianLaw):
@@ -53,9 +54,49 @@ class RistowSchafer(AbstractHertzianLaw):
         return (self.K * power(depth, self.n - 1.0) + self.c * rate,)
 
     @classmethod
-    def like_seed(cls, seed: Self, standing: Standing) -> Self:
+    def like_seed(cls, seed: Self, standing: "Standing") -> Self:
         """The seed's law."""
         return seed
+
+
+class Standing(NamedTuple):
+    """How a mass stands on the seed's law, computed where it is asked for.
+
+    Attributes:
+        law: the seed's.
+        mass: what stands there [kg].
+        g: gravitational acceleration [m/s²].
+    """
+
+    law: RistowSchafer
+    mass: Scalar
+    g: Scalar
+
+    @property
+    def penetration(self) -> Scalar:
+        """How deep it stands [m]."""
+        return _rest_penetration(self.mass, self.g, self.law.K, self.law.n)
+
+    @property
+    def damping_ratio(self) -> Scalar:
+        """Of small oscillations about that [–]."""
+        return _damping_ratio(self.penetration, self.mass, self.g, self.law.c, self.law.n)
+
+    def arguments(self) -> dict[str, Scalar]:
+        """Of `from_weight`."""
+        names = ("mass", "penetration", "damping_ratio", "g")
+        return {name: getattr(self, name) for name in names}
+
+
+@kept_alone
+def _rest_penetration(mass: Scalar, g: Scalar, K: Scalar, n: Scalar) -> Scalar:
+    return (mass * g / K) ** (1.0 / n)
+
+
+@kept_alone
+def _damping_ratio(penetration: Scalar, mass: Scalar, g: Scalar, c: Scalar, n: Scalar) -> Scalar:
+    stiffness = n * mass * g / penetration
+    return 0.5 * c * penetration / jnp.sqrt(stiffness * mass)
 
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)

@@ -1,7 +1,7 @@
 """Weight on a normal law: its parameters from how a mass stands on it."""
 
 import abc
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+from typing import ClassVar, Self
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -10,9 +10,6 @@ from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, hertz_energy, hertz_force
-
-if TYPE_CHECKING:
-    from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
 
 
 class AbstractDampedLaw(AbstractNormalLaw):
@@ -74,35 +71,6 @@ class AbstractHertzianLaw(AbstractDampedLaw):
         return hertz_energy(self.K, getattr(self, "n", self.exponent), penetration)
 
 
-class Standing(NamedTuple):
-    """How a mass stands on the seed's law, computed where it is asked for.
-
-    Attributes:
-        law: the seed's.
-        mass: what stands there [kg].
-        g: gravitational acceleration [m/s²].
-    """
-
-    law: "RistowSchafer"
-    mass: Scalar
-    g: Scalar
-
-    @property
-    def penetration(self) -> Scalar:
-        """How deep it stands [m]."""
-        return _rest_penetration(self.mass, self.g, self.law.K, self.law.n)
-
-    @property
-    def damping_ratio(self) -> Scalar:
-        """Of small oscillations about that [–]."""
-        return _damping_ratio(self.penetration, self.mass, self.g, self.law.c, self.law.n)
-
-    def arguments(self) -> dict[str, Scalar]:
-        """Of `from_weight`."""
-        names = ("mass", "penetration", "damping_ratio", "g")
-        return {name: getattr(self, name) for name in names}
-
-
 def matched_to_weight(
     *,
     mass: Parameter,
@@ -145,17 +113,6 @@ def _coefficient(
     law: type[AbstractDampedLaw], damper: Scalar, penetration: Scalar, mass: Scalar, g: Scalar
 ) -> Scalar:
     return law.damping_coefficient(damper, penetration, mass * g)
-
-
-@kept_alone
-def _rest_penetration(mass: Scalar, g: Scalar, K: Scalar, n: Scalar) -> Scalar:
-    return (mass * g / K) ** (1.0 / n)
-
-
-@kept_alone
-def _damping_ratio(penetration: Scalar, mass: Scalar, g: Scalar, c: Scalar, n: Scalar) -> Scalar:
-    stiffness = n * mass * g / penetration
-    return 0.5 * c * penetration / jnp.sqrt(stiffness * mass)
 
 
 @kept_alone

@@ -1,0 +1,194 @@
+"""Motion of a linkage in gravity."""
+
+import warnings
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._checks import (
+    ArgumentError,
+    check_count,
+    check_finite,
+    check_increasing,
+    check_not_negative,
+    check_positive,
+    check_type,
+)
+from jaxbiped._ending import Ending
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
+from jaxbiped.constraints._linkage import Constraints, constraints_of
+from jaxbiped.constraints._projection import check_independent, correct_step, nearest_consistent
+from jaxbiped.dynamics._linkage_motion import LinkageState, linkage_field
+from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._walker import LinkageScene
+from jaxbiped.simulate._start import Options, check_steps
+from jaxbiped.solve._accuracy import rms_norm, tolerances
+from jaxbiped.solve._projected_solver import check_adjoint, wrap_projected
+from jaxbiped.solve._solvers import solver_named, with_root_tolerances
+from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve.controllers._first_and_last_step import first_step
+from jaxbiped.solve.controllers._tangent_step_size import step_control
+from jaxbiped.solve.controllers._wrapped_control import StepControl
+
+_FAR = 0.5
+"""Distance of a start from its joints, in units of the longest arm, beyond which it is refused."""
+_LONGER, _LONG = 2.0, 1e-2
+"""Factor to the steps that steps of one size are held against, and the relative change of the final
+state from which they are too long."""
+
+
+_ALLOWED = ("solver", "accuracy", "rtol", "atol", "dt", "save", "max_solver_steps", "adjoint")
+"""Options that apply."""
+
+
+def simulate_linkage(
+    scene: LinkageScene, state: LinkageState, asked: Options
+) -> Trajectory[LinkageState]:
+    """Checks what is asked, and simulates a linkage from a start put on its constraints."""
+    asked.refuse_others(scene, _ALLOWED)
+    times, dt, adjoint = asked.times, asked.dt, asked.adjoint
+    if times is None:
+        raise ArgumentError(
+            f"save = {asked.save!r} is not allowed for a LinkageScene: give increasing times."
+        )
+    scene = check_scene(scene, LinkageScene)
+    check_type("state", state, LinkageState)
+    count = scene.linkage.coordinates * len(scene.linkage.bodies)
+    for name in ("q", "v"):
+        values = getattr(state, name)
+        if len(values) != count:
+            raise ArgumentError(
+                f"state.{name} has {len(values)} entries: this linkage has {count} coordinates."
+            )
+        for value in values:
+            check_finite(f"state.{name}", value)
+    state = LinkageState(*(tuple(map(as_float, values)) for values in state))
+    check_finite("times", times)
+    check_increasing("times", times, 1)
+    check_not_negative("times", times, "s")
+    check_count("max_solver_steps", asked.max_solver_steps)
+    times = as_float(times)
+    check_positive("times[-1]", times[-1], "s")
+    method = solver_named(asked.solver)
+    check_steps(method, dt, most_steps=asked.max_solver_steps, duration=times[-1])
+    check_independent(scene.linkage, scene.method, state.q)
+    _check_joints(scene, state)
+    check_adjoint(scene.method, adjoint)
+    relative, absolute = tolerances(asked.accuracy, asked.rtol, asked.atol)
+    control = step_control(relative, absolute, rms_norm) if dt is None else None
+    chosen = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
+    if dt is not None:
+        method = with_root_tolerances(method, as_float(relative), as_float(absolute))
+    problem = scene, state, times, method, control
+    step = None if dt is None else as_float(dt)
+    try:
+        swung = _solve(*problem, step, asked.max_solver_steps, chosen)
+    except TypeError as error:
+        if adjoint is not None or "forward-mode" not in str(error):
+            raise
+        raise ArgumentError(
+            "adjoint = None is not allowed in forward mode: choose diffrax.ForwardMode()."
+        ) from error
+    leaves = jtu.tree_leaves((scene, state, times, step))
+    if step is not None and not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+        longer = _solve(*problem, _LONGER * step, asked.max_solver_steps, chosen)
+        _warn_of_long_steps(swung, float(step), longer)
+    return swung
+
+
+def _check_joints(scene: LinkageScene, state: LinkageState) -> None:
+    """Refuses a start whose joints are far open; what is traced, or a batch, is not looked at."""
+    joints = scene.linkage.joints
+    pins = [joint.point_1 for joint in joints]
+    pins += [joint.point_2 for joint in joints if joint.body_2 is not None]
+    leaves = jtu.tree_leaves((scene, state))
+    if not pins or any(isinstance(x, jax.core.Tracer) or jnp.ndim(x) for x in leaves):
+        return
+    arm = max(float(np.hypot(*pin)) for pin in pins)
+    off = float(_distance(constraints_of(scene.linkage, *state)))
+    if arm > 0.0 and off > _FAR * arm:
+        raise ArgumentError(
+            f"state is {off:.3g} m off its joints: give a start on its constraints, or nearer than "
+            f"{_FAR:g} times the longest arm from a centre of mass to a joint, {arm:.3g} m."
+        )
+
+
+def _warn_of_long_steps(
+    swung: Trajectory[LinkageState], dt: float, other: Trajectory[LinkageState]
+) -> None:
+    """Warns where steps of one size are too long: others lead elsewhere."""
+    if swung.outcome is not Ending.FINISHED:
+        return
+    change = 0.0
+    for course, found in zip(swung.state, other.final, strict=True):
+        size = np.max(np.abs(np.array(course)))
+        apart = np.max(np.abs(np.array(course)[:, -1] - np.array(found)))
+        change = max(change, float(apart / size) if size > 0.0 else 0.0)
+    if not change <= _LONG:
+        warnings.warn(
+            f"dt = {dt:g} is too long: with steps of {_LONGER * dt:g} s the relative change of the "
+            f"final state is {change:.2g}; take shorter steps, or tolerances.",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+
+
+@cached_jit
+def _solve(
+    scene: LinkageScene,
+    state: LinkageState,
+    times: Scalar,
+    solver: diffrax.AbstractSolver[PyTree],
+    control: StepControl | None,
+    dt: Scalar | None,
+    most: int,
+    adjoint: diffrax.AbstractAdjoint,
+) -> Trajectory[LinkageState]:
+    if isinstance(scene.method, AbstractProjectingMethod):
+        solver = wrap_projected(solver, _correct_step, adjoint)
+    off = _distance(constraints_of(scene.linkage, *state))
+    start = LinkageState(*map(tuple, nearest_consistent(scene.linkage, *state)))
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(linkage_field),
+        solver,
+        t0=jnp.zeros_like(times[0]),
+        t1=times[-1],
+        dt0=first_step(times[-1]) if control is not None else dt,
+        y0=start,
+        args=scene,
+        saveat=diffrax.SaveAt(ts=times),
+        stepsize_controller=diffrax.ConstantStepSize() if control is None else control,
+        max_steps=most,
+        adjoint=adjoint,
+        throw=False,
+    )
+    found: PyTree = solution.ys
+    finite = jnp.isfinite(sum(leaf[-1] for leaf in jtu.tree_leaves(found)))
+    out_of_steps = jnp.asarray(solution.result == diffrax.RESULTS.max_steps_reached)
+    done = finite & jnp.asarray(solution.result == diffrax.RESULTS.successful)
+    ending = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), int(Ending.SOLVER_FAILED))
+    return Trajectory(
+        t=jnp.asarray(solution.ts),
+        state=found,
+        ending=jnp.where(done, int(Ending.FINISHED), ending),
+        accepted=solution.stats["num_accepted_steps"],
+        rejected=solution.stats["num_rejected_steps"],
+        correction=off,
+        violation=_distance(constraints_of(scene.linkage, *found)),
+    )
+
+
+def _correct_step(scene: LinkageScene, state: LinkageState) -> LinkageState:
+    assert isinstance(scene.method, AbstractProjectingMethod)
+    return LinkageState(*map(tuple, correct_step(scene.linkage, scene.method, *state)))
+
+
+def _distance(at: Constraints) -> Scalar:
+    squares = [value * value for value in at.violation]
+    return jnp.sqrt(sum(squares[1:], squares[0])) if squares else jnp.zeros(())

@@ -1,0 +1,258 @@
+"""Walk of the rigid walker: a checked request, which either engine runs."""
+
+import dataclasses
+import functools
+from typing import ClassVar, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._checks import (
+    ArgumentError,
+    check_positive,
+    check_room,
+    check_unbatched,
+    traced_rules,
+)
+from jaxbiped._types import Scalar, as_float, by_numpy
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
+from jaxbiped.compiler import Program, Request
+from jaxbiped.dynamics._section import HeelStrike
+from jaxbiped.dynamics._state import RigidState, check_state
+from jaxbiped.scene._scene import RigidScene
+from jaxbiped.scene._scene_checks import check_scene, where_allowed
+from jaxbiped.simulate._derivatives import with_derivatives
+from jaxbiped.simulate._slopes import Slopes, rigid_slopes_of
+from jaxbiped.simulate._start import (
+    Options,
+    check_limits,
+    check_single_scene,
+    in_one_precision,
+    in_own_precision,
+)
+from jaxbiped.solve._accuracy import ACCURACIES
+from jaxbiped.solve._engine_names import engine_for, engine_named
+from jaxbiped.solve._rigid_steps import (
+    RigidProgress,
+    RigidWalk,
+    attempt_step,
+    ending_of,
+    initial_progress,
+    state_with_hip,
+)
+from jaxbiped.solve._scene_key import scene_key
+from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
+
+_ROOM = 256
+"""Heel strikes that there is room for where it is not known how many come."""
+_FIRST = 1e-1
+"""First tolerance as a share of the relative error wanted."""
+_EMBEDDED = 0.3
+"""Tolerance of the embedded method's witness over the walk's: its errors are those that the
+tolerance bounds, which the walk's are 10 to 30 times below."""
+_LOOSEST = 1e-3
+"""Loosest tolerance to begin with."""
+_PATIENCE = 50.0
+"""Time allowed for each footstep, in units of √(l/g)."""
+_ALLOWED = (
+    *("duration", "footsteps", "accuracy", "rtol", "save", "max_arrivals", "max_solver_steps"),
+    "engine",
+)
+"""Options that apply."""
+
+
+class RigidSimulation(eqx.Module):
+    """A prepared rigid walk. Call it for its trajectory.
+
+    Attributes:
+        walk: the program's inputs.
+        waits: whether the duration only bounds the wait for footsteps.
+        embedded: whether steps go on with the embedded solution, one order lower.
+        max_arrivals: how many heel strikes to keep.
+        engine: "lanes", "cuda" or "xla".
+        finest_tolerance: finest relative tolerance to which its error is refined: rolling is smooth
+            and never stiff.
+    """
+
+    finest_tolerance: ClassVar[float] = 1e-13
+    walk: RigidWalk
+    waits: bool = eqx.field(static=True)
+    embedded: bool = eqx.field(static=True)
+    max_arrivals: int = eqx.field(static=True)
+    engine: str = eqx.field(static=True)
+
+    @staticmethod
+    def of(scene: RigidScene, state: RigidState, asked: Options) -> "RigidSimulation":
+        """Checks what is asked, and forms it."""
+        asked.refuse_others(scene, _ALLOWED)
+        section, duration, footsteps = asked.section, asked.duration, asked.footsteps
+        ends_alone = isinstance(asked.save, str) and asked.save == "end"
+        if not ends_alone and not isinstance(section, HeelStrike):
+            raise ArgumentError(
+                f"save = {asked.save!r} is not allowed for a RigidScene: "
+                'give "end" or HeelStrike().'
+            )
+        check_limits(duration, footsteps, asked.max_solver_steps)
+        with traced_rules() as rules:
+            scene = check_scene(scene, RigidScene)
+            state = in_one_precision(check_state(in_own_precision(state), RigidState))
+            check_single_scene(scene)
+            check_unbatched("state", state, "one start")
+            if duration is not None:
+                check_positive("duration", duration, "s")
+            usual = ACCURACIES[asked.accuracy].rigid_walk
+            tolerance = usual if asked.rtol is None else asked.rtol
+            check_positive("rtol", tolerance)
+        # Of a lane that is not allowed nothing is known from the start.
+        state, duration = where_allowed(rules, state), where_allowed(rules, duration, 1.0)
+        check_room("max_arrivals", asked.max_arrivals)
+        dtype = state.theta_1.dtype
+        narrow = "it computes in 64 bits" if dtype != jnp.float64 else None
+        count, longest = 1 if footsteps is None else footsteps, duration
+        if duration is None:
+            longest = by_numpy(
+                lambda numpy, l, g: count * (_PATIENCE * numpy.sqrt(l / g)),
+                scene.walker.l,
+                scene.ground.g,
+            )
+        walk = RigidWalk(
+            scene=scene,
+            state=state,
+            duration=as_float(longest),
+            footsteps=as_float(0 if footsteps is None else int(footsteps)),
+            rtol=as_float(tolerance),
+            max_attempts=as_float(asked.max_solver_steps),
+        )
+        return RigidSimulation(
+            # In the precision of the start, as a compliant walk has it.
+            jtu.tree_map(lambda leaf: leaf.astype(dtype), walk),
+            waits=duration is None,
+            embedded=False,
+            max_arrivals=0 if section is None else int(asked.max_arrivals),
+            engine=engine_for(asked.engine, obstacle=narrow, by_device=True, by_any=True),
+        )
+
+    @property
+    def scene(self) -> RigidScene:
+        """What walks."""
+        return self.walk.scene
+
+    @property
+    def rtol(self) -> Scalar:
+        """Relative tolerance."""
+        return self.walk.rtol
+
+    def at_tolerance(self, rtol: float) -> "RigidSimulation":
+        """The same at another relative tolerance."""
+        changed = as_float(rtol).astype(self.rtol.dtype)
+        return dataclasses.replace(self, walk=self.walk._replace(rtol=changed))
+
+    def by_other_method(self) -> tuple["RigidSimulation", float, float]:
+        """The same by the embedded method; its tolerance in units of the walk's, and its weight."""
+        return dataclasses.replace(self, embedded=True), _EMBEDDED, 1.0
+
+    def first_tolerance(self, wanted: float) -> float:
+        """The relative tolerance to begin with where this relative error is wanted."""
+        return min(_FIRST * wanted, _LOOSEST)
+
+    def __call__(self) -> Trajectory[RigidState]:
+        """Solves it, differentiably."""
+        walk = with_derivatives(self, RigidSimulation.solved, moving=_moving, slopes=_slopes)
+        return dataclasses.replace(walk, scene_key=scene_key(self.walk.scene))
+
+    def solved(self) -> Trajectory[RigidState]:
+        """Solves it."""
+        state = self.walk.state
+        program = rigid_program(self.max_arrivals > 0, self.waits, self.embedded)
+        request = Request(program, self.walk, room=self.max_arrivals, quick=True)
+        found, recorded, _ = engine_named(self.engine).run(request)
+        no_rows = np.zeros((0, 1 + len(state)), state.theta_1.dtype)
+        rows = no_rows if recorded is None else recorded.values
+        t, end = single_time(found.t, found.state)
+        return Trajectory(
+            t=t,
+            state=end,
+            ending=found.ending,
+            accepted=found.accepted,
+            rejected=found.rejected,
+            arrivals=arrivals_among(rows, found.footsteps, state),
+            grazes=found.grazes,
+            engine=self.engine,
+        )
+
+
+class RigidSolved(NamedTuple):
+    """One walk's outputs: see `RigidProgress`."""
+
+    t: Scalar
+    state: RigidState
+    ending: Scalar
+    footsteps: Scalar
+    accepted: Scalar
+    rejected: Scalar
+    grazes: Scalar
+
+
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def rigid_program(records: bool, waits: bool, embedded: bool = False) -> Program:
+    """The program of a `RigidWalk`.
+
+    Args:
+        records: whether time and state after each strike are recorded.
+        waits: whether the duration only bounds the wait for footsteps.
+        embedded: whether steps go on with the embedded solution; see `rolling_step`.
+    """
+
+    def finish(walk: RigidWalk, now: RigidProgress) -> RigidSolved:
+        code = ending_of(walk, now, jnp.asarray(waits))
+        counts = (now.footsteps, now.accepted, now.rejected, now.grazes)
+        return RigidSolved(now.t, state_with_hip(walk, now), code, *counts)
+
+    attempt = functools.partial(attempt_step, embedded=embedded)
+    return Program(initial_progress, attempt, finish, record=_record if records else None)
+
+
+def _record(walk: RigidWalk, now: RigidProgress, time: Scalar) -> tuple[Scalar, list[Scalar]]:
+    return now.struck, [now.t, *state_with_hip(walk, now)]
+
+
+def _moving(run: RigidSimulation) -> tuple[PyTree, PyTree, PyTree]:
+    return run.walk.state, run.walk.scene, run.walk.duration
+
+
+def _slopes(
+    run: RigidSimulation,
+    found: Trajectory[RigidState],
+    places: tuple[int, ...],
+    active: tuple[int, ...],
+) -> Slopes:
+    assert found.arrivals is not None
+    count, kept = found.arrivals.total, run.max_arrivals
+    strikes = found.arrivals.t
+    known = [each for each in (count, run.walk.footsteps) if not isinstance(each, jax.core.Tracer)]
+    room = int(known[0]) if known and int(known[0]) else _ROOM
+    if room > kept:
+        walk: RigidSimulation = jax.lax.stop_gradient(dataclasses.replace(run, max_arrivals=room))
+        again = walk.solved().arrivals
+        assert again is not None
+        strikes = again.t
+    slopes = rigid_slopes_of(
+        run.walk.scene,
+        run.walk.state,
+        strikes,
+        count,
+        found.t[-1],
+        found.ending,
+        until=run.walk.duration,
+        rtol=run.walk.rtol,
+        places=places,
+        active=active,
+    )
+    if len(strikes) == kept:
+        return slopes
+    # Of the strikes only those that are kept, then the end.
+    return Slopes(*(jnp.concatenate([leaf[:kept], leaf[-1:]]) for leaf in slopes))

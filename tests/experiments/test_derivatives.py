@@ -1,0 +1,52 @@
+"""Derivatives, at their quick size, against differences of finer walks and a finer reference."""
+
+import numpy as np
+import pytest
+
+from tests.drawn import points_of
+from tests.experiments.quick import drawn_run, quick_run
+
+pytestmark = pytest.mark.nightly
+
+
+def test_every_derivative_through_an_ending_is_right_or_refused(tmp_path):
+    numbers, _ = quick_run("event_derivatives", tmp_path)
+    assert len(numbers["endings"]) == 5
+    for row in numbers["endings"]:
+        for error in row["errors"].values():
+            if row["ends"] == "every step":
+                assert 'save="steps"' in error
+            else:
+                assert error < 1e-4
+    for draft, balanced, tight in numbers["laws"]["stribeck"].values():
+        assert draft < 1e-3
+        assert balanced < 1e-4
+        assert tight < 1e-5
+    assert "kelvin-voigt" in (tmp_path / "event_derivatives.md").read_text()
+
+
+def test_both_precautions_make_derivatives_follow_their_tolerance(tmp_path):
+    # Units stand in the titles, of what is in error.
+    bare = {"error", "attempted steps of a footstep"}
+    numbers, figures = drawn_run("gradient_accuracy", tmp_path, unitless=bare)
+    points = numbers["points"]["exact laws"]
+    keys = ("state", "period_s", "unit_multiplier", "period_slope")
+    for ax, key in zip(figures["gradient_accuracy.png"].axes, keys, strict=True):
+        for name, row in points.items():
+            shown = [(point["steps"], point[key]) for point in row]
+            np.testing.assert_array_equal(points_of(ax, name)[0], shown)
+    assert numbers["reference"]["exact laws"]["unit_multiplier"] < 1e-6
+    for name in ("norm", "both"):
+        assert points[name][-1]["unit_multiplier"] < 1e-3
+        assert points[name][-1]["period_slope"] < 1e-3
+    assert points["plain"][-1]["unit_multiplier"] > 1e-3
+    assert all(row[-1]["state"] < 1e-5 for row in points.values())
+
+
+def test_costs_over_the_number_of_parameters(tmp_path):
+    numbers, figures = quick_run("gradient_cost", tmp_path)
+    assert not figures
+    (row,) = numbers["rows"]
+    assert row["parameters"] == 4
+    assert row["return_ms"] > 0.0
+    assert row["radius_by_differences_ms"] == pytest.approx(8.0 * row["return_ms"])

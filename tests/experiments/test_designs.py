@@ -1,0 +1,51 @@
+"""Designs and fitted parameters, at the quick size, against the seed's gait and known truths."""
+
+import pytest
+
+from tests.drawn import assert_is_drawn, labels_of
+from tests.experiments.quick import drawn_run, quick_run
+
+pytestmark = pytest.mark.nightly
+
+
+def test_the_worst_member_costs_speed_and_the_front_is_a_trade(tmp_path):
+    bare = {"bound of the spectral radius", "spectral radius under scatter"}
+    numbers, _ = drawn_run("optimise_robust", tmp_path, unitless=bare)
+    found = numbers["designs"]
+    assert found["worst"]["objective"] < found["mean"]["objective"]
+    assert found["worst"]["share_beyond_bound"] <= found["nominal"]["share_beyond_bound"]
+    loose, strict = numbers["front"]["speed_m_s"]
+    assert loose > strict
+
+
+def test_the_radius_is_halved_at_no_loss_of_speed(tmp_path):
+    bare = {"gait sensitivity norm", "spectral radius", "real part of a multiplier"}
+    numbers, _ = drawn_run("optimise_speed", tmp_path, unitless={*bare, "imaginary part"})
+    told = numbers["designs"]
+    seed = told["seed"]["measures"]
+    for name in ("calmest", "least radius"):
+        measures = told[name]["measures"]
+        assert measures["spectral_radius"] <= 0.5 * seed["spectral_radius"] * (1.0 + 1e-4)
+        assert measures["speed"] >= seed["speed"] * (1.0 - 1e-4)
+    for each in told.values():
+        assert each["certificate"]["stable"] is True
+        assert each["certificate"]["returned"] is True
+    fast = numbers["fastest"]["trust-region"]["measures"]
+    assert fast["speed"] > seed["speed"]
+    assert fast["spectral_radius"] <= 0.4 * (1.0 + 1e-4)
+    descent = numbers["descents"]["minimise spectral_radius"]
+    assert descent["objective"] < seed["spectral_radius"]
+    assert descent["evaluations"] >= descent["iterations"] > 1
+
+
+def test_estimates_scatter_as_their_errors_say(tmp_path):
+    numbers, figures = quick_run("identify", tmp_path)
+    assert numbers["converged"] == numbers["sets"] == 3
+    assert numbers["undetermined_with_xi"] == ["xi"]
+    for held in numbers["parameters"].values():
+        # Three estimates scatter; four standard errors are a wide gate, a wrong Jacobian wider.
+        off = abs(held["mean_estimate"] - held["truth"])
+        assert off < 4.0 * held["mean_standard_error"]
+        assert 0.0 < held["mean_standard_error"] < 0.1 * held["truth"]
+    (figure,) = figures.values()
+    assert_is_drawn(figure, unitless=set(labels_of(figure)))

@@ -1,0 +1,84 @@
+"""Speeds, at their quick size, against results that must be right and lanes' bits."""
+
+import numpy as np
+import pytest
+
+from tests.compiler.fake_driver import install
+from tests.drawn import labels_of, points_of
+from tests.experiments.quick import drawn_run, quick_run
+
+pytestmark = pytest.mark.nightly
+
+
+def test_without_a_device_it_says_so(tmp_path, monkeypatch):
+    install(monkeypatch, devices=0)
+    numbers, figures = quick_run("gpu_speed", tmp_path)
+    assert numbers["missing"] == "there is no CUDA device"
+    assert not figures
+    assert not {"walks", "labels", "peak_flops"} & set(numbers)
+    for row in numbers["assembled"]:
+        assert row["registers"] <= 255
+        assert row["warps"] == 8
+
+
+def test_where_a_device_is_it_runs_to_its_end(tmp_path, monkeypatch):
+    install(monkeypatch, lanes=2, multiprocessors=1)
+    bare = {"starts in the batch", "attempted steps a second"}
+    numbers, _ = drawn_run("gpu_speed", tmp_path, unitless=bare)
+    assert numbers["devices"] == ["emulated 0"]
+    assert numbers["peak_flops"] > 0.0
+    assert [row["same_bits"] for row in numbers["errors"]] == [1.0]
+    assert [row["labels_that_differ"] for row in numbers["labels"]] == [0]
+
+
+def test_what_lanes_are_timed_by_is_right(tmp_path):
+    counts = {"simulations in the batch", "simulations of 2 s a second"}
+    numbers, figures = drawn_run("lanes_speed", tmp_path, unitless=counts, alone=True)
+    ways = {row["way"] for row in numbers["singles"]}
+    assert {"lanes", "lanes, rodas4", "xla"} <= ways
+    assert all(row["error"] < 1e-3 for row in numbers["singles"])
+    assert numbers["batches"]
+    assert all(row["error_median"] < 1e-3 for row in numbers["batches"])
+    assert "lanes" in {row["way"] for row in numbers["derivatives"]}
+    ours = [row for row in numbers["derivatives"] if row["way"] != "CasADi CVODES"]
+    assert all(0.0 < row["error"] < 1e-4 for row in ours)
+    gaits = {"lanes, with the radius's", "lanes, without the radius's"}
+    assert set(numbers["gaits_s"]) == set(numbers["gait_periods_s"]) == gaits
+    for period in numbers["gait_periods_s"].values():
+        assert period == pytest.approx(0.4408349, abs=1e-7)
+    more, less = numbers["scenes"]
+    assert more["instructions"] > less["instructions"] > 0
+    assert 0.0 < numbers["share_of_peak"] < 1.0
+    batches, alone = figures["lanes_speed.png"].axes
+    shown = points_of(batches, "lanes")[0][:, 1].tolist()
+    rows = [row for row in numbers["batches"] if row["way"] == "lanes"]
+    assert shown == [row["simulations_per_s"] for row in rows]
+    assert {line.get_label() for line in alone.lines} == ways
+
+
+def test_every_lane_of_a_batch_arrives(tmp_path):
+    labels = {"simulations in the batch", "attempted steps a second, all lanes"}
+    numbers, figures = drawn_run("speed_batch", tmp_path, unitless=labels, alone=True)
+    ours = [row for row in numbers["rows"] if row["way"] == "vmap"]
+    assert ours
+    assert all(row["failed"] == 0 and row["steps_per_second"] > 0 for row in ours)
+    assert labels_of(figures["speed_batch.png"]) == labels
+
+
+def test_single_walks_agree_with_an_independent_solve(tmp_path):
+    numbers, figures = drawn_run("speed_single", tmp_path, alone=True)
+    assert numbers["reference_difference"] < 1e-8
+    errors = [point["error"] for point in numbers["points"]["rodas4"]]
+    assert min(errors) < 1e-7
+    shown = np.concatenate(points_of(figures["speed_single.png"].axes[0]))
+    assert set(errors) <= set(shown[:, 0])
+
+
+def test_the_default_has_the_smaller_error_in_about_as_many_steps(tmp_path):
+    label = "median error of the final state (SI units)"
+    numbers, figures = drawn_run("steps_tried", tmp_path, unitless={label}, alone=True)
+    old, new = ({row["way"]: row for row in numbers["rows"]}[way] for way in ("rodas4", "rodas4p"))
+    assert new["error_median"] < old["error_median"] < 1e-4
+    assert new["steps"] < 1.1 * old["steps"]
+    assert 0.0 < new["rejected"] < 0.3
+    assert label in labels_of(figures["steps_tried.png"])

@@ -1,0 +1,63 @@
+"""Sweeps of labels, at their quick size, against labels by SciPy, in memory and of one worker."""
+
+import pytest
+
+from tests.drawn import points_of
+from tests.experiments.quick import drawn_run, quick_run
+
+pytestmark = pytest.mark.nightly
+
+
+def test_peers_see_the_same_starts_walk(tmp_path):
+    bare = {"starts in the batch", "labelled starts that walk, a second"}
+    numbers, figures = drawn_run("throughput", tmp_path, unitless=bare, alone=True)
+    assert [row["size"] for row in numbers["sizes"]] == [500, 2000]
+    assert [row["chunk"] for row in numbers["chunks"]] == [512, 2048]
+    assert [row["threads"] for row in numbers["by_threads"]] == [1, 2]
+    assert all(row["walking_agrees"] == 1.0 for row in numbers["peers"])
+    independent = [row for row in numbers["peers"] if row["way"] == "SciPy LSODA"]
+    assert [row["which"] for row in independent] == ["that walk", "that fall"]
+    for row in independent:
+        assert row["starts"] == 8
+        assert row["fates_agree"] == 1.0
+    both = [(row["engine"], row["labels_agree"]) for row in numbers["engines"]]
+    assert both == [("lanes", 1.0), ("xla", 1.0)]
+    shown = points_of(figures["throughput.png"].axes[0], "compliant")[0].tolist()
+    assert shown == [[row["size"], row["us_each"]] for row in numbers["sizes"]]
+
+
+def test_a_killed_sweep_is_resumed_to_the_same_labels(tmp_path):
+    numbers, _ = quick_run("sweep_store", tmp_path)
+    assert numbers["runs"]
+    for run in numbers["runs"]:
+        assert run["killed"] == len(run["kills"])
+        assert 0 < run["labelled_in_last_run"] < run["starts"]
+        assert run["pending"] == 0
+        assert run["differ_from_memory"] == 0
+
+
+def test_two_workers_find_the_labels_of_one(tmp_path):
+    bare = {"worker processes of one core each", "labelled starts a second"}
+    numbers, _ = drawn_run("process_scaling", tmp_path, unitless=bare, alone=True)
+    one, two = numbers["rows"]
+    assert (one["workers"], two["workers"]) == (1, 2)
+    for row in (one, two):
+        assert row["starts"] == 1024
+        assert row["labels_differ"] == 0
+        assert min(row["starts_per_s"]) > 0.0
+    assert numbers["efficiency"] == pytest.approx(two["best"] / one["best"] / 2.0)
+
+
+def test_lanes_give_the_same_bits_and_xla_what_an_ulp_does(tmp_path):
+    bare = {"share of walks that differ by more"}
+    numbers, _ = drawn_run("reproducibility", tmp_path, unitless=bare)
+    rows = {row["name"]: row for row in numbers["rows"]}
+    moved = rows.pop("lanes, start one ulp away")
+    xla = rows.pop("XLA")
+    assert {"lanes, 256 bits, threads: 1", "lanes, batches of 7"} <= rows.keys()
+    for row in rows.values():
+        assert row["same_bits"] == numbers["walks"], row["name"]
+        assert row["labels"] == row["gait"] == 0
+    assert moved["same_bits"] == 0
+    assert 0.0 < xla["median"] < 3.0 * moved["median"]
+    assert xla["endings"] == 0

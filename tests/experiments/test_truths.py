@@ -1,0 +1,166 @@
+"""Truths of gradients: closed form and collocation against SciPy, and what tools say of them."""
+
+import dataclasses
+import json
+import sys
+from importlib.metadata import version
+
+import _gradient_ways
+import footstep_truth
+import gradient_truth
+import numpy as np
+import pytest
+import truth_of_all
+from _ball_closed_form import PROBLEMS, closed_form
+from reference.collocation import radau
+from reference.compliant import numbers
+from reference.footstep import LAWS, MID_STANCE, PARAMETERS, footstep
+from reference.scipy_solves import final_of
+from scipy.integrate import solve_ivp
+
+from tests.experiments.quick import drawn_run
+
+ROWS = [
+    {"problem": "spring", "way": "ours", "setting": "rtol", "value": 1e-4, "outcome": "answered"}
+    | {"state_error": 2e-5, "gradient_error": 3e-5, "said": 4e-3, "seconds": 0.2, "cpu_s": 0.1},
+    {"problem": "spring", "way": "another", "setting": "dt", "outcome": "not installed"},
+    {"problem": "footstep", "way": "third", "setting": "dt", "value": 1e-3, "outcome": "answered"}
+    | {"state_error": 1e-1, "gradient_error": 7.5, "said": None, "seconds": 2.0, "cpu_s": 3.0},
+]
+
+
+def _followed(problem):
+    """SciPy's solution, phase by phase between touchdown and release."""
+    g, K, c = problem.g, problem.K, problem.c
+
+    def falling(t, y):
+        return y[1], -g
+
+    def damping(v):
+        return c * (v if problem.damps_rebound else min(v, 0.0))
+
+    def pushed(t, y):
+        return y[1], -g * problem.weight_in_contact - K * y[0] - damping(y[1])
+
+    def touchdown(t, y):
+        return y[0]
+
+    def release(t, y):
+        return K * y[0] + damping(y[1])
+
+    touchdown.direction, touchdown.terminal = -1.0, True
+    release.direction, release.terminal = 1.0, True
+    t, y, in_contact = 0.0, np.array([problem.height, 0.0]), False
+    while t < problem.duration:
+        rates, event = (pushed, release) if in_contact else (falling, touchdown)
+        span = (t, problem.duration)
+        found = solve_ivp(rates, span, y, "DOP853", events=event, rtol=1e-12, atol=1e-14)
+        t, y, in_contact = found.t[-1], found.y[:, -1], not in_contact
+    return y
+
+
+OTHER_LAWS = (
+    dataclasses.replace(PROBLEMS[0], name="no weight in contact", weight_in_contact=0.0),
+    dataclasses.replace(PROBLEMS[1], name="damped while it sinks", damps_rebound=False),
+)
+
+
+@pytest.mark.parametrize("problem", [*PROBLEMS, *OTHER_LAWS], ids=lambda problem: problem.name)
+def test_the_closed_form_is_what_scipy_finds(problem):
+    truth = closed_form(problem)
+    assert truth.bounces == 3
+    assert truth.uncertainty < 1e-20
+    assert _followed(problem) == pytest.approx(truth.state, rel=1e-8)
+
+
+def test_derivatives_of_the_closed_form_are_scipys_differences():
+    problem, step = PROBLEMS[1], 1e-5
+    for column, name in enumerate(problem.parameters):
+        value = getattr(problem, name)
+        ends = [
+            _followed(dataclasses.replace(problem, **{name: value * (1.0 + sign * step)}))
+            for sign in (1.0, -1.0)
+        ]
+        slopes = (ends[0] - ends[1]) / (2.0 * step)
+        truth = np.array(closed_form(problem).gradient)[:, column]
+        assert slopes == pytest.approx(truth, rel=1e-4), name
+
+
+def test_radau_is_of_its_order():
+    """The last row integrates powers exactly up to twice the stages less two, and no further."""
+    nodes, matrix, _, last = radau(4)
+    for power in range(7):
+        assert matrix[-1] @ nodes**power == pytest.approx(1.0 / (power + 1), abs=1e-14)
+    assert matrix[-1] @ nodes**7 != pytest.approx(1.0 / 8.0, abs=1e-6)
+    assert last @ nodes**2 == pytest.approx(0.0, abs=1e-14)
+    assert abs(last @ nodes**3) > 1e-2
+
+
+@pytest.mark.nightly
+def test_the_footstep_is_scipys():
+    found = footstep()
+    assert found.state == pytest.approx(final_of(found.time, 1e-9, start=MID_STANCE), abs=2e-7)
+    assert [name for name, _ in found.switches].count("depth 1") == 1
+
+
+@pytest.mark.nightly
+def test_derivatives_of_the_footstep_are_differences():
+    found, h = footstep(), 1e-4
+    for k in (0, 1, 2, 3):
+        laws = [LAWS * np.exp(s * h * np.eye(4)[k]) for s in (1.0, -1.0)]
+        ends = [footstep(p=numbers(**dict(zip(PARAMETERS, each, strict=True)))) for each in laws]
+        slope = (ends[0].time - ends[1].time) / (2.0 * h)
+        assert slope == pytest.approx(found.time_gradient[8 + k], rel=1e-4, abs=1e-10)
+    height = np.eye(8)[1] * 1e-8
+    ends = [footstep(MID_STANCE + s * height) for s in (1.0, -1.0)]
+    slope = (ends[0].state - ends[1].state) / 2e-8
+    assert slope == pytest.approx(found.gradient[:, 1], rel=1e-4, abs=1e-5)
+
+
+@pytest.mark.nightly
+def test_only_our_gradients_through_bounces_are_right_and_know_it(tmp_path):
+    numbers, _ = drawn_run("gradient_truth", tmp_path)
+    answered = [row for row in numbers["rows"] if row["outcome"] == "answered"]
+    own = [row for row in answered if row["way"] == "jaxbiped"]
+    assert {row["problem"] for row in own} == {problem.name for problem in PROBLEMS}
+    for row in own:
+        assert row["gradient_error"] < 1e-2
+        assert row["gradient_error"] <= row["said"] < 0.1
+    assert min(row["gradient_error"] for row in answered if row["setting"] == "dt") > 0.1
+
+
+@pytest.mark.nightly
+def test_our_gradients_of_a_footstep_agree_and_say_how_far(tmp_path):
+    numbers, _ = drawn_run("footstep_truth", tmp_path)
+    assert numbers["problem"]["coarser_collocation"] < 1e-9
+    assert numbers["problem"]["our_finest"] < 2e-8
+    *own, peer = numbers["rows"]
+    assert {row["way"] for row in own} == {"jaxbiped"}
+    for row in own:
+        assert row["gradient_error"] <= row["said"] < 0.1
+    # Differences of solves at 1e-4, by the best of their steps.
+    assert peer["gradient_error"] > 10.0 * own[0]["gradient_error"]
+    assert peer["said"] is None
+
+
+def test_versions_are_those_installed():
+    found = _gradient_ways.versions()
+    assert found["jax"] == version("jax")
+    assert set(found) == set(_gradient_ways.PACKAGES)
+
+
+def test_both_truths_come_in_one_table_and_a_file_each(tmp_path, monkeypatch, capsys):
+    parts = {gradient_truth: ROWS[:2], footstep_truth: ROWS[2:]}
+    for module, rows in parts.items():
+        made = {"rows": rows, "picture": f"{module.__name__}.png"}
+        monkeypatch.setattr(module, "measured", lambda options, made=made: made)
+    monkeypatch.setattr(sys, "argv", ["truth_of_all", "--out", str(tmp_path)])
+    truth_of_all.main()
+    said = [line.split() for line in capsys.readouterr().out.splitlines()]
+    (ours,) = (line for line in said if "ours" in line)
+    assert {"2e-05", "3e-05", "0.1", "0.004"} <= set(ours)
+    assert any("another" in line and "installed" in line for line in said)
+    (third,) = (line for line in said if "third" in line)
+    assert "–" in third
+    for module, rows in parts.items():
+        assert json.loads((tmp_path / f"{module.__name__}.json").read_text())["rows"] == rows

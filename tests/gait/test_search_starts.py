@@ -1,0 +1,40 @@
+"""Starts of a search: the fitted one against walkers of any size, others against rolling."""
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.gait._search_starts import default_guess
+from tests.solve.test_units import sized
+
+
+def test_the_seeds_own_start_is_the_papers():
+    assert [float(x) for x in default_guess(jb.seed_scene())] == [float(x) for x in jb.seed_state()]
+
+
+@pytest.mark.parametrize(("length", "time"), [(1e-3, 1e-3**0.5), (1e3, 2.0)])
+def test_a_walker_of_any_size_starts_alike(length, time):
+    scene, start, _ = sized(length, time)
+    fitted = default_guess(scene)
+    np.testing.assert_allclose(np.array(fitted), np.array(start), rtol=1e-12)
+    walk = jb.simulate(scene, fitted, duration=0.45 * time, save="end", engine="lanes")
+    assert walk.outcome == jb.Ending.WALKING
+
+
+def test_rolling_starts_do_not_slip_and_begin_with_the_seeds():
+    scene = jb.seed_scene(l=0.5)
+    starts = jb.gait.rolling_starts(scene, 5)
+    both = jb.dynamics.feet(scene, starts)
+    np.testing.assert_allclose(both.foot_2.slip_speed, 0.0, atol=1e-14)
+    np.testing.assert_allclose(both.foot_2.penetration_rate, 0.0, atol=1e-14)
+    np.testing.assert_allclose(both.foot_2.penetration, both.foot_2.penetration[0], atol=1e-14)
+    seed = jb.seed_state()
+    assert float(starts.theta_1[0]) == float(seed.theta_1)
+    assert np.ptp(np.asarray(starts.theta_1)) > 0.0
+    assert not np.allclose(starts.omega_2, jb.gait.rolling_starts(scene, 5, seed=1).omega_2)
+
+
+@pytest.mark.parametrize(("count", "spread", "named"), [(0, 0.3, "count"), (3, 0.0, "spread")])
+def test_bad_arguments(count, spread, named):
+    with pytest.raises(jb.ArgumentError, match=named):
+        jb.gait.rolling_starts(jb.seed_scene(), count, spread=spread)

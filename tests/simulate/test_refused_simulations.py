@@ -1,0 +1,151 @@
+"""Simulations that are not allowed, against one sentence before anything is compiled."""
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from tests.linkages import hanging, one_leg, pinned_pendulum
+from tests.rigid_walkers import rigid_seed
+
+SCENE, STATE = jb.seed_scene(), jb.seed_state()
+ROLLING = jb.dynamics.rigid_state(STATE)
+STILL = hanging(0.5, rates=(0.0,))
+START = hanging(0.5, -0.8, rates=(1.0, 2.0))
+SEVERAL = jb.LinkageScene(pinned_pendulum(), jb.constraints.Standard())
+
+
+def walked(**how):
+    return jb.simulate(SCENE, STATE, **{"duration": 1.0, **how})
+
+
+def in_legs(**how):
+    return jb.simulate(jb.RedundantScene(SCENE), STATE, duration=1.0, **how)
+
+
+def rolled(**how):
+    return jb.rigid_walk(rigid_seed(), ROLLING, **how)
+
+
+def swung(state=STILL, **how):
+    scene = jb.LinkageScene(one_leg(), jb.constraints.Index1())
+    return jb.swing(scene, state, **{"times": [0.0, 3.0], **how})
+
+
+def swung_by_euler(state=START, **how):
+    times = jnp.linspace(0.0, 2.0, 201)
+    return jb.swing(SEVERAL, state, **{"times": times, "solver": "euler", "dt": 1e-3, **how})
+
+
+CASES = [
+    (walked, dict(duration=-1.0), "duration = -1 is not allowed"),
+    (walked, dict(duration=np.nan), "duration = nan is not allowed"),
+    (walked, dict(duration=None), "say how long to simulate"),
+    (walked, dict(footsteps=0), "footsteps = 0 is not allowed"),
+    (walked, dict(rtol=0.0), "rtol = 0 is not allowed"),
+    (walked, dict(atol=-1e-9), "atol = -1e-09 is not allowed"),
+    (walked, dict(max_solver_steps=0), "max_solver_steps = 0 is not allowed"),
+    (walked, dict(max_arrivals=0), "max_arrivals = 0 is not allowed"),
+    (walked, dict(save=jb.MidStance(), max_arrivals=0), "max_arrivals = 0 is not allowed"),
+    (walked, dict(watch=("falls",)), "watch = 'falls' is not known"),
+    (walked, dict(save="last"), "save = 'last' is not known"),
+    (walked, dict(save=jnp.array([0.2, 0.1])), "save"),
+    (walked, dict(save=jnp.array([0.5, 1.5])), "must be increasing times from 0 to 1"),
+    (walked, dict(engine="gpu"), "choose one of auto, xla, lanes"),
+    (walked, dict(save=jb.MidStance(), engine="fast"), "choose one of auto, xla, lanes"),
+    (walked, dict(engine="lanes", solver="kvaerno3"), "Kvaerno3 is not one of its solvers"),
+    (walked, dict(engine="lanes", adjoint=diffrax.ForwardMode()), "an adjoint is diffrax's"),
+    (walked, dict(save=jb.HeelStrike(), engine="xla"), "only lanes do that"),
+    (walked, dict(save=jb.HeelStrike(), solver="kvaerno3"), "Kvaerno3 is not one"),
+    (walked, dict(accuracy="best"), "accuracy = 'best' is not known"),
+    (walked, dict(accuracy="fine"), "accuracy = 'fine' is not known: choose one of draft"),
+    (walked, dict(accuracy=0.0), "accuracy = 0 is not allowed"),
+    (walked, dict(accuracy=-1), "accuracy = -1 is not allowed"),
+    (walked, dict(accuracy=float("nan")), "accuracy = nan is not allowed"),
+    (walked, dict(accuracy=True), "accuracy = True is not a number"),
+    (
+        walked,
+        dict(accuracy=1e-3, rtol=1e-6),
+        "rtol = 1e-06 is not allowed beside accuracy = 0.001",
+    ),
+    (walked, dict(accuracy=1e-3, dt=1e-6), "dt = 1e-06 is not allowed beside accuracy"),
+    (in_legs, dict(engine="lanes"), "redundant coordinates are diffrax's, but for save"),
+    (in_legs, dict(solver="euler"), "dt = None is not allowed for solver = euler"),
+    (in_legs, dict(dt=0.0), "dt = 0 is not allowed"),
+    (in_legs, dict(dt=1e-9), "more than max_solver_steps = 65536"),
+    (in_legs, dict(save=jb.HeelStrike()), "save = HeelStrike() is not allowed here"),
+    (rolled, dict(), "say how long"),
+    (rolled, dict(footsteps=0), "footsteps = 0"),
+    (rolled, dict(duration=-1.0), "duration = -1"),
+    (rolled, dict(footsteps=1, accuracy="best"), "accuracy = 'best'"),
+    (rolled, dict(footsteps=1, accuracy="fine"), "is not known: choose one of draft"),
+    (rolled, dict(footsteps=1, accuracy=0.0), "accuracy = 0 is not allowed"),
+    (rolled, dict(footsteps=1, rtol=0.0), "rtol = 0"),
+    (
+        rolled,
+        dict(footsteps=1, accuracy=1e-3, rtol=1e-6),
+        "rtol = 1e-06 is not allowed beside accuracy = 0.001",
+    ),
+    (rolled, dict(footsteps=1, engine="gpu"), "engine = 'gpu'"),
+    (rolled, dict(footsteps=1, max_solver_steps=0), "max_solver_steps = 0"),
+    (swung, dict(times=3.0), "times = 3"),
+    (swung, dict(times=[]), "1 or more increasing numbers"),
+    (swung, dict(times=[2.0, 1.0, 3.0]), "increasing numbers"),
+    (swung, dict(times=[-1.0, 3.0]), "times = -1"),
+    (swung, dict(times=[1.0, np.nan]), "times = nan"),
+    (swung, dict(state=STILL._replace(q=(5.0, 5.0, 0.5))), "7.1 m off its joints"),
+    (
+        swung,
+        dict(state=STILL._replace(q=(0.0, 0.0))),
+        "state.q has 2 entries: this linkage has 3 coordinates",
+    ),
+    (
+        swung,
+        dict(state=STILL._replace(q=(0.0,) * 4)),
+        "state.q has 4 entries: this linkage has 3 coordinates",
+    ),
+    (swung_by_euler, dict(dt=None), "dt = None is not allowed for solver = euler"),
+    (swung_by_euler, dict(dt=-1e-3), "dt = -0.001 is not allowed"),
+    (swung_by_euler, dict(dt=1e-9), "more than max_solver_steps"),
+    (swung_by_euler, dict(times=jnp.asarray([0.0, jnp.nan])), "times = nan"),
+    (
+        swung_by_euler,
+        dict(state=jb.dynamics.LinkageState((0.0,), (0.0,))),
+        "this linkage has 6 coordinates",
+    ),
+]
+
+
+@pytest.mark.parametrize(("simulation", "how", "said"), CASES)
+def test_what_is_not_allowed_is_one_sentence(simulation, how, said):
+    with pytest.raises(jb.ArgumentError) as refused:
+        simulation(**how)
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("scene", "state", "how", "said"),
+    [
+        (rigid_seed(), ROLLING, dict(save="end", dt=1e-3), "dt = 0.001 is not allowed for a Rigid"),
+        (rigid_seed(), ROLLING, dict(), 'give "end" or HeelStrike()'),
+        (SEVERAL, START, dict(save=[1.0], footsteps=3), "footsteps = 3 is not allowed for a Link"),
+        (SEVERAL, START, dict(), "give increasing times"),
+    ],
+)
+def test_options_of_other_kinds_of_scene_are_refused(scene, state, how, said):
+    with pytest.raises(jb.ArgumentError) as refused:
+        jb.simulate(scene, state, **how)
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(("walk", "start"), [(jb.simulate, STATE), (jb.rigid_walk, ROLLING)])
+def test_an_accuracy_by_a_number_is_refused_where_nothing_is_known_yet(walk, start):
+    scene = SCENE if walk is jb.simulate else rigid_seed()
+
+    def walked(angle):
+        return walk(scene, start._replace(theta_1=angle), footsteps=1, accuracy=1e-3).t
+
+    with pytest.raises(jb.ArgumentError, match="under jit, vmap or differentiation"):
+        jax.jit(walked)(-0.25)
