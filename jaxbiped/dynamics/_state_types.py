@@ -1,4 +1,4 @@
-"""Types of states made from the names of their scalars: the same type each time, in each process."""
+"""Types of states by the names of their scalars: the same each time and in each process."""
 
 import collections
 import functools
@@ -24,7 +24,7 @@ def _made(names: tuple[str, ...]) -> type[Any]:
     for kind in (known_states.State, known_states.BristleState, known_states.RigidState):
         if kind._fields == names:
             return kind
-    made: Any = collections.namedtuple("State", names)  # noqa: PYI024
+    made: Any = collections.namedtuple("State", names)
     made.__module__, made.__qualname__ = __name__, f"StateOf({','.join(names)})"
     return made
 
