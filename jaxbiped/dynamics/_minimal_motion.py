@@ -4,13 +4,14 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._actuation import hip_torques
-from jaxbiped.dynamics._contacts import Feet, Foot, feet, foot_force, hip_motion
+from jaxbiped.dynamics._contacts import feet, foot_force, hip_motion
 from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.dynamics._state import State, field_of
+from jaxbiped.dynamics._tree import Motion, point_motion, pose_of, times
+from jaxbiped.dynamics._tree_inertia import centrifugal_loads, composites, eliminate, substitute
 from jaxbiped.scene._scene import CompliantScene, Scene
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
@@ -29,56 +30,9 @@ class Accelerations(NamedTuple):
     alpha_2: Scalar
 
 
-class LegLoad(NamedTuple):
-    """What one leg brings to the equations of motion.
-
-    Attributes:
-        force_x, force_z: ground reaction and centrifugal force that reach the hip [N].
-        torque: of ground reaction, gravity and actuators about the hip [N·m].
-        coupling_x, coupling_z: m d cos θ and m d sin θ, inertial coupling to the hip [kg·m].
-        inertia: about the hip, J + m d² [kg·m²].
-    """
-
-    force_x: Scalar
-    force_z: Scalar
-    torque: Scalar
-    coupling_x: Scalar
-    coupling_z: Scalar
-    inertia: Scalar
-
-
-def leg_load(scene: Scene, angle: Scalar, rate: Scalar, foot: Foot) -> LegLoad:
-    """Forces, torque and inertia of the leg at `angle` [rad] turning at `rate` [rad/s]."""
-    walker, ground = scene.walker, scene.ground
-    sine, cosine = sine_cosine(angle)
-    moment = walker.m * walker.d
-    coupling_x, coupling_z = moment * cosine, moment * sine
-    downhill, weight = ground.g * jnp.sin(ground.slope), ground.g * jnp.cos(ground.slope)
-    force_x, force_z = coupling_z * rate * rate, -coupling_x * rate * rate
-    torque = coupling_x * downhill - coupling_z * weight
-    # Where it is known that a foot never touches, nothing of its contact is in the program.
-    if foot.admitted is not False:
-        reaction = foot_force(scene, foot)
-        force_z = force_z + reaction.normal
-        torque = torque + reaction.normal * (walker.hip_to_foot * sine)
-        if reaction.tangential is not None:
-            force_x = force_x + reaction.tangential
-            torque = torque + reaction.tangential * (walker.hip_to_foot * cosine + walker.r)
-    inertia = walker.J + moment * walker.d
-    return LegLoad(force_x, force_z, torque, coupling_x, coupling_z, inertia)
-
-
-def leg_acceleration(leg: LegLoad, hip_ax: Scalar, hip_az: Scalar) -> Scalar:
-    """Angular acceleration [rad/s²] of a leg whose hip accelerates by (hip_ax, hip_az) [m/s²]."""
-    return (leg.torque - leg.coupling_x * hip_ax - leg.coupling_z * hip_az) / leg.inertia
-
-
 @kept_alone
 def accelerations(scene: Scene, state: State) -> Accelerations:
     """Accelerations at a state; leaves shaped as the state's.
-
-    The legs' accelerations are eliminated from the 4 × 4 mass matrix, and the 2 × 2 system that
-    is left for the hip is solved in closed form.
 
     Args:
         scene: the walker on its ground.
@@ -87,47 +41,27 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
     Returns:
         Hip [m/s²] and legs [rad/s²], leaves shaped as the state's.
     """
-    both = feet(scene, state)
-    legs = (
-        leg_load(scene, state.theta_1, state.omega_1, both.foot_1),
-        leg_load(scene, state.theta_2, state.omega_2, both.foot_2),
-    )
+    mechanism, ground, both = scene.walker.mechanism(), scene.ground, feet(scene, state)
+    structure = mechanism.structure
+    angles, rates = (state.theta_1, state.theta_2), (state.omega_1, state.omega_2)
+    motion = Motion(state.hip_x, state.hip_z, state.hip_vx, state.hip_vz, angles, rates)
+    pose, known = pose_of(mechanism, motion), composites(mechanism)
+    loads = centrifugal_loads(structure, known, pose)
+    for body, foot, found in zip(structure.feet, mechanism.feet, both, strict=True):
+        # Where it is known that a foot never touches, nothing of its contact is in the program.
+        if found.admitted is not False:
+            reaction = foot_force(scene, found)
+            point = point_motion(structure, pose, body, foot.centre)
+            loads = loads.with_force(point, reaction.tangential, reaction.normal)
+            loads = loads.with_torques(((body, 1.0),), times(reaction.tangential, foot.radius))
+    torques = None
     if scene.actuation is not None:
-        legs = _with_torques(scene, state, both, legs)
-    mass, ground = scene.walker.total_mass, scene.ground
-    m_xx, m_xz, m_zz = mass, jnp.zeros_like(mass), mass
-    f_x = mass * ground.g * jnp.sin(ground.slope)
-    f_z = -mass * ground.g * jnp.cos(ground.slope)
-    for leg in legs:
-        m_xx = m_xx - leg.coupling_x * leg.coupling_x / leg.inertia
-        m_xz = m_xz - leg.coupling_x * leg.coupling_z / leg.inertia
-        m_zz = m_zz - leg.coupling_z * leg.coupling_z / leg.inertia
-        f_x = f_x + leg.force_x - leg.coupling_x * leg.torque / leg.inertia
-        f_z = f_z + leg.force_z - leg.coupling_z * leg.torque / leg.inertia
-    determinant = m_xx * m_zz - m_xz * m_xz
-    hip_ax = (m_zz * f_x - m_xz * f_z) / determinant
-    hip_az = (m_xx * f_z - m_xz * f_x) / determinant
-    return Accelerations(
-        hip_ax,
-        hip_az,
-        leg_acceleration(legs[0], hip_ax, hip_az),
-        leg_acceleration(legs[1], hip_ax, hip_az),
-    )
-
-
-def _with_torques(
-    scene: Scene, state: State, both: Feet, legs: tuple[LegLoad, LegLoad]
-) -> tuple[LegLoad, LegLoad]:
-    """The legs' loads with the torques of the actuators."""
-    rates = (state.omega_1, state.omega_2)
-    hip = hip_motion(scene, both, (state.theta_1, state.theta_2), rates)
-    torques = hip_torques(scene, hip)
-    if torques is None:
-        return legs
-    first, second = (
-        leg._replace(torque=leg.torque + torque) for leg, torque in zip(legs, torques, strict=True)
-    )
-    return first, second
+        torques = hip_torques(scene, hip_motion(scene, both, angles, rates))
+    for body, torque in enumerate(torques or ()):
+        loads = loads.with_torques(((body, 1.0),), torque)
+    found = substitute(structure, eliminate(structure, known, pose), loads)
+    downhill, weight = ground.g * jnp.sin(ground.slope), ground.g * jnp.cos(ground.slope)
+    return Accelerations(found[0] + downhill, found[1] - weight, *found[2:])
 
 
 def bristle_rates(

@@ -9,6 +9,9 @@ from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.constraints._linkage import Body, Joint, Linkage
+from jaxbiped.scene._bodies import Body as RigidBody
+from jaxbiped.scene._bodies import Foot
+from jaxbiped.scene._mechanism import Mechanism
 
 
 class Walker(eqx.Module):
@@ -51,6 +54,15 @@ class Walker(eqx.Module):
         """Distance from the hip to the centre of the foot, l − r [m]."""
         found: Scalar = by_numpy(lambda _, l, r: l - r, self.l, self.r)
         return found
+
+    def mechanism(self) -> Mechanism:
+        """Two legs on the hip as data: bodies "1" and "2", of which the second stands."""
+        return Mechanism(
+            root_mass=self.hip_mass,
+            bodies=tuple(RigidBody(n, mass=self.m, inertia=self.J, centre=self.d) for n in "12"),
+            feet=tuple(Foot(n, centre=self.hip_to_foot, radius=self.r) for n in "12"),
+            mirror=(("1", "2"),),
+        )
 
     @property
     def total_mass(self) -> Scalar:

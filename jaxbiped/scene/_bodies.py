@@ -1,0 +1,130 @@
+"""Bodies and feet of a mechanism, and the points of a body at which they are fixed."""
+
+import dataclasses
+import re
+from typing import Any
+
+import equinox as eqx
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped._parameter_declaration import check_parameters, parameter
+from jaxbiped._types import Parameter
+
+_NAME = re.compile(r"[A-Za-z0-9_]+")
+RESERVED = ("normal", "vertical")
+"""Names that take a reaction and move nothing: the slope's normal and the vertical."""
+
+
+class Point(eqx.Module):
+    """A point of a body, in the body's own frame, whose origin is the body's hinge.
+
+    At an angle θ of the body the first axis is (sin θ, −cos θ), down the hanging body, and the
+    second is (cos θ, sin θ), ahead of it. In MuJoCo's words `pos="px 0 pz"` is (−pz, px).
+
+    Attributes (leaves of any batch shape):
+        along: down the body [m].
+        ahead: ahead of it [m]; None for 0, which is then not in the program at all.
+    """
+
+    along: Parameter = parameter("along the body", "", "m")
+    ahead: Parameter | None = parameter("ahead of the body", "", "m", default=None)
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
+
+
+def point_of(place: Any) -> Any:
+    """A point from one number, down the body, or from a pair (along, ahead)."""
+    if place is None or isinstance(place, Point):
+        return place
+    if isinstance(place, tuple | list):
+        if len(place) != 2:
+            raise ArgumentError(
+                f"a point = {place!r} is not allowed: give one number, down the body, or a pair "
+                "(along, ahead)."
+            )
+        return Point(*place)
+    return Point(place)
+
+
+def check_name(argument: str, name: object) -> None:
+    """Raises `ArgumentError` unless a name is made of letters, digits and underscores."""
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise ArgumentError(
+            f"{argument} = {name!r} is not allowed: it must be made of letters, digits and "
+            "underscores."
+        )
+    if name in RESERVED:
+        raise ArgumentError(
+            f"{argument} = {name!r} is not allowed: the name stands for a direction that takes a "
+            "reaction."
+        )
+
+
+class Body(eqx.Module):
+    """A rigid body that hangs by a hinge on another one, or on the root point.
+
+    Its angle θ is absolute, from the slope's normal: 0 where it hangs straight down, and a leg's is
+    positive where its foot is ahead (downhill). A torso stands above its hinge: its centre is
+    negative, and its angle positive where it leans back.
+
+    Attributes:
+        name: of letters, digits and underscores; its angle is `theta_NAME` in states.
+        mass: of the body [kg].
+        inertia: moment of inertia about its mass centre [kg·m²].
+        centre: mass centre in the body's frame, one number down the body or a pair (along, ahead)
+            [m], kept as a `Point`.
+        parent: the body that it hangs on; None for the root point.
+        at: place of its hinge in the parent's frame, likewise [m]; None for the parent's own hinge.
+
+    Raises:
+        ArgumentError: a name of other characters, a mass or an inertia below 0, or `at` without a
+            parent.
+    """
+
+    name: str = eqx.field(static=True)
+    _: dataclasses.KW_ONLY
+    mass: Parameter = parameter("mass", "$m$", "kg", minimum=0.0)
+    inertia: Parameter = parameter("moment of inertia", "$J$", "kg m^2", minimum=0.0)
+    centre: Point = eqx.field(converter=point_of)
+    parent: str | None = eqx.field(static=True, default=None)
+    at: Point | None = eqx.field(converter=point_of, default=None)
+
+    def __check_init__(self) -> None:
+        check_name("name", self.name)
+        check_parameters(self)
+        if self.at is not None and self.parent is None:
+            raise ArgumentError(
+                f"at is not allowed for Body({self.name!r}), which has no parent: bodies without "
+                "one all turn about the root point; give parent or leave at out."
+            )
+
+
+class Foot(eqx.Module):
+    """A circular foot of a body, or a point foot.
+
+    Attributes:
+        body: the body that it is part of.
+        centre: centre of its circle in the body's frame, one number down the body or a pair (along,
+            ahead) [m]; the sole is `centre + radius` down the body.
+        radius: of the circle [m]; None for a point.
+        name: "foot" unless given, or "foot_1", "foot_2" in order where a body has several.
+        leg: the leg that it belongs to; all feet of a body are one leg, named as the body is,
+            unless given.
+
+    Raises:
+        ArgumentError: a name of other characters, or a radius below 0.
+    """
+
+    body: str = eqx.field(static=True)
+    _: dataclasses.KW_ONLY
+    centre: Point = eqx.field(converter=point_of)
+    radius: Parameter | None = parameter("foot radius", "$r$", "m", minimum=0.0, default=None)
+    name: str | None = eqx.field(static=True, default=None)
+    leg: str | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self) -> None:
+        for argument in ("name", "leg"):
+            if getattr(self, argument) is not None:
+                check_name(argument, getattr(self, argument))
+        check_parameters(self)

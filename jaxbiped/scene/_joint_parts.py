@@ -1,0 +1,238 @@
+"""What acts at the joints of a mechanism: springs, stops, latches, couplings and motors."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, TypeAlias
+
+import equinox as eqx
+
+from jaxbiped._checks import ArgumentError, check_choice, check_type, holds_somewhere, is_number
+from jaxbiped._parameter_declaration import check_parameters, parameter
+from jaxbiped._types import Parameter
+from jaxbiped.scene._bodies import check_name
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
+
+Weights: TypeAlias = tuple[tuple[str, float], ...]
+"""Weights of bodies' absolute angles, in the order written."""
+
+HOLDS = ("while pressed", "until heel strike", "through heel strike")
+SIDES = ("role", "side")
+
+
+def angle_of(angle: Any) -> Any:
+    """A joint's angle as it is kept: a body's name, or weights of absolute angles as pairs."""
+    if isinstance(angle, Mapping):
+        return tuple((name, _weight(name, weight)) for name, weight in angle.items())
+    return angle
+
+
+def _weight(name: object, weight: object) -> float:
+    if not is_number(weight) or isinstance(weight, list | tuple):
+        raise ArgumentError(f"the weight of {name!r} in angle = {weight!r} is not a number.")
+    return float(weight)  # type: ignore[arg-type]
+
+
+class AbstractJointPart(eqx.Module):
+    """A force or a constraint on an angle of a mechanism.
+
+    The angle φ is a body's name, for its angle from the body that it hangs on (from the slope's
+    normal where it hangs on the root point), or weights of absolute angles by name, which may name
+    "normal" (angle 0) and "vertical" (angle of the slope) too. A torque τ acts on each body with
+    its weight, so the weights must sum to 0: what one side gains the other takes.
+
+    Attributes:
+        kind: what parameters of such a part are called after. A property of the class.
+        angle: see above.
+        name: takes the place of the kind in names of parameters; needed for two of a kind.
+    """
+
+    kind: ClassVar[str]
+    angle: eqx.AbstractVar[str | Weights]
+    name: eqx.AbstractVar[str | None]
+
+    def __check_init__(self) -> None:
+        if self.name is not None:
+            check_name("name", self.name)
+        check_angle(self.angle)
+        check_parameters(self)
+
+
+def check_angle(angle: object) -> None:
+    """Raises `ArgumentError` unless an angle is a name, or weights that sum to 0."""
+    if isinstance(angle, str):
+        return
+    if not isinstance(angle, tuple) or not angle:
+        raise ArgumentError(
+            f"angle = {angle!r} is not allowed: give a body's name, or weights of absolute angles "
+            "by name."
+        )
+    for name, weight in angle:
+        if weight == 0.0:
+            raise ArgumentError(
+                f"angle has the weight 0 for {name!r}, which is not allowed: leave the name out."
+            )
+    total = sum(weight for _, weight in angle)
+    if abs(total) > 1e-12 * max(abs(weight) for _, weight in angle):
+        raise ArgumentError(
+            f"angle = {dict(angle)} is not allowed, for its weights sum to {total:g}: a torque "
+            'from nowhere; name its other side, or "normal" or "vertical".'
+        )
+
+
+class Spring(AbstractJointPart):
+    """A spring, a damper or both: τ = −k (φ − rest) − b φ̇.
+
+    Attributes:
+        angle: see `AbstractJointPart`.
+        stiffness: k [N·m/rad]; None for a damper alone.
+        damping: b [N·m·s/rad]; None for none.
+        rest: angle at which the spring is slack [rad]; None for 0.
+        name: see `AbstractJointPart`.
+
+    Raises:
+        ArgumentError: neither stiffness nor damping, or a rest angle without stiffness.
+    """
+
+    kind: ClassVar[str] = "spring"
+    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    _: dataclasses.KW_ONLY
+    stiffness: Parameter | None = parameter("joint stiffness", "$k$", "N m/rad", default=None)
+    damping: Parameter | None = parameter("joint damping", "$b$", "N m s/rad", default=None)
+    rest: Parameter | None = parameter("rest angle", r"$\varphi_0$", "rad", default=None)
+    name: str | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self) -> None:
+        if self.stiffness is None and self.damping is None:
+            raise ArgumentError(
+                f"Spring({self.angle!r}) has neither stiffness nor damping: give one of them."
+            )
+        if self.rest is not None and self.stiffness is None:
+            raise ArgumentError(
+                f"rest is not allowed for Spring({self.angle!r}), which has no stiffness: it would "
+                "have no effect."
+            )
+
+
+class Stop(AbstractJointPart):
+    """Limits of an angle: elastic in scenes with laws of contact, plastic on rigid feet.
+
+    Beyond a limit a law of the normal force pushes back, τ = −law(φ − upper, φ̇) above and
+    +law(lower − φ, −φ̇) below. Its penetration is an angle [rad] and its force a torque [N·m], so
+    that a stiffness has the unit N·m/radⁿ.
+
+    Attributes:
+        angle: see `AbstractJointPart`.
+        upper, lower: the limits [rad]; None for none on that side.
+        law: what a scene with laws of contact needs; one of `NORMAL_LAWS`, for example.
+        holds: what a scene on rigid feet does: "while pressed", released when it would have to
+            pull; "until heel strike" or "through heel strike", locked from the hit on.
+        name: see `AbstractJointPart`.
+
+    Raises:
+        ArgumentError: no limit, a lower limit that is not below the upper one, or a law or a word
+            of another kind.
+    """
+
+    kind: ClassVar[str] = "stop"
+    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    _: dataclasses.KW_ONLY
+    upper: Parameter | None = parameter("upper limit", r"$\varphi_+$", "rad", default=None)
+    lower: Parameter | None = parameter("lower limit", r"$\varphi_-$", "rad", default=None)
+    law: AbstractNormalLaw | None = None
+    holds: str = eqx.field(static=True, default="while pressed")
+    name: str | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self) -> None:
+        if self.upper is None and self.lower is None:
+            raise ArgumentError(f"Stop({self.angle!r}) has no limit: give upper, lower or both.")
+        if (
+            self.upper is not None
+            and self.lower is not None
+            and holds_somewhere(self.lower >= self.upper)
+        ):
+            raise ArgumentError(
+                f"lower = {self.lower} is not allowed for Stop({self.angle!r}) with upper = "
+                f"{self.upper}: it must be below."
+            )
+        if self.law is not None:
+            check_type("law", self.law, AbstractNormalLaw)
+        check_choice("holds", self.holds, HOLDS)
+
+
+class Latch(AbstractJointPart):
+    """A detent that holds an angle until a torque overcomes it, the same on both kinds of feet.
+
+    τ = −T u exp((1 − u²)/2) − b φ̇ exp(−u²/2) with u = (φ − at)/width: largest, T, at ±width. A
+    mechanical latch that a knee keeps until heel strike is `Stop(..., holds=...)`.
+
+    Attributes:
+        angle: see `AbstractJointPart`.
+        at: the angle that it holds [rad].
+        width: where its torque is largest, from there [rad].
+        torque: T [N·m].
+        damping: b, where it holds [N·m·s/rad]; None for none.
+        name: see `AbstractJointPart`.
+
+    Raises:
+        ArgumentError: a width that is not above 0, or a torque or damping below 0.
+    """
+
+    kind: ClassVar[str] = "latch"
+    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    _: dataclasses.KW_ONLY
+    at: Parameter = parameter("latched angle", r"$\varphi_0$", "rad")
+    width: Parameter = parameter("width of the latch", "$w$", "rad", positive=True)
+    torque: Parameter = parameter("torque of the latch", "$T$", "N m", minimum=0.0)
+    damping: Parameter | None = parameter(
+        "damping of the latch", "$b$", "N m s/rad", minimum=0.0, default=None
+    )
+    name: str | None = eqx.field(static=True, default=None)
+
+
+class Coupling(AbstractJointPart):
+    """Angles that move together, exactly: Σ w θ = rest.
+
+    The angle and the rate of the first body that it names are not in states: they follow from the
+    others. `Coupling("battery")` welds a body to the one that it hangs on.
+
+    Attributes:
+        angle: see `AbstractJointPart`.
+        rest: what the sum is [rad]; None for 0.
+        name: see `AbstractJointPart`.
+    """
+
+    kind: ClassVar[str] = "coupling"
+    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    _: dataclasses.KW_ONLY
+    rest: Parameter | None = parameter("coupled angle", r"$\varphi_0$", "rad", default=None)
+    name: str | None = eqx.field(static=True, default=None)
+
+
+class Motor(AbstractJointPart):
+    """A motor, whose torque is a law of the motion and of nothing else.
+
+    Attributes:
+        angle: see `AbstractJointPart`; the torque turns it forward.
+        law: a function of the motion, `law(motion)` [N·m], a pytree of parameters.
+        by: "role" where the law is written for the second leg of each pair standing, and is
+            exchanged where the first one stands; "side" where it is told as it stands.
+        name: see `AbstractJointPart`.
+
+    Raises:
+        ArgumentError: a law that cannot be called, or another word.
+    """
+
+    kind: ClassVar[str] = "motor"
+    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    law: Callable[[Any], Any]
+    _: dataclasses.KW_ONLY
+    by: str = eqx.field(static=True, default="role")
+    name: str | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self) -> None:
+        if not callable(self.law):
+            raise ArgumentError(
+                f"law = {self.law!r} is not allowed for Motor({self.angle!r}): give a function of "
+                "the motion."
+            )
+        check_choice("by", self.by, SIDES)

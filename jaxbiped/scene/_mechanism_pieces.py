@@ -1,0 +1,97 @@
+"""Pieces of a mechanism, checked and numbered: what hangs on what, and which angle a part is on."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import equinox as eqx
+
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped.scene._bodies import RESERVED, Body, Foot
+from jaxbiped.scene._joint_parts import AbstractJointPart
+from jaxbiped.scene._structure import Angle, Indices
+
+
+def check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
+    for argument, kind, group in (
+        ("bodies", Body, bodies), ("feet", Foot, feet), ("joints", AbstractJointPart, joints)
+    ):  # fmt: skip
+        if isinstance(group, eqx.Module) or not isinstance(group, Sequence):
+            raise ArgumentError(f"{argument} = {group!r} is not allowed: give a tuple of them.")
+        for each in group:
+            check_type(argument, each, kind)
+    if not feet:
+        raise ArgumentError("feet is empty, which is not allowed: a mechanism needs one foot.")
+    names = [each.name for each in bodies]
+    for name in names:
+        if names.count(name) > 1 or name == root:
+            raise ArgumentError(
+                f"two parts are called {name!r}, which is not allowed: names are unique."
+            )
+
+
+def number_of(part: str, name: Any, names: Sequence[str]) -> int:
+    if name not in names:
+        raise ArgumentError(
+            f"{part} names {name!r}, which is no body: there are {', '.join(names)}."
+        )
+    return names.index(name)
+
+
+def parents_of(bodies: Sequence[Body], names: list[str]) -> Indices:
+    found = []
+    for j, body in enumerate(bodies):
+        if body.parent is None:
+            found.append(-1)
+            continue
+        parent = number_of(f"Body({body.name!r})", body.parent, names)
+        if parent >= j:
+            raise ArgumentError(
+                f"Body({body.name!r}) stands before its parent {body.parent!r}: parents come first."
+            )
+        found.append(parent)
+    return tuple(found)
+
+
+def foot_names_of(feet: Sequence[Foot]) -> tuple[str, ...]:
+    of_body = [each.body for each in feet]
+    found: list[str] = []
+    for k, foot in enumerate(feet):
+        several = of_body.count(foot.body) > 1
+        plain = f"foot_{of_body[: k + 1].count(foot.body)}" if several else "foot"
+        name = plain if foot.name is None else foot.name
+        if (foot.body, name) in zip(of_body, found, strict=False):
+            raise ArgumentError(
+                f"two feet of {foot.body!r} are called {name!r}, which is not allowed."
+            )
+        found.append(name)
+    return tuple(found)
+
+
+def angle_of_part(part: AbstractJointPart, parents: Indices, names: list[str]) -> Angle:
+    words = f"{type(part).__name__} on {part.angle!r}"
+    if isinstance(part.angle, str):
+        j = number_of(words, part.angle, names)
+        reaction = () if parents[j] < 0 else ((parents[j], -1.0),)
+        return Angle(((j, 1.0), *reaction))
+    weights, vertical = [], 0.0
+    for name, weight in part.angle:
+        if name == "vertical":
+            vertical = weight
+        elif name not in RESERVED:
+            weights.append((number_of(words, name, names), weight))
+    if not weights:
+        raise ArgumentError(f"{words} names no body, so that nothing would move.")
+    return Angle(tuple(weights), vertical)
+
+
+def turn_of(turn: Mapping[str, int] | None, names: list[str]) -> tuple[int, int] | None:
+    if turn is None:
+        return None
+    if not isinstance(turn, Mapping) or len(turn) != 1:
+        raise ArgumentError(f"turn = {turn!r} is not allowed: give one body and its count.")
+    ((name, count),) = turn.items()
+    if not isinstance(count, int) or count < 3:
+        raise ArgumentError(
+            f"turn = {dict(turn)} is not allowed: the count must be a whole number of at least 3."
+        )
+    return number_of("turn", name, names), count
