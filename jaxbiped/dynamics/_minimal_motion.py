@@ -59,9 +59,9 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
         torques = hip_torques(scene, hip_motion(scene, both, angles, rates))
     for body, torque in enumerate(torques or ()):
         loads = loads.with_torques(((body, 1.0),), torque)
-    found = substitute(structure, eliminate(structure, known, pose), loads)
+    moved = substitute(structure, eliminate(structure, known, pose), loads)
     downhill, weight = ground.g * jnp.sin(ground.slope), ground.g * jnp.cos(ground.slope)
-    return Accelerations(found[0] + downhill, found[1] - weight, *found[2:])
+    return Accelerations(moved[0] + downhill, moved[1] - weight, moved[2], moved[3])
 
 
 def bristle_rates(

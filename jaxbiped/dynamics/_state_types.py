@@ -1,13 +1,15 @@
 """Types of states by the names of their scalars: the same each time and in each process."""
 
 import collections
-import functools
 import re
 from collections.abc import Sequence
 from typing import Any
 
 import jaxbiped.dynamics._state as known_states
+from jaxbiped.caching._caches import bounded_cache
 
+_KEPT = 64
+"""Types that are kept though no state of theirs is left."""
 _CALLED = re.compile(r"StateOf\((\w+(?:,\w+)*)\)")
 
 
@@ -19,12 +21,12 @@ def state_type_of(names: Sequence[str]) -> type[Any]:
     return _made(tuple(names))
 
 
-@functools.cache
+@bounded_cache(_KEPT)
 def _made(names: tuple[str, ...]) -> type[Any]:
     for kind in (known_states.State, known_states.BristleState, known_states.RigidState):
         if kind._fields == names:
             return kind
-    made: Any = collections.namedtuple("State", names)
+    made: Any = collections.namedtuple("State", names)  # type: ignore[misc]
     made.__module__, made.__qualname__ = __name__, f"StateOf({','.join(names)})"
     return made
 

@@ -10,7 +10,7 @@ from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.constraints._linkage import Body, Joint, Linkage
 from jaxbiped.scene._bodies import Body as RigidBody
-from jaxbiped.scene._bodies import Foot
+from jaxbiped.scene._bodies import Foot, Point
 from jaxbiped.scene._mechanism import Mechanism
 
 
@@ -59,8 +59,10 @@ class Walker(eqx.Module):
         """Two legs on the hip as data: bodies "1" and "2", of which the second stands."""
         return Mechanism(
             root_mass=self.hip_mass,
-            bodies=tuple(RigidBody(n, mass=self.m, inertia=self.J, centre=self.d) for n in "12"),
-            feet=tuple(Foot(n, centre=self.hip_to_foot, radius=self.r) for n in "12"),
+            bodies=tuple(
+                RigidBody(n, mass=self.m, inertia=self.J, centre=Point(self.d)) for n in "12"
+            ),
+            feet=tuple(Foot(n, centre=Point(self.hip_to_foot), radius=self.r) for n in "12"),
             mirror=(("1", "2"),),
         )
 
