@@ -44,7 +44,7 @@ def test_a_gait_draws_nearer_in_its_metric_by_its_contraction():
             state=jb.dynamics.RigidState(0.0, -0.2, 0.2, -0.1, -0.2), spectral_radius=radius,
             period=3.0, step_length=0.4,
         ),
-        cycle_footsteps=1, orbit=(None, [np.zeros((1, 2))] * 5),
+        cycle_footsteps=1, orbit=(None, jb.dynamics.RigidState(*[np.zeros((1, 2))] * 5)),
     )  # fmt: skip
     found = attractor_without_radius(SCENE, gait)
     q = 0.5 * (1.0 + radius)
