@@ -127,7 +127,7 @@ def attractor_without_radius(scene: Scene | RigidScene, gait: Gait) -> Attractor
         radius=-1.0,
         model=factor.T @ slopes @ np.linalg.inv(factor.T),
         slowest=np.stack([left.real, left.imag]) @ tangents.T,
-        crossings=np.stack([leaf[:, 0] for leaf in recurring_leaves(gait.orbit[1])], axis=1),
+        crossings=np.stack(recurring_leaves(gait.orbit[1]), axis=-1)[:, 0],
     )
 
 
