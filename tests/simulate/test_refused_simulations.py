@@ -51,6 +51,7 @@ CASES = [
     (walked, dict(save=jb.MidStance(), max_arrivals=0), "max_arrivals = 0 is not allowed"),
     (walked, dict(watch=("falls",)), "watch = 'falls' is not known"),
     (walked, dict(save="last"), "save = 'last' is not known"),
+    (walked, dict(save=None), "save = None is not known"),
     (walked, dict(save=jnp.array([0.2, 0.1])), "save"),
     (walked, dict(save=jnp.array([0.5, 1.5])), "must be increasing times from 0 to 1"),
     (walked, dict(engine="gpu"), "choose one of auto, xla, lanes"),
