@@ -130,6 +130,7 @@ def test_what_is_not_allowed_is_one_sentence(simulation, how, said):
     ("scene", "state", "how", "said"),
     [
         (rigid_seed(), ROLLING, dict(save="end", dt=1e-3), "dt = 0.001 is not allowed for a Rigid"),
+        (rigid_seed(), ROLLING, dict(save="end", dt=jnp.ones(2)), "is not allowed for a Rigid"),
         (rigid_seed(), ROLLING, dict(), 'give "end" or HeelStrike()'),
         (SEVERAL, START, dict(save=[1.0], footsteps=3), "footsteps = 3 is not allowed for a Link"),
         (SEVERAL, START, dict(), "give increasing times"),
