@@ -126,7 +126,7 @@ def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None
     ]
     label = PENETRATION.on_axis("mm")
     ax = _draw_both(ax, samples.t, depths, "Penetration of the feet", label)
-    ax.set_ylim(0.0, 1.1 * float(np.nanmax(depths, initial=1e-3)))
+    ax.set_ylim(0.0, 1.1 * float(np.nanmax(np.stack(depths), initial=1e-3)))
     return style.figure_of(ax)
 
 

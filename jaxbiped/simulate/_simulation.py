@@ -140,7 +140,7 @@ class Simulation(eqx.Module):
         check_type("watch", asked.watch, tuple, list)
         for name in asked.watch:
             check_choice("watch", name, WATCHES)
-        if isinstance(asked.save, str):
+        if asked.save is None or isinstance(asked.save, str):
             check_choice("save", asked.save, ("steps", "end"))
         check_room("max_arrivals", asked.max_arrivals)
         if times is not None:

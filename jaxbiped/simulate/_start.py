@@ -74,8 +74,8 @@ class Options(NamedTuple):
     def refuse(self, scene: Any, *names: str) -> None:
         """Raises `ArgumentError` for one of these options: they do not apply to such a scene."""
         for name in names:
-            value = getattr(self, name)
-            if value != self._field_defaults[name]:
+            value, usual = getattr(self, name), self._field_defaults[name]
+            if value is not usual and (usual is None or value != usual):
                 kind = type(scene).__name__
                 raise ArgumentError(
                     f"{name} = {value!r} is not allowed for a {kind}: leave it out."

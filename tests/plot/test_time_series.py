@@ -46,6 +46,15 @@ def test_depth_in_millimetres_while_a_foot_touches(seed_walk):
         assert np.nanmin(drawn) == 0.0
 
 
+def test_feet_in_the_air_have_no_depth(seed_walk):
+    scene, _ = seed_walk
+    start = jb.seed_state()
+    flight = jb.simulate(scene, start._replace(hip_z=start.hip_z + 0.2), duration=0.02)
+    (ax,) = penetrations(scene, flight).axes
+    assert all(np.isnan(line.get_ydata()).all() for line in ax.lines)
+    assert ax.get_ylim() == pytest.approx((0.0, 1.1e-3))
+
+
 def test_a_whole_walk_shows_the_peaks_of_both_feet_and_tells_legs_apart(seed_walk):
     scene, walk = seed_walk
     normal_axes, strike_axes, tangential_axes, _ = axes = contact_forces(scene, walk).axes

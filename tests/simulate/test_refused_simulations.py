@@ -51,6 +51,7 @@ CASES = [
     (walked, dict(save=jb.MidStance(), max_arrivals=0), "max_arrivals = 0 is not allowed"),
     (walked, dict(watch=("falls",)), "watch = 'falls' is not known"),
     (walked, dict(save="last"), "save = 'last' is not known"),
+    (walked, dict(save=None), "save = None is not known"),
     (walked, dict(save=jnp.array([0.2, 0.1])), "save"),
     (walked, dict(save=jnp.array([0.5, 1.5])), "must be increasing times from 0 to 1"),
     (walked, dict(engine="gpu"), "choose one of auto, xla, lanes"),
@@ -129,6 +130,7 @@ def test_what_is_not_allowed_is_one_sentence(simulation, how, said):
     ("scene", "state", "how", "said"),
     [
         (rigid_seed(), ROLLING, dict(save="end", dt=1e-3), "dt = 0.001 is not allowed for a Rigid"),
+        (rigid_seed(), ROLLING, dict(save="end", dt=jnp.ones(2)), "is not allowed for a Rigid"),
         (rigid_seed(), ROLLING, dict(), 'give "end" or HeelStrike()'),
         (SEVERAL, START, dict(save=[1.0], footsteps=3), "footsteps = 3 is not allowed for a Link"),
         (SEVERAL, START, dict(), "give increasing times"),

@@ -2,12 +2,15 @@
 
 import numpy as np
 import pytest
+import xarray
 
 import jaxbiped as jb
+from jaxbiped.sweep import _gait_sweep
 
 pytestmark = pytest.mark.slow
 
 PLAIN = dict(parameters=("K",), radius_sensitivities=False)
+PLAIN_RIGID = dict(parameters=("d",), radius_sensitivities=False)
 OVER = {"slope": [0.005, 0.012, 0.02, 0.03], "K": [1e6, 1.1e6]}
 
 
@@ -39,3 +42,30 @@ def test_elasticities_promise_the_neighbour(swept):
     slopes = at.elasticity_period.sel(parameter="K").data
     promised = 0.5 * (slopes[0] + slopes[1]) * np.log(1.1)
     assert np.log(at.period.data[1] / at.period.data[0]) == pytest.approx(promised, abs=1e-6)
+
+
+def test_a_killed_sweep_of_few_points_continues_from_its_store(tmp_path, monkeypatch):
+    """What was written is not searched again, a point without a gait neither."""
+    scene, over = jb.ladder()["rigid"], {"slope": [-0.02, 0.02, 0.025]}
+    whole = jb.gait_sweep(scene, over, **PLAIN_RIGID)
+    assert list(whole.ending == int(jb.gait.Search.FOUND)) == [False, True, True]
+    find, calls, stop = _gait_sweep.find_gait, [], [3]
+
+    def counted(own, *rest, **options):
+        if len(calls) == stop[0]:
+            raise KeyboardInterrupt
+        calls.append(float(own.ground.slope))
+        return find(own, *rest, **options)
+
+    monkeypatch.setattr(_gait_sweep, "find_gait", counted)
+    with pytest.raises(KeyboardInterrupt):
+        jb.gait_sweep(scene, over, store=tmp_path / "gaits", **PLAIN_RIGID)
+    assert calls[0] == 0.02
+    searched = []
+    for _ in range(2):
+        calls[:], stop[:] = [], [-1]
+        again = jb.gait_sweep(scene, over, store=tmp_path / "gaits", **PLAIN_RIGID)
+        searched.append(set(calls))
+    # The first point is looked at for the shapes.
+    assert searched == [{-0.02, 0.02}, {0.02}]
+    xarray.testing.assert_equal(again.load(), whole)
