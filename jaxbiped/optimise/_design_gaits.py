@@ -38,7 +38,7 @@ class GaitSettings(NamedTuple):
 
 def are_walks(gaits: Gait) -> np.ndarray:
     """Whether a gait was found, and is a walk: of one or of a batch."""
-    return np.asarray((gaits.ending == int(Search.FOUND)) & gaits.sound)
+    return (np.asarray(gaits.ending) == int(Search.FOUND)) & np.asarray(gaits.sound)
 
 
 def gaits_near(
