@@ -1,7 +1,7 @@
-"""What acts at the joints of a mechanism: springs, stops, latches, couplings and motors."""
+"""What acts at the joints of a mechanism: springs, stops, latches and couplings."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar, TypeAlias
 
 import equinox as eqx
@@ -16,7 +16,6 @@ Weights: TypeAlias = tuple[tuple[str, float], ...]
 """Weights of bodies' absolute angles, in the order written."""
 
 HOLDS = ("while pressed", "until heel strike", "through heel strike")
-SIDES = ("role", "side")
 
 
 def angle_of(angle: Any) -> Any:
@@ -206,33 +205,3 @@ class Coupling(AbstractJointPart):
     _: dataclasses.KW_ONLY
     rest: Parameter | None = parameter("coupled angle", r"$\varphi_0$", "rad", default=None)
     name: str | None = eqx.field(static=True, default=None)
-
-
-class Motor(AbstractJointPart):
-    """A motor, whose torque is a law of the motion and of nothing else.
-
-    Attributes:
-        angle: see `AbstractJointPart`; the torque turns it forward.
-        law: a function of the motion, `law(motion)` [N·m], a pytree of parameters.
-        by: "role" where the law is written for the second leg of each pair standing, and is
-            exchanged where the first one stands; "side" where it is told as it stands.
-        name: see `AbstractJointPart`.
-
-    Raises:
-        ArgumentError: a law that cannot be called, or another word.
-    """
-
-    kind: ClassVar[str] = "motor"
-    angle: str | Weights = eqx.field(static=True, converter=angle_of)
-    law: Callable[[Any], Any]
-    _: dataclasses.KW_ONLY
-    by: str = eqx.field(static=True, default="role")
-    name: str | None = eqx.field(static=True, default=None)
-
-    def __check_init__(self) -> None:
-        if not callable(self.law):
-            raise ArgumentError(
-                f"law = {self.law!r} is not allowed for Motor({self.angle!r}): give a function of "
-                "the motion."
-            )
-        check_choice("by", self.by, SIDES)

@@ -39,7 +39,7 @@ class Mechanism(eqx.Module):
         root_mass: point mass there [kg]; None for none.
         bodies: the bodies, parents before children.
         feet: their feet, at least one.
-        joints: what acts at joints: `Spring`, `Stop`, `Latch`, `Coupling`, `Motor`.
+        joints: what acts at joints: `Spring`, `Stop`, `Latch`, `Coupling`.
         mirror: pairs of bodies, first the one that swings where a cycle begins, then the one that
             stands.
         turn: `{body: N}` of a body that looks the same, its feet too, after an N-th of a turn.
@@ -204,20 +204,20 @@ def _leaf_name(path: tuple[Any, ...]) -> str:
 
 
 def _check_parameter_names(mechanism: "Mechanism") -> None:
-    structure = mechanism.structure
-    prefixes = list(mechanism._prefixes().values())
-    for k, prefix in zip(structure.body_pieces, structure.bodies, strict=True):
-        called = mechanism._prefixes()[k]
-        if called != prefix and called in structure.bodies:
+    """Raises `ArgumentError` where two parameters would have one name."""
+    structure, prefixes = mechanism.structure, mechanism._prefixes()
+    for k, own in zip(structure.body_pieces, structure.bodies, strict=True):
+        called = prefixes[k]
+        if called != own and called in structure.bodies:
             raise ArgumentError(
                 f"a body is called {called!r}, which is not allowed: in names of parameters "
                 f"{called!r} stands for the pair."
             )
     for k, part in zip(structure.joint_pieces, mechanism.joints, strict=True):
-        if prefixes.count(mechanism._prefixes()[k]) > 1:
+        if list(prefixes.values()).count(prefixes[k]) > 1:
             raise ArgumentError(
-                f"two {part.kind}s at one body, {mechanism._prefixes()[k]!r}, are not allowed "
-                "without a name each: give name=."
+                f"two {part.kind}s at one body, {prefixes[k]!r}, are not allowed without a name "
+                "each: give name=."
             )
 
 

@@ -12,6 +12,7 @@ from jaxbiped.scene._structure import Angle, Indices
 
 
 def check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
+    """Raises `ArgumentError` for pieces of the wrong kind, no foot, or a name that stands twice."""
     for argument, kind, group in (
         ("bodies", Body, bodies), ("feet", Foot, feet), ("joints", AbstractJointPart, joints)
     ):  # fmt: skip
@@ -30,6 +31,7 @@ def check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
 
 
 def number_of(part: str, name: Any, names: Sequence[str]) -> int:
+    """The number of a body by its name; `part` says in a refusal who names it."""
     if name not in names:
         raise ArgumentError(
             f"{part} names {name!r}, which is no body: there are {', '.join(names)}."
@@ -38,6 +40,7 @@ def number_of(part: str, name: Any, names: Sequence[str]) -> int:
 
 
 def parents_of(bodies: Sequence[Body], names: list[str]) -> Indices:
+    """The number of each body's parent, −1 for the root point."""
     found = []
     for j, body in enumerate(bodies):
         if body.parent is None:
@@ -53,6 +56,7 @@ def parents_of(bodies: Sequence[Body], names: list[str]) -> Indices:
 
 
 def foot_names_of(feet: Sequence[Foot]) -> tuple[str, ...]:
+    """The name of each foot, its own or "foot", numbered where a body has several."""
     of_body = [each.body for each in feet]
     found: list[str] = []
     for k, foot in enumerate(feet):
@@ -68,6 +72,7 @@ def foot_names_of(feet: Sequence[Foot]) -> tuple[str, ...]:
 
 
 def angle_of_part(part: AbstractJointPart, parents: Indices, names: list[str]) -> Angle:
+    """The angle that a joint part acts on, as a sum of bodies' absolute angles."""
     words = f"{type(part).__name__} on {part.angle!r}"
     if isinstance(part.angle, str):
         j = number_of(words, part.angle, names)
@@ -85,6 +90,7 @@ def angle_of_part(part: AbstractJointPart, parents: Indices, names: list[str]) -
 
 
 def turn_of(turn: Mapping[str, int] | None, names: list[str]) -> tuple[int, int] | None:
+    """The body and the count of a rotational symmetry."""
     if turn is None:
         return None
     if not isinstance(turn, Mapping) or len(turn) != 1:

@@ -9,7 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Latch, Motor, Spring, Stop
+from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Latch, Spring, Stop
 from jaxbiped.scene._structure import Angle, Indices
 
 _NAMING = {"name", "body", "parent", "leg", "angle"}
@@ -88,7 +88,7 @@ def foot_twins(feet: Indices, legs: Sequence[str], twin: Indices, pieces: Sequen
 def joint_twins(
     joints: Sequence[Angle], twin: Indices, parts: Sequence[AbstractJointPart]
 ) -> Indices:
-    """Number of each joint part's mirror image. Motors by role are their own business.
+    """Number of each joint part's mirror image.
 
     Raises:
         ArgumentError: a part without an equal one on the other side, or one on an angle that
@@ -106,10 +106,7 @@ def joint_twins(
         ]
         if same:
             found[k] = same[0]
-            if not (isinstance(part, Motor) and part.by == "role"):
-                check_alike(part, parts[same[0]])
-        elif isinstance(part, Motor) and part.by == "role":
-            continue
+            check_alike(part, parts[same[0]])
         elif image.is_like(angle.reversed()):
             _check_same_both_ways(part)
         else:
@@ -168,11 +165,6 @@ def _check_same_both_ways(part: AbstractJointPart) -> None:
         raise ArgumentError(
             f"Stop({_words(part)}) has an angle that changes its sign in the mirror: lower must be "
             "minus upper."
-        )
-    if isinstance(part, Motor):
-        raise ArgumentError(
-            f"Motor({_words(part)}, by='side') has an angle that changes its sign in the mirror: "
-            "tell it by role, or leave the mirror out."
         )
 
 

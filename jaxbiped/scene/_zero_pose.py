@@ -59,10 +59,7 @@ def _mass_matrix(mechanism: "Mechanism") -> np.ndarray:
     n = len(bodies)
     total: Any = 0.0
     for body, chain in zip(bodies, structure.chains, strict=True):
-        lever = np.zeros((2, 2 + n))
-        moves: Any = lever[..., :, :]
-        moves = _added(moves, 0, 0, 1.0)
-        moves = _added(moves, 1, 1, 1.0)
+        moves: Any = np.eye(2, 2 + n)
         for link, after in zip(chain, (*chain[1:], None), strict=True):
             point = body.centre if after is None else bodies[after].at
             if point is None:

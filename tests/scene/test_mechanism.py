@@ -8,7 +8,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.scene._bodies import Body, Foot
-from jaxbiped.scene._joint_parts import Coupling, Latch, Motor, Spring, Stop
+from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._structure import pair_name
 
@@ -126,7 +126,6 @@ REFUSED = {
     "it must be below": lambda: Stop("leg_1", upper=0.0, lower=0.1),
     "holds = 'always' is not known": lambda: Stop("leg_1", upper=0.0, holds="always"),
     "width = 0": lambda: Latch("leg_1", at=0.0, width=0.0, torque=1.0),
-    "give a function": lambda: Motor("leg_1", 3.0),
     "has no parent": lambda: Body("a", mass=1, inertia=1, centre=0, at=0.1),
     "letters, digits and underscores": lambda: Body("a b", mass=1, inertia=1, centre=0),
     "takes a reaction": lambda: Body("vertical", mass=1, inertia=1, centre=0),
