@@ -29,11 +29,12 @@ extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.intersphinx",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
     "gallery",
+    "mathml",
+    "options",
     "public_names",
     "results",
     "watched_walks",
@@ -46,6 +47,9 @@ nb_execution_raise_on_error = True
 nb_merge_streams = True
 myst_enable_extensions = ["dollarmath", "deflist", "colon_fence"]
 myst_heading_anchors = 4
+# Pages load nothing from a network.
+html_math_renderer = "mathml"
+myst_update_mathjax = False
 
 default_role = "py:obj"
 autodoc_typehints = "description"

@@ -6,7 +6,7 @@ import numpy as np
 from _force_samples import largest, motion, strikes
 
 import jaxbiped as jb
-from jaxbiped.plot.style import LEG_NAMES, dress, leg_line, new_figure
+from jaxbiped.plot.style import Look, dress, new_figure
 
 SLOPES, QUICK_SLOPES = (0.010, 0.015, 0.020, 0.025, 0.030, 0.040), (0.020, 0.040)
 DURATION = 4.0
@@ -75,7 +75,7 @@ def drawn(curves, y_label, title):
     for ax, (slope, (walked, values)) in zip(axes.flat, curves.items(), strict=True):
         for k, row in enumerate(values):
             places = telling(row)
-            look = dict(linewidth=1.0, label=LEG_NAMES[k], **leg_line(k))
+            look = dict(linewidth=1.0, label=f"leg {k + 1}", **Look(k).line)
             ax.plot(walked.t[places], row[places], **look)
         ended = walked.t[-1] < DURATION * (1.0 - 1e-6)
         when = f" at {walked.t[-1]:.2f} s" if ended else ""

@@ -10,16 +10,16 @@ def of_basin_seed(numbers: dict[str, Any]) -> Iterator[str]:
     """How much of the slice walks, how folded boundaries are, and what changes the basin."""
     walks, boundary = numbers["fractions"]["walking period-1"], numbers["boundary"]
     interval = f"[{percents(walks['low'])}, {percents(walks['high'])}]"
-    yield f"Of that slice {percents(walks['estimate'])} % {interval} walks"
+    yield f"In that slice, {percents(walks['estimate'])} % {interval} of the starts walk"
     yield (
-        f"the boundary of what walks has dimension {boundary['walking or not']['dimension']:.2f}, "
-        f"that of all labels {boundary['all labels']['dimension']:.2f}"
+        f"of the walking basin has dimension {boundary['walking or not']['dimension']:.2f}; the "
+        f"boundary between all labels has dimension {boundary['all labels']['dimension']:.2f}"
     )
     for name, said in (("c", "falls with damping"), ("K", "grows with stiffness")):
         (first, *_), *_, (last, *_) = numbers["along"][name]["walking"]
         yield f"{said} ({percents(first)} to {percents(last)} %"
     yield f"{min(row['distance'] for row in numbers['pushes']):.4f} (units of"
-    yield f"rays alone find {numbers['pushes'][0]['distance']:.4f}"
+    yield f"rays alone finds {numbers['pushes'][0]['distance']:.4f}"
 
 
 def of_basin_simplest(numbers: dict[str, Any]) -> Iterator[str]:
@@ -65,8 +65,9 @@ def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
     }
     ours, tsit5 = damped["jaxbiped", 1e-6], damped["diffrax Tsit5", 1e-6]
     warp = damped["Warp", 1e-5]
-    yield f"{small(ours['gradient_error'])}, says {small(ours['said'])}"
-    yield f"diffrax {small(tsit5['gradient_error'])}, Warp {small(warp['gradient_error'])}"
+    yield f"is {small(ours['gradient_error'])}, and its error bar is {small(ours['said'])}"
+    others = small(tsit5["gradient_error"]), small(warp["gradient_error"])
+    yield "{} with diffrax's Tsit5 and {} with Warp".format(*others)
 
 
 def of_footstep_truth(numbers: dict[str, Any]) -> Iterator[str]:

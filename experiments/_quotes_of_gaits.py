@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
+from _mechanism_table import table
 from _quote_words import UNKNOWN, row, small
 
 
@@ -26,6 +27,21 @@ def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
     )
 
 
+def of_kneed_ladder(numbers: dict[str, Any]) -> Iterator[str]:
+    """The kneed walker's gait on its way to the one on rigid feet."""
+    steps = numbers["paths"]["c with K^(3/2)"]
+    rows = [(f"{each['factor']:.0f}", each) for each in steps]
+    for words, found in [*rows, ("rigid", numbers["rigid"])]:
+        real, imaginary = found["pair"]
+        yield row(
+            words,
+            f"{found['period']:.5f}",
+            f"{found['step_length']:.5f}",
+            f"{real:.4f} ± {imaginary:.4f} i",
+            f"{found['third']:.4f}",
+        )
+
+
 def of_ladder(numbers: dict[str, Any]) -> Iterator[str]:
     """Measures and costs of the rungs, and the rates of the way to the rigid limit."""
     for name, found in numbers["measures"].items():
@@ -43,9 +59,15 @@ def of_ladder(numbers: dict[str, Any]) -> Iterator[str]:
         )
     both, alone = (numbers["paths"][path]["rates"] for path in ("c with K", "c alone"))
     yield (
-        f"its period differs by s^−{both['period']:.2f} and its step length by "
-        f"s^−{both['step_length']:.2f}, with c alone by s^−{alone['period']:.1f}"
+        f"the period differs from the rigid one by s^−{both['period']:.2f} and the step length by "
+        f"s^−{both['step_length']:.2f}. If c alone grows, the period differs by "
+        f"s^−{alone['period']:.1f}"
     )
+
+
+def of_mechanism_matrix(numbers: dict[str, Any]) -> Iterator[str]:
+    """What each capability gives on each mechanism, and the sentences that refuse it."""
+    yield from filter(None, table(numbers["rows"]))
 
 
 def of_force_models(numbers: dict[str, Any]) -> Iterator[str]:
@@ -60,8 +82,8 @@ def of_force_models(numbers: dict[str, Any]) -> Iterator[str]:
     most = max(abs(moved(law, key)) for law in damped.values() for key in keys)
     least = min(moved(law, "peak_normal_N") for law in damped.values())
     largest = max(moved(law, "peak_normal_N") for law in damped.values()) + 1.0
-    yield f"period, step length and speed move by at most {100 * most:.1f} %"
-    yield f"the peak force by −{-100 * least:.0f} % (Hunt–Crossley) to {largest:.1f} times"
+    yield f"period, step length and speed change by at most {100 * most:.1f} %"
+    yield f"force changes by −{-100 * least:.0f} % (Hunt–Crossley) to {largest:.1f} times"
     yield f"(off by {numbers['normal']['tsuji']['unit_multiplier_error']:.2f})"
 
 
@@ -94,6 +116,14 @@ def of_optimise_speed(numbers: dict[str, Any]) -> Iterator[str]:
     for name, each in numbers["descents"].items():
         seconds = (f"{each[key]:.1f}" for key in ("warm_wall_s", "warm_cpu_s"))
         yield row(name, str(each["iterations"]), str(each["evaluations"]), *seconds)
+
+
+def of_published_walkers(numbers: dict[str, Any]) -> Iterator[str]:
+    """What was printed of published walkers, ours, and the difference; rounding is not told."""
+    for each in numbers["rows"]:
+        off = each["difference"]
+        told = small(off) if off > 2e-12 else "below 2e-12"
+        yield row(each["walker"], each["quantity"], each["printed"], each["ours"], told)
 
 
 def of_radius_map(numbers: dict[str, Any]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Scenes that several experiments walk: the seed's under other laws, and the simplest walker."""
+"""Scenes that several experiments walk: the seed's under other laws, and on rigid feet."""
 
 import dataclasses
 
@@ -27,13 +27,3 @@ def seed_with(
 def rigid_seed(slope: float = 0.02) -> jb.RigidScene:
     """The seed's walker on rigid feet."""
     return jb.RigidScene(walker=jb.seed_scene().walker, ground=jb.Ground(slope=slope))
-
-
-def simplest_walker(slope: float, impulse: float | None = None) -> jb.RigidScene:
-    """A hip of mass one on massless legs: their own, at the feet, is far below rounding.
-
-    Gravity and the leg's length are one; pushed off by an impulse, where there is one.
-    """
-    walker = jb.Walker(m=1e-13, J=0.0, l=1.0, d=1.0, r=0.0, hip_mass=1.0)
-    push = None if impulse is None else jb.actuation.PushOff(impulse)
-    return jb.RigidScene(walker, jb.Ground(slope=slope, g=1.0), push)

@@ -77,7 +77,7 @@ def _walked(scene, starts, footsteps, rtol):
         last = jax.tree.map(lambda leaf: leaf[-1], at.state)
         if not isinstance(scene, jb.RigidScene):
             stands = jnp.abs(last.theta_1) < jnp.abs(last.theta_2)
-            other = jb.dynamics.exchange_legs(last)
+            other = jb.dynamics.exchange_legs(scene, last)
             last = jax.tree.map(lambda a, b: jnp.where(stands, a, b), other, last)
         return at.t, last._replace(hip_x=0.0 * last.hip_x), at.total
 

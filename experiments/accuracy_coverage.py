@@ -1,11 +1,11 @@
 """Coverage of error bars: true errors of walks and gaits of random scenes against their bars.
 
 Writes accuracy_coverage.png. Scenes are the seed's with parameters and start drawn at random, and
-each accuracy a number drawn at random. References are ours at the finest tolerance, of walks by
-Rodas4 and of gaits by Rodas4P, methods that neither the results nor their bars come from; their own
-error is their difference from Rodas5P. Rigid walks are held against the finest tolerance of their
-one method, whose error is the difference from a ten times looser one. Scenes lie in
-accuracy_coverage.jsonl as they come: a run that was cut off goes on.
+each accuracy a number drawn at random, of "named" gaits "balanced". References are ours at the
+finest tolerance, of walks by Rodas4 and of gaits by Rodas4P, methods that neither the results nor
+their bars come from; their own error is their difference from Rodas5P. Rigid walks are held against
+the finest tolerance of their one method, whose error is the difference from a ten times looser one.
+Scenes lie in accuracy_coverage.jsonl as they come: a run that was cut off goes on.
 """
 
 import dataclasses
@@ -22,8 +22,8 @@ from tqdm import tqdm
 import jaxbiped as jb
 from jaxbiped.plot.style import new_figure
 
-SCENES = {"walks": 1000, "gaits": 1000, "rigid": 300}
-QUICK_SCENES = {"walks": 6, "gaits": 1, "rigid": 20}
+SCENES = {"walks": 1000, "gaits": 1000, "rigid": 300, "named": 100}
+QUICK_SCENES = {"walks": 6, "gaits": 1, "rigid": 20, "named": 1}
 DURATION = 1.0
 PARAMETERS = ("K", "c", "xi")
 FINEST = 1e-11
@@ -171,6 +171,26 @@ def _gait(random):
     return _record(gait.error.met, True, pairs)
 
 
+def _named(random):
+    """True errors and bars of derivatives by all parameters of a gait at "balanced"."""
+    scene = _scene(random, 2.0)
+    gait = _quietly(jb.find_gait, scene)
+    exact, checked = (
+        jb.find_gait(scene, gait.measures.state, solver=solver, accuracy="tight")
+        for solver in ("rodas4p", "rodas5p")
+    )
+    three = (gait, exact, checked)
+    if not all(each.outcome is jb.gait.Search.FOUND for each in three) or int(gait.grazes):
+        return _record(False, True, {})
+    slopes = *(each.sensitivities for each in three), gait.sensitivity_errors
+    points = [
+        row
+        for name in (*MEASURES, "spectral_radius")
+        for row in _points(*(getattr(each, name) for each in slopes))
+    ]
+    return _record(True, True, {"sensitivities by name": points})
+
+
 def _record(met, same, pairs):
     return {"met": met, "silently_wrong": bool(met and not same), "pairs": pairs}
 
@@ -232,7 +252,7 @@ def _draw(options, pairs):
     return options.save(figure, "accuracy_coverage.png")
 
 
-KINDS = {"walks": _walk, "gaits": _gait, "rigid": _rigid}
+KINDS = {"walks": _walk, "gaits": _gait, "rigid": _rigid, "named": _named}
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ the rate that leads upright, so that the thin area can be seen.
 import _simplest
 import numpy as np
 from _experiment import Options, experiment
-from _scenes import simplest_walker
 
 import jaxbiped as jb
 from jaxbiped import plot
@@ -64,7 +63,7 @@ def just_struck(scene, states):
 def labelling_of(slope, **options):
     """A labelling that knows the gait, found from the published equations' own."""
     theta, rate = _simplest.fixed_point(slope)
-    scene = simplest_walker(slope)
+    scene = jb.models.garcia(slope)
     guess = just_struck(scene, jb.dynamics.RigidState(0.0, -theta, theta, rate, rate))
     return jb.labelling(scene, guess=guess, footsteps=FOOTSTEPS, **options)
 

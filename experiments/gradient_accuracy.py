@@ -69,7 +69,7 @@ class Stepped(jb.gait.AbstractSystem):
 
     def reset_map(self, args, y):
         """Legs exchanged."""
-        return jb.dynamics.exchange_legs(y)
+        return jb.dynamics.exchange_legs(args.scene, y)
 
     def load(self, args, y):
         """No largest load: no step is spent on it."""

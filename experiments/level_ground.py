@@ -10,7 +10,7 @@ import dataclasses
 import numpy as np
 from _experiment import Options, experiment
 from _pictures import COLOURS, MARKERS
-from _scenes import rigid_seed, simplest_walker
+from _scenes import rigid_seed
 
 import jaxbiped as jb
 from jaxbiped.plot.style import dress, legend_below, new_figure
@@ -123,7 +123,7 @@ def simplest_pairs(count):
     """
     pairs, lost = [], []
     for impulse in map(float, 1.05 * np.linspace(0.05, 0.3, count) ** 2):
-        scene = simplest_walker(0.0, impulse)
+        scene = jb.models.kuo(impulse)
         gait = jb.find_gait(scene, accuracy="tight", parameters=())
         if gait.outcome is not jb.gait.Search.FOUND:
             lost.append(impulse)
@@ -156,7 +156,7 @@ def passive_of(level):
     rate = -np.sqrt(4.0 * slope * np.sin(alpha)) / np.tan(2.0 * alpha)
     guess = level._replace(omega_1=np.cos(2.0 * alpha) * rate, omega_2=rate)
     for _ in range(8):
-        gait = jb.find_gait(simplest_walker(slope), guess, accuracy="tight", parameters=("slope",))
+        gait = jb.find_gait(jb.models.garcia(slope), guess, accuracy="tight", parameters=("slope",))
         if gait.outcome is not jb.gait.Search.FOUND:
             raise RuntimeError(f"no passive gait with steps of {alpha:g} rad: {gait.outcome}")
         guess = gait.measures.state

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _experiment import Options, experiment
-from _scenes import rigid_seed, simplest_walker
+from _scenes import rigid_seed
 
 import jaxbiped as jb
 from jaxbiped import plot
@@ -34,12 +34,12 @@ def main(options: Options):
     seed = jb.continue_gait(rigid_seed(), "slope", bounds=(0.09, 0.11), accuracy="tight")
     doubled = jb.continuation.switch_branch(seed)
     # Both gaits on the slope of 0.009, found without a guess.
-    pair = jb.continuation.find_isolated(simplest_walker(PAIR_SLOPE), accuracy="tight")
+    pair = jb.continuation.find_isolated(jb.models.garcia(PAIR_SLOPE), accuracy="tight")
     pair = sorted(pair, key=lambda each: -float(each.state.theta_2))
     long, short = (branch_of(PAIR_SLOPE, gait) for gait in pair)
     cascade = jb.continuation.doubling_cascade(long, options.sized(DOUBLINGS, QUICK_DOUBLINGS))
     walks = settled(options.sized(WALKED, QUICK_WALKED), long)
-    scene, starts = simplest_walker(PERIOD_THREE), options.sized(STARTS, QUICK_STARTS)
+    scene, starts = jb.models.garcia(PERIOD_THREE), options.sized(STARTS, QUICK_STARTS)
     how = dict(footsteps=3, accuracy="tight")
     three = jb.continuation.find_isolated(scene, starts=starts, **how)
     families = [branch_of(PERIOD_THREE, gait, footsteps=3) for gait in three[:1]]
@@ -74,7 +74,7 @@ def main(options: Options):
 def branch_of(slope, gait, footsteps=1):
     """The simplest walker's branch along the slope through a gait."""
     how = dict(bounds=BOUNDS, guess=gait.state, footsteps=footsteps, accuracy="tight")
-    return jb.continue_gait(simplest_walker(slope), "slope", **how)
+    return jb.continue_gait(jb.models.garcia(slope), "slope", **how)
 
 
 def gait_numbers(gait):
@@ -110,7 +110,7 @@ def settled(count, long):
     @jax.jit
     @jax.vmap
     def strikes(slope, start):
-        walk = jb.rigid_walk(simplest_walker(slope), start, max_solver_steps=1 << 20, **how)
+        walk = jb.rigid_walk(jb.models.garcia(slope), start, max_solver_steps=1 << 20, **how)
         return walk.arrivals.state.theta_2[SETTLING:]
 
     states = jax.tree.map(lambda *leaves: jnp.stack(leaves), *starts)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import matplotlib.pyplot as plt
 import numpy as np
 from _experiment import Options, by, experiment
-from _scenes import rigid_seed, simplest_walker
+from _scenes import rigid_seed
 from _settled import Settled, settled
 from _timing import timed
 from matplotlib.ticker import NullFormatter
@@ -76,8 +76,7 @@ def _rough(mu):
 
 
 def _compass(degrees):
-    walker = jb.Walker(m=5.0, J=0.0, l=1.0, d=0.5, r=0.0, hip_mass=10.0)
-    return jb.RigidScene(walker=walker, ground=jb.Ground(slope=float(np.deg2rad(degrees))))
+    return jb.models.goswami(float(np.deg2rad(degrees)))
 
 
 THIRD = 10**0.5
@@ -93,7 +92,7 @@ FAMILIES = {
     "random": Family("number", "–", np.arange(RANDOM) + 1.0, _random),
     "rigid": Family("slope", "rad", np.arange(5, 101, 5) * 1e-3, rigid_seed),
     "simplest": Family(
-        "slope", "rad", [*(np.arange(5, 190, 5) * 1e-4), 0.0187, 0.0189], simplest_walker
+        "slope", "rad", [*(np.arange(5, 190, 5) * 1e-4), 0.0187, 0.0189], jb.models.garcia
     ),
     "compass": Family("slope", "degrees", np.arange(1, 11) * 0.5, _compass),
 }

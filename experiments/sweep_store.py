@@ -45,7 +45,7 @@ JOBS = (
     Job("compliant", 100_000, (0.3, 0.6)),
     *(Job("compliant", 10**power, ()) for power in range(3, 8)),
 )
-QUICK_JOBS = (Job("rigid", 2000, (0.3,), chunk=100),)
+QUICK_JOBS = (Job("rigid", 10_000, (0.3,), chunk=100),)
 
 
 @experiment

@@ -12,6 +12,7 @@ from jaxbiped import dynamics as dynamics
 from jaxbiped import gait as gait
 from jaxbiped import identify as identify
 from jaxbiped import measure as measure
+from jaxbiped import models as models
 from jaxbiped import optimise as optimise
 from jaxbiped import plot as plot
 from jaxbiped.scene import actuation as actuation
@@ -24,9 +25,19 @@ from jaxbiped.caching._caches import cache_info as cache_info
 from jaxbiped.caching._caches import clear_caches as clear_caches
 
 # What is modelled.
+from jaxbiped.scene._bodies import Body as Body
+from jaxbiped.scene._bodies import Foot as Foot
 from jaxbiped.scene._ground import Ground as Ground
+from jaxbiped.scene._joint_parts import Coupling as Coupling
+from jaxbiped.scene._joint_parts import Latch as Latch
+from jaxbiped.scene._joint_parts import Motor as Motor
+from jaxbiped.scene._joint_parts import Spring as Spring
+from jaxbiped.scene._joint_parts import Stop as Stop
+from jaxbiped.scene._kneed import Kneed as Kneed
+from jaxbiped.scene._mechanism import Mechanism as Mechanism
+from jaxbiped._parameter_declaration import parameter as parameter
 from jaxbiped.scene._ready_scenes import ladder as ladder
-from jaxbiped.scene._walker import LinkageScene as LinkageScene
+from jaxbiped.scene._linkages import LinkageScene as LinkageScene
 from jaxbiped.scene._parameter_access import parameter_names as parameter_names
 from jaxbiped.scene._parameter_access import parameter_quantities as parameter_quantities
 from jaxbiped.scene._parameter_access import parameter_values as parameter_values
@@ -35,14 +46,15 @@ from jaxbiped.scene._scene import RedundantScene as RedundantScene
 from jaxbiped.scene._scene import RigidScene as RigidScene
 from jaxbiped.scene._scene import Scene as Scene
 from jaxbiped.scene._ready_scenes import seed_scene as seed_scene
+from jaxbiped.scene._torso_walker import WithTorso as WithTorso
 from jaxbiped.scene._walker import Walker as Walker
-from jaxbiped.scene._walker import walker_linkage as walker_linkage
+from jaxbiped.scene._linkages import walker_linkage as walker_linkage
 
 # States and the sections that they cross.
 from jaxbiped.dynamics._section import HeelStrike as HeelStrike
 from jaxbiped.dynamics._section import MidStance as MidStance
 from jaxbiped.dynamics._section import Section as Section
-from jaxbiped.dynamics._state import State as State
+from jaxbiped.scene._state_types import State as State
 from jaxbiped.dynamics._state import seed_state as seed_state
 
 # Simulation.
@@ -85,7 +97,7 @@ from jaxbiped.sweep._workers import cluster_executor as cluster_executor
 from jaxbiped.sweep._workers import local_executor as local_executor
 from jaxbiped.sweep._gait_family import Family as Family
 from jaxbiped.sweep._gait_sweep import gait_sweep as gait_sweep
-from jaxbiped.sweep._label_function import label_at as label_at
+from jaxbiped.sweep._labelling_preparation import label_at as label_at
 from jaxbiped.sweep._labelling_loop import Labelled as Labelled
 from jaxbiped.sweep._labelling import Labelling as Labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure as nearest_failure

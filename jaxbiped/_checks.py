@@ -155,15 +155,18 @@ def check_not_negative(name: str, value: object, unit: str = "") -> None:
     _require(name, value, f"a finite number of at least 0{_in(unit)}", lambda x: x >= 0)
 
 
-def check_count(name: str, value: "ArrayLike") -> None:
-    """Raises `ArgumentError` unless `value` is one whole number above zero, known beforehand."""
+def check_count(name: str, value: "ArrayLike", least: int = 1) -> int:
+    """One whole number of at least so much, known beforehand; raises `ArgumentError` for others."""
     import numpy as np
 
-    allowed = "a whole number above 0"
+    allowed = "a whole number " + ("above 0" if least == 1 else f"of at least {least}")
+    if value is None:
+        raise ArgumentError(f"{name} = None is not allowed: it must be {allowed}.")
     if _is_traced(value) or np.ndim(value):
         shown = "a traced value" if _is_traced(value) else f"an array of shape {np.shape(value)}"
         raise ArgumentError(f"{name} = {shown} is not allowed: it must be {allowed}.")
-    _require(name, value, allowed, lambda x: (x > 0) & (x == np.floor(x)))
+    _require(name, value, allowed, lambda x: (x >= least) & (x == np.floor(x)))
+    return int(np.asarray(value))
 
 
 def check_room(name: str, value: "ArrayLike") -> None:

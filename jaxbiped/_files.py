@@ -6,9 +6,12 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from jaxbiped._checks import ArgumentError, ResourceError
+
+JsonObject: TypeAlias = dict[str, Any]
+"""Numbers and words by name, ready for JSON: what a command writes, settings of a store."""
 
 _WRONG_PATH = ("EACCES", "EPERM", "EROFS", "ENOENT", "EEXIST", "ENOTDIR", "EISDIR", "ENAMETOOLONG")
 """Errors of a file system where another path would do; any other is the disk's own."""

@@ -142,10 +142,10 @@ def code_digests(*values: object) -> dict[str, str]:
 
 
 def _telling_fields(value: Any) -> Iterator[tuple[str, object]]:
-    """Static fields, and parts that have such."""
+    """Static fields, texts, and parts that have such."""
     for field in dataclasses.fields(value):
         part = getattr(value, field.name)
-        whole = isinstance(part, list | tuple | Mapping) or dataclasses.is_dataclass(part)
+        whole = isinstance(part, str | list | tuple | Mapping) or dataclasses.is_dataclass(part)
         if whole or field.metadata.get("static", False):
             yield field.name, part
 

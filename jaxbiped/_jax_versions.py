@@ -6,6 +6,7 @@ two counts. Since 0.12 `ClosedJaxpr` and `Jaxpr` are one class, and `eval_jaxpr`
 """
 
 import contextlib
+import weakref
 from collections.abc import Iterator, Sequence
 from typing import Any, TypeAlias
 
@@ -37,6 +38,11 @@ CALLS = {
     "xla_metadata_call": "jaxpr",
 }
 """Primitives that only call a program, and the parameter that holds it."""
+
+
+def current_trace() -> "weakref.ref[Any]":
+    """The trace that operations go to now, to be compared."""
+    return weakref.ref(trace_ctx.trace)
 
 
 def called_program(equation: JaxprEqn) -> tuple[Jaxpr, Sequence[Numbers]] | None:

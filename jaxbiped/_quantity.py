@@ -15,6 +15,8 @@ from jaxbiped._checks import (
 )
 
 _EXPONENT = re.compile(r"\^([\w.]+)")
+_FORCE_OR_LENGTH = re.compile(r"\b[Nm]\b")
+_ANGULAR = {"N": "N m", "m": "rad"}
 _BASES, _PLAIN = ("m", "s"), ("rad", "1")
 _SUPERSCRIPTS = dict(zip("0123456789n", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True))
 
@@ -54,6 +56,11 @@ class Quantity(NamedTuple):
                 elif base not in _PLAIN:
                     raise ValueError(f"{self.unit!r} is not made of lengths and times alone")
         return powers[0], powers[1]
+
+    @property
+    def angular(self) -> "Quantity":
+        """The same of a law between an angle and a torque, not a length and a force: N m/rad^n."""
+        return self._replace(unit=_FORCE_OR_LENGTH.sub(lambda found: _ANGULAR[found[0]], self.unit))
 
     def in_row(self) -> str:
         """Words and symbol."""

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, PyTree
 
 from jaxbiped._checks import is_number
+from jaxbiped._files import JsonObject as JsonObject
 
 Scalar: TypeAlias = Float[Array, "..."]
 """A number: one scalar leaf, or one such leaf for each entry of a batch or a time series."""
@@ -17,8 +18,6 @@ Scalar: TypeAlias = Float[Array, "..."]
 Numbers: TypeAlias = Array | np.ndarray
 """An array, of JAX or of NumPy."""
 
-JsonObject: TypeAlias = dict[str, Any]
-"""Numbers and words by name, ready for JSON: what a command writes, settings of a store."""
 
 SomeTree = TypeVar("SomeTree")
 """A pytree that comes back in the same structure."""

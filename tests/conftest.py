@@ -1,5 +1,7 @@
 """What all tests share."""
 
+import contextlib
+import ctypes
 import gc
 import os
 import shutil
@@ -28,26 +30,48 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 
 MANY_MAPPINGS = 12_000
 """Mappings of memory that programs may hold; Linux allows 65530 and XLA dies where it gets none."""
+MUCH_MEMORY = 1 << 30
+"""Bytes that a worker may grow by: what XLA compiled holds some ten kilobytes an operation."""
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _few_programs_are_kept():
+def _few_programs_are_kept(_memory):
     """A worker lives through many files: programs of those behind it are dropped when they pile up.
 
     Not after every file, for what files share would be compiled again.
     """
     yield
     mappings = Path("/proc/self/maps")
-    if mappings.exists() and mappings.read_bytes().count(b"\n") > MANY_MAPPINGS:
+    if not mappings.exists():
+        return
+    many = mappings.read_bytes().count(b"\n") > MANY_MAPPINGS
+    if many or _resident() > _memory[-1] + MUCH_MEMORY:
         jb.clear_caches()
         jax.clear_caches()
         gc.collect()
+        with contextlib.suppress(AttributeError):  # another C library
+            ctypes.CDLL(None).malloc_trim(0)
+        _memory.append(_resident())
+
+
+@pytest.fixture(scope="session")
+def _memory():
+    """What the worker took where programs were last dropped [bytes]."""
+    return [_resident() if Path("/proc/self/statm").exists() else 0]
+
+
+def _resident():
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE")
 
 
 QUICK_COMPILING = "--xla_backend_optimization_level=0"
 """XLA compiles walks and gaits in less than half the time, and runs them slower."""
 if jax.__version_info__ < (0, 11, 1):  # which no longer has a choice of emitters
-    QUICK_COMPILING += " --xla_cpu_use_fusion_emitters=false"
+    # In parts, for which a worker has no second core, it takes a fifth longer.
+    QUICK_COMPILING += (
+        " --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
+    )
 
 
 def pytest_addoption(parser):

@@ -13,28 +13,28 @@ DISTANCE = 0.1
 
 def pinned_pendulum(orientation="angle", *, twice=False):
     """Two of the seed's legs hanging from one pin; `twice` says the second joint twice."""
-    body = jb.constraints.Body(**LEG)
+    body = jb.constraints.LinkBody(**LEG)
     hip = (0.0, DISTANCE)
-    joints = [jb.constraints.Joint(hip, (0.0, 0.0), 0), jb.constraints.Joint(hip, hip, 0, 1)]
+    joints = [jb.constraints.Pin(hip, (0.0, 0.0), 0), jb.constraints.Pin(hip, hip, 0, 1)]
     return jb.constraints.Linkage((body, body), joints + joints[1:] * twice, orientation)
 
 
 def one_leg(distance=DISTANCE):
     """The seed's leg hanging from a pin: the linkage that compiles soonest."""
-    joint = jb.constraints.Joint((0.0, distance), (0.0, 0.0), 0)
-    return jb.constraints.Linkage((jb.constraints.Body(**LEG),), (joint,))
+    joint = jb.constraints.Pin((0.0, distance), (0.0, 0.0), 0)
+    return jb.constraints.Linkage((jb.constraints.LinkBody(**LEG),), (joint,))
 
 
 def four_bar(orientation="angle"):
     """Crank, coupler and rocker between two pins of the ground; each bar a thin rod."""
     lengths = (0.2, 0.5, 0.4)
-    bars = [jb.constraints.Body(length, length**3 / 12.0) for length in lengths]
+    bars = [jb.constraints.LinkBody(length, length**3 / 12.0) for length in lengths]
     ends = [((-length / 2, 0.0), (length / 2, 0.0)) for length in lengths]
     joints = (
-        jb.constraints.Joint(ends[0][0], (0.0, 0.0), 0),
-        jb.constraints.Joint(ends[0][1], ends[1][0], 0, 1),
-        jb.constraints.Joint(ends[1][1], ends[2][1], 1, 2),
-        jb.constraints.Joint(ends[2][0], (0.5, 0.0), 2),
+        jb.constraints.Pin(ends[0][0], (0.0, 0.0), 0),
+        jb.constraints.Pin(ends[0][1], ends[1][0], 0, 1),
+        jb.constraints.Pin(ends[1][1], ends[2][1], 1, 2),
+        jb.constraints.Pin(ends[2][0], (0.5, 0.0), 2),
     )
     return jb.constraints.Linkage(bars, joints, orientation)
 

@@ -36,8 +36,8 @@ def _many(state):
 
 
 def _pendulum():
-    body = jb.constraints.Body(mass=1.0, inertia=0.0096)
-    joint = jb.constraints.Joint((0.0, 0.1), (0.0, 0.0), 0)
+    body = jb.constraints.LinkBody(mass=1.0, inertia=0.0096)
+    joint = jb.constraints.Pin((0.0, 0.1), (0.0, 0.0), 0)
     linkage = jb.constraints.Linkage((body,), (joint,))
     start = jb.dynamics.LinkageState((0.1 * np.sin(0.5), -0.1 * np.cos(0.5), 0.5), (0.0,) * 3)
     scene = jb.LinkageScene(linkage, jb.constraints.Index1())
@@ -101,16 +101,20 @@ CALLS = {
 }
 
 
+def _alike(a, b):
+    words = np.asarray(a).dtype.kind == "U"  # names of legs
+    return np.array_equal(a, b) if words else np.allclose(a, b, equal_nan=True)
+
+
 @pytest.mark.parametrize("name", CALLS)
 def test_switches_change_nothing(name):
     call = CALLS[name]
     plain = call()
-    for switch, value in SWITCHES.items():
-        with contextlib.ExitStack() as on:
+    with contextlib.ExitStack() as on:
+        for switch, value in SWITCHES.items():
             on.enter_context(getattr(jax, switch)(value))
-            found = call()
-        same = jax.tree.map(lambda a, b: np.allclose(a, b, equal_nan=True), found, plain)
-        assert jax.tree.all(same), switch
+        found = call()
+    assert jax.tree.all(jax.tree.map(_alike, found, plain))
 
 
 def test_the_user_s_own_code_is_still_looked_at():

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.dynamics._state import state_for
 from jaxbiped.solve._scene_key import scene_key
+from tests.mechanisms import scene_of
 
 SCENE, START = jb.seed_scene(), jb.seed_state()
 RIGID, ROLLING = jb.ladder()["rigid"], jb.dynamics.rigid_state(START)
@@ -43,7 +45,7 @@ def walk():
 @pytest.mark.parametrize("other", OTHERS)
 def test_a_walk_of_another_scene_is_refused(walk, name, other):
     with pytest.raises(
-        jb.ArgumentError, match=r"simulated with another|it must be a (Scene or|Rigid)"
+        jb.ArgumentError, match=r"simulated with another|it must be a (Scene or|Rigid|Redundant)"
     ):
         TAKES[name](OTHERS[other], walk)
 
@@ -72,6 +74,17 @@ def test_the_key_of_a_scene_is_the_same_however_it_is_computed(walk):
     assert jb.energy_ledger(near, walk).gravity_work == pytest.approx(
         jb.energy_ledger(SCENE, walk).gravity_work
     )
+
+
+def test_whole_turns_stay_where_they_wind_something_up():
+    legs = {"leg_1": scene_of("unequal"), "1": SCENE}
+    spring = jb.Spring({"1": 1, "2": -1}, stiffness=1.0)
+    sprung = jb.Mechanism(**SCENE.mechanism.arguments() | {"joints": (spring,)})
+    legs["sprung"] = dataclasses.replace(SCENE, walker=sprung)
+    for name, scene in legs.items():
+        angle = "theta_1" if name == "sprung" else f"theta_{name}"
+        found = getattr(state_for(scene, scene.state(**{angle: 7.0})), angle)
+        assert float(found) == pytest.approx(7.0 if name == "sprung" else 7.0 - 2.0 * np.pi)
 
 
 @pytest.mark.parametrize("leg", ["theta_1", "theta_2"])

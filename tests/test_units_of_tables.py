@@ -5,10 +5,10 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.optimise._objectives import OBJECTIVES
-from jaxbiped.plot import _branch, _symbols
+from jaxbiped.plot import _parameter_charts, _symbols
 from jaxbiped.solve._units import units_of
 from jaxbiped.sweep._stored_fields import FIELDS
-from jaxbiped.sweep.starts._coordinates import COORDINATES, START_QUANTITIES
+from jaxbiped.sweep.starts._coordinates import START_QUANTITIES, state_coordinates
 
 METRES, SECONDS, KILOGRAMS = 2.0, 3.0, 5.0
 """Units of another system, in SI's."""
@@ -32,8 +32,9 @@ RATES = {"hip_x": "hip_vx", "hip_z": "hip_vz", "theta_1": "omega_1", "theta_2": 
 def test_rates_of_the_state_have_the_units_of_rates():
     for name, rate in RATES.items():
         assert STATE_QUANTITIES[rate].unit == f"{STATE_QUANTITIES[name].unit}/s"
-    for name, leaf in COORDINATES.items():
-        assert START_QUANTITIES[name].unit == STATE_QUANTITIES[leaf].unit
+    for name, leaf in state_coordinates(jb.seed_scene()).items():
+        own = START_QUANTITIES.get(name, STATE_QUANTITIES[leaf])
+        assert own.unit == STATE_QUANTITIES[leaf].unit
     # By what errors are measured in: lengths, √(l/g) and their quotients.
     scene = jb.with_parameters(jb.seed_scene(), {"l": 0.4 * METRES, "g": 9.8 * METRES / SECONDS**2})
     inverse = units_of(scene, jb.seed_state()).inverse
@@ -53,7 +54,7 @@ BY_DIMENSION = {
     [
         {name: each.quantity.unit for name, each in OBJECTIVES.items()},
         {name: unit for name, (_, _, unit, _) in FIELDS.items() if name != "cycle_footsteps"},
-        {name: each.unit for name, each in _branch._MEASURES.items()},
+        {name: each.unit for name, each in _parameter_charts._MEASURES.items()},
     ],
     ids=["objectives", "fields of a sweep", "measures of a branch"],
 )
@@ -63,8 +64,9 @@ def test_measures_have_the_units_of_what_they_are(table):
 
 
 def test_axes_of_figures_have_the_units_of_what_they_are():
-    told = {"TIME": "s", "HORIZONTAL": "m", "HEIGHT": "m", "LEG_ANGLE": "rad", "PENETRATION": "m",
-            "LEG_RATE": "rad/s", "NORMAL_FORCE": "N", "TANGENTIAL_FORCE": "N", "SLIP_SPEED": "m/s",
+    told = {"TIME": "s", "HORIZONTAL": "m", "HEIGHT": "m", "PENETRATION": "m",
+            "NORMAL_FORCE": "N", "TANGENTIAL_FORCE": "N", "SLIP_SPEED": "m/s",
             "FORCE_RATIO": ""}  # fmt: skip
     for name, unit in told.items():
         assert getattr(_symbols, name).unit == unit, name
+    assert (_symbols.angle_of("leg").unit, _symbols.rate_of("leg").unit) == ("rad", "rad/s")

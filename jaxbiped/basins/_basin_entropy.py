@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped._checks import ArgumentError
-from jaxbiped.basins._arguments import check_label_grid, check_whole
+from jaxbiped._checks import ArgumentError, check_count
+from jaxbiped.basins._labels import check_label_grid
 
 
 class Entropy(NamedTuple):
@@ -59,7 +59,7 @@ def entropy(labels: npt.ArrayLike, *, box: int = 5) -> Entropy:
         0.0
     """
     grid = check_label_grid(labels)
-    side = check_whole("box", box, 2)
+    side = check_count("box", box, 2)
     if side > min(grid.shape):
         raise ArgumentError(
             f"box = {side} is not allowed: it must be at most {min(grid.shape)}, "

@@ -6,9 +6,16 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped._checks import ArgumentError, check_positive
-from jaxbiped.basins._arguments import check_box, check_label_grid, check_vector, check_whole
-from jaxbiped.basins._label_oracle import LabelOf, LabelOracle, normalise, spread_points
+from jaxbiped._checks import ArgumentError, check_count, check_positive
+from jaxbiped.basins._label_oracle import (
+    LabelOf,
+    LabelOracle,
+    check_box,
+    check_vector,
+    normalise,
+    spread_points,
+)
+from jaxbiped.basins._labels import check_label_grid
 from jaxbiped.basins._refined_boundary import RefinedBoundary
 
 
@@ -81,7 +88,7 @@ def boundary_dimension(
         ArgumentError: no boundary at three sizes, sides with a refined boundary, a side larger
             than the grid or not dividing the largest, or an argument that is not allowed.
     """
-    check_whole("skip", skip, 0)
+    check_count("skip", skip, 0)
     if isinstance(boundary, RefinedBoundary):
         if sides is not None:
             raise ArgumentError(f"sides = {sides} is not allowed: the levels must set the sizes.")
@@ -118,7 +125,7 @@ def _lengths(name: str, given: Sequence[int] | None, most: int) -> np.ndarray:
     """Those given, in order; otherwise powers of two up to `most`."""
     if given is None:
         return np.asarray(2 ** np.arange(max(most, 1).bit_length()))
-    return np.unique([check_whole(name, each, 1) for each in given])
+    return np.unique([check_count(name, each) for each in given])
 
 
 def _mixed_boxes(labels: np.ndarray, side: int) -> int:
@@ -239,7 +246,7 @@ def sampled_uncertainty(
         raise ArgumentError(f"distances holds {parts[-1]:g}: each must be below 0.5.")
     d = low.size
     ask = LabelOracle(label_of, batch)
-    spread = spread_points(check_whole("samples", samples, 1), 2 * d)
+    spread = spread_points(check_count("samples", samples), 2 * d)
     # Starts keep from the box's faces, so that none is asked for outside.
     centres = parts[-1] + (1.0 - 2.0 * parts[-1]) * spread[:, :d]
     ways = normalise(ndtri(spread[:, d:]))

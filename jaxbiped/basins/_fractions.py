@@ -5,9 +5,8 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped._checks import ArgumentError, check_at_least, check_not_negative
-from jaxbiped.basins._arguments import check_confidence, check_known
-from jaxbiped.basins._labels import Label
+from jaxbiped._checks import ArgumentError, check_at_least, check_finite, check_not_negative
+from jaxbiped.basins._labels import Label, check_known
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +54,7 @@ def wilson_interval(
     """
     from scipy.special import ndtri
 
-    check_confidence(confidence)
+    _check_confidence(confidence)
     check_not_negative("count", count)
     check_not_negative("total", total)
     k, n = np.asarray(count, dtype=float), np.asarray(total, dtype=float)
@@ -100,7 +99,7 @@ def fractions(
         >>> {name: (float(each.estimate), each.count) for name, each in found.items()}
         {'walking': (0.75, 3), 'fell forward': (0.25, 1)}
     """
-    check_confidence(confidence)
+    _check_confidence(confidence)
     names = _names(np.asarray(labels))
     unsure = np.zeros(np.shape(labels), bool) if doubt is None else np.asarray(doubt, dtype=bool)
     if unsure.shape != np.shape(labels):
@@ -128,3 +127,12 @@ def _names(labels: np.ndarray) -> np.ndarray:
     check_known(labels)
     codes, place = np.unique(labels.ravel(), return_inverse=True)
     return np.asarray([str(Label(code)) for code in codes])[place]
+
+
+def _check_confidence(value: float) -> None:
+    """Raises `ArgumentError` unless the confidence lies between 0 and 1."""
+    check_finite("confidence", value)
+    if not (np.ndim(value) == 0 and 0.0 < value < 1.0):
+        raise ArgumentError(
+            f"confidence = {value} is not allowed: it must be one number above 0 and below 1."
+        )

@@ -88,8 +88,8 @@ def label_errors(found: "xarray.Dataset") -> LabelErrors:
     text = found.attrs.get(ERRORS)
     if text is None:
         raise ArgumentError(
-            "found tells no errors of its labels: it must be a sweep of a labelling whose accuracy "
-            "is a number."
+            "found has no error estimates of its labels: it must be a sweep of a labelling whose "
+            "accuracy is a number."
         )
     return LabelErrors(**json.loads(text))
 

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped._checks import ArgumentError
-from jaxbiped.basins._arguments import check_whole
+from jaxbiped._checks import ArgumentError, check_count, check_finite
 from jaxbiped.basins._labels import Label
 
 LabelOf = Callable[[np.ndarray], npt.ArrayLike]
@@ -18,7 +17,7 @@ class LabelOracle:
 
     def __init__(self, label_of: LabelOf, batch: int):
         self.label_of = label_of
-        self.batch = check_whole("batch", batch, 1)
+        self.batch = check_count("batch", batch)
         self.asked = 0
         self.calls = 0
 
@@ -67,3 +66,29 @@ def spread_directions(count: int, d: int) -> np.ndarray:
     if d == 1 or count <= 2 * d:
         return axes
     return np.concatenate([axes, normalise(ndtri(spread_points(count - 2 * d, d)))])
+
+
+def check_vector(name: str, value: npt.ArrayLike) -> np.ndarray:
+    """Finite numbers of shape (d,), d at least 1; raises `ArgumentError` for anything else."""
+    check_finite(name, value)
+    array = np.asarray(value, dtype=float)
+    if array.ndim != 1 or array.size == 0:
+        raise ArgumentError(
+            f"{name} has shape {array.shape}: it must be (d,), one entry a dimension, d at least 1."
+        )
+    return array
+
+
+def check_box(lower: npt.ArrayLike, upper: npt.ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """The two corners of a box, shape (d,); raises `ArgumentError` where it has no volume."""
+    low, high = check_vector("lower", lower), check_vector("upper", upper)
+    if low.shape != high.shape:
+        raise ArgumentError(
+            f"lower has shape {low.shape} and upper {high.shape}: they must be the same."
+        )
+    if (low >= high).any():
+        k = int(np.argmax(low >= high))
+        raise ArgumentError(
+            f"lower[{k}] = {low[k]:g} is not below upper[{k}] = {high[k]:g}: it must be."
+        )
+    return low, high

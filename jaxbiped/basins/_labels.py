@@ -5,6 +5,7 @@ import enum
 import numpy as np
 import numpy.typing as npt
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 
 WALKING_NAME = "walking period-{cycle_footsteps}"
@@ -100,3 +101,31 @@ class Witness(enum.IntFlag):
 
     LOOSER = 1
     OTHER = 2
+
+
+def check_label_grid(labels: npt.ArrayLike) -> np.ndarray:
+    """Label codes on a grid of one or more dimensions, none of them pending.
+
+    Raises:
+        ArgumentError: no entry, no axis, codes that are not whole numbers, or a pending one.
+    """
+    grid = np.asarray(labels)
+    if grid.ndim == 0 or grid.size == 0:
+        raise ArgumentError(
+            f"labels has shape {grid.shape}: it must be a grid with at least one entry."
+        )
+    if grid.dtype.kind not in "iu":
+        raise ArgumentError(f"labels has dtype {grid.dtype}: it must be whole numbers, the codes.")
+    pending = int((grid == Label.PENDING).sum())
+    if pending:
+        raise ArgumentError(
+            f"labels has {pending} pending entries of {grid.size}: they must all be labelled."
+        )
+    return grid
+
+
+def check_known(labels: np.ndarray) -> None:
+    """Raises `ArgumentError` for whole numbers that are no code of `Label`."""
+    unknown = sorted(set(np.unique(labels).tolist()) - set(map(int, Label)))
+    if unknown:
+        raise ArgumentError(f"labels holds {unknown[0]}: it must hold names or codes of Label.")

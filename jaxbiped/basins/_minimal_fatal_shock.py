@@ -1,15 +1,28 @@
 """Minimal fatal shock: the nearest start about a gait with another label."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped._checks import ArgumentError, check_finite, check_positive
-from jaxbiped.basins._arguments import check_vector, check_whole
-from jaxbiped.basins._label_oracle import LabelOf, LabelOracle, normalise, spread_directions
-from jaxbiped.basins._ray_descent import GivenNormals, Normal, SecantNormals, descend_rays
-from jaxbiped.basins._rays import Brackets, Surroundings, bisect_brackets, first_exits
+from jaxbiped._checks import ArgumentError, check_count, check_finite, check_positive
+from jaxbiped.basins._label_oracle import (
+    LabelOf,
+    LabelOracle,
+    check_vector,
+    normalise,
+    spread_directions,
+)
+from jaxbiped.basins._rays import (
+    Brackets,
+    GivenNormals,
+    Normal,
+    SecantNormals,
+    Surroundings,
+    bisect_brackets,
+    descend_rays,
+    first_exits,
+)
 
 _APART = 0.5
 """Angle [rad] between the rays that are improved, so that they lead to different places."""
@@ -111,8 +124,8 @@ def minimal_fatal_shock(
             f"tolerance = {tolerance:g} is not allowed: it must be at least 1e-12 max_distance = "
             f"{1e-12 * max_distance:g} and below max_distance = {max_distance:g}."
         )
-    check_whole("improved", improved, 0)
-    marks = np.linspace(0.0, max_distance, check_whole("steps", steps, 1) + 1)[1:]
+    check_count("improved", improved, 0)
+    marks = np.linspace(0.0, max_distance, check_count("steps", steps) + 1)[1:]
 
     rays = first_exits(around, ways, marks)
     rays = rays.take(np.isfinite(rays.outside))
@@ -141,11 +154,11 @@ def _surroundings(ask: LabelOracle, origin: npt.ArrayLike, scales: npt.ArrayLike
     return Surroundings(ask, centre, units, int(ask(centre[None])[0]))
 
 
-def _directions(directions: int | npt.ArrayLike | None, d: int) -> np.ndarray:
+def _directions(directions: Any, d: int) -> np.ndarray:
     if directions is None:
         return spread_directions(32 * d, d)
     if np.ndim(directions) == 0:
-        return spread_directions(check_whole("directions", directions, 1), d)
+        return spread_directions(check_count("directions", directions), d)
     check_finite("directions", directions)
     given = np.asarray(directions, dtype=float)
     if given.ndim != 2 or given.shape[1] != d or len(given) == 0:

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped._checks import ArgumentError
-from jaxbiped.basins._arguments import check_box, check_whole
-from jaxbiped.basins._label_oracle import LabelOf, LabelOracle
+from jaxbiped._checks import ArgumentError, check_count
+from jaxbiped.basins._label_oracle import LabelOf, LabelOracle, check_box
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -127,12 +126,12 @@ def refine_boundary(
         ArgumentError: an argument that is not allowed, or labels of a wrong shape.
     """
     low, high = check_box(lower, upper)
-    coarse = tuple(check_whole("shape", n, 1) for n in np.atleast_1d(np.asarray(shape)))
+    coarse = tuple(check_count("shape", n) for n in np.atleast_1d(np.asarray(shape)))
     if len(coarse) != low.size:
         raise ArgumentError(
             f"shape has {len(coarse)} entries and the box {low.size} dimensions: they must agree."
         )
-    check_whole("levels", levels, 0)
+    check_count("levels", levels, 0)
     if math.prod((n << levels) + 1 for n in coarse) >= 2**62:
         raise ArgumentError(
             f"levels = {levels} is not allowed: the finest grid must have fewer than 2^62 points."

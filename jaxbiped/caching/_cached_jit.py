@@ -11,8 +11,6 @@ from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 import equinox as eqx
 import jax
-import jax.tree_util as jtu
-import numpy as np
 
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._jax_versions import nothing_is_traced
@@ -186,30 +184,6 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
 
     def _count(self) -> int:
         return int(self._jitted._cached._cache_size()) + len(self._programs)
-
-
-def kept_alone(function: Callable[_P, _T]) -> Callable[_P, _T]:
-    """Decorator: a function of arrays that is one kept program where it is called by itself.
-
-    Operation by operation JAX would compile a program for each. Where something traces it, it is
-    a part of the whole as it is.
-    """
-    kept = cached_jit(function)
-
-    @without_switches
-    @functools.wraps(function)
-    def called(*args: _P.args, **kwargs: _P.kwargs) -> _T:
-        if not nothing_is_traced():
-            return function(*args, **kwargs)
-        args, kwargs = jtu.tree_map(_as_array, (args, kwargs))
-        return kept(*args, **kwargs)
-
-    return called
-
-
-def _as_array(leaf: Any) -> Any:
-    """A number of Python's as an array, for it not to be compiled in."""
-    return np.asarray(leaf) if isinstance(leaf, float | int) else leaf
 
 
 def arguments_of(given: tuple[tuple[Any, ...], dict[str, Any]]) -> Arguments | None:

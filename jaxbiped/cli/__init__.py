@@ -8,6 +8,7 @@ import operator
 import os
 import re
 import sys
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,10 +20,9 @@ from jaxbiped._environment import check_environment
 from jaxbiped._files import user_path
 from jaxbiped._progress import tell_stages
 from jaxbiped.cli._basin import Basin
-from jaxbiped.cli._cache import Cache
 from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._continue import ContinueGait
-from jaxbiped.cli._doctor import Doctor
+from jaxbiped.cli._doctor import Cache, Doctor
 from jaxbiped.cli._fit import Fit
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
@@ -149,10 +149,9 @@ def one_sentence(box: str) -> str:
 
     The first block is the message; of the others, flags and commands that may have been meant.
     """
-    plain = [_SIDES.sub(r"\1", line) for line in _COLOUR.sub("", box).splitlines()]
-    lines = [line for line in plain if line]
+    plain = (_SIDES.sub(r"\1", line) for line in _COLOUR.sub("", box).splitlines())
     blocks: list[list[str]] = [[]]
-    for line in lines:
+    for line in filter(None, plain):
         if _RULE.match(line) or line.startswith("╭"):
             blocks.append([])
         else:
@@ -162,22 +161,14 @@ def one_sentence(box: str) -> str:
     if not filled:
         return "these arguments are not allowed: see jaxbiped --help."
     message, *others = filled
-    parts = [_join_lines(message)]
+    # A message may go on to list its reasons.
+    told = takewhile(lambda line: not line.startswith(("Got errors", "- <class")), message)
+    parts = [_OPTIONAL.sub(r"\2 is no \1", " ".join(told)).rstrip(". ")]
     for block in others:
         flags = [line.split()[0] for line in block[1:] if line.startswith("--")]
         flags = [flag for flag in flags if flag not in parts[0].split()]
         if block[0].startswith("Perhaps you meant") and flags:
             parts.append(f"perhaps you meant {' or '.join(dict.fromkeys(flags))}")
         elif block[0].startswith("Available subcommands"):
-            parts.append(_join_lines(block))
+            parts.append(" ".join(block).rstrip(". "))
     return "; ".join(part[0].lower() + part[1:] for part in parts) + "."
-
-
-def _join_lines(lines: list[str]) -> str:
-    """The lines of a block in one, up to where it begins to list its reasons."""
-    shown = []
-    for line in lines:
-        if line.startswith(("Got errors", "- <class")):
-            break
-        shown.append(line)
-    return _OPTIONAL.sub(r"\2 is no \1", " ".join(shown)).rstrip(". ")

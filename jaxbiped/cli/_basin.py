@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
+from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
 from jaxbiped.caching import _import_time
 from jaxbiped.cli import _options as options
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray
 
-    from jaxbiped._types import JsonObject
 
 _GAIT = {
     "gait": "{0[name]}",
@@ -37,16 +37,16 @@ _REDUNDANT = (
 
 
 class SweepOptions(options.Options, of=("labelling", "sweep")):
-    """How starts are followed, and where the results go."""
+    """How starts are followed, and where results are stored."""
 
     footsteps: options.Count
-    """After which a start that is not certain yet is unresolved."""
+    """Maximum number of footsteps; a start that is still uncertain after them is unresolved."""
     accuracy: options.AnyAccuracy
-    """How accurately to solve: draft, balanced or tight; or the share of the labels that may be
-    wrong, such as 1e-4."""
+    """How accurately to solve: draft, balanced or tight; or the fraction of the labels that may
+    be wrong, such as 1e-4."""
     engine: options.Engine
     store: Path | None
-    """Zarr store for the results; a run that was killed continues there."""
+    """Zarr store for the results, from which an interrupted run continues."""
     any_version: bool
     """Continue a store that another version or revision of jaxbiped wrote."""
     chunk: options.Count
@@ -116,7 +116,7 @@ class Basin(options.Command):
         return 0
 
 
-def _basin_numbers(found: "xarray.Dataset", seconds: float) -> "JsonObject":
+def _basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
     """What is known of a basin in SI units, ready for JSON."""
     remains = int(jb.basins.Doubt.REMAINS)
     doubt = found.doubt.values == remains if "doubt" in found else None
@@ -146,7 +146,7 @@ def _label_names(found: "xarray.Dataset") -> "np.ndarray":
     return jb.basins.label_names(found.label.values, found.cycle_footsteps.values)
 
 
-def _print(report: Report, numbers: "JsonObject") -> None:
+def _print(report: Report, numbers: JsonObject) -> None:
     layout = {
         "label": "{0[0]}",
         "starts": "{0[1]}",
@@ -200,11 +200,12 @@ def _write_results(
 
 def _mark(known: "jb.Labelling", x: str, y: str) -> tuple[float, float] | None:
     """Where the gait of the scene itself is in these coordinates, if it has one."""
-    from jaxbiped.sweep.starts._coordinates import COORDINATES
+    from jaxbiped.sweep.starts._coordinates import state_coordinates
 
     gaits = [gait for row in known.family.rows for gait in row]
     if known.family.names or not gaits:
         return None
     values: dict[str, Any] = dict(jb.parameter_values(known.scene))
-    values |= {name: getattr(gaits[0].state, leaf, None) for name, leaf in COORDINATES.items()}
+    leaves = state_coordinates(known.scene)
+    values |= {name: getattr(gaits[0].state, leaf) for name, leaf in leaves.items()}
     return float(values[x]), float(values[y])

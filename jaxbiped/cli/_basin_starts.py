@@ -2,15 +2,15 @@
 
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.cli import _options as options
 
-_USUAL = ("theta_swing=-0.5:0.3:100", "omega_swing=-2:4:100")
+_USUAL = ("theta_{swing}=-0.5:0.3:100", "omega_{swing}=-2:4:100")
 """Axes of a basin that nobody chose, and as many starts on each."""
-_USUAL_RIGID = ("theta_stance=0:0.5:100", "omega_stance=-2.5:0:100")
+_USUAL_RIGID = ("theta_{stance}=0:0.5:100", "omega_{stance}=-2.5:0:100")
 
 
 def parse_axis(text: str) -> tuple[str, tuple[float, float, int]]:
@@ -38,27 +38,28 @@ Axis = Annotated[str | None, _IS_AXIS]
 
 
 class StartsOptions(options.Options, of=("starts.sample", "starts.grid")):
-    """Which starts; what is not named keeps the value that the gait has on its section."""
+    """The starts; coordinates that are not named have the value of the gait on its section."""
 
     x: Axis = None
     """Horizontal axis, as name=first:last:count: theta_stance, theta_swing, omega_stance,
     omega_swing, hip_z, hip_vx, hip_vz, or a parameter of the scene."""
     y: Axis = None
-    """Vertical axis, likewise."""
+    """Vertical axis, in the same form."""
     more: Annotated[
         tuple[str, ...], options.Check(lambda _, text: parse_axis(text), each=True)
     ] = ()
-    """Further axes, likewise."""
+    """Further axes, in the same form."""
     samples: options.Count | None = None
-    """So many quasi-random starts within the axes' ranges, in place of a grid."""
+    """Number of random starts within the ranges of the axes, instead of a grid."""
     sampling: Annotated[str, options.one_of("starts.SAMPLINGS")] = "sobol"
-    """How they are drawn: uniform, latin-hypercube, sobol or halton."""
+    """How random starts are drawn: uniform, latin-hypercube, sobol or halton."""
     seed: int
-    """Of the samples."""
-    place: bool
-    """Place the stance foot on the ground: hip height and velocity follow from the stance leg."""
+    """Random seed for drawing the starts."""
+    place: bool = False
+    """Place the stance leg on the ground, which determines the height and the velocity of the root
+    point. Always on if an axis is an angle or rate of a body by its name in the state."""
     starts: Path | None = None
-    """Label these starts instead: CSV with the header
+    """Label the starts of this file instead: CSV with the names of the state as its header, such as
     hip_x,hip_z,theta_1,theta_2,hip_vx,hip_vz,omega_1,omega_2, in the slope's frame."""
 
     @property
@@ -70,7 +71,8 @@ class StartsOptions(options.Options, of=("starts.sample", "starts.grid")):
         """Raises `ArgumentError` for what is wrong in itself."""
         if self.starts is not None and (self.axes or self.samples is not None):
             raise ArgumentError(
-                f"starts = {str(self.starts)!r} goes without x, y, more and samples: name either."
+                f"starts = {str(self.starts)!r} is not allowed with x, y, more or "
+                "samples: give one or the other."
             )
         super().check()
 
@@ -83,14 +85,14 @@ class StartsOptions(options.Options, of=("starts.sample", "starts.grid")):
         axes = self._ranges(scene)
         if self.samples is None:
             values = {name: np.linspace(*axis) for name, axis in axes.items()}
-            return jb.starts.grid(scene, values, place=self.place)
+            return jb.starts.grid(scene, values, place=self.place or None)
         return jb.starts.sample(
             scene,
             {name: (low, high) for name, (low, high, _) in axes.items()},
             self.samples,
             method=self.sampling,
             seed=self.seed,
-            place=self.place,
+            place=self.place or None,
         )
 
     def _ranges(self, scene: "jb.Scene | jb.RigidScene") -> dict[str, tuple[float, float, int]]:
@@ -98,13 +100,22 @@ class StartsOptions(options.Options, of=("starts.sample", "starts.grid")):
         from jaxbiped.sweep.starts._coordinates import check_coordinates
 
         axes: dict[str, tuple[float, float, int]] = {}
-        for text in self.axes or reversed(_USUAL if scene.compliant else _USUAL_RIGID):
+        for text in self.axes or _usual_axes(scene):
             name, axis = parse_axis(text)
             check_coordinates(scene, [name])
             if name in axes:
                 raise ArgumentError(f"{name} is named by two axes: each needs its own.")
             axes[name] = axis
         return axes
+
+
+def _usual_axes(scene: "jb.Scene | jb.RigidScene") -> tuple[str, ...]:
+    """Of what swings and what stands where a cycle begins: one of the first pair each."""
+    structure, roles = scene.mechanism.structure, {"swing": "swing", "stance": "stance"}
+    if "theta_swing" not in jb.starts.coordinate_names(scene):
+        roles = {role: structure.bodies[j] for role, j in zip(roles, structure.roles, strict=True)}
+    y, x = (axis.format(**roles) for axis in (_USUAL if scene.compliant else _USUAL_RIGID))
+    return x, y
 
 
 def read_starts(path: Path, scene: "jb.Scene | jb.RigidScene") -> object:
@@ -114,8 +125,10 @@ def read_starts(path: Path, scene: "jb.Scene | jb.RigidScene") -> object:
     import numpy as np
 
     from jaxbiped._types import as_float
+    from jaxbiped.scene._state_types import state_type_of
 
-    named, names = f"starts = {str(path)!r}", list(jb.State._fields)
+    structure = scene.mechanism.structure
+    named, names = f"starts = {str(path)!r}", [*structure.coordinates, *structure.rates]
     wanted = ",".join(names)
     try:
         with path.open(newline="") as file:
@@ -141,5 +154,5 @@ def read_starts(path: Path, scene: "jb.Scene | jb.RigidScene") -> object:
             raise ArgumentError(
                 f"{named}, line {line}: {len(row)} numbers instead of {len(names)}."
             )
-    whole = jb.State(*map(as_float, np.array(numbers).T))
+    whole: Any = state_type_of(names)(*map(as_float, np.array(numbers).T))
     return whole if scene.compliant else jb.dynamics.rigid_state(whole)

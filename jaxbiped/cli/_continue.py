@@ -3,18 +3,17 @@
 import math
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from tyro.conf import arg
 
 import jaxbiped as jb
 from jaxbiped._checks import check_finite
+from jaxbiped._files import JsonObject
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._report import Report, columns, records, table, wall_times
-from jaxbiped.cli._scene_options import SceneOptions, StartOptions
-
-if TYPE_CHECKING:
-    from jaxbiped._types import JsonObject
+from jaxbiped.cli._scene_options import SceneOptions
+from jaxbiped.cli._start_options import StartOptions
 
 _MOST_ROWS = 24
 _STABLE = {True: "yes", False: "no", None: "undecided"}
@@ -27,15 +26,15 @@ class ContinueGait(options.Command, of=("continue_gait",)):
     start: StartOptions
     output: options.OutputOptions
     along: str = "slope"
-    """The parameter, by its name."""
+    """Name of the parameter."""
     first: Annotated[float, arg(name="from"), options.Check(check_finite)] = 0.005
-    """Beginning of its range (SI units)."""
+    """Beginning of the range of the parameter (SI units)."""
     last: Annotated[float, arg(name="to"), options.Check(check_finite)] = 0.1
-    """End of its range."""
+    """End of the range (SI units)."""
     footsteps: options.CycleFootsteps
     log: bool | None
     largest_step: Annotated[float, options.positive()]
-    """Largest arclength of a step, in which the range counts 1."""
+    """Maximum arclength of a step, with the range scaled to length 1."""
     max_points: options.Count
     accuracy: options.GaitAccuracy
     engine: options.Engine
@@ -44,7 +43,7 @@ class ContinueGait(options.Command, of=("continue_gait",)):
         """Runs the command; returns the exit code."""
         continue_gait, imported = jb.continue_gait, time.perf_counter()
         scene = self.scene.scene()
-        guess = self.start.guess(scene)
+        guess = self.start.guess(scene, self.scene.walker)
         options.make_folder(self.output.out)
         branch = continue_gait(
             scene,  # type: ignore[arg-type]
@@ -65,7 +64,7 @@ class ContinueGait(options.Command, of=("continue_gait",)):
         return 0 if len(branch) else 1
 
 
-def branch_numbers(branch: "jb.continuation.Branch") -> "JsonObject":
+def branch_numbers(branch: "jb.continuation.Branch") -> JsonObject:
     """What is known of a branch in SI units, for `strict_json`."""
     return {
         "along": branch.along,
@@ -88,14 +87,7 @@ def branch_numbers(branch: "jb.continuation.Branch") -> "JsonObject":
             | {"value": each.value}
             for each in branch.bifurcations
         ],
-        "ends": [
-            {
-                "end": str(each.end),
-                "cause": each.cause,
-                "value": each.value if len(branch) else None,
-            }
-            for each in branch.stops
-        ],
+        "ends": records(branch.stops),
         "engine": branch.engine,
     }
 
@@ -122,17 +114,11 @@ def _print(report: Report, branch: "jb.continuation.Branch", wall: dict[str, flo
     rows = [(each, abs(each.multipliers[0]), _STABLE[each.stable]) for each in branch.points]
     report.say(columns(layout, rows, most=_MOST_ROWS), "")
     if branch.bifurcations:
-        head = ("bifurcation", along, "error", "multiplier", "error")
-        events = [
-            (
-                str(each.kind),
-                f"{each.value:.10g}",
-                "–" if math.isnan(each.value_error) else f"{each.value_error:.1e}",
-                _multiplier(each),
-                f"{each.error:.1e}",
-            )
-            for each in branch.bifurcations
-        ]
+        head, events = ("bifurcation", along, "error", "multiplier", "error"), []
+        for each in branch.bifurcations:
+            off = "–" if math.isnan(each.value_error) else f"{each.value_error:.1e}"
+            at = str(each.kind), f"{each.value:.10g}", off
+            events.append((*at, _multiplier(each), f"{each.error:.1e}"))
         report.say(table(head, events, most=_MOST_ROWS))
     for where, stop in zip(("first", "last"), branch.stops, strict=True):
         report.say(f"{where} end at {branch.along} = {stop.value:.8g}: {stop.end} ({stop.cause})")

@@ -1,4 +1,4 @@
-"""`jaxbiped doctor`: what is installed and whether it computes rightly, for reports of bugs."""
+"""`jaxbiped doctor` and `cache`: what is installed and computes rightly; what is kept on disk."""
 
 import contextlib
 import time
@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import jaxbiped as jb
-from jaxbiped.caching._disk_cache import cache_folder, disk_use
+from jaxbiped.caching._disk_cache import BYTES, CACHE_VARIABLE, cache_folder, clear_disk, disk_use
 from jaxbiped.cli import _options as options
-from jaxbiped.cli._report import Report, columns
+from jaxbiped.cli._report import Report, columns, records
+from jaxbiped.models import MODELS
 
 PACKAGES = (
     "jaxbiped", "jax", "jaxlib", "diffrax", "equinox", "optimistix", "lineax", "llvmlite",
@@ -29,16 +30,15 @@ _TRUTH = {
 }
 _FALL = 0.3
 """How long a walker falls freely [s]."""
-_PUBLISHED = (0.200310900544287, -0.199832473004977)
-"""Stance angle and rate of the simplest walker's long gait at a slope of 0.009, after Garcia,
-Chatterjee, Ruina and Coleman, Journal of Biomechanical Engineering 120 (1998) 281."""
+_PUBLISHED = MODELS["garcia"].starts["long"]
+"""The simplest walker's long gait behind a heel strike."""
 
 
 class Doctor(options.Command):
     """Show versions, vectors, threads and caches, and test this machine's answers."""
 
     json: options.JsonPath = None
-    """File for the same in JSON; - prints only that."""
+    """File for the same in JSON; - prints only the JSON."""
 
     def run(self) -> int:
         """Prints what is installed and tests it; returns 1 where something is wrong."""
@@ -130,7 +130,7 @@ def self_test() -> tuple[Truth, ...]:
     return (
         Truth("height after free fall [m]", 2.0 - 0.5 * 9.8 * _FALL**2, height, 1e-9),
         Truth("its derivative with respect to g [s²]", -0.5 * _FALL**2, derivative, 1e-9),
-        Truth("simplest walker's angle after a footstep [rad]", _PUBLISHED[0], _footstep(), 1e-7),
+        Truth("simplest walker's angle after a footstep [rad]", *_footstep(), 1e-7),
     )
 
 
@@ -156,17 +156,47 @@ def _height_and_slope(scene: "jb.Scene", start: "jb.State", g: Any) -> Any:
     return jax.jvp(height, (g,), (jnp.ones_like(g),))
 
 
-def _footstep() -> float:
-    """Angle of the next stance leg, in its own direction."""
-    import numpy as np
+def _footstep() -> tuple[float, float]:
+    """Angles of the stance leg before a footstep and behind it, each in its leg's own direction."""
+    scene = jb.models.garcia()
+    start = scene.state(**_PUBLISHED)
+    end = jb.rigid_walk(scene, start, footsteps=1).final._asdict().items()
+    angles = (float(x) for name, x in end if name.startswith("theta"))
+    return max(_PUBLISHED.values()), max(angles)
 
-    from jaxbiped._types import as_float
 
-    theta, rate = _PUBLISHED
-    # Legs without mass: their own, at the feet, is far below rounding.
-    walker = jb.Walker(m=1e-13, J=0.0, l=1.0, d=1.0, r=0.0, hip_mass=1.0)
-    scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=0.009, g=1.0))
-    swing = rate - rate * (1.0 - np.cos(2.0 * theta))
-    start = jb.dynamics.RigidState(*map(as_float, (0.0, -theta, theta, swing, rate)))
-    end = jb.rigid_walk(scene, start, footsteps=1)
-    return max(float(end.final.theta_1), float(end.final.theta_2))
+_CONTENT = {
+    "lanes": "machine code of lanes",
+    "programs": "programs of lanes, without their code",
+    "host": "programs run by NumPy",
+    "sources": "digests of the package's source",
+    "xla": "programs compiled by XLA",
+}
+
+
+class Cache(options.Command):
+    """Show the compiled programs that are kept on disk, or remove them."""
+
+    clear: bool = False
+    """Remove all programs; the next runs compile again."""
+    json: options.JsonPath = None
+    """File for the same in JSON; - prints only the JSON."""
+
+    def run(self) -> int:
+        """Runs the command; returns the exit code."""
+        report, folder = Report(self.json), cache_folder()
+        removed = clear_disk() if self.clear else None
+        use = disk_use()
+        rows = [(_CONTENT[kind], each.entries, each.size / 2**20) for kind, each in use.items()]
+        layout = {"kept": "{0[0]}", "entries": "{0[1]}", "MiB": "{0[2]:.1f}"}
+        report.say(columns(layout, rows))
+        if folder is None:
+            report.say(f"nothing is kept: {CACHE_VARIABLE} is empty")
+        else:
+            report.say(f"in {folder}, at most {BYTES // 2**20} MiB")
+        if removed is not None:
+            report.say(f"removed: {removed.entries} entries, {removed.size / 2**20:.1f} MiB")
+        numbers = {"folder": folder and str(folder), "bound_bytes": BYTES}
+        kept = {kind: records(each) for kind, each in use.items()}
+        report.finish(numbers | {"kept": kept, "removed": records(removed)})
+        return 0

@@ -28,7 +28,7 @@ class Fit(options.Command, of=("fit_gait",)):
     file: Annotated[Positional[Path], options.Check(read_json)]
     """JSON file of measured gaits (see jaxbiped.identify.read_measured)."""
     vary: str
-    """Names of the parameters to fit, with commas between: K,c,mu_kinetic."""
+    """Names of the parameters to fit, separated by commas: K,c,mu_kinetic."""
     scene: Annotated[SceneOptions, minimal(_REDUNDANT)]
     accuracy: options.GaitAccuracy
     engine: options.Engine

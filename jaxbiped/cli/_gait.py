@@ -3,15 +3,14 @@
 import time
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import jaxbiped as jb
+from jaxbiped._files import JsonObject
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._report import Report, columns, wall_times, words
-from jaxbiped.cli._scene_options import SceneOptions, StartOptions
-
-if TYPE_CHECKING:
-    from jaxbiped._types import JsonObject
+from jaxbiped.cli._scene_options import SceneOptions
+from jaxbiped.cli._start_options import StartOptions
 
 _SECTIONS = {"mid-stance": "MidStance", "heel-strike": "HeelStrike"}
 _UNITS = {
@@ -58,30 +57,24 @@ class FindGait(options.Command, of=("find_gait",)):
     accuracy: options.Accuracy
     footsteps: options.CycleFootsteps
     section: Annotated[str | None, options.among(*_SECTIONS)]
-    """Where a cycle begins: mid-stance (the usual one) or heel-strike (a rigid walker's)."""
+    """Start of a cycle: mid-stance (default), or heel-strike (default for rigid walkers)."""
     engine: options.Engine
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
-        from jaxbiped.cli._walk_report import cost_sentence
         from jaxbiped.solve._accuracy import accuracy_told
         from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 
         find_gait, imported = jb.find_gait, time.perf_counter()
         scene = self.scene.scene()
-        guess = self.start.guess(scene)
+        guess = self.start.guess(scene, self.scene.walker)
         options.make_folder(self.output.out)
         section = None if self.section is None else getattr(jb, _SECTIONS[self.section])()
+        how = self.arguments("find_gait")
+        how |= {"section": section, "accuracy": accuracy_told(self.accuracy)}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
-            gait = find_gait(
-                scene,
-                guess,
-                footsteps=self.footsteps,
-                section=section,
-                accuracy=accuracy_told(self.accuracy),
-                engine=self.engine,
-            )
+            gait = find_gait(scene, guess, **how)
         found = gait.outcome is jb.gait.Search.FOUND  # waits for the result
         wall, search = wall_times(imported), jb.gait.explain_search(scene, gait)
         numbers = gait_numbers(gait) | {"search": search, "wall_s": wall}
@@ -90,51 +83,43 @@ class FindGait(options.Command, of=("find_gait",)):
         if found and isinstance(scene, jb.RigidScene):
             numbers["assumptions"] = _assumptions(scene, gait)
         if found and scene.actuation is not None:
-            numbers |= _gait_cost(scene, gait, self.footsteps)
+            numbers |= _gait_cost(scene, gait)
         report = Report(self.output.json)
         if found:
             _print(report, numbers, gait)
-            if "assumptions" in numbers:
-                report.say(_assumption_line(numbers["assumptions"]))
-            if "cost_of_transport" in numbers:
-                report.say(cost_sentence(numbers))
         else:
             report.say(_failure(numbers, gait))
         if gait.error is not None:
             report.say(error_sentence(gait.error))
         if found and self.output.out is not None:
-            report.wrote(write_figures(gait, self.output.out))
+            report.wrote(write_figures(scene, gait, self.output.out))
         report.finish(numbers)
         return 0 if found else 1
 
 
-def write_figures(gait: "jb.Gait", out: Path) -> list[Path]:
+def write_figures(scene: Any, gait: "jb.Gait", out: Path) -> list[Path]:
     """Writes the figures of a gait; returns their paths."""
     figures: dict[str, Any] = {
         "multipliers.png": jb.plot.multipliers,
         "elasticities.png": jb.plot.elasticities,
-        "orbit.png": jb.plot.gait_orbit,
+        "orbit.png": lambda gait: jb.plot.gait_orbit(gait, scene=scene),
     }
     for name, draw in figures.items():
         draw(gait).savefig(out / name)
     return [out / name for name in figures]
 
 
-def gait_numbers(gait: "jb.Gait") -> "JsonObject":
+def gait_numbers(gait: "jb.Gait") -> JsonObject:
     """What is known of a gait in SI units, for `strict_json`."""
     measures, found = gait.measures, gait.outcome is jb.gait.Search.FOUND
     return {
         "ending": str(gait.outcome),
-        "period_s": float(measures.period),
-        "step_length_m": float(measures.step_length),
-        "speed_m_s": float(measures.speed),
-        "peak_normal_N": float(measures.peak_normal),
+        **{name: float(getattr(measures, field)) for field, name in _UNITS.items()},
         "state": {name: float(value) for name, value in measures.state._asdict().items()},
         "residual": float(gait.residual),
         "multipliers": gait.multipliers,
         "multiplier_errors": gait.multiplier_errors,
         "unit_multiplier_error": float(gait.unit_multiplier_error),
-        "spectral_radius": float(measures.spectral_radius),
         "stable": found and float(measures.spectral_radius) < 1.0,
         "bifurcation": str(gait.critical if found else jb.gait.Bifurcation.NONE),
         "sensitivities": _by_parameter(gait.parameters, gait.sensitivities),
@@ -160,22 +145,22 @@ def gait_numbers(gait: "jb.Gait") -> "JsonObject":
 def _by_parameter(
     parameters: tuple[str, ...], values: "jb.gait.Measures"
 ) -> dict[str, dict[str, float]]:
-    columns = {name: getattr(values, field).tolist() for field, name in _UNITS.items()}
-    columns |= {f"state.{name}": each.tolist() for name, each in values.state._asdict().items()}
+    found = {name: getattr(values, field).tolist() for field, name in _UNITS.items()}
+    found |= {f"state.{name}": each.tolist() for name, each in values.state._asdict().items()}
+    rows = zip(*found.values(), strict=True)
     return {
-        parameter: {name: column[k] for name, column in columns.items()}
-        for k, parameter in enumerate(parameters)
+        name: dict(zip(found, row, strict=True)) for name, row in zip(parameters, rows, strict=True)
     }
 
 
-def _gait_cost(scene: Any, gait: "jb.Gait", footsteps: int) -> "JsonObject":
+def _gait_cost(scene: Any, gait: "jb.Gait") -> JsonObject:
     """Cost of transport over a cycle of a driven gait, ready for JSON.
 
     A cycle that begins between heel strikes is counted from the first of them.
     """
     from jaxbiped.cli._walk_report import walk_cost
 
-    modelled, state, most = scene.minimal, gait.measures.state, footsteps + 1
+    modelled, state, most = scene.minimal, gait.measures.state, len(gait.step_lengths) + 1
     walk: jb.Trajectory[Any]
     if isinstance(modelled, jb.RigidScene):
         walk = jb.rigid_walk(modelled, state, footsteps=most, max_arrivals=most, accuracy="tight")
@@ -207,7 +192,7 @@ def _assumption_line(known: dict[str, float]) -> str:
     )
 
 
-def _failure(numbers: "JsonObject", gait: "jb.Gait") -> str:
+def _failure(numbers: JsonObject, gait: "jb.Gait") -> str:
     """One sentence on a search that found no gait."""
     turns = int(gait.evaluations)
     returned = words("residual {0:.2e}", numbers["residual"])
@@ -223,8 +208,10 @@ def _failure(numbers: "JsonObject", gait: "jb.Gait") -> str:
     )
 
 
-def _print(report: Report, numbers: "JsonObject", gait: "jb.Gait") -> None:
+def _print(report: Report, numbers: JsonObject, gait: "jb.Gait") -> None:
     import numpy as np
+
+    from jaxbiped.cli._walk_report import cost_sentence
 
     shown = numbers | {"cycles": int(gait.evaluations)}
     rows = [(name, words(text, shown)) for name, text in _GAIT.items()]
@@ -249,3 +236,7 @@ def _print(report: Report, numbers: "JsonObject", gait: "jb.Gait") -> None:
         columns(_ELASTICITY, elasticities),
         words("import {0[import]:.1f} s, total {0[total]:.1f} s", numbers["wall_s"]),
     )
+    if "assumptions" in numbers:
+        report.say(_assumption_line(numbers["assumptions"]))
+    if "cost_of_transport" in numbers:
+        report.say(cost_sentence(numbers))

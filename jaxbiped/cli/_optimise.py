@@ -5,19 +5,17 @@ import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._files import JsonObject
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._report import Report, columns, records
 from jaxbiped.cli._scene_options import SceneOptions, minimal
 
-if TYPE_CHECKING:
-    from jaxbiped._types import JsonObject
-
-_USUAL_RANGE = 2.0
-"""Factor to both sides of a parameter's own value that it varies by unless bounds are given."""
+_USUAL_RANGE = (0.5, 2.0)
+"""Factors of a parameter's own value between which it varies unless bounds are given."""
 _STABLE = {True: "stable", False: "NOT STABLE", None: "undecided within the error"}
 _REDUNDANT = (
     "formulation = redundant is not allowed here: how the hip is held makes no difference to a "
@@ -29,30 +27,30 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
     """Find the parameters within bounds whose periodic gait is best, and certify it."""
 
     vary: str
-    """Parameters that vary, d,r,J (half to double their values) or with bounds d=0.05:0.2,r,J."""
+    """Parameters to vary: d,r,J (from half to double their values), or with bounds d=0.05:0.2,r."""
     scene: Annotated[SceneOptions, minimal(_REDUNDANT)]
     maximise: str | None = None
     """Measure of the gait to maximise, such as speed."""
     minimise: str | None = None
-    """Or to minimise, such as spectral_radius."""
+    """Measure of the gait to minimise, such as spectral_radius."""
     subject_to: tuple[str, ...] = ()
-    """What must hold, such as "spectral_radius<0.4" "step_length>0.2"."""
+    """Requirements, such as "spectral_radius<0.4" "step_length>0.2"."""
     optimiser: Annotated[str, options.one_of("optimise.OPTIMISERS")]
-    """trust-region, slsqp, trust-constr, or without requirements optax."""
+    """Optimiser: trust-region, slsqp, trust-constr; or, without requirements, optax."""
     iterations: options.Count
-    """Most iterations of a run."""
+    """Maximum number of iterations of a run."""
     restarts: options.NotNegative
-    """Further runs, from the best of scattered designs."""
+    """Number of further runs, from the best of scattered designs."""
     seed: int
-    """Seed of these designs."""
+    """Random seed for scattering these designs."""
     accuracy: options.GaitAccuracy
     engine: options.Engine
     basin: options.NotNegative = 1024
-    """Starts about the gait that are labelled for the certificate's basin; 0 for none."""
+    """Number of starts around the gait that the certificate labels; 0 for none."""
     footsteps: options.NotNegative
-    """Footsteps of the certificate's walk from a pushed start; 0 for none."""
+    """Number of footsteps that the certificate walks from a pushed start; 0 for none."""
     bifurcations: str = "slope"
-    """Parameters in which the certificate seeks the nearest bifurcation: slope,d; or none."""
+    """Parameters along which the certificate seeks the nearest bifurcation: slope,d; or none."""
     fatal_push: bool
     other_engine: bool
     store: Path | None
@@ -108,13 +106,12 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
                 raise ArgumentError(
                     f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
                 )
-            ends = (value / _USUAL_RANGE, value * _USUAL_RANGE)
-            least, most = (farthest_allowed(scene, name, end) for end in ends)
-            found[name] = (least, most)
+            low, high = (farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
+            found[name] = (low, high)
             continue
         try:
-            low, high = bounds.split(":", 1)
-            found[name] = (float(low), float(high))
+            first, last = bounds.split(":", 1)
+            found[name] = (float(first), float(last))
         except ValueError:
             raise ArgumentError(
                 f"vary = {part.strip()!r} is not understood: write {name}=low:high."
@@ -124,7 +121,7 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
 
 def _optimum_numbers(
     found: "jb.optimise.Optimum", certificate: "jb.optimise.Certificate", goal: str, sense: str
-) -> "JsonObject":
+) -> JsonObject:
     """What is known of an optimum in SI units, for `strict_json`."""
     return {
         "outcome": str(found.outcome),
@@ -153,7 +150,7 @@ def _optimum_numbers(
     }
 
 
-def _certificate_numbers(certificate: "jb.optimise.Certificate") -> "JsonObject":
+def _certificate_numbers(certificate: "jb.optimise.Certificate") -> JsonObject:
     """A certificate, for `strict_json`."""
     told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
     basin, push = certificate.basin, certificate.fatal_push

@@ -144,26 +144,28 @@ NotNegative = Annotated[int, Check(check_not_negative)]
 AnyAccuracy = Annotated[str, Check(_check_accuracy)]
 Accuracy = Annotated[
     AnyAccuracy,
-    arg(
-        help="How accurately to solve: draft, balanced or tight; or a relative error, such as 1e-4."
-    ),
+    arg(help="Accuracy of the solve: draft, balanced or tight; or a relative error, such as 1e-4."),
 ]
 GaitAccuracy = Annotated[
-    str, arg(help="How accurately to solve: balanced or tight."), one_of("ACCURACIES")
+    str, arg(help="Accuracy of the solve: balanced or tight."), one_of("ACCURACIES")
 ]
 """Of a gait with derivatives."""
 Engine = Annotated[
     str,
-    arg(help="What computes: xla, lanes, cuda, or auto for the faster one that can."),
+    arg(help="Engine: xla, lanes, cuda, or auto (the faster one that supports the request)."),
     one_of("ENGINES"),
 ]
-CycleFootsteps = Annotated[Count, arg(help="Footsteps in a cycle.")]
+CycleFootsteps = Annotated[
+    int | None, Check(check_count), arg(help="Number of footsteps in a cycle.")
+]
 JsonPath = Annotated[Path | None, Check(_check_json)]
-Numbers = Annotated[JsonPath, arg(help="File for the numbers in SI units; - prints only them.")]
+Numbers = Annotated[
+    JsonPath, arg(help="File for the numbers in SI units; - prints only the numbers.")
+]
 
 
 class OutputOptions(Options):
-    """Where results go."""
+    """Where results are written."""
 
     out: Path | None = None
     """Folder for pictures, an animation and the trajectory."""

@@ -8,13 +8,10 @@ import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from jaxbiped._files import strict_json
+from jaxbiped._files import JsonObject, strict_json
 from jaxbiped.caching import _import_time
-
-if TYPE_CHECKING:
-    from jaxbiped._types import JsonObject
 
 
 class Report:
@@ -34,7 +31,7 @@ class Report:
         for path in paths:
             self.say(f"wrote {path}")
 
-    def finish(self, numbers: "JsonObject") -> None:
+    def finish(self, numbers: JsonObject) -> None:
         """Writes the numbers."""
         text = strict_json(numbers, indent=2) + "\n"
         if self._only_json:

@@ -1,4 +1,4 @@
-"""Options that describe a scene and a start: the model, its laws, their parameters, actuators."""
+"""Options that describe a scene: the walker, the model, its laws, their parameters, actuators."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -7,20 +7,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tyro.conf import arg
 
 import jaxbiped as jb
-from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_pair
-from jaxbiped.cli._declarations import (
-    Argument,
-    fields,
-    registered,
-    signature,
-)
+from jaxbiped._checks import ArgumentError, check_choice, check_pair
+from jaxbiped.cli._declarations import Argument, fields, registered, signature
 from jaxbiped.cli._options import Check, Field, Options, among, one_of
+from jaxbiped.cli._walkers import SEED as SEED_WALKER
+from jaxbiped.cli._walkers import WALKERS, check_walker, walker_of
+from jaxbiped.models import MODELS
 
 if TYPE_CHECKING:
     AnyScene = jb.Scene | jb.RigidScene | jb.RedundantScene
 
 MATCHED = {"normal": ("K", "c", "n"), "friction": ("mu_static", "mu_kinetic", "v0", "xi")}
 """Parameters that laws of each kind are matched to."""
+CLEARANCES = {"stance-rotation": "StanceRotation", "always-touching": "AlwaysTouching"}
+_OF_WALKER = ("m", "J", "l", "d", "r", "hip_mass")
+"""Parameters of the seed's walker."""
+_OF_GROUND = ("slope", "g")
+"""Parameters that a published walker has its own of: None unless given."""
 
 
 def _seed_parameters() -> dict[str, Argument]:
@@ -40,8 +43,12 @@ SEED = _seed_parameters()
 def _parameter_fields() -> Iterator[tuple[str, Field]]:
     for name, parameter in SEED.items():
         assert parameter.info is not None
-        checked = Annotated[float, arg(help=parameter.help), Check(parameter.info.check)]
-        yield name, Field(checked, parameter.default)
+        kind: Any = float
+        help_, default = parameter.help, parameter.default
+        if name in _OF_GROUND:
+            kind, default = float | None, None
+            help_ += f" If omitted: that of a published walker, otherwise {parameter.default}."
+        yield name, Field(Annotated[kind, arg(help=help_), Check(parameter.info.check)], default)
 
 
 def _actuator_fields() -> Iterator[tuple[str, Field]]:
@@ -51,12 +58,12 @@ def _actuator_fields() -> Iterator[tuple[str, Field]]:
             words = f" {info.quantity.words} [{info.quantity.unit}]" if info else ""
             said.append(f"{own}={'...' if default is None else default}{words}")
         checked = Annotated[
-            tuple[str, ...], arg(help="; ".join(said) + "."), Check(_named_text, each=True)
+            tuple[str, ...], arg(help="; ".join(said) + "."), Check(named_text, each=True)
         ]
         yield name.replace("-", "_"), Field(checked, ())
 
 
-def _named_text(option: str, text: str, example: str = "") -> tuple[str, str]:
+def named_text(option: str, text: str, example: str = "") -> tuple[str, str]:
     """Name and value of name=value; raises `ArgumentError`."""
     name, given, value = (part.strip() for part in text.partition("="))
     if not name or not given:
@@ -66,7 +73,7 @@ def _named_text(option: str, text: str, example: str = "") -> tuple[str, str]:
     return name, value
 
 
-def _numbers(option: str, name: str, text: str, parts: list[str]) -> list[float]:
+def numbers_in(option: str, name: str, text: str, parts: list[str]) -> list[float]:
     """The parts of a text as numbers; raises `ArgumentError`."""
     try:
         return [float(part) for part in parts]
@@ -97,11 +104,11 @@ def _actuator(option: str, kind: Any, texts: tuple[str, ...]) -> Any:
     values: dict[str, Any] = {}
     known = {field.name: field for field in dataclasses.fields(kind)}
     for text in texts:
-        name, value = _named_text(option, text)
+        name, value = named_text(option, text)
         check_choice(f"{option}'s name", name, known)
         values[name] = value
         if name in infos:
-            numbers = _numbers(option, name, value, value.split(","))
+            numbers = numbers_in(option, name, value, value.split(","))
             values[name] = numbers if len(numbers) > 1 else numbers[0]
     for name, field in known.items():
         if field.default is dataclasses.MISSING and name not in values:
@@ -110,23 +117,31 @@ def _actuator(option: str, kind: Any, texts: tuple[str, ...]) -> Any:
 
 
 class SceneOptions(Options, made=dict(_parameter_fields())):
-    """What is modelled: the seed's scene with its parameters by their paper names (SI units)."""
+    """The model: the seed's scene, with its parameters under the paper's names (SI units)."""
 
-    model: Annotated[str, among("compliant", "rigid")] = "compliant"
-    """compliant, or rigid: feet that roll without slip and strike without rebound."""
+    walker: Annotated[str, Check(check_walker)] = SEED_WALKER
+    """Walker: seed, kneed, with-torso, or a published walker with its own scene, such as garcia
+    (see jaxbiped models); or FILE.py:NAME, a Mechanism in a file, a module with a method
+    mechanism(), or a function without arguments that returns one of these."""
+    clearance: Annotated[str | None, among(*CLEARANCES)] = None
+    """Which foot may touch: stance-rotation (while its leg rotates as a stance leg), or
+    always-touching. If omitted: the walker's own rule."""
+    model: Annotated[str | None, among("compliant", "rigid")] = None
+    """Kind of feet: compliant, or rigid (they roll without slip and strike without rebound). If
+    omitted: those of a published walker, otherwise compliant."""
     formulation: Annotated[str, among("minimal", "redundant")] = "minimal"
-    """minimal, or redundant: each leg has coordinates of its own, joined at the hip by a method."""
+    """Coordinates: minimal, or redundant (each leg has its own, joined at the hip by a method)."""
     method: Annotated[str | None, one_of("constraints.CONSTRAINT_METHODS")] = None
-    """How redundant coordinates hold the hip: standard, baumgarte, penalty, augmented, index1 (the
-    usual one), index1aug or described."""
+    """Method that holds the hip in redundant coordinates: standard, baumgarte, penalty, augmented,
+    index1 (used if omitted), index1aug or described."""
     orientation: Annotated[str, one_of("constraints.ORIENTATIONS")] = "angle"
-    """How redundant coordinates write a leg's orientation: angle, or euler (parameters)."""
+    """Orientation of a leg in redundant coordinates: angle, or euler (parameters)."""
     normal: str = "ristow-schafer"
     """Law of the normal force (see jaxbiped models), matched to K, c and n under the weight."""
     friction: str = "bengisu-akay"
     """Law of friction, matched to mu-static, mu-kinetic, v0 and xi."""
     set: tuple[str, ...] = ()
-    """Any parameters by name, as name=value, after the laws were matched."""
+    """Any parameters as name=value, set after the laws were matched."""
     driven: ActuationOptions
 
     def check(self) -> None:
@@ -134,7 +149,8 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         super().check()
         check_choice("normal", self.normal, registered("laws", "normal"))
         check_choice("friction", self.friction, registered("laws", "friction"))
-        check_pair("l", self.values["l"], "r", self.values["r"])
+        if self._on_seed:
+            check_pair("l", self.values["l"], "r", self.values["r"])
         for name, value in self.named_values().items():
             own = name.rpartition(".")[2]
             if own in SEED and self.values[own] != SEED[own].default:
@@ -147,53 +163,91 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
     @property
     def values(self) -> dict[str, float]:
         """The seed's parameters, by their paper names."""
-        return {name: getattr(self, name) for name in SEED}
+        said = {name: getattr(self, name) for name in SEED}
+        return {name: SEED[name].default if x is None else x for name, x in said.items()}
+
+    @property
+    def rolls(self) -> bool:
+        """Whether feet are rigid."""
+        if self.model is not None:
+            return self.model == "rigid"
+        own = MODELS.get(self.walker)
+        return own is not None and own.rigid
+
+    @property
+    def _on_seed(self) -> bool:
+        """Whether the walker has the parameters of the seed's."""
+        return self.walker in WALKERS and not WALKERS[self.walker].own_parameters
 
     def _check_that_all_is_used(self) -> None:
-        rolls = self.model == "rigid"
+        rolls = self.rolls
         if rolls and self.formulation == "redundant":
             raise ArgumentError(
                 'formulation = redundant is not allowed with model = "rigid": it rolls in minimal '
                 "coordinates."
             )
         chosen = 'model = "rigid"' if rolls else 'formulation = "minimal"'
-        mend = "" if rolls else "; --formulation redundant has them"
-        unused = {}
+        unused: list[tuple[str, tuple[str, ...], str]] = []
+        if not self._on_seed:
+            why = "that has parameters of its own, for --set."
+            unused.append((f"walker = {self.walker!r}", _OF_WALKER, why))
         if rolls:
-            contact = ("normal", "friction", "n", "K", "c", *MATCHED["friction"])
-            unused = dict.fromkeys(contact, "its feet have no laws of contact.")
+            contact = ("normal", "friction", "n", "K", "c", "clearance", *MATCHED["friction"])
+            unused.append((chosen, contact, "its feet have no laws of contact."))
         if self.formulation == "minimal":
-            unused |= dict.fromkeys(("method", "orientation"), f"it has no constraints{mend}.")
-        for name, why in unused.items():
-            if (value := getattr(self, name)) != getattr(SceneOptions, name):
-                raise ArgumentError(f"{name} = {value} is not allowed with {chosen}: {why}")
+            why = "it has no constraints" + (
+                "." if rolls else "; --formulation redundant has them."
+            )
+            unused.append((chosen, ("method", "orientation"), why))
+        for told, options, why in unused:
+            for name in options:
+                if (value := getattr(self, name)) != getattr(SceneOptions, name):
+                    raise ArgumentError(f"{name} = {value} is not allowed with {told}: {why}")
 
     def named_values(self) -> dict[str, float]:
         """The parameters that were set by name; raises `ArgumentError`."""
-        named = (_named_text("set", text, ", such as K=2e6") for text in self.set)
-        return {name: _numbers("set", name, value, [value])[0] for name, value in named}
+        named = (named_text("set", text, ", such as K=2e6") for text in self.set)
+        return {name: numbers_in("set", name, value, [value])[0] for name, value in named}
 
     def scene(self) -> "AnyScene":
         """The scene that these options describe; raises `ArgumentError`."""
         self.check()
-        own = jb.seed_scene(**self.values)
-        rolls = self.model == "rigid"
-        scene: Any = jb.RigidScene(own.walker, own.ground) if rolls else self._with_laws(own)
-        scene = dataclasses.replace(scene, actuation=self.driven.actuation())
+        own = self._own_scene()
+        walker = walker_of("walker", self.walker, own.walker)
+        rolls = self.rolls
+        scene: Any = jb.RigidScene(walker, own.ground) if rolls else self._with_laws(own, walker)
+        driven = self.driven.actuation()
+        scene = dataclasses.replace(scene, actuation=own.actuation if driven is None else driven)
         scene = jb.with_parameters(scene, self.named_values())
         if self.formulation == "minimal":
             return scene
         method = jb.constraints.CONSTRAINT_METHODS[self.method or "index1"]()
         return jb.RedundantScene(scene, method, self.orientation)
 
-    def _with_laws(self, own: "jb.Scene") -> "jb.Scene":
+    def _own_scene(self) -> Any:
+        """The published scene, or else the seed's, on the ground that was told."""
+        model = MODELS.get(self.walker)
+        if model is None:
+            values = self.values
+            if not self._on_seed:
+                values = {name: x for name, x in values.items() if name not in _OF_WALKER}
+            return jb.seed_scene(**values)
+        said = {name: x for name in _OF_GROUND if (x := getattr(self, name)) is not None}
+        return jb.with_parameters(model.make(), said)
+
+    def _with_laws(self, own: Any, walker: Any) -> "jb.Scene":
         import jax.tree_util as jtu
         import numpy as np
 
+        from jaxbiped.scene._mechanism import mechanism_of
+
         # By NumPy: JAX would compile a program for each operation.
-        mass = jtu.tree_map(np.asarray, own.walker).total_mass
-        normal = self._law("normal", {"mass": mass, "g": self.values["g"]})
-        return dataclasses.replace(own, normal=normal, friction=self._law("friction", {}))
+        mass = mechanism_of(jtu.tree_map(np.asarray, walker)).total_mass
+        normal = self._law("normal", {"mass": mass, "g": own.ground.g})
+        rule = own.clearance if self._on_seed else None
+        if self.clearance is not None:
+            rule = getattr(jb.laws, CLEARANCES[self.clearance])()
+        return jb.Scene(walker, own.ground, normal, self._law("friction", {}), rule)
 
     def _law(self, kind: str, others: Mapping[str, Any]) -> Any:
         """A law matched to the parameters; raises `ArgumentError` for one that it cannot use."""
@@ -215,66 +269,17 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         return law
 
 
-def minimal(sentence: str) -> Check:
-    """Refuses redundant coordinates with this sentence."""
-    return Check(lambda _, scene: _require(scene.formulation == "minimal", sentence))
+def minimal(sentence: str, *, compliant: bool = False) -> Check:
+    """Refuses redundant coordinates, and rigid feet where it must be compliant, in a sentence."""
+
+    def check(_: str, scene: SceneOptions) -> None:
+        if scene.formulation != "minimal" or (compliant and scene.rolls):
+            raise ArgumentError(sentence)
+
+    return Check(check)
 
 
 def compliant_and_minimal(what: str) -> Check:
     """Refuses rigid feet and redundant coordinates: what others are, such as "compared"."""
-    sentence = f"model or formulation is not allowed here: compliant and minimal are {what}."
-    usual = ("compliant", "minimal")
-    return Check(lambda _, scene: _require((scene.model, scene.formulation) == usual, sentence))
-
-
-def _require(holds: bool, sentence: str) -> None:
-    if not holds:
-        raise ArgumentError(sentence)
-
-
-class StartOptions(Options):
-    """Start in the slope's frame; the seed's own, fitted to the scene, unless said otherwise."""
-
-    hip_x: float | None = None
-    """Hip, along the slope [m]; the seed's is 0."""
-    hip_z: float | None = None
-    """Hip, above the slope [m]; the seed's is 0.395, fitted to legs and ground."""
-    theta_1: float | None = None
-    """Angle of leg 1 from the slope's normal, foot ahead positive [rad]; the seed's is -0.2479."""
-    theta_2: float | None = None
-    """Angle of leg 2 [rad]; the seed's is 0.1655."""
-    hip_vx: float | None = None
-    """Hip velocity along the slope [m/s]; the seed's is 0.49797, fitted to the legs."""
-    hip_vz: float | None = None
-    """Hip velocity away from the slope [m/s]; the seed's is 0.05853, fitted likewise."""
-    omega_1: float | None = None
-    """Rate of leg 1 [rad/s]; the seed's is -0.0052."""
-    omega_2: float | None = None
-    """Rate of leg 2 [rad/s]; the seed's is -1.2565."""
-
-    @property
-    def given(self) -> dict[str, float]:
-        """The numbers that were said."""
-        return {name: x for name, x in vars(self).items() if x is not None}
-
-    def check(self) -> None:
-        """Raises `ArgumentError` for a number that is not finite."""
-        for name, value in self.given.items():
-            check_finite(f"state.{name}", value)
-
-    def guess(self, scene: "AnyScene") -> Any:
-        """The start if any of it was said; else None, which leaves it to a search."""
-        return self.state(scene) if self.given else None
-
-    def state(self, scene: "AnyScene") -> Any:
-        """The start, of the kind that the scene needs; raises `ArgumentError`.
-
-        A rigid walker takes the place and the legs' angles and rates.
-        """
-        from jaxbiped._types import as_float
-        from jaxbiped.cli._default_start import default_start
-
-        self.check()
-        start = default_start(scene)
-        own = {name: as_float(x) for name, x in self.given.items() if name in start._fields}
-        return start._replace(**own)
+    here = "walker, model or formulation is not allowed here"
+    return minimal(f"{here}: compliant and minimal are {what}.", compliant=True)

@@ -5,13 +5,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
+from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._scene_options import SceneOptions, StartOptions, compliant_and_minimal
+from jaxbiped.cli._scene_options import SceneOptions, compliant_and_minimal
+from jaxbiped.cli._start_options import StartOptions
 
 if TYPE_CHECKING:
-    from jaxbiped._types import JsonObject
     from jaxbiped.trade import GaitTrade, Row, Truth, WalkTrade
 
 _ERRORS = (1e-2, 1e-4, 1e-6, 1e-8)
@@ -46,9 +47,9 @@ class Trade(options.Command):
     duration: Annotated[float, options.positive("s")] = 2.0
     """Simulated time of the walk [s]."""
     repeats: options.Count = 3
-    """Warm runs of which the median counts."""
+    """Number of warm runs, of which the median counts."""
     full: bool = False
-    """Every solver, both engines and a ladder of tolerances; takes many minutes."""
+    """Try every solver, both engines and a ladder of tolerances; takes many minutes."""
     out: Path | None = None
     """Folder for the pictures."""
     json: options.Numbers = None
@@ -59,8 +60,7 @@ class Trade(options.Command):
 
         scene = self.scene.scene()
         assert isinstance(scene, jb.Scene)
-        start = self.start.state(scene)
-        assert isinstance(start, jb.State)
+        start = self.start.start(scene, self.scene.walker)
         options.make_folder(self.out)
         report = Report(self.json)
         trades: dict[str, Any] = {
@@ -120,7 +120,7 @@ def _axes(rows: "list[Row]") -> dict[str, None]:
     return dict.fromkeys(axis for row in rows for axis in row.errors)
 
 
-def _advice(rows: "list[Row]") -> "JsonObject":
+def _advice(rows: "list[Row]") -> JsonObject:
     """By error axis and error: the cheapest setting seen that has it, by CPU time."""
     from jaxbiped.trade import cheapest
 

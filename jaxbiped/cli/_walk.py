@@ -10,7 +10,8 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
 from jaxbiped.caching import _import_time
 from jaxbiped.cli import _options as options
-from jaxbiped.cli._scene_options import SceneOptions, StartOptions
+from jaxbiped.cli._scene_options import SceneOptions
+from jaxbiped.cli._start_options import StartOptions
 
 MOST_STEPS = 1 << 20
 """Solver's steps that nobody asked for more than: about 25 minutes of the seed's walk."""
@@ -23,22 +24,22 @@ _ROOM = 1 << 17
 
 
 class SolveOptions(options.Options, of=("simulate",)):
-    """How long and how to solve."""
+    """Duration and solver."""
 
     duration: Annotated[float, options.positive("s")] = 10.0
     """Simulated time [s]."""
     solver: Annotated[str, options.one_of("solvers.SOLVERS")]
-    """Name of a solver: ours (rodas3p, rodas4, rodas4p, rodas5p) or one of diffrax's."""
+    """Name of the solver: rodas3p, rodas4, rodas4p or rodas5p, or one of diffrax's."""
     accuracy: options.AnyAccuracy | None = None
-    """In place of tolerances: draft, balanced or tight; or a relative error, such as 1e-4."""
+    """Accuracy, instead of tolerances: draft, balanced or tight; or a relative error like 1e-4."""
     rtol: Annotated[float | None, options.positive()] = None
-    """Relative tolerance; 1e-6 unless given."""
+    """Relative tolerance. If omitted: 1e-6."""
     atol: Annotated[float | None, options.positive()] = None
-    """Absolute tolerance (SI units); a hundredth of the relative one unless given."""
+    """Absolute tolerance (SI units). If omitted: a hundredth of the relative one."""
     dt: Annotated[float | None, options.positive("s")] = None
-    """Steps of this size [s], in place of tolerances; what --solver euler needs."""
+    """Fixed step size [s], instead of tolerances; required by --solver euler."""
     max_solver_steps: options.Count | None = None
-    """Cap on the solver's steps: unless given 65536 for each ten seconds, at most 1048576."""
+    """Maximum number of solver steps. If omitted: 65536 per ten seconds, at most 1048576."""
     engine: options.Engine
 
     def check(self) -> None:
@@ -93,7 +94,7 @@ class SolveOptions(options.Options, of=("simulate",)):
 
 
 class Walk(options.Command):
-    """Simulate the seed's walker from a start; print its footsteps and how it ended."""
+    """Simulate a walker from a start; print its footsteps and how it ended."""
 
     scene: SceneOptions
     start: StartOptions
@@ -106,7 +107,7 @@ class Walk(options.Command):
 
         imported = time.perf_counter()
         scene = self.scene.scene()
-        state = self.start.state(scene)
+        state = self.start.start(scene, self.scene.walker)
         walked = self._roll if isinstance(scene, jb.RigidScene) else self._walk
         walk, settings, wall = walked(scene, state)
         wall["import"] = imported - _import_time.IMPORT_BEGAN
@@ -190,17 +191,12 @@ def _simulate(request: "jb.Simulation", wanted: float | None) -> "tuple[jb.Traje
         # It makes room beforehand, and time asked for need not be walked.
         room = min(most, _ROOM)
     while True:
-        trajectory, seconds = _run(dataclasses.replace(request, max_solver_steps=room))
+        with stage("compiling the simulation (first time for this kind of scene)"):
+            program = dataclasses.replace(request, max_solver_steps=room).compile()
+        compiled = time.perf_counter()
+        with stage(f"simulating {float(request.duration):g} s"):
+            trajectory = program()
+        seconds = time.perf_counter() - compiled
         if room == most or trajectory.outcome is not jb.Ending.OUT_OF_STEPS:
             return trajectory, seconds
         room = min(most, 4 * room)
-
-
-def _run(request: "jb.Simulation") -> "tuple[jb.Trajectory[Any], float]":
-    """The trajectory of a request and how long it took once it was compiled [s]."""
-    with stage("compiling the simulation (first time for this kind of scene)"):
-        program = request.compile()
-    compiled = time.perf_counter()
-    with stage(f"simulating {float(request.duration):g} s"):
-        trajectory = program()
-    return trajectory, time.perf_counter() - compiled

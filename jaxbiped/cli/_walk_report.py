@@ -8,8 +8,8 @@ import jax.tree_util as jtu
 import numpy as np
 
 import jaxbiped as jb
+from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
-from jaxbiped._types import JsonObject
 from jaxbiped.cli._options import OutputOptions
 from jaxbiped.cli._report import Report, columns
 from jaxbiped.cli._walk_warnings import (
@@ -19,11 +19,13 @@ from jaxbiped.cli._walk_warnings import (
     walk_warnings,
 )
 from jaxbiped.constraints._constraint_methods import name_of
+from jaxbiped.measure._samples import from_start, places_of_standing
 from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 
 _MOST_ROWS = 24
 _SHOWN = 60.0
 """The part of a long walk that is drawn and can be watched [s]."""
+_FIRST = {"step": "{0[step]}", "leg": "{0[leg]}"}
 _FOOTSTEP = {
     "step": "{0[step]}",
     "time s": "{0[time_s]:.4f}",
@@ -102,6 +104,9 @@ def _compliant_numbers(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
     """What is known of a walk on compliant feet alone."""
     with stage("measuring the footsteps"):
         rows = footstep_rows(jb.footsteps(scene, walk))
+        legs = scene.mechanism.structure.legs
+        struck = jb.measure.heel_strikes(scene, walk).foot[1:]
+        rows = [{"leg": legs[leg - 1]} | row for leg, row in zip(struck, rows, strict=True)]
         ledger = jb.energy_ledger(scene, walk)
     numbers: JsonObject = {
         "ending": ending_name(scene, walk),
@@ -130,7 +135,7 @@ def _rigid_numbers(scene: "jb.RigidScene", walk: "jb.Trajectory[Any]") -> JsonOb
 
 def _say(report: Report, numbers: JsonObject, walk: "jb.Trajectory[Any]") -> None:
     """What people read of a walk before its files."""
-    layout, lines = _FOOTSTEP | _FORCES, _LINES
+    layout, lines = _FIRST | _FOOTSTEP | _FORCES, _LINES
     if "model" in numbers:
         layout, lines = _FOOTSTEP, _RIGID_LINES
     rows = []
@@ -168,20 +173,24 @@ def _rigid_footsteps(scene: "jb.RigidScene", strikes: Any) -> list[dict[str, flo
     """Each footstep from one heel strike to the next."""
     count, states = min(int(strikes.total), len(np.asarray(strikes.t))), strikes.state
     at = np.asarray(strikes.t)[:count]
-    # Where the new stance foot comes down: under its centre, which lies on the leg's axis.
-    reach = float(scene.walker.hip_to_foot)
-    places = np.asarray(states.hip_x)[:count] + reach * np.sin(np.asarray(states.theta_2)[:count])
+    places = places_of_standing(scene, jtu.tree_map(lambda leaf: np.asarray(leaf)[:count], states))
     periods, lengths = np.diff(at), np.diff(places)
     found = {"time_s": at[1:], "period_s": periods, "length_m": lengths}
     return _rows(found | {"speed_m_s": lengths / periods})
 
 
-def write_outputs(scene: Any, walk: "jb.Trajectory[Any]", out: Path) -> list[Path]:
-    """Writes the figures, the animations and the trajectory; returns their paths."""
-    figures: dict[str, Any] = {
+def _motion_figures() -> dict[str, Any]:
+    """The figures of a walk on any feet, by the names of their files."""
+    return {
         "strobe.png": jb.plot.gait_strobe,
         "phase_portrait.png": jb.plot.phase_portrait,
         "leg_angles.png": jb.plot.leg_angles,
+    }
+
+
+def write_outputs(scene: Any, walk: "jb.Trajectory[Any]", out: Path) -> list[Path]:
+    """Writes the figures, the animations and the trajectory; returns their paths."""
+    figures = _motion_figures() | {
         "penetrations.png": jb.plot.penetrations,
         "contact_forces.png": jb.plot.contact_forces,
     }
@@ -199,10 +208,11 @@ def _write_rigid_outputs(
     scene: "jb.RigidScene", state: Any, walk: "jb.Trajectory[Any]", out: Path
 ) -> list[Path]:
     """The same of a walk on rigid feet."""
-    picture, shown = out / "leg_angles.png", min(float(np.asarray(walk.t)[-1]), _SHOWN)
-    jb.plot.rigid_leg_angles(scene, state, duration=shown).savefig(picture)
-    page = jb.plot.view(scene, _rigid_beginning(walk), start=state)
-    return [picture, page.save(out / "walk.html")]
+    shown = from_start(scene, _rigid_beginning(walk), state)
+    figures = _motion_figures()
+    for name, draw in figures.items():
+        draw(scene, shown).savefig(out / name)
+    return [*(out / name for name in figures), jb.plot.view(scene, shown).save(out / "walk.html")]
 
 
 def _beginning(walk: "jb.Trajectory[Any]") -> "jb.Trajectory[Any]":
@@ -227,7 +237,7 @@ def walk_cost(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
     found = jb.measure.cost_of_transport(scene, walk)
     if not len(found.cost):
         return {}
-    weight = float(scene.walker.total_mass * scene.ground.g)
+    weight = float(scene.mechanism.total_mass) * float(scene.ground.g)
     motors, gravity = float(found.motor_work.sum()), float(found.gravity_work.sum())
     return {
         "cost_of_transport": (motors + gravity) / (weight * float(found.distance.sum())),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 import jaxbiped as jb
-from jaxbiped._types import JsonObject
+from jaxbiped._files import JsonObject
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._samples import at_steps
 from jaxbiped.solve._accuracy import unresolved_slip

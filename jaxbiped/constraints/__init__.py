@@ -1,5 +1,8 @@
 """Constraint methods in redundant coordinates, linkages, and the algebra of their constraints."""
 
+import warnings as _warnings
+from typing import Any as _Any
+
 from jaxbiped.constraints._constraint_method import (
     AbstractConstraintMethod as AbstractConstraintMethod,
 )
@@ -16,6 +19,23 @@ from jaxbiped.constraints._constraint_methods import Index1Augmented as Index1Au
 from jaxbiped.constraints._constraint_methods import Penalty as Penalty
 from jaxbiped.constraints._constraint_methods import Standard as Standard
 from jaxbiped.constraints._linkage import ORIENTATIONS as ORIENTATIONS
-from jaxbiped.constraints._linkage import Body as Body
-from jaxbiped.constraints._linkage import Joint as Joint
 from jaxbiped.constraints._linkage import Linkage as Linkage
+from jaxbiped.constraints._linkage import LinkAngle as LinkAngle
+from jaxbiped.constraints._linkage import LinkBody as LinkBody
+from jaxbiped.constraints._linkage import Pin as Pin
+
+_RENAMED = {"Body": LinkBody, "Joint": Pin}
+"""Parts of a linkage by the names that bodies and joints of mechanisms have taken."""
+
+
+def __getattr__(name: str) -> _Any:
+    if name not in _RENAMED:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = _RENAMED[name]
+    _warnings.warn(
+        f"jaxbiped.constraints.{name} is deprecated: a linkage's is jaxbiped.constraints."
+        f"{found.__name__}.",
+        DeprecationWarning,
+        stacklevel=2,
+    )
+    return found

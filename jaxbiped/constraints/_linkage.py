@@ -1,16 +1,10 @@
-"""Linkages: rigid bodies in a plane and the pins that join them; their constraints, exact."""
-
-from collections.abc import Sequence
-from typing import NamedTuple
+"""Linkages: rigid bodies in a plane, and the pins and held angles that join them."""
 
 import equinox as eqx
-import jax.numpy as jnp
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type
-from jaxbiped._circular import sine_cosine
 from jaxbiped._parameter_declaration import AbstractPart, check_parameters, parameter
-from jaxbiped._types import Parameter, Scalar
-from jaxbiped.constraints._constraint_method import Row
+from jaxbiped._types import Parameter
 
 ORIENTATIONS = ("angle", "euler")
 """How a body's orientation is written.
@@ -20,7 +14,7 @@ ORIENTATIONS = ("angle", "euler")
 """
 
 
-class Body(AbstractPart):
+class LinkBody(AbstractPart):
     """A rigid body in the plane.
 
     Attributes:
@@ -35,7 +29,7 @@ class Body(AbstractPart):
     inertia: Parameter = parameter("body inertia", "$J$", "kg m^2", positive=True)
 
 
-class Joint(eqx.Module):
+class Pin(eqx.Module):
     """A frictionless pin: a point of one body stays where a point of another one is.
 
     A body's own frame has its origin in the centre of mass; at θ = 0 it is parallel to the plane's.
@@ -64,6 +58,24 @@ class Joint(eqx.Module):
             )
 
 
+class LinkAngle(AbstractPart):
+    """A sum of bodies' angles that is held, Σ w θ = value.
+
+    With Euler parameters an angle is known between −2π and 2π alone.
+
+    Attributes:
+        value: what the sum is [rad].
+        weights: of the angles, by the positions of their bodies in the linkage.
+
+    Raises:
+        ArgumentError: a value that is not finite.
+    """
+
+    value: Parameter = parameter("held angle", r"$\varphi$", "rad")
+    # mypy takes a call of `parameter` for a default.
+    weights: tuple[tuple[int, float], ...] = eqx.field(static=True, converter=tuple)  # type: ignore[misc]
+
+
 class Linkage(eqx.Module):
     """Bodies and joints; its coordinates are each body's centre of mass and orientation.
 
@@ -71,196 +83,35 @@ class Linkage(eqx.Module):
         bodies: of which there are n.
         joints: each takes two degrees of freedom, unless others took them already.
         orientation: one of `ORIENTATIONS`.
+        angles: each takes one.
 
     Raises:
         ArgumentError: no body, a part of the wrong type, a joint of a body that there is not, or
             an unknown orientation.
     """
 
-    bodies: tuple[Body, ...] = eqx.field(converter=tuple)
-    joints: tuple[Joint, ...] = eqx.field(converter=tuple)
+    bodies: tuple[LinkBody, ...] = eqx.field(converter=tuple)
+    joints: tuple[Pin, ...] = eqx.field(converter=tuple)
     orientation: str = eqx.field(static=True, default="angle")
+    angles: tuple[LinkAngle, ...] = eqx.field(converter=tuple, default=())
 
     def __check_init__(self) -> None:
         check_choice("orientation", self.orientation, ORIENTATIONS)
         if not self.bodies:
             raise ArgumentError("bodies = () is not allowed: a linkage needs at least one body.")
         for body in self.bodies:
-            check_type("bodies", body, Body)
+            check_type("bodies", body, LinkBody)
         for joint in self.joints:
-            check_type("joints", joint, Joint)
+            check_type("joints", joint, Pin)
             for number in (joint.body_1, joint.body_2):
                 if number is not None:
                     check_choice("body of a joint", number, range(len(self.bodies)))
+        for held in self.angles:
+            check_type("angles", held, LinkAngle)
+            for number, _ in held.weights:
+                check_choice("body of a held angle", number, range(len(self.bodies)))
 
     @property
     def coordinates(self) -> int:
         """Coordinates of one body: 3, or 4 with Euler parameters."""
         return 4 if self.orientation == "euler" else 3
-
-
-class Constraints(NamedTuple):
-    """k constraints at one state of a linkage with n coordinates.
-
-    Two of each joint, in metres: point of body 1 − point of body 2, along x and along z. With Euler
-    parameters then one of each body, without unit: cos² + sin² − 1.
-
-    Attributes:
-        violation: Φ, k entries.
-        rate: Φ̇ = J q̇, k entries.
-        rows: of J = ∂Φ/∂q, k of them: entries by coordinate, the others are zero.
-        bias: γ = −J̇ q̇, k entries.
-    """
-
-    violation: list[Scalar]
-    rate: list[Scalar]
-    rows: list[Row]
-    bias: list[Scalar]
-
-
-class Point(NamedTuple):
-    """A point of a body, with derivatives with respect to the coordinates and ∂²/∂t² at q̈ = 0.
-
-    Attributes:
-        x, z: place in the plane [m].
-        row_x, row_z: derivatives with respect to the linkage's coordinates.
-        convective_x, convective_z: its acceleration at constant rates of the coordinates [m/s²].
-    """
-
-    x: Scalar
-    z: Scalar
-    row_x: Row
-    row_z: Row
-    convective_x: Scalar
-    convective_z: Scalar
-
-
-class Heading(NamedTuple):
-    """Sine and cosine of a body's orientation, their derivatives and ∂²/∂t² at q̈ = 0."""
-
-    sine: Scalar
-    cosine: Scalar
-    sine_row: Row
-    cosine_row: Row
-    sine_convective: Scalar
-    cosine_convective: Scalar
-
-
-def point_of(
-    linkage: Linkage,
-    q: Sequence[Scalar],
-    headings: Sequence[Heading],
-    body: int,
-    point: tuple[Scalar, Scalar],
-) -> Point:
-    """A point of a body, given in the body's own frame [m]."""
-    first, heading = linkage.coordinates * body, headings[body]
-    x, z = point
-    return Point(
-        x=q[first] + heading.cosine * x - heading.sine * z,
-        z=q[first + 1] + heading.sine * x + heading.cosine * z,
-        row_x={first: jnp.ones_like(q[first])}
-        | {c: heading.cosine_row[c] * x - heading.sine_row[c] * z for c in heading.sine_row},
-        row_z={first + 1: jnp.ones_like(q[first])}
-        | {c: heading.sine_row[c] * x + heading.cosine_row[c] * z for c in heading.sine_row},
-        convective_x=heading.cosine_convective * x - heading.sine_convective * z,
-        convective_z=heading.sine_convective * x + heading.cosine_convective * z,
-    )
-
-
-def headings_of(
-    linkage: Linkage,
-    q: Sequence[Scalar],
-    v: Sequence[Scalar],
-    circular: Sequence[tuple[Scalar, Scalar]] | None = None,
-) -> list[Heading]:
-    """Every body's heading; `circular` are sines and cosines of the angles, where known already."""
-    found = []
-    for body in range(len(linkage.bodies)):
-        first = linkage.coordinates * body + 2
-        own = slice(first, first + linkage.coordinates - 2)
-        if linkage.orientation == "euler":
-            found.append(_by_euler(first, q[own], v[own]))
-        else:
-            pair = sine_cosine(q[first]) if circular is None else circular[body]
-            found.append(_by_angle(first, pair, v[first]))
-    return found
-
-
-def constraints_of(
-    linkage: Linkage,
-    q: Sequence[Scalar],
-    v: Sequence[Scalar],
-    headings: Sequence[Heading] | None = None,
-) -> Constraints:
-    """Φ, Φ̇, J and γ at coordinates and rates, one scalar each, in the linkage's order."""
-    headings = headings_of(linkage, q, v) if headings is None else headings
-    violation: list[Scalar] = []
-    rows: list[Row] = []
-    bias: list[Scalar] = []
-    for joint in linkage.joints:
-        one = point_of(linkage, q, headings, joint.body_1, joint.point_1)
-        if joint.body_2 is None:
-            x, z = joint.point_2
-            violation += [one.x - x, one.z - z]
-            rows += [one.row_x, one.row_z]
-            bias += [-one.convective_x, -one.convective_z]
-            continue
-        other = point_of(linkage, q, headings, joint.body_2, joint.point_2)
-        violation += [one.x - other.x, one.z - other.z]
-        rows += [one.row_x | _subtract(other.row_x), one.row_z | _subtract(other.row_z)]
-        bias += [other.convective_x - one.convective_x, other.convective_z - one.convective_z]
-    if linkage.orientation == "euler":
-        for body in range(len(linkage.bodies)):
-            c, s = 4 * body + 2, 4 * body + 3
-            violation.append(q[c] * q[c] + q[s] * q[s] - 1.0)
-            rows.append({c: 2.0 * q[c], s: 2.0 * q[s]})
-            bias.append(-2.0 * (v[c] * v[c] + v[s] * v[s]))
-    return Constraints(violation, [row_times(row, v) for row in rows], rows, bias)
-
-
-def row_times(row: Row, v: Sequence[Scalar]) -> Scalar:
-    """A row of J times a vector."""
-    terms = [entry * v[c] for c, entry in row.items()]
-    return sum(terms[1:], terms[0])
-
-
-def masses_of(linkage: Linkage) -> list[Scalar]:
-    """The diagonal of M [kg, kg·m²], n entries.
-
-    With Euler parameters e the rotation's energy is 2 J |ė|²: the same as ½ J ω² wherever e stays
-    normalised, and its mass matrix is constant, diagonal and regular.
-    """
-    masses: list[Scalar] = []
-    for body in linkage.bodies:
-        turning = [body.inertia] if linkage.orientation == "angle" else [4.0 * body.inertia] * 2
-        masses += [body.mass, body.mass, *turning]
-    return masses
-
-
-def torque_on(linkage: Linkage, q: Sequence[Scalar], torque: Scalar) -> list[Scalar]:
-    """Generalised forces of a torque [N·m] on a body with these own coordinates (x, z, …)."""
-    if linkage.orientation == "angle":
-        return [torque]
-    return [-2.0 * torque * q[3], 2.0 * torque * q[2]]
-
-
-def _by_angle(first: int, circular: tuple[Scalar, Scalar], rate: Scalar) -> Heading:
-    (sine, cosine), square = circular, rate * rate
-    return Heading(sine, cosine, {first: cosine}, {first: -sine}, -sine * square, -cosine * square)
-
-
-def _by_euler(first: int, own: Sequence[Scalar], rates: Sequence[Scalar]) -> Heading:
-    (c, s), (c_rate, s_rate) = own, rates
-    return Heading(
-        sine=2.0 * c * s,
-        cosine=c * c - s * s,
-        sine_row={first: 2.0 * s, first + 1: 2.0 * c},
-        cosine_row={first: 2.0 * c, first + 1: -2.0 * s},
-        sine_convective=4.0 * c_rate * s_rate,
-        cosine_convective=2.0 * (c_rate * c_rate - s_rate * s_rate),
-    )
-
-
-def _subtract(row: Row) -> Row:
-    return {c: -entry for c, entry in row.items()}

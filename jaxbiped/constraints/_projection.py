@@ -8,7 +8,8 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
-from jaxbiped.caching._cached_jit import cached_jit, kept_alone
+from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._constraint_method import (
     AbstractConstraintMethod,
     AbstractProjectingMethod,
@@ -17,7 +18,8 @@ from jaxbiped.constraints._constraint_method import (
     gram,
     inverse_masses,
 )
-from jaxbiped.constraints._linkage import Linkage, constraints_of, masses_of, row_times
+from jaxbiped.constraints._linkage import Linkage
+from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of, row_times
 from jaxbiped.linalg._symmetric import factorise, solve
 
 _LEAST = 1e-10
@@ -33,9 +35,9 @@ def check_independent(
         ArgumentError: for a method that needs independent constraints. What is being traced, or
             a batch, is not looked at.
     """
-    if not method.needs_independent or not linkage.joints:
+    lower = _gram_of(linkage, list(q)) if method.needs_independent else []
+    if not lower:
         return
-    lower = _gram_of(linkage, list(q))
     entries = [entry for row in lower for entry in row]
     if any(isinstance(entry, jax.core.Tracer) or jnp.ndim(entry) for entry in entries):
         return
@@ -106,7 +108,7 @@ def nearest_consistent(
         left = [off - row_times(row, gone) for off, row in zip(at.violation, at.rows, strict=True)]
         return _add(origin, least(at.rows, left))
 
-    if not linkage.joints:
+    if not constraints_of(linkage, q, v).rows:
         return origin, list(v)
     found = jax.lax.fori_loop(0, _ITERATIONS, nearer, origin)
     at = constraints_of(linkage, found, v)

@@ -17,9 +17,7 @@ from jaxbiped.continuation._branch_point import BranchPoint as BranchPoint
 from jaxbiped.continuation._continue_gait import resume_branch as resume_branch
 from jaxbiped.continuation._deflation import IsolatedGait as IsolatedGait
 from jaxbiped.continuation._deflation import find_isolated as find_isolated
-from jaxbiped.continuation._nearest_bifurcation import (
-    NearestBifurcation as NearestBifurcation,
-)
+from jaxbiped.continuation._nearest_bifurcation import NearestBifurcation as NearestBifurcation
 from jaxbiped.continuation._nearest_bifurcation import nearest_bifurcation as nearest_bifurcation
 from jaxbiped.continuation._switch_branch import DoublingCascade as DoublingCascade
 from jaxbiped.continuation._switch_branch import doubling_cascade as doubling_cascade

@@ -99,7 +99,7 @@ def bifurcation_curve(
     check_type("bifurcation", bifurcation, BifurcationPoint)
     if bifurcation.kind in (BranchEvent.LIMIT, BranchEvent.NOT_LOCATED):
         raise ArgumentError(
-            f"bifurcation is not allowed: {bifurcation} is no zero of a test function."
+            f"bifurcation is not allowed: {bifurcation} is not a zero of a test function."
         )
     second = axis_of(branch.scene, along, bounds, log)
     if along == branch.along:
@@ -166,7 +166,7 @@ def _gait_at(setup: ContinuationSetup, second: Axis, place: np.ndarray) -> Chang
     *scaled, s, t = place
     first, point = setup.axis, np.array(scaled) * setup.curve.sizes[:-1]
     values = [first.value(float(s)), second.value(float(t))]
-    seen = setup.problem.cycle(point, (first.leaf, second.leaf), values, setup.footsteps)
+    seen = setup.problem.cycle(point, (first.leaf, second.leaf), values, setup.arrivals)
     return change_of(seen, point, first.slope(float(s)))
 
 

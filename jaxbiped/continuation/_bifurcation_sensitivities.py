@@ -123,7 +123,7 @@ def fold_forcing(
     known = parameter_values(scene)
     _, leaves = select_parameters(scene, names)
     values = [float(known[name]) for name in names]
-    seen = setup.problem.cycle(recurring, leaves, values, setup.footsteps)
+    seen = setup.problem.cycle(recurring, leaves, values, setup.arrivals)
     if int(seen.code[0]) != 0:
         return None
     m, sizes = len(recurring), setup.curve.sizes[:-1]

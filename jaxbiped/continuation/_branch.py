@@ -14,17 +14,14 @@ from jaxbiped._types import as_float
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch_point import Axis, BranchPoint
 from jaxbiped.continuation._trace import BranchStop
-from jaxbiped.dynamics._state import BristleState, RigidState, State, WalkerState
-from jaxbiped.dynamics._state_quantities import (
-    STATE_QUANTITIES,
-    recurring_names,
-    state_of_recurring,
-)
+from jaxbiped.dynamics._state import state_type
+from jaxbiped.dynamics._state_quantities import recurring_names, state_of_recurring, unit_of
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._state_types import WalkerState
 
 if TYPE_CHECKING:
     import xarray
@@ -135,7 +132,7 @@ def branch_dataset(branch: Branch) -> "xarray.Dataset":
     import xarray
 
     names = recurring_names(branch.state_type)
-    units = {name: STATE_QUANTITIES[name].unit for name in names}
+    units = {name: unit_of(name) for name in names}
     variables = _columns(branch, branch.points, "", "point", units)
     kinds = [EVENTS.index(each.kind) for each in branch.bifurcations]
     variables["event_kind"] = (
@@ -158,7 +155,6 @@ def branch_dataset(branch: Branch) -> "xarray.Dataset":
         "axis": branch.axis._asdict(),
         "stops": [[int(each.end), each.cause, each.value] for each in branch.stops],
         **scene_identity(branch.scene),
-        "state_type": branch.state_type.__name__,
         "footsteps": branch.footsteps,
         "accuracy": branch.accuracy,
         "engine": branch.engine,
@@ -206,9 +202,6 @@ def _columns(
     return {before + name: column for name, column in columns.items()}
 
 
-_STATES = {kind.__name__: kind for kind in (State, BristleState, RigidState)}
-
-
 def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
     """The branch that a dataset holds, to be drawn, or followed on by `resume_branch`.
 
@@ -232,8 +225,8 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
         raise ArgumentError(
             f"scene is not allowed: it differs from the branch's own in {difference}."
         )
-    state_type = _STATES[settings["state_type"]]
-    special = _points(dataset, state_type, settings["along"], "event_")
+    kind = state_type(scene)
+    special = _points(dataset, kind, settings["along"], "event_")
     events = [
         BifurcationPoint(EVENTS[int(kind)], point, complex(real, imaginary), *map(float, errors))
         for kind, point, real, imaginary, *errors in zip(
@@ -246,11 +239,11 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
     first, last = (BranchStop(BranchEnd(end), why, float(at)) for end, why, at in settings["stops"])
     return Branch(
         scene=scene,
-        points=tuple(_points(dataset, state_type, settings["along"], "")),
+        points=tuple(_points(dataset, kind, settings["along"], "")),
         bifurcations=tuple(events),
         stops=(first, last),
         axis=Axis(**settings["axis"]),
-        state_type=state_type,
+        state_type=kind,
         footsteps=settings["footsteps"],
         accuracy=settings["accuracy"],
         engine=settings["engine"],
@@ -265,13 +258,11 @@ def _column(dataset: "xarray.Dataset", name: str) -> np.ndarray:
     return np.asarray(dataset[name].values)
 
 
-def _points(
-    dataset: "xarray.Dataset", state_type: Any, along: str, before: str
-) -> list[BranchPoint]:
+def _points(dataset: "xarray.Dataset", kind: Any, along: str, before: str) -> list[BranchPoint]:
     def column(name: str) -> np.ndarray:
         return _column(dataset, before + name)
 
-    recurring = np.stack([column(f"state_{name}") for name in recurring_names(state_type)], axis=1)
+    recurring = np.stack([column(f"state_{name}") for name in recurring_names(kind)], axis=1)
     values = column("multipliers_real") + 1j * column("multipliers_imag")
     errors, codes = column("multipliers_error"), column("bifurcation")
     numbers = {name: column(name) for name in NUMBERS}

@@ -11,17 +11,18 @@ from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point, change_of
 from jaxbiped.continuation._cycle import Cycle, CycleProblem
 from jaxbiped.continuation._trace import Trace, limit_cause, trace
-from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.dynamics._state_quantities import state_of_recurring
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Change, Curve, CurvePoint, correct
-from jaxbiped.gait._return_map_spec import return_map_spec
-from jaxbiped.gait._search_starts import component_sizes, default_guess
+from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
+from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, precision_of
+from jaxbiped.solve._units import recurring_sizes
 
 _TOLD_BY_CONTACT = (BranchEnd.BREAKS_OFF, BranchEnd.WALK_ENDS)
 _CONVERGED = 3.0
@@ -36,16 +37,22 @@ class ContinuationSetup(NamedTuple):
     Attributes:
         scene: the walker.
         axis: the parameter.
-        footsteps: of a cycle.
+        arrivals: of a cycle at its section: of a mirrored walker one a footstep.
         accuracy: by name.
         problem: how cycles are followed.
     """
 
     scene: Scene | RigidScene
     axis: Axis
-    footsteps: int
+    arrivals: int
     accuracy: str
     problem: CycleProblem
+
+    @property
+    def footsteps(self) -> int:
+        """Footsteps of a cycle."""
+        each: int = self.scene.arrival_footsteps
+        return self.arrivals * each
 
     @property
     def curve(self) -> Curve:
@@ -54,12 +61,12 @@ class ContinuationSetup(NamedTuple):
         def change(point: np.ndarray, s: float) -> Change:
             return change_of(self.cycle(point, self.axis.value(s)), point, self.axis.slope(s))
 
-        sizes = np.append(component_sizes(self.scene, self.problem.like), 1.0)
+        sizes = np.append(recurring_sizes(self.scene, self.problem.like), 1.0)
         return Curve(change, sizes, _CONVERGED * float(self.problem.precision.rtol))
 
-    def cycle(self, recurring: np.ndarray, value: float, footsteps: int | None = None) -> Cycle:
+    def cycle(self, recurring: np.ndarray, value: float, arrivals: int | None = None) -> Cycle:
         """The cycle from these components at a value of the parameter."""
-        count = self.footsteps if footsteps is None else footsteps
+        count = self.arrivals if arrivals is None else arrivals
         return self.problem.cycle(recurring, (self.axis.leaf,), [value], count)
 
     def at_value(self, recurring: np.ndarray, value: float) -> Attempt:
@@ -114,16 +121,21 @@ class ContinuationSetup(NamedTuple):
 
 
 def continuation_setup(
-    scene: Scene | RigidScene, axis: Axis, *, footsteps: int, accuracy: str, engine: str
+    scene: Scene | RigidScene, axis: Axis, *, footsteps: int | None, accuracy: str, engine: str
 ) -> ContinuationSetup:
-    """The setup for a scene; raises `ArgumentError` for an engine that cannot."""
+    """The setup for a scene.
+
+    Raises:
+        ArgumentError: an engine that cannot, or footsteps that are no whole cycles.
+    """
     scene = check_scene(scene, Scene, RigidScene)
+    arrivals = arrivals_of(scene, footsteps)
     like = default_guess(scene)
     # A branch may come to gaits that are costlier than those of a search.
     most = max(each.max_solver_steps for each in ACCURACIES.values())
     spec = return_map_spec(scene, like, solver=None, engine=engine, max_solver_steps=most)
     problem = CycleProblem(spec, scene, like, precision_of(accuracy, scene))
-    return ContinuationSetup(scene, axis, footsteps, accuracy, problem)
+    return ContinuationSetup(scene, axis, arrivals, accuracy, problem)
 
 
 def setup_of(branch: Branch, **others: Any) -> ContinuationSetup:

@@ -19,16 +19,16 @@ from jaxbiped.continuation._continuation_setup import (
     setup_of,
 )
 from jaxbiped.continuation._trace import LIMITS, BranchStop, Trace
-from jaxbiped.dynamics._state import WalkerState, state_for
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint, correct
 from jaxbiped.gait._search_provenance import explain_search
-from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.gait._search_starts import default_guess, state_of_guess
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 
@@ -38,7 +38,7 @@ def continue_gait(
     *,
     bounds: tuple[float, float],
     guess: Gait | WalkerState | None = None,
-    footsteps: int = 1,
+    footsteps: int | None = None,
     log: bool | None = None,
     largest_step: float = 0.02,
     max_points: int = 200,
@@ -58,12 +58,14 @@ def continue_gait(
         bounds: the range (from, to), SI units, at whose ends the branch stops.
         guess: a gait or a start near the one to follow; the gait that `find_gait` finds unless
             given.
-        footsteps: how many a cycle has.
-        log: whether equal steps are equal factors; unless given, where a positive range spans two
-            decades.
-        largest_step: largest arclength of a step, in which the range counts 1, an angle 1 rad,
-            and lengths, velocities and rates l, √(g l) and √(g/l).
-        max_points: points followed in each direction at most.
+        footsteps: how many a cycle has; one of a mirrored walker unless given, of one with unlike
+            legs those of a stride.
+        log: whether equal steps are equal factors (if omitted: on if a positive range spans two
+            decades).
+        largest_step: maximum arclength of a step. In the arclength, the parameter is scaled by the
+            width of its range, angles by 1 rad, lengths by l, velocities by √(g l) and rates by
+            √(g/l).
+        max_points: maximum number of points in each direction.
         accuracy: "balanced" or "tight".
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
         progress: whether to show a bar on stderr.
@@ -85,16 +87,12 @@ def continue_gait(
     """
     check_followed(scene)
     axis = axis_of(scene, along, bounds, log)
-    check_count("footsteps", footsteps)
     check_positive("largest_step", largest_step)
     check_count("max_points", max_points)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     start = start_of(scene, axis)
-    near = guess.measures.state if isinstance(guess, Gait) else guess
-    near = None if near is None else state_for(scene, near, "guess")
-    setup = continuation_setup(
-        scene, axis, footsteps=int(footsteps), accuracy=accuracy, engine=engine
-    )
+    near = state_of_guess(scene, guess)
+    setup = continuation_setup(scene, axis, footsteps=footsteps, accuracy=accuracy, engine=engine)
     begin = first_gait(setup, start, near, engine)
     if isinstance(begin, str):
         none = BranchStop(BranchEnd.NO_BEGINNING, begin, float("nan"))

@@ -1,7 +1,7 @@
 """Cycle of footsteps with its derivatives: the one evaluation that all continuation reads.
 
 It is chained of single returns, so that one compiled program serves every point of a branch, every
-step of a corrector and every number of footsteps.
+step of a corrector and every number of arrivals.
 """
 
 from typing import NamedTuple
@@ -13,11 +13,11 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.gait._fixed_point_search import is_sound, with_looser
+from jaxbiped.compiler import host_jit
+from jaxbiped.gait._fixed_point_search import is_sound, search_by_lanes, with_looser
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.scene._scene import AbstractWalkerScene
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 
 NO_WALK = -1
@@ -25,7 +25,7 @@ NO_WALK = -1
 
 
 class Cycle(NamedTuple):
-    """A cycle of footsteps; beside it a looser one, the witness of its error, on a first axis of 2.
+    """A cycle of arrivals; beside it a looser one, the witness of its error, on a first axis of 2.
 
     With m recurring components and p parameters:
 
@@ -64,7 +64,7 @@ class CycleProblem(NamedTuple):
     """Whose cycles are followed, and how exactly.
 
     Attributes:
-        spec: of a return of one footstep.
+        spec: of a return to the next arrival.
         scene: the walker.
         like: any state of it.
         precision: of the solves.
@@ -76,22 +76,22 @@ class CycleProblem(NamedTuple):
     precision: Precision
 
     def cycle(
-        self, point: np.ndarray, active: tuple[int, ...], values: list[float], footsteps: int
+        self, point: np.ndarray, active: tuple[int, ...], values: list[float], arrivals: int
     ) -> Cycle:
         """The cycle from a point of m components, parameters at positions `active` so changed."""
-        numbers: PyTree = np.asarray(point), np.asarray(values, float), np.asarray(footsteps)
+        numbers: PyTree = np.asarray(point), np.asarray(values, float), np.asarray(arrivals)
         both = self._replace(precision=with_looser(self.precision))
         found: Cycle = jax.device_get(_evaluate(both, active, *numbers))
         return found
 
 
-@cached_jit
+@host_jit(search_by_lanes, within=True)
 def _evaluate(
     problem: CycleProblem,
     active: tuple[int, ...],
     point: Scalar,
     values: Scalar,
-    footsteps: Scalar,
+    arrivals: Scalar,
 ) -> Cycle:
     """The cycle, and in a lane of its own the looser one."""
     leaves, structure = jtu.tree_flatten(problem.scene)
@@ -99,12 +99,12 @@ def _evaluate(
         leaves[place] = values[k]
     there = problem._replace(scene=jtu.tree_unflatten(structure, leaves))
     return jax.vmap(
-        lambda precision: _chain(there._replace(precision=precision), active, point, footsteps)
+        lambda precision: _chain(there._replace(precision=precision), active, point, arrivals)
     )(problem.precision)
 
 
 def _chain(
-    problem: CycleProblem, active: tuple[int, ...], point: Scalar, footsteps: Scalar
+    problem: CycleProblem, active: tuple[int, ...], point: Scalar, arrivals: Scalar
 ) -> Cycle:
     spec, scene, like, precision = problem
     m, p = point.shape[0], len(active)
@@ -142,4 +142,4 @@ def _chain(
         grazes=jnp.asarray(0),
         sound=jnp.asarray(True),
     )
-    return jax.lax.fori_loop(0, footsteps, add, begin)
+    return jax.lax.fori_loop(0, arrivals, add, begin)

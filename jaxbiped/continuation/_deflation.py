@@ -19,7 +19,7 @@ from jaxbiped.continuation._continuation_setup import (
     check_followed,
     continuation_setup,
 )
-from jaxbiped.dynamics._state import WalkerState, state_for
+from jaxbiped.dynamics._state import state_for
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
@@ -27,6 +27,7 @@ from jaxbiped.gait._pseudo_arclength import Change
 from jaxbiped.gait._search_starts import rolling_starts
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 _MOST_STEPS = 40
@@ -62,7 +63,7 @@ class IsolatedGait(NamedTuple):
 def find_isolated(
     scene: Scene | RigidScene,
     *,
-    footsteps: int = 1,
+    footsteps: int | None = None,
     known: tuple[WalkerState, ...] = (),
     starts: int = 32,
     seed: int = 0,
@@ -76,8 +77,8 @@ def find_isolated(
 
     Args:
         scene: the walker, compliant or rigid.
-        footsteps: how many a cycle has; gaits that repeat themselves after fewer are avoided, but
-            not returned.
+        footsteps: how many a cycle has, the fewest unless given; gaits that repeat themselves after
+            fewer are avoided, but not returned.
         known: states of gaits to avoid.
         starts: how many, scattered about the gait that `find_gait` finds.
         seed: of their random numbers.
@@ -91,15 +92,12 @@ def find_isolated(
         ArgumentError: an argument that is not allowed, before anything is compiled.
     """
     check_followed(scene)
-    for name, count in (("footsteps", footsteps), ("starts", starts)):
-        check_count(name, count)
+    check_count("starts", starts)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     checked = [state_for(scene, each, "guess") for each in known]
     slope = float(parameter_values(scene)["slope"])
     axis = axis_of(scene, "slope", (slope, slope + 0.01), None)
-    setup = continuation_setup(
-        scene, axis, footsteps=int(footsteps), accuracy=accuracy, engine=engine
-    )
+    setup = continuation_setup(scene, axis, footsteps=footsteps, accuracy=accuracy, engine=engine)
     search = _DeflatedNewton(setup, slope)
     for state in checked:
         search.learn(setup.recurring(state), keep=False)
@@ -148,20 +146,20 @@ class _DeflatedNewton:
     def learn(self, point: np.ndarray, *, keep: bool = True) -> None:
         """Makes a cycle known, wherever it crosses the section."""
         crossings = [point]
-        for _ in range(self._setup.footsteps - 1):
+        for _ in range(self._setup.arrivals - 1):
             after, code = self._walk(crossings[-1], 1)
             if code or self._apart(after, point) < _SAME:
                 break
             crossings.append(after)
         self._crossings += [each / self._sizes for each in crossings]
         place = self._setup.at_value(point, self._value).found
-        if keep and len(crossings) == self._setup.footsteps and place is not None:
+        if keep and len(crossings) == self._setup.arrivals and place is not None:
             told = self._setup.point(place)
             self._gaits.append(IsolatedGait(self._setup.state_of(told.recurring), told))
 
     def returns(self, start: np.ndarray) -> bool:
         """Whether the walk from a start comes through a cycle."""
-        return self._walk(start, self._setup.footsteps + 1)[1] == 0
+        return self._walk(start, self._setup.arrivals + 1)[1] == 0
 
     def from_start(self, start: np.ndarray) -> np.ndarray | None:
         """A cycle that is not known yet, None where the search ends without."""
@@ -192,13 +190,13 @@ class _DeflatedNewton:
         """A step on, or as much of it as leads to where the walk returns."""
         for k in range(_HALVINGS):
             ahead = point + 0.5**k * step * self._sizes
-            code = self._walk(ahead, self._setup.footsteps)[1]
+            code = self._walk(ahead, self._setup.arrivals)[1]
             if code == 0:
                 break
         return ahead, code
 
-    def _walk(self, point: np.ndarray, footsteps: int) -> tuple[np.ndarray, int]:
-        found = self._setup.cycle(point, self._value, footsteps)
+    def _walk(self, point: np.ndarray, arrivals: int) -> tuple[np.ndarray, int]:
+        found = self._setup.cycle(point, self._value, arrivals)
         return np.asarray(found.recurring[0]), found.failure
 
     def _change(self, point: np.ndarray) -> Change:

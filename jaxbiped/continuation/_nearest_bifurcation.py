@@ -3,9 +3,13 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
+from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._continue_gait import continue_gait
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -87,7 +91,8 @@ def nearest_bifurcation(
             where the walker allows no more; the slope of level ground by 0.1 rad to both sides.
 
     Returns:
-        The one whose value differs by the smallest factor.
+        Of the first on each side along the branch, the one whose value differs by the smaller
+        factor: what lies beyond a fold is another gait's.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled; a parameter
@@ -99,9 +104,9 @@ def nearest_bifurcation(
     if not factor > 1.0:
         raise ArgumentError(f"factor = {factor!r} is not allowed: it must be above 1.")
     bounds, level = range_of(scene, along, factor), own == 0.0
-    steps = gait.orbit[0].shape[0]
+    steps = gait.step_lengths.shape[0]
     branch = continue_gait(scene, along, bounds=bounds, guess=gait, footsteps=steps)
-    seen = [each for each in branch.bifurcations if level or each.value / own > 0.0]
+    seen = [each for each in _first_each_way(branch, gait, own) if level or each.value / own > 0.0]
     if not seen:
         return NearestBifurcation(along, None, math.nan, math.nan, complex(math.nan), math.nan)
 
@@ -116,3 +121,23 @@ def nearest_bifurcation(
     first = min(seen, key=nearest)
     ratio = math.nan if level else first.value / own
     return NearestBifurcation(along, first.kind, first.value, ratio, first.multiplier, first.error)
+
+
+def _first_each_way(branch: Branch, gait: Gait, own: float) -> list[BifurcationPoint]:
+    """What a branch comes to first on both sides of one of its gaits, at the parameter's own value.
+
+    Beyond a fold the branch passes the same values once more, with other gaits.
+    """
+    values = [each.value for each in branch.points]
+    at = [k for k, value in enumerate(values) if math.isclose(value, own, abs_tol=_NEAR)]
+    if not at:
+        return []
+    state = np.stack(recurring_leaves(gait.measures.state))
+    own_place = min(at, key=lambda k: float(np.max(np.abs(branch.points[k].recurring - state))))
+    places = [each.place for each in branch.points]
+    before: list[BifurcationPoint] = []
+    after: list[BifurcationPoint] = []
+    for each in branch.bifurcations:
+        where = next(k for k, place in enumerate(places) if np.array_equal(place, each.point.place))
+        (after if where > own_place else before).append(each)
+    return [*before[-1:], *after[:1]]

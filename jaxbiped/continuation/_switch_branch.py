@@ -142,7 +142,7 @@ def _doubled_branch(
     near: float = _NEAR,
 ) -> Branch:
     setup = setup_of(branch, footsteps=2 * branch.footsteps)
-    begin = _doubled_cycle(setup, branch.footsteps, doubling, near)
+    begin = _doubled_cycle(setup, doubling, near)
     if begin is None:
         raise ArgumentError(
             f"doubling at {branch.along} = {doubling.value:.6g} is not allowed: no gait of "
@@ -159,12 +159,12 @@ def _doubled_branch(
 
 
 def _doubled_cycle(
-    setup: ContinuationSetup, footsteps: int, doubling: BifurcationPoint, near: float
+    setup: ContinuationSetup, doubling: BifurcationPoint, near: float
 ) -> CurvePoint | None:
     """A cycle of doubled period beside a doubling, its tangent pointing away from there."""
-    point, curve = doubling.point, setup.curve
+    point, curve, undoubled = doubling.point, setup.curve, setup.arrivals // 2
     sizes = curve.sizes
-    seen = setup.cycle(point.recurring, point.value, footsteps)
+    seen = setup.cycle(point.recurring, point.value, undoubled)
     m = len(point.recurring)
     values, vectors = np.linalg.eig(
         np.asarray(seen.jacobian[0])[:, :m] / sizes[:m, None] * sizes[:m]
@@ -180,7 +180,7 @@ def _doubled_cycle(
         if found is None or abs(found.place[-1] - point.place[-1]) > near:
             continue
         own = found.place[:-1] * sizes[:-1]
-        half = setup.cycle(own, setup.axis.value(found.place[-1]), footsteps)
+        half = setup.cycle(own, setup.axis.value(found.place[-1]), undoubled)
         apart = np.linalg.norm((np.asarray(half.recurring[0]) - own) / sizes[:-1])
         if apart > _APART * 2.0 * amplitude:
             return found

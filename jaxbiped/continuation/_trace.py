@@ -17,10 +17,10 @@ from jaxbiped.continuation._bifurcations import (
 from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point
 from jaxbiped.continuation._cycle import NO_WALK
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.dynamics._state import State, WalkerState
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, correct, follow
 from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._state_types import State, WalkerState
 from jaxbiped.simulate._simulate import simulate
 
 NOT_SMOOTH = "grazing: the return map is not smooth"
@@ -58,7 +58,7 @@ def limit_cause(
 def _load(scene: Scene, state: WalkerState) -> float:
     """Force on both feet, in units of the weight."""
     both = contacts(scene, cast(State, state)).forces
-    weight = float(scene.walker.total_mass * scene.ground.g)
+    weight = float(scene.mechanism.total_mass * scene.ground.g)
     return sum(float(force.normal) for force in both) / weight
 
 

@@ -1,11 +1,15 @@
-"""Actuation in the equations of motion: torques at the hip, set points of feet, their powers."""
+"""Actuation in the equations of motion: torques at joints, set points of feet, their powers."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple, TypeAlias, TypeVar
 
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._joint_loads import with_joint_loads
+from jaxbiped.dynamics._legs import LegMotion
+from jaxbiped.dynamics._motor_motion import motor_torques
+from jaxbiped.dynamics._tree import Loads, Motion
 from jaxbiped.scene._scene import CompliantScene, RigidScene
 from jaxbiped.scene.actuation._abstract_actuator import (
     AbstractActuator,
@@ -41,18 +45,15 @@ def _sums(pairs: Iterable[tuple[Scalar, Scalar]]) -> tuple[Scalar, Scalar] | Non
     return added
 
 
-def load_shares(
-    scene: WalkerScene, normal: tuple[Scalar | None, Scalar | None]
-) -> tuple[Scalar | None, Scalar | None]:
-    """Share of the load on each leg, of normal forces [N]; None for a foot that never touches.
+def load_shares(scene: WalkerScene, normal: tuple[Scalar | None, ...]) -> tuple[Scalar | None, ...]:
+    """Share of the load on each foot, of normal forces [N]; None for one that never touches.
 
-    F_i/(F_1 + F_2 + ε W) with a hundredth ε of the weight W: smooth, and zero in flight.
+    F_i/(ΣF + ε W) with a hundredth ε of the weight W: smooth, and zero in flight.
     """
-    total: Scalar = _LIGHT * scene.walker.total_mass * scene.ground.g
+    total: Scalar = _LIGHT * scene.mechanism.total_mass * scene.ground.g
     for force in normal:
         total = total if force is None else total + force
-    first, second = (None if force is None else force / total for force in normal)
-    return first, second
+    return tuple(None if force is None else force / total for force in normal)
 
 
 def hip_torques(scene: WalkerScene, hip: HipMotion) -> LegTorques | None:
@@ -60,9 +61,42 @@ def hip_torques(scene: WalkerScene, hip: HipMotion) -> LegTorques | None:
     return _sums(part.torques(hip) for part in _at_hip(scene))
 
 
-def preload(scene: WalkerScene, angle: Scalar, rate: Scalar) -> tuple[Scalar, Scalar] | None:
-    """Extension of a leg's foot [m] and its rate [m/s]; None where the scene has no preload."""
-    return _sums(part.set_point(angle, rate) for part in actuators_of(scene, FootPreload))
+def preload(scene: WalkerScene, leg: LegMotion) -> tuple[Scalar, Scalar] | None:
+    """Extension of a leg's feet [m] and its rate [m/s]; None where the scene has no preload."""
+    parts = actuators_of(scene, FootPreload)
+    return _sums(part.set_point(leg.angle, leg.rate) for part in parts)
+
+
+Carriers: TypeAlias = tuple[Sequence[LegMotion], Sequence[Scalar | None]]
+"""Lines of all legs, and the share of the load on each; None for one that never touches."""
+
+
+def with_driven_joints(
+    loads: Loads,
+    scene: WalkerScene,
+    motion: Motion,
+    carriers: Callable[[], Carriers],
+    hip: Callable[[], HipMotion],
+) -> Loads:
+    """With the torques of springs, stops, latches, motors and actuators at the hip.
+
+    Args:
+        loads: what acts besides.
+        scene: whose parts they are.
+        motion: angles and rates of all bodies.
+        carriers: which legs carry, asked where there are motors.
+        hip: what actuators at the hip know, asked where there are any.
+    """
+    mechanism, slope = scene.mechanism, scene.ground.slope
+    loads = with_joint_loads(loads, mechanism, motion, slope, stops=scene.compliant)
+    if mechanism.has_motors:
+        for _, angle, torque in motor_torques(mechanism, motion, slope, *carriers()):
+            loads = loads.with_torques(angle.weights, torque)
+    pairs = mechanism.structure.pairs
+    if scene.actuation is not None and pairs:
+        for body, torque in zip(pairs[0], hip_torques(scene, hip()) or (), strict=False):
+            loads = loads.with_torques(((body, 1.0),), torque)
+    return loads
 
 
 class ActuatorPowers(NamedTuple):
@@ -71,7 +105,7 @@ class ActuatorPowers(NamedTuple):
     Attributes:
         total: of all torques and set points on the walker, of springs and dampers too [W].
         motors: of each motor by itself [W]: one for each actuator at the hip that has one, then one
-            for each leg's foot.
+            for each foot.
     """
 
     total: Scalar
@@ -79,19 +113,27 @@ class ActuatorPowers(NamedTuple):
 
 
 def actuator_powers(
-    scene: WalkerScene, hip: HipMotion, normal: tuple[Scalar | None, Scalar | None]
+    scene: WalkerScene,
+    hip: HipMotion | None,
+    feet: Sequence[tuple[Scalar | None, LegMotion]] = (),
 ) -> ActuatorPowers:
-    """Powers of the actuators of a walker that moves like this under these normal forces [N]."""
-    total, motors = jnp.zeros_like(hip.angle[0]), []
-    torques = hip_torques(scene, hip)
-    if torques is not None:
-        total = total + _power(torques, hip)
-    for part in _at_hip(scene):
-        driven = part.motor_torques(hip)
-        if driven is not None:
-            motors.append(_power(driven, hip))
-    for force, angle, rate in zip(normal, hip.angle, hip.rate, strict=True):
-        moved = preload(scene, angle, rate)
+    """Powers of the actuators of a walker that moves like this.
+
+    Args:
+        scene: what moves.
+        hip: what actuators at the hip know; None where the walker has no pair of legs.
+        feet: normal force on each foot [N] and how its leg moves; none of rigid feet.
+    """
+    total = jnp.zeros_like(feet[0][1].rate if hip is None else hip.angle[0])
+    motors: list[Scalar] = []
+    if hip is not None:
+        torques = hip_torques(scene, hip)
+        if torques is not None:
+            total = total + _power(torques, hip)
+        driven = (part.motor_torques(hip) for part in _at_hip(scene))
+        motors += [_power(each, hip) for each in driven if each is not None]
+    for force, leg in feet:
+        moved = preload(scene, leg)
         if moved is not None and force is not None:
             motors.append(force * moved[1])
             total = total + motors[-1]

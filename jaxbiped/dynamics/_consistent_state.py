@@ -7,9 +7,9 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._types import Scalar, by_numpy
-from jaxbiped.caching._cached_jit import kept_alone
+from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
-from jaxbiped.constraints._linkage import masses_of
+from jaxbiped.constraints._linkage_constraints import masses_of
 from jaxbiped.constraints._projection import correct_step, nearest_consistent
 from jaxbiped.dynamics._redundant_motion import (
     Violation,
@@ -17,19 +17,14 @@ from jaxbiped.dynamics._redundant_motion import (
     violation,
     with_coordinates,
 )
-from jaxbiped.dynamics._redundant_state import (
-    CompliantState,
-    EulerState,
-    LegsState,
-    RedundantState,
-    is_redundant,
-    redundant_state,
-)
-from jaxbiped.dynamics._state import check_leaves, state_for
+from jaxbiped.dynamics._redundant_state import BodiesState, CompliantState, redundant_state
+from jaxbiped.dynamics._state import state_for
 from jaxbiped.scene._scene import RedundantScene
+from jaxbiped.scene._state_types import is_redundant
 
-FURTHEST = Violation(position=0.01, rate=0.1, normalisation=0.01)
-"""A start that is further off its constraints is refused [m, m/s, –]."""
+FURTHEST = Violation(position=0.01, rate=0.1, normalisation=0.01, angle=0.01, angle_rate=0.1)
+"""A start that is further off its constraints is refused [m, m/s, –, rad, rad/s]."""
+_UNITS = dict(zip(Violation._fields, ("m", "m/s", "(no unit)", "rad", "rad/s"), strict=True))
 
 
 class Consistent(NamedTuple):
@@ -42,13 +37,13 @@ class Consistent(NamedTuple):
         velocity: the same of its velocities [m/s].
     """
 
-    state: LegsState
+    state: BodiesState
     violation: Violation
     position: Scalar
     velocity: Scalar
 
 
-def project(scene: RedundantScene, state: LegsState) -> LegsState:
+def project(scene: RedundantScene, state: BodiesState) -> BodiesState:
     """The state as the scene's method corrects it after each step; differentiable.
 
     Args:
@@ -76,8 +71,8 @@ def consistent_state(
     """The consistent state nearest to a start, least in the mass metric.
 
     Args:
-        scene: whose legs are joined.
-        state: start; a `State` is made a redundant one, and needs no correction.
+        scene: whose bodies are joined.
+        state: start; a minimal one is made redundant, and needs no correction.
         max_violation: a start that violates its constraints by more is refused.
 
     Returns:
@@ -87,10 +82,12 @@ def consistent_state(
         ArgumentError: not a state of the scene's kind, an entry that is not finite, leaves of
             different shapes, or a start too far off. What is being traced is not refused.
     """
-    state = _check_state_of_scene(scene, state)
+    if is_redundant(state):
+        state = state_for(scene, state)
+    else:
+        state = redundant_state(scene, state_for(scene.scene, state))
     off = violation(scene, state)
-    units = {"position": "m", "rate": "m/s", "normalisation": "(no unit)"}
-    for name, unit in units.items():
+    for name, unit in _UNITS.items():
         value, bound = getattr(off, name), getattr(max_violation, name)
         if holds_somewhere(by_numpy(lambda _, value, bound: value > bound, value, bound)):
             raise ArgumentError(
@@ -101,7 +98,7 @@ def consistent_state(
 
 
 @kept_alone
-def _nearest_state(scene: RedundantScene, state: LegsState, off: Violation) -> Consistent:
+def _nearest_state(scene: RedundantScene, state: BodiesState, off: Violation) -> Consistent:
     """The nearest state that keeps the constraints."""
     q, v = coordinates_of(scene, state)
     masses = masses_of(scene.linkage)
@@ -109,27 +106,6 @@ def _nearest_state(scene: RedundantScene, state: LegsState, off: Violation) -> C
 
     def size(new: list[Scalar], old: list[Scalar]) -> Scalar:
         moved = [m * (a - b) ** 2 for m, a, b in zip(masses, new, old, strict=True)]
-        return jnp.sqrt(sum(moved[1:], moved[0]) / scene.walker.total_mass)
+        return jnp.sqrt(sum(moved[1:], moved[0]) / scene.mechanism.total_mass)
 
     return Consistent(with_coordinates(state, new_q, new_v), off, size(new_q, q), size(new_v, v))
-
-
-def _check_state_of_scene(scene: RedundantScene, state: object) -> LegsState:
-    if not is_redundant(state):
-        return redundant_state(scene, state_for(scene.scene, state))
-    kind = EulerState if scene.orientation == "euler" else RedundantState
-    if not isinstance(state, kind):
-        raise ArgumentError(
-            f"state is a {type(state).__name__}, but orientation = {scene.orientation!r} needs a "
-            f"{kind.__name__}."
-        )
-    remembers = scene.has_bristles
-    if remembers and state.bristle_1 is None:
-        straight = jnp.zeros_like(state.x_1)
-        state = state._replace(bristle_1=straight, bristle_2=straight)
-    if not remembers and state.bristle_1 is not None:
-        raise ArgumentError(
-            f"state has bristles, but friction = {type(scene.friction).__name__} has none: leave "
-            "them None."
-        )
-    return check_leaves(state, "state")

@@ -1,17 +1,27 @@
 """Contacts: where the feet are and how they move, which touch, and the ground's forces on them."""
 
+import functools
+import operator
 from typing import NamedTuple, cast
 
 import jax.numpy as jnp
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, select
-from jaxbiped.caching._cached_jit import kept_alone
+from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import load_shares, preload
-from jaxbiped.dynamics._redundant_state import CompliantState, Leg, legs_of
-from jaxbiped.dynamics._state import SomeState, exchange_legs
+from jaxbiped.dynamics._footfalls import FootMotion, leg_depth, standing_leg, touches
+from jaxbiped.dynamics._legs import LegMotion, leg_motions
+from jaxbiped.dynamics._redundant_state import CompliantState, poses_of
+from jaxbiped.dynamics._symmetry import images
+from jaxbiped.dynamics._tree import Pose, point_motion
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._ground import drop_under
-from jaxbiped.scene._scene import AbstractWalkerScene, CompliantScene
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._placement import placement
+from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene._state_types import SomeState
+from jaxbiped.scene._structure import Structure
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
@@ -20,154 +30,119 @@ _JUST_TOUCHING = 1e-6
 """Depth or height of a foot that counts as at the surface, in units of the leg's length."""
 
 
-class Foot(NamedTuple):
-    """Kinematics of one foot, leaves shaped as the state's.
-
-    Attributes:
-        x, z: centre of the foot in the slope's frame [m].
-        vx, vz: velocity of that centre [m/s].
-        penetration: δ = r − z, positive when indented, and the foot's extension where it has a
-            preload [m].
-        penetration_rate: δ̇ = −vz, and the rate of the extension [m/s].
-        slip_speed: V_T = vx + r θ̇, tangential velocity of the material point in contact [m/s].
-        admitted: whether the clearance rule lets the foot touch (boolean), None for "always",
-            Python's False for "never".
-        bristle: see `AbstractBristleLaw` [–]; None where friction has no memory.
-    """
-
-    x: Scalar
-    z: Scalar
-    vx: Scalar
-    vz: Scalar
-    penetration: Scalar
-    penetration_rate: Scalar
-    slip_speed: Scalar
-    admitted: Scalar | bool | None
-    bristle: Scalar | None
-
-
-class Feet(NamedTuple):
-    """Kinematics of both feet.
-
-    Attributes:
-        foot_1, foot_2: of each leg's foot, leaves shaped as the state's.
-    """
-
-    foot_1: Foot
-    foot_2: Foot
-
-
 @kept_alone
-def feet(scene: CompliantScene, state: CompliantState) -> Feet:
-    """Both feet's kinematics (model: foot centre O = S + (l − r)(sin θ, −cos θ)).
+def feet(scene: CompliantScene, state: CompliantState) -> tuple[FootMotion, ...]:
+    """Kinematics of all feet of a walker, in the order of its mechanism.
 
-    In redundant coordinates S is where the foot's own leg has the hip.
+    In redundant coordinates the root point is where the foot's own leg has it.
 
     Args:
         scene: the walker, in minimal or redundant coordinates.
         state: leaves of any common shape, SI units.
 
     Returns:
-        Positions [m], velocities [m/s] and penetrations [m] of both feet, leaves shaped as the
+        Positions [m], velocities [m/s] and penetrations [m] of each foot, leaves shaped as the
         state's.
     """
-    return feet_of(scene, legs_of(scene, state))
+    return feet_at(scene, poses_of(scene, state), bristles_of(scene, state))
 
 
-def feet_of(scene: CompliantScene, legs: tuple[Leg, Leg]) -> Feet:
-    """The feet at the ends of legs."""
-    return Feet(_foot(scene, 1, legs[0]), _foot(scene, 2, legs[1]))
+def bristles_of(scene: CompliantScene, state: CompliantState) -> tuple[Scalar | None, ...]:
+    """The bristles of each foot [–]; None where a state has none."""
+    return tuple(getattr(state, name, None) for name in scene.mechanism.structure.bristles)
 
 
-def _foot(scene: CompliantScene, number: int, leg: Leg) -> Foot:
-    length, radius = scene.walker.hip_to_foot, scene.walker.r
-    sine, cosine = leg.sine, leg.cosine
-    x = leg.hip_x + length * sine
-    z = leg.hip_z - length * cosine
-    vx = leg.hip_vx + length * cosine * leg.rate
-    vz = leg.hip_vz + length * sine * leg.rate
-    depth, depth_rate = radius - z, -vz
-    drop = drop_under(scene.ground, number)
-    if drop is not None:
-        depth = depth - drop
-    moved = preload(scene, leg.angle, leg.rate)
-    if moved is not None:
-        depth, depth_rate = depth + moved[0], depth_rate + moved[1]
-    return Foot(
-        x=x,
-        z=z,
-        vx=vx,
-        vz=vz,
-        penetration=depth,
-        penetration_rate=depth_rate,
-        slip_speed=vx + radius * leg.rate,
-        admitted=scene.clearance.admits(number, leg.rate),
-        bristle=leg.bristle,
+def feet_at(
+    scene: CompliantScene, poses: tuple[Pose, ...], bristles: tuple[Scalar | None, ...]
+) -> tuple[FootMotion, ...]:
+    """The feet of bodies in these poses."""
+    mechanism = scene.mechanism
+    structure, given = mechanism.structure, mechanism.feet
+    points = tuple(
+        point_motion(structure, poses[body], body, foot.centre)
+        for body, foot in zip(structure.feet, given, strict=True)
     )
+    legs = leg_motions(structure, poses, [foot.centre for foot in given], points)
+    admitted = [
+        scene.clearance.admits(name, leg.rate)
+        for name, leg in zip(structure.legs, legs, strict=True)
+    ]
+    found = []
+    for k, (body, leg) in enumerate(zip(structure.feet, structure.leg_of_foot, strict=True)):
+        point, radius = points[k], given[k].radius
+        depth, depth_rate = -point.z, -point.vz
+        slip = point.vx
+        if radius is not None:
+            depth, slip = radius - point.z, point.vx + radius * poses[body].motion.rates[body]
+        drop = drop_under(scene.ground, leg)
+        if drop is not None:
+            depth = depth - drop
+        moved = preload(scene, legs[leg])
+        if moved is not None:
+            depth, depth_rate = depth + moved[0], depth_rate + moved[1]
+        place = point.x, point.z, point.vx, point.vz
+        found.append(FootMotion(*place, depth, depth_rate, slip, admitted[leg], bristles[k]))
+    return tuple(found)
+
+
+def legs_at(scene: CompliantScene, state: CompliantState) -> tuple[LegMotion, ...]:
+    """Each leg's line from the root point to the mean of its feet."""
+    return legs_in(scene.mechanism, poses_of(scene, state))
+
+
+def legs_in(mechanism: Mechanism, poses: tuple[Pose, ...]) -> tuple[LegMotion, ...]:
+    """Each leg's line where bodies are in these poses."""
+    structure, centres = mechanism.structure, [foot.centre for foot in mechanism.feet]
+    points = [
+        point_motion(structure, poses[body], body, centre)
+        for body, centre in zip(structure.feet, centres, strict=True)
+    ]
+    return leg_motions(structure, poses, centres, points)
 
 
 @kept_alone
-def touches(foot: Foot) -> Scalar:
-    """Whether the foot is in contact (boolean): indented and admitted by the clearance rule.
+def with_stance_leg_standing(scene: CompliantScene, state: SomeState) -> SomeState:
+    """The same motion in the names that sections are looked at in: the stance leg stands.
 
-    Args:
-        foot: kinematics of one foot, see `feet`.
-
-    Returns:
-        Booleans shaped as the state's leaves.
+    Where a leg that may have its name stands alone the names are exchanged, but for a state at the
+    stance leg's heel strike, whose foot just touches: it carries from there on. Without a symmetry
+    the names stay.
     """
-    below = foot.penetration > 0.0
-    return below if foot.admitted is None else below & foot.admitted
-
-
-@kept_alone
-def landings(before: Feet, after: Feet) -> tuple[Scalar, Scalar]:
-    """Whether each foot comes to touch between two moments and is the one ahead (booleans).
-
-    Such a landing is a heel strike where the other foot made the one before.
-    """
-
-    def lands(i: int) -> Scalar:
-        newly = ~touches(before[i]) & touches(after[i])
-        return newly & (after[i].x > after[1 - i].x)
-
-    return lands(0), lands(1)
-
-
-@kept_alone
-def standing_foot(both: Feet) -> Scalar:
-    """The foot that alone touches: 1 or 2, or 0 where none or both do."""
-    touch_1, touch_2 = touches(both.foot_1), touches(both.foot_2)
-    return jnp.where(touch_1 & ~touch_2, 1, jnp.where(touch_2 & ~touch_1, 2, 0))
-
-
-@kept_alone
-def with_leg_2_standing(scene: CompliantScene, state: SomeState) -> SomeState:
-    """The same motion in the names that sections are looked at in: leg 2 stands.
-
-    Where leg 1 stands alone the names are exchanged, but for a state at leg 2's heel strike, whose
-    foot just touches: it carries from there on.
-    """
-    both = feet(scene, cast("CompliantState", state))
-    strikes = jnp.abs(both.foot_2.penetration) <= _JUST_TOUCHING * scene.walker.l
-    return select((standing_foot(both) == 1) & ~strikes, exchange_legs(state), state)
+    mechanism = scene.mechanism
+    structure = mechanism.structure
+    *others, _ = images(scene, state)
+    if not others:
+        return state
+    leg, found = structure.stance_leg, feet(scene, cast("CompliantState", state))
+    strikes = jnp.abs(leg_depth(structure, found, leg)) <= _JUST_TOUCHING * mechanism.height
+    stands = standing_leg(structure, found)
+    for other, image in others:
+        state = select((stands == 1 + other) & ~strikes, image, state)
+    return state
 
 
 def standing_height(
     scene: AbstractWalkerScene, stance_angle: Scalar, penetration: Scalar | float = 0.0
 ) -> Scalar:
-    """Height of the hip over a leg that stands on its foot.
+    """Height of the root point over a leg that stands on its lowest foot.
 
     Args:
         scene: the walker on its ground.
-        stance_angle: of that leg from the slope's normal [rad].
-        penetration: how deep its foot indents the ground [m].
+        stance_angle: of all bodies of that leg from the slope's normal [rad].
+        penetration: how deep the foot indents the ground [m].
 
     Returns:
-        The hip's height above the slope [m], of the broadcast shape.
+        The root point's height above the slope [m], of the broadcast shape.
     """
-    walker = scene.walker
-    return walker.r - penetration + walker.hip_to_foot * jnp.cos(stance_angle)
+    structure = scene.mechanism.structure
+    leg = structure.stance_leg
+    turned = {
+        f"theta_{structure.bodies[j]}": stance_angle
+        for j in structure.free
+        if j in structure.bodies_of_leg(leg)
+    }
+    placed = placement(scene.mechanism, scene.ground.slope, turned, structure.legs[leg])
+    return placed[f"{structure.root}_z"] - penetration
 
 
 class FootForce(NamedTuple):
@@ -182,7 +157,7 @@ class FootForce(NamedTuple):
     tangential: Scalar | None
 
 
-def foot_force(scene: CompliantScene, foot: Foot) -> FootForce:
+def foot_force(scene: CompliantScene, foot: FootMotion) -> FootForce:
     """Force on a foot whose kinematics are known."""
     if foot.admitted is False:
         nothing = jnp.zeros_like(foot.penetration)
@@ -202,20 +177,9 @@ def foot_force(scene: CompliantScene, foot: Foot) -> FootForce:
     return FootForce(normal, scene.friction.force(normal, foot.slip_speed))
 
 
-class FootForces(NamedTuple):
-    """Forces of the ground on both feet.
-
-    Attributes:
-        foot_1, foot_2: on each leg's foot, leaves shaped as the state's [N].
-    """
-
-    foot_1: FootForce
-    foot_2: FootForce
-
-
 @kept_alone
-def foot_forces(scene: CompliantScene, state: CompliantState) -> FootForces:
-    """Forces on both feet at a state; leaves shaped as the state's.
+def foot_forces(scene: CompliantScene, state: CompliantState) -> tuple[FootForce, ...]:
+    """Forces on all feet at a state; leaves shaped as the state's.
 
     Args:
         scene: the walker, in minimal or redundant coordinates.
@@ -227,44 +191,66 @@ def foot_forces(scene: CompliantScene, state: CompliantState) -> FootForces:
     Raises:
         ArgumentError: a state without the bristles that the scene's friction needs.
     """
-    both = feet(scene, state)
-    return FootForces(foot_force(scene, both.foot_1), foot_force(scene, both.foot_2))
+    return tuple(foot_force(scene, foot) for foot in feet(scene, state))
 
 
 class Contacts(NamedTuple):
     """Feet, whether each touches, and the forces on them; leaves shaped as the state's."""
 
-    feet: Feet
-    touching: tuple[Scalar, Scalar]
-    forces: FootForces
+    feet: tuple[FootMotion, ...]
+    touching: tuple[Scalar, ...]
+    forces: tuple[FootForce, ...]
 
     @property
     def both_carry(self) -> Scalar:
-        """Whether both feet carry something (boolean): double support."""
-        return (self.forces.foot_1.normal > 0.0) & (self.forces.foot_2.normal > 0.0)
+        """Whether all feet carry something (boolean): of two legs' feet, double support."""
+        return functools.reduce(operator.and_, (each.normal > 0.0 for each in self.forces))
 
 
 def contacts(scene: CompliantScene, state: CompliantState) -> Contacts:
-    """Both feet's contacts with the ground."""
-    both = feet(scene, state)
-    first, second = (jnp.broadcast_to(touches(foot), foot.x.shape) for foot in both)
-    return Contacts(both, (first, second), foot_forces(scene, state))
+    """All feet's contacts with the ground."""
+    found = feet(scene, state)
+    touching = tuple(jnp.broadcast_to(touches(foot), foot.x.shape) for foot in found)
+    return Contacts(found, touching, foot_forces(scene, state))
 
 
-def normal_forces(scene: CompliantScene, both: Feet) -> tuple[Scalar | None, Scalar | None]:
+def normal_forces(
+    scene: CompliantScene, found: tuple[FootMotion, ...]
+) -> tuple[Scalar | None, ...]:
     """Normal force on each foot [N]; None for one that is known never to touch."""
+    return tuple(
+        None if foot.admitted is False else foot_force(scene, foot).normal for foot in found
+    )
 
-    def force(foot: Foot) -> Scalar | None:
-        return None if foot.admitted is False else foot_force(scene, foot).normal
 
-    return force(both.foot_1), force(both.foot_2)
+def leg_loads(structure: Structure, shares: tuple[Scalar | None, ...]) -> tuple[Scalar | None, ...]:
+    """Share of the load on each leg; None for one that never touches."""
+    found: list[Scalar | None] = []
+    for feet_of in structure.feet_of_leg:
+        own = [share for k in feet_of if (share := shares[k]) is not None]
+        found.append(sum(own[1:], own[0]) if own else None)
+    return tuple(found)
 
 
 def hip_motion(
     scene: CompliantScene,
-    both: Feet,
-    angle: tuple[Scalar, Scalar],
-    rate: tuple[Scalar, Scalar],
+    found: tuple[FootMotion, ...],
+    angles: tuple[Scalar, ...],
+    rates: tuple[Scalar, ...],
 ) -> HipMotion:
-    """What actuators at the hip of a compliant walker know of it."""
-    return HipMotion(angle, rate, load_shares(scene, normal_forces(scene, both)))
+    """What actuators at the hip of a compliant walker know of it: of the mirror's first pair."""
+    structure = scene.mechanism.structure
+    pair = structure.pairs[0]  # there is one: else the scene has refused such actuators
+    shares = load_shares(scene, normal_forces(scene, found))
+    loads: list[Scalar | None] = []
+    for body in pair:
+        carried = [
+            share
+            for share, own in zip(shares, structure.feet, strict=True)
+            if share is not None and body in structure.chains[own]
+        ]
+        loads.append(sum(carried[1:], carried[0]) if carried else None)
+    first, second = pair
+    return HipMotion(
+        (angles[first], angles[second]), (rates[first], rates[second]), (loads[0], loads[1])
+    )

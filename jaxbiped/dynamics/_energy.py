@@ -1,25 +1,37 @@
 """Energies of the walker and the powers that change them."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.caching._cached_jit import kept_alone
-from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
-from jaxbiped.dynamics._contacts import Foot, feet, foot_force, hip_motion, normal_forces, touches
-from jaxbiped.dynamics._redundant_state import legs_of, minimal_state
-from jaxbiped.dynamics._state import State
-from jaxbiped.scene._scene import AbstractWalkerScene, Scene
+from jaxbiped.compiler import kept_alone
+from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers, load_shares
+from jaxbiped.dynamics._contacts import (
+    feet,
+    foot_force,
+    hip_motion,
+    leg_loads,
+    legs_at,
+    normal_forces,
+)
+from jaxbiped.dynamics._footfalls import FootMotion, touches
+from jaxbiped.dynamics._joint_loads import JointEnergy, joint_energy
+from jaxbiped.dynamics._motor_motion import motor_powers
+from jaxbiped.dynamics._redundant_state import motion_in, poses_of
+from jaxbiped.dynamics._tree import PointMotion, point_motion
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._state_types import State
 
 
 class Energies(NamedTuple):
     """Energies at a state [J].
 
     Attributes:
-        kinetic: of both legs and the hip.
+        kinetic: of all bodies and the root point.
         gravitational: zero with all mass at the origin of the slope's frame.
-        elastic: stored in the feet that touch.
+        elastic: stored in the feet that touch, and in springs, stops and latches.
     """
 
     kinetic: Scalar
@@ -37,8 +49,9 @@ class Powers(NamedTuple):
 
     Attributes:
         gravity: of gravity on the walker.
-        indentation: of the walker on the ground's normal reaction, F_N δ̇, both feet together.
-        damper: what of it is lost while a foot touches, (F_N − elastic force) δ̇.
+        indentation: of the walker on the ground's normal reaction, F_N δ̇, all feet together, and on
+            springs, stops and latches.
+        damper: what of it is lost, and not stored: of a foot that touches (F_N − elastic force) δ̇.
         friction: lost to friction, never negative.
         actuation: of the actuators, springs and dampers between the legs among them; None for a
             passive walker.
@@ -66,25 +79,43 @@ def energies(scene: Scene, state: State) -> Energies:
     """
     kinetic, moment = kinetic_and_moment(scene, state)
     elastic = sum(_elastic_energy(scene, foot) for foot in feet(scene, state))
+    joints = _joint_energy(scene, state)
+    if joints is not None:
+        elastic = elastic + joints.stored
     return Energies(kinetic, scene.ground.g * moment, jnp.asarray(elastic))
 
 
 def kinetic_and_moment(scene: AbstractWalkerScene, state: State) -> tuple[Scalar, Scalar]:
     """Kinetic energy [J] and mass times height [kg·m] of a walker of any kind."""
-    walker, ground = scene.walker, scene.ground
-    hip = minimal_state(scene, state)
-    kinetic = 0.5 * walker.hip_mass * (hip.hip_vx**2 + hip.hip_vz**2)
-    moment_x = walker.hip_mass * hip.hip_x
-    moment_z = walker.hip_mass * hip.hip_z
-    for leg in legs_of(scene, state):
-        sine, cosine = jnp.sin(leg.angle), jnp.cos(leg.angle)
-        vx = leg.hip_vx + walker.d * cosine * leg.rate
-        vz = leg.hip_vz + walker.d * sine * leg.rate
-        kinetic = kinetic + 0.5 * (walker.m * (vx**2 + vz**2) + walker.J * leg.rate**2)
-        moment_x = moment_x + walker.m * (leg.hip_x + walker.d * sine)
-        moment_z = moment_z + walker.m * (leg.hip_z - walker.d * cosine)
+    ground = scene.ground
+    kinetic = moment_x = moment_z = jnp.zeros_like(state[0])
+    for mass, point in _mass_points(scene, state):
+        kinetic = kinetic + 0.5 * mass * (point.vx**2 + point.vz**2)
+        moment_x, moment_z = moment_x + mass * point.x, moment_z + mass * point.z
+    bodies = zip(scene.mechanism.bodies, poses_of(scene, state), strict=True)
+    for j, (body, pose) in enumerate(bodies):
+        kinetic = kinetic + 0.5 * body.inertia * pose.motion.rates[j] ** 2
     height = moment_z * jnp.cos(ground.slope) - moment_x * jnp.sin(ground.slope)
     return kinetic, height
+
+
+def _mass_points(scene: AbstractWalkerScene, state: Any) -> list[tuple[Scalar, PointMotion]]:
+    """Mass and motion of each body's centre of mass, and of the root point where it has a mass."""
+    mechanism, poses = scene.mechanism, poses_of(scene, state)
+    points = [
+        (body.mass, point_motion(mechanism.structure, pose, j, body.centre))
+        for j, (body, pose) in enumerate(zip(mechanism.bodies, poses, strict=True))
+    ]
+    if mechanism.root_mass is not None:
+        root = motion_in(scene, state)
+        at = PointMotion(root.x, root.z, root.vx, root.vz, ())
+        points.append((mechanism.root_mass, at))
+    return points
+
+
+def _joint_energy(scene: Scene, state: Any) -> JointEnergy | None:
+    motion = motion_in(scene, state)
+    return joint_energy(scene.mechanism, motion, scene.ground.slope, stops=scene.compliant)
 
 
 @kept_alone
@@ -98,15 +129,11 @@ def powers(scene: Scene, state: State) -> Powers:
     Returns:
         The powers [W], leaves shaped as the state's.
     """
-    walker, ground = scene.walker, scene.ground
-    hip = minimal_state(scene, state)
-    momentum_x = walker.total_mass * hip.hip_vx
-    momentum_z = walker.total_mass * hip.hip_vz
-    for leg in legs_of(scene, state):
-        momentum_x = momentum_x + walker.m * walker.d * jnp.cos(leg.angle) * leg.rate
-        momentum_z = momentum_z + walker.m * walker.d * jnp.sin(leg.angle) * leg.rate
+    ground = scene.ground
+    indentation = damper = friction = momentum_x = momentum_z = jnp.zeros_like(state[0])
+    for mass, point in _mass_points(scene, state):
+        momentum_x, momentum_z = momentum_x + mass * point.vx, momentum_z + mass * point.vz
     gravity = ground.g * (jnp.sin(ground.slope) * momentum_x - jnp.cos(ground.slope) * momentum_z)
-    indentation = damper = friction = jnp.zeros_like(hip.hip_x)
     for foot in feet(scene, state):
         force = foot_force(scene, foot)
         held = jnp.where(touches(foot), scene.normal.elastic_force(foot.penetration), 0.0)
@@ -114,18 +141,32 @@ def powers(scene: Scene, state: State) -> Powers:
         damper = damper + (force.normal - held) * foot.penetration_rate
         if force.tangential is not None:
             friction = friction - force.tangential * foot.slip_speed
-    if scene.actuation is None:
+    joints = _joint_energy(scene, state)
+    if joints is not None:
+        indentation, damper = indentation + joints.taken, damper + joints.lost
+    if not is_driven(scene):
         return Powers(gravity, indentation, damper, friction)
     actuators = _actuator_powers(scene, state)
     return Powers(gravity, indentation, damper, friction, actuators.total, actuators.motors)
 
 
+def is_driven(scene: AbstractWalkerScene) -> bool:
+    """Whether anything but gravity may drive a walker: an actuator, or a motor at a joint."""
+    return scene.mechanism.has_motors or getattr(scene, "actuation", None) is not None
+
+
 def _actuator_powers(scene: Scene, state: State) -> ActuatorPowers:
-    first, second = legs_of(scene, state)
-    angles, rates, both = (first.angle, second.angle), (first.rate, second.rate), feet(scene, state)
-    hip = hip_motion(scene, both, angles, rates)
-    return actuator_powers(scene, hip, normal_forces(scene, both))
+    motion, found = poses_of(scene, state)[0].motion, feet(scene, state)
+    hip = None
+    if scene.mechanism.structure.pairs:
+        hip = hip_motion(scene, found, motion.angles, motion.rates)
+    legs, forces = legs_at(scene, state), normal_forces(scene, found)
+    shares = leg_loads(scene.mechanism.structure, load_shares(scene, forces))
+    of_feet = (legs[leg] for leg in scene.mechanism.structure.leg_of_foot)
+    of_parts = actuator_powers(scene, hip, list(zip(forces, of_feet, strict=True)))
+    told = motor_powers(scene.mechanism, motion, scene.ground.slope, legs, shares)
+    return ActuatorPowers(sum(told, of_parts.total), of_parts.motors + tuple(told))
 
 
-def _elastic_energy(scene: Scene, foot: Foot) -> Scalar:
+def _elastic_energy(scene: Scene, foot: FootMotion) -> Scalar:
     return jnp.where(touches(foot), scene.normal.elastic_energy(foot.penetration), 0.0)

@@ -1,18 +1,22 @@
 """Loads of what acts at the joints of a mechanism, and the constraint torques of couplings."""
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._tree import Loads, Motion, plus, weighted
+from jaxbiped.dynamics._tree import Loads, Motion
 from jaxbiped.dynamics._tree_inertia import Elimination, substitute
-from jaxbiped.linalg._elimination import Entry, inverse
+from jaxbiped.linalg._elimination import inverse, plus
+from jaxbiped.scene._couplings import with_fixed
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._structure import Angle, Structure
+from jaxbiped.scene._structure import Angle, Structure, weighted
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 _ROOT_E = 1.6487212707001282
 """√e, which makes a latch's largest torque the one that it is told to have."""
@@ -20,11 +24,7 @@ _ROOT_E = 1.6487212707001282
 
 def angle_value(angle: Angle, values: tuple[Scalar, ...], vertical: Scalar | None) -> Scalar:
     """A sum of angles, or of rates, for which `vertical` is None."""
-    total: Entry = None
-    for body, weight in angle.weights:
-        total = plus(total, weighted(values[body], weight))
-    if angle.vertical and vertical is not None:
-        total = plus(total, weighted(vertical, angle.vertical))
+    total = angle.of(values, vertical)
     return jnp.zeros_like(values[0]) if total is None else total
 
 
@@ -65,8 +65,13 @@ def _stop_torque(stop: Stop, angle: Scalar, rate: Scalar) -> Scalar:
     return torque
 
 
+def _offset(latch: Latch, angle: Scalar) -> Scalar:
+    """How many widths a latch's angle is from where it holds."""
+    return (angle if latch.at is None else angle - latch.at) / latch.width
+
+
 def _latch_torque(latch: Latch, angle: Scalar, rate: Scalar) -> Scalar:
-    u = (angle - latch.at) / latch.width
+    u = _offset(latch, angle)
     pull = latch.torque * (_ROOT_E * u)
     if latch.damping is not None:
         pull = pull + latch.damping * rate
@@ -80,8 +85,17 @@ _TORQUES: dict[type, Callable[..., Scalar]] = {
 }
 
 
+def _elastic(mechanism: Mechanism, *, stops: bool) -> list[tuple[Angle, Any]]:
+    """The parts that a torque is a law of, with their angles; `stops`: whether stops are."""
+    return [
+        (angle, part)
+        for angle, part in zip(mechanism.structure.joints, mechanism.joints, strict=True)
+        if type(part) in _TORQUES and (stops or not isinstance(part, Stop))
+    ]
+
+
 def with_joint_loads(
-    loads: Loads, mechanism: Mechanism, motion: Motion, slope: Scalar | None
+    loads: Loads, mechanism: Mechanism, motion: Motion, slope: Scalar | None, *, stops: bool
 ) -> Loads:
     """With the torques of springs, stops and latches.
 
@@ -90,14 +104,102 @@ def with_joint_loads(
         mechanism: whose joints they are.
         motion: angles and rates of all bodies.
         slope: angle of the vertical [rad]; None for stops and latches of rigid feet alone.
+        stops: whether they are elastic; on rigid feet they are plastic.
     """
-    for angle, part in zip(mechanism.structure.joints, mechanism.joints, strict=True):
-        if isinstance(part, Coupling):
-            continue
+    for angle, part in _elastic(mechanism, stops=stops):
         value = angle_value(angle, motion.angles, slope)
         rate = angle_value(angle, motion.rates, None)
         loads = loads.with_torques(angle.weights, _TORQUES[type(part)](part, value, rate))
     return loads
+
+
+def _spring_energy(spring: Spring, angle: Scalar) -> Scalar:
+    if spring.stiffness is None:
+        return jnp.zeros_like(angle)
+    stretched = angle if spring.rest is None else angle - spring.rest
+    return 0.5 * spring.stiffness * stretched * stretched
+
+
+def _stop_energy(stop: Stop, angle: Scalar) -> Scalar:
+    assert stop.law is not None
+    stored = jnp.zeros_like(angle)
+    for limit in pressed_limits(stop, angle, angle):
+        depth = limit.penetration
+        stored = stored + jnp.where(depth > 0.0, stop.law.elastic_energy(depth), 0.0)
+    return stored
+
+
+def _latch_energy(latch: Latch, angle: Scalar) -> Scalar:
+    """Zero where it holds."""
+    u = _offset(latch, angle)
+    return latch.torque * latch.width * _ROOT_E * (1.0 - jnp.exp(-0.5 * u * u))
+
+
+_ENERGIES: dict[type, Callable[..., Scalar]] = {
+    Spring: _spring_energy,
+    Stop: _stop_energy,
+    Latch: _latch_energy,
+}
+
+
+class JointEnergy(NamedTuple):
+    """What springs, stops and latches store [J], and their powers [W].
+
+    Attributes:
+        stored: all together.
+        taken: power that the walker puts into them.
+        lost: what of it is not stored.
+    """
+
+    stored: Scalar
+    taken: Scalar
+    lost: Scalar
+
+
+def joint_energy(
+    mechanism: Mechanism, motion: Motion, slope: Scalar, *, stops: bool
+) -> JointEnergy | None:
+    """Energy and powers of springs, stops and latches; None where there are none.
+
+    `stops`: whether they are elastic.
+    """
+    total: Any = (None, None, None)
+    for angle, part in _elastic(mechanism, stops=stops):
+        value = angle_value(angle, motion.angles, slope)
+        rate = angle_value(angle, motion.rates, None)
+        taken = -_TORQUES[type(part)](part, value, rate) * rate
+        energy = functools.partial(_ENERGIES[type(part)], part)
+        stored, kept = jax.jvp(energy, (value,), (rate,))
+        total = tuple(map(plus, total, (stored, taken, taken - kept)))
+    return None if total[0] is None else JointEnergy(*total)
+
+
+def stop_limits(
+    mechanism: Mechanism, motion: Motion, slope: Scalar
+) -> tuple[tuple[AbstractNormalLaw, Pressed], ...]:
+    """Every limit of every stop with its law."""
+    found = []
+    for angle, part in zip(mechanism.structure.joints, mechanism.joints, strict=True):
+        if isinstance(part, Stop) and part.law is not None:
+            value = angle_value(angle, motion.angles, slope)
+            rate = angle_value(angle, motion.rates, None)
+            found += [(part.law, limit) for limit in pressed_limits(part, value, rate)]
+    return tuple(found)
+
+
+def of_all_bodies(
+    structure: Structure, values: Sequence[Scalar], like: Scalar
+) -> tuple[Scalar, ...]:
+    """Rates or accelerations of all bodies' angles from those of the free ones, shaped `like`."""
+    return tuple(with_fixed(structure, _by_body(structure, values, like)))
+
+
+def _by_body(structure: Structure, values: Sequence[Scalar], like: Scalar) -> list[Scalar]:
+    """Values of the free bodies by the numbers of all; `like` in place of the others."""
+    found = [like] * len(structure.bodies)
+    for j, value in zip(structure.free, values, strict=True):
+        found[j] = value
+    return found
 
 
 def motion_of(
@@ -111,19 +213,11 @@ def motion_of(
         places: x and z of the root point, then free angles.
         rates: of these.
     """
-    structure, joints = mechanism.structure, mechanism.joints
-    n = len(structure.bodies)
-    angles, turning = [places[0]] * n, [rates[0]] * n
-    for j, angle, rate in zip(structure.free, places[2:], rates[2:], strict=True):
-        angles[j], turning[j] = angle, rate
-    for each in structure.fixed:
-        own = angle_value(each.angle, tuple(angles), ground.slope)
-        for k, weight in each.rests:
-            rest = joints[k].rest  # type: ignore[attr-defined]
-            own = own if rest is None else own + weighted(rest, weight)
-        angles[each.body] = own
-        turning[each.body] = angle_value(each.angle, tuple(turning), None)
-    return Motion(places[0], places[1], rates[0], rates[1], tuple(angles), tuple(turning))
+    structure = mechanism.structure
+    own = _by_body(structure, places[2:], places[0])
+    angles = with_fixed(structure, own, ground.slope, mechanism.joints)
+    turning = of_all_bodies(structure, rates[2:], rates[0])
+    return Motion(places[0], places[1], rates[0], rates[1], tuple(angles), turning)
 
 
 def with_constraint_torques(

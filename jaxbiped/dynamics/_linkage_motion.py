@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from jaxbiped._types import Scalar, Time
-from jaxbiped.caching._cached_jit import kept_alone
+from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
-from jaxbiped.constraints._linkage import Heading, Linkage, constraints_of, masses_of
-from jaxbiped.scene._walker import LinkageScene
+from jaxbiped.constraints._linkage import Linkage
+from jaxbiped.constraints._linkage_constraints import Heading, constraints_of, masses_of
+from jaxbiped.scene._linkages import LinkageScene
 
 
 class LinkageState(NamedTuple):

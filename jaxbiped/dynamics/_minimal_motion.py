@@ -1,75 +1,127 @@
-"""Equations of motion in minimal coordinates: hip x, hip z and two leg angles."""
+"""Equations of motion in minimal coordinates: the root point's place and the free angles."""
 
-from typing import NamedTuple
-
-import jax.numpy as jnp
+from typing import Any, NamedTuple
 
 from jaxbiped._types import Scalar, Time, VectorField
-from jaxbiped.caching._cached_jit import kept_alone
-from jaxbiped.dynamics._actuation import hip_torques
-from jaxbiped.dynamics._contacts import feet, foot_force, hip_motion
-from jaxbiped.dynamics._redundant_state import CompliantState
-from jaxbiped.dynamics._state import State, field_of
-from jaxbiped.dynamics._tree import Motion, point_motion, pose_of, times
-from jaxbiped.dynamics._tree_inertia import centrifugal_loads, composites, eliminate, substitute
+from jaxbiped.compiler import kept_alone
+from jaxbiped.dynamics._actuation import Carriers, load_shares, with_driven_joints
+from jaxbiped.dynamics._contacts import (
+    bristles_of,
+    feet,
+    feet_at,
+    foot_force,
+    hip_motion,
+    leg_loads,
+    legs_in,
+    normal_forces,
+)
+from jaxbiped.dynamics._footfalls import FootMotion
+from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
+from jaxbiped.dynamics._joint_loads import with_constraint_torques
+from jaxbiped.dynamics._redundant_state import CompliantState, motion_in
+from jaxbiped.dynamics._state import field_of
+from jaxbiped.dynamics._tree import Loads, Pose, point_motion, pose_of
+from jaxbiped.dynamics._tree_balance import force_balance, free_mass_entries
+from jaxbiped.dynamics._tree_inertia import (
+    Composites,
+    centrifugal_loads,
+    composites,
+    eliminate,
+)
+from jaxbiped.linalg._elimination import times
+from jaxbiped.linalg._sparse_lu import SparseMatrix
+from jaxbiped.scene._ground import gravity_on
+from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._scene import CompliantScene, Scene
+from jaxbiped.scene._state_types import state_type_of
+from jaxbiped.scene._structure import Structure
+from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
 
-class Accelerations(NamedTuple):
-    """Second derivatives of the coordinates, leaves shaped as the state's.
-
-    Attributes:
-        hip_ax, hip_az: of the hip in the slope's frame [m/s²].
-        alpha_1, alpha_2: of the legs [rad/s²].
-    """
-
-    hip_ax: Scalar
-    hip_az: Scalar
-    alpha_1: Scalar
-    alpha_2: Scalar
-
-
 @kept_alone
-def accelerations(scene: Scene, state: State) -> Accelerations:
-    """Accelerations at a state; leaves shaped as the state's.
+def accelerations(scene: Scene, state: Any) -> Any:
+    """Accelerations of a walker at a state.
 
     Args:
         scene: the walker on its ground.
-        state: leaves of any common shape, SI units.
+        state: of the scene's kind, leaves of any common shape, SI units.
 
     Returns:
-        Hip [m/s²] and legs [rad/s²], leaves shaped as the state's.
+        Of the root point, `ROOT_ax` and `ROOT_az` [m/s²], and of the bodies, `alpha_BODY` [rad/s²];
+        for `Walker` an `Accelerations`.
     """
-    mechanism, ground, both = scene.walker.mechanism(), scene.ground, feet(scene, state)
+    at = _at(scene, state)
+    structure, known, pose = at.mechanism.structure, at.known, at.pose
+    loads = _with_applied_loads(centrifugal_loads(structure, known, pose), scene, at)
+    factors = eliminate(structure, known, pose)
+    moved = with_constraint_torques(structure, at.mechanism.joints, factors, loads)
+    downhill, weight = gravity_on(scene.ground)
+    turning = (moved[2 + body] for body in structure.free)
+    kind = state_type_of(structure.accelerations)
+    return kind(moved[0] + downhill, moved[1] - weight, *turning)
+
+
+class _Known(NamedTuple):
+    """A walker at a state."""
+
+    mechanism: Mechanism
+    known: Composites
+    pose: Pose
+    feet: tuple[FootMotion, ...]
+
+
+def _at(scene: Scene, state: CompliantState) -> _Known:
+    mechanism = scene.mechanism
+    pose = pose_of(mechanism, motion_in(scene, state))
+    found = feet_at(scene, (pose,) * len(mechanism.structure.bodies), bristles_of(scene, state))
+    return _Known(mechanism, composites(mechanism), pose, found)
+
+
+def _with_applied_loads(loads: Loads, scene: Scene, at: _Known) -> Loads:
+    """With the forces of the ground, of joint parts and of actuators."""
+    mechanism = at.mechanism
     structure = mechanism.structure
-    angles, rates = (state.theta_1, state.theta_2), (state.omega_1, state.omega_2)
-    motion = Motion(state.hip_x, state.hip_z, state.hip_vx, state.hip_vz, angles, rates)
-    pose, known = pose_of(mechanism, motion), composites(mechanism)
-    loads = centrifugal_loads(structure, known, pose)
-    for body, foot, found in zip(structure.feet, mechanism.feet, both, strict=True):
+    for body, foot, found in zip(structure.feet, mechanism.feet, at.feet, strict=True):
         # Where it is known that a foot never touches, nothing of its contact is in the program.
         if found.admitted is not False:
             reaction = foot_force(scene, found)
-            point = point_motion(structure, pose, body, foot.centre)
+            point = point_motion(structure, at.pose, body, foot.centre)
             loads = loads.with_force(point, reaction.tangential, reaction.normal)
             loads = loads.with_torques(((body, 1.0),), times(reaction.tangential, foot.radius))
-    torques = None
-    if scene.actuation is not None:
-        torques = hip_torques(scene, hip_motion(scene, both, angles, rates))
-    for body, torque in enumerate(torques or ()):
-        loads = loads.with_torques(((body, 1.0),), torque)
-    moved = substitute(structure, eliminate(structure, known, pose), loads)
-    downhill, weight = ground.g * jnp.sin(ground.slope), ground.g * jnp.cos(ground.slope)
-    return Accelerations(moved[0] + downhill, moved[1] - weight, moved[2], moved[3])
+    return with_torques(loads, scene, (at.pose,) * len(structure.bodies), at.feet)
+
+
+def with_torques(
+    loads: Loads, scene: CompliantScene, poses: tuple[Pose, ...], found: tuple[FootMotion, ...]
+) -> Loads:
+    """With the torques of joint parts and of actuators.
+
+    Args:
+        loads: what acts besides.
+        scene: whose parts they are.
+        poses: as each body has them, with the same angles in all.
+        found: the feet.
+    """
+    mechanism, motion = scene.mechanism, poses[0].motion
+
+    def carriers() -> Carriers:
+        shares = load_shares(scene, normal_forces(scene, found))
+        return legs_in(mechanism, poses), leg_loads(mechanism.structure, shares)
+
+    def hip() -> HipMotion:
+        return hip_motion(scene, found, motion.angles, motion.rates)
+
+    return with_driven_joints(loads, scene, motion, carriers, hip)
 
 
 def bristle_rates(
     law: AbstractBristleLaw, scene: CompliantScene, state: CompliantState
 ) -> dict[str, Scalar]:
-    """Rates of both feet's bristles by their names in the state [1/s]."""
+    """Rates of all feet's bristles by their names in the state [1/s]."""
     rates = {}
-    for name, foot in zip(("bristle_1", "bristle_2"), feet(scene, state), strict=True):
+    names = scene.mechanism.structure.bristles
+    for name, foot in zip(names, feet(scene, state), strict=True):
         load = foot_force(scene, foot).normal  # refuses a foot without a bristle
         assert foot.bristle is not None
         rates[name] = law.bristle_rate(load, foot.slip_speed, foot.bristle)
@@ -77,7 +129,7 @@ def bristle_rates(
 
 
 @kept_alone
-def vector_field(t: Time, state: State, scene: Scene) -> State:
+def vector_field(t: Time, state: Any, scene: Scene) -> Any:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes.
 
     Args:
@@ -88,23 +140,49 @@ def vector_field(t: Time, state: State, scene: Scene) -> State:
     Returns:
         The rates of change [SI units per second], a state of the same kind and shape.
     """
-    second = accelerations(scene, state)
+    structure = scene.mechanism.structure
+    places = {
+        place: getattr(state, rate)
+        for place, rate in zip(structure.coordinates, structure.rates, strict=True)
+    }
+    second = dict(zip(structure.rates, accelerations(scene, state), strict=True))
     memory = {}
     if isinstance(scene.friction, AbstractBristleLaw):
         memory = bristle_rates(scene.friction, scene, state)
-    return type(state)(
-        **memory,
-        hip_x=state.hip_vx,
-        hip_z=state.hip_vz,
-        theta_1=state.omega_1,
-        theta_2=state.omega_2,
-        hip_vx=second.hip_ax,
-        hip_vz=second.hip_az,
-        omega_1=second.alpha_1,
-        omega_2=second.alpha_2,
-    )
+    return type(state)(**places, **second, **memory)
+
+
+class WalkerField(AbstractImplicitField):
+    """`vector_field` with the tree's implicit form, in which bristles stand alone."""
+
+    def __call__(self, t: Time, y: CompliantState, args: Scene) -> CompliantState:
+        return vector_field(t, y, args)
+
+    def mass_matrix(self, y: CompliantState, args: Scene) -> SparseMatrix:
+        at = _at(args, y)
+        places = _places(at.mechanism.structure, y)
+        entries = free_mass_entries(at.mechanism.structure, at.known, at.pose)
+        return {(places[i], places[j]): entry for (i, j), entry in entries.items()}
+
+    def residual(self, y: CompliantState, rates: CompliantState, args: Scene) -> Residual:
+        at, (downhill, weight) = _at(args, y), gravity_on(args.ground)
+        structure = at.mechanism.structure
+        given = [getattr(rates, name) for name in structure.rates]
+        given[0], given[1] = given[0] - downhill, given[1] + weight
+        loads = _with_applied_loads(Loads.none(structure), args, at)
+        balance = force_balance(structure, at.known, at.pose, loads, given)
+        found = dict(zip(_places(structure, y), balance, strict=True))
+        if isinstance(args.friction, AbstractBristleLaw):
+            for name, rate in bristle_rates(args.friction, args, y).items():
+                found[y._fields.index(name)] = rate - getattr(rates, name)
+        return found
+
+
+def _places(structure: Structure, state: CompliantState) -> list[int]:
+    """Where the rates of the coordinates are in a state."""
+    return [state._fields.index(name) for name in structure.rates]
 
 
 @field_of.register
 def _(scene: Scene) -> VectorField:
-    return vector_field
+    return WalkerField()

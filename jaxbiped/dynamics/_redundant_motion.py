@@ -1,29 +1,52 @@
-"""Equations of motion in redundant coordinates: each leg its own body, joined at the hip."""
+"""Equations of motion in redundant coordinates: each body by itself, held by constraints."""
 
-from typing import NamedTuple, cast
+import functools
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._circular import sine_cosine
 from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
-from jaxbiped.caching._cached_jit import kept_alone
-from jaxbiped.constraints._linkage import constraints_of, headings_of, point_of, torque_on
-from jaxbiped.dynamics._actuation import hip_torques
-from jaxbiped.dynamics._contacts import feet, feet_of, foot_force, hip_motion
+from jaxbiped.compiler import kept_alone
+from jaxbiped.constraints._linkage_constraints import (
+    constraints_of,
+    headings_of,
+    row_times,
+    torque_on,
+    turn_of,
+)
+from jaxbiped.dynamics._contacts import bristles_of, feet_at, foot_force
+from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
+from jaxbiped.dynamics._legs import mean
 from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
-from jaxbiped.dynamics._minimal_motion import Accelerations, accelerations, bristle_rates
-from jaxbiped.dynamics._redundant_state import Leg, LegsState, legs_of
+from jaxbiped.dynamics._minimal_motion import bristle_rates, with_torques
+from jaxbiped.dynamics._redundant_state import BodiesState, poses_of
 from jaxbiped.dynamics._state import field_of
-from jaxbiped.scene._scene import AbstractWalkerScene, CompliantScene, RedundantScene
-from jaxbiped.scene._walker import leg_of
+from jaxbiped.dynamics._tree import (
+    Arm,
+    Loads,
+    PointMotion,
+    Pose,
+    Vector,
+    arm_of,
+    point_acceleration,
+    point_motion,
+)
+from jaxbiped.linalg._elimination import times
+from jaxbiped.linalg._sparse_lu import SparseMatrix
+from jaxbiped.scene._bodies import Point
+from jaxbiped.scene._ground import gravity_on
+from jaxbiped.scene._linkages import loaded_bodies
+from jaxbiped.scene._scene import RedundantScene
+from jaxbiped.scene._state_types import state_type_of
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
 
 class HipForce(NamedTuple):
-    """Force of the hip on leg 1 in the slope's frame, leaves shaped as the state's.
+    """Force of the root point's hinge on the first body, leaves shaped as the state's.
 
-    On leg 2 it is the opposite, but for what a mass at the hip takes.
+    On the other bodies there it is the opposite, but for what a mass of the root point takes.
 
     Attributes:
         x: along the slope, downhill positive [N].
@@ -38,65 +61,73 @@ class Violation(NamedTuple):
     """How far a redundant state is off its constraints, leaves shaped as the state's.
 
     Attributes:
-        position: distance between the hips of the two legs, ‖Φ‖ [m].
-        rate: their relative speed, ‖Φ̇‖ [m/s].
-        normalisation: largest | cos² + sin² − 1 | of a leg's Euler parameters; 0 without them.
+        position: largest distance at a hinge between the places that its two bodies give it [m].
+        rate: largest relative speed of these [m/s].
+        normalisation: largest | cos² + sin² − 1 | of a body's Euler parameters; 0 without them.
+        angle: by how much a coupling is off, the largest [rad]; 0 without couplings.
+        angle_rate: how fast that changes, the largest [rad/s].
     """
 
     position: RealScalarLike
     rate: RealScalarLike
     normalisation: RealScalarLike
+    angle: RealScalarLike = 0.0
+    angle_rate: RealScalarLike = 0.0
 
 
 class RedundantMotion(NamedTuple):
     """How a redundant walker moves at a state, leaves shaped as the state's.
 
     Attributes:
-        accelerations: of the coordinates in the state's order [m/s², rad/s², 1/s²]: six, or eight
-            with Euler parameters.
-        hip_force: of the hip on leg 1 [N].
-        minimal: the same motion in minimal coordinates, the hip half way between the legs' two.
+        accelerations: of the coordinates in the state's order [m/s², rad/s², 1/s²].
+        hip_force: of the root point's hinge on the first body [N].
+        minimal: the same motion in minimal coordinates, the root point half way between where the
+            bodies on it have it.
     """
 
     accelerations: list[Scalar]
     hip_force: HipForce
-    minimal: Accelerations
+    minimal: Any
 
 
-def coordinates_of(scene: RedundantScene, state: LegsState) -> tuple[list[Scalar], list[Scalar]]:
+def coordinates_of(scene: RedundantScene, state: BodiesState) -> tuple[list[Scalar], list[Scalar]]:
     """Coordinates and rates of a redundant state as the linkage has them."""
-    count = 2 * scene.linkage.coordinates
-    leaves = cast("tuple[Scalar, ...]", state)
-    return list(leaves[:count]), list(leaves[count : 2 * count])
+    count = len(scene.mechanism.structure.bodies) * scene.linkage.coordinates
+    return list(state[:count]), list(state[count : 2 * count])
 
 
-def with_coordinates(state: PyTree, q: list[Scalar], v: list[Scalar]) -> LegsState:
+def with_coordinates(state: PyTree, q: list[Scalar], v: list[Scalar]) -> BodiesState:
     """The state with other coordinates and rates; bristles stay."""
-    return type(state)(*q, *v, state.bristle_1, state.bristle_2)
+    return type(state)(*q, *v, *state[len(q) + len(v) :])
 
 
 @kept_alone
-def redundant_motion(scene: RedundantScene, state: LegsState) -> RedundantMotion:
-    """Accelerations and the hip's reaction by the scene's method.
+def redundant_motion(scene: RedundantScene, state: BodiesState) -> RedundantMotion:
+    """Accelerations and the reaction at the root point by the scene's method.
 
     Args:
         scene: the walker and its constraint method.
         state: redundant, leaves of any common shape, SI units.
 
     Returns:
-        Accelerations [m/s², rad/s²] and the hip's force on leg 1 [N], leaves shaped as the state's.
+        Accelerations [m/s², rad/s²] and force on the first body [N], leaves shaped as the state's.
     """
-    q, v = coordinates_of(scene, state)
+    structure, root_mass = scene.mechanism.structure, scene.mechanism.root_mass
     moved = _linkage_motion(scene, state)
-    minimal, hip = _minimal_accelerations(scene, q, v, moved.accelerations)
-    (force_x, force_z), half = moved.joint_forces[0], 0.5 * scene.walker.hip_mass
-    downhill, weight = _gravity(scene)
-    force = HipForce(force_x - half * (hip[0] - downhill), force_z - half * (hip[1] - weight))
-    return RedundantMotion(moved.accelerations, force, minimal)
+    minimal, (ax, az) = _minimal_accelerations(scene, state, moved.accelerations)
+    forces = [
+        force for force, j in zip(moved.joint_forces, structure.parents[1:], strict=True) if j < 0
+    ]
+    nothing = (jnp.zeros_like(ax),) * 2
+    force_x, force_z = (sum(each[1:], each[0]) for each in zip(*(forces or [nothing]), strict=True))
+    if root_mass is not None:
+        share, (downhill, weight) = root_mass / (len(forces) + 1), gravity_on(scene.ground)
+        force_x, force_z = force_x - share * (ax - downhill), force_z - share * (az + weight)
+    return RedundantMotion(moved.accelerations, HipForce(force_x, force_z), minimal)
 
 
 @kept_alone
-def redundant_field(t: Time, state: LegsState, scene: RedundantScene) -> LegsState:
+def redundant_field(t: Time, state: BodiesState, scene: RedundantScene) -> BodiesState:
     """Time derivative of a redundant state, in the form that `diffrax.ODETerm` takes.
 
     Args:
@@ -115,119 +146,113 @@ def redundant_field(t: Time, state: LegsState, scene: RedundantScene) -> LegsSta
     return with_coordinates(state, v, moved.accelerations)._replace(**memory)
 
 
+class BodiesField(AbstractImplicitField):
+    """`redundant_field`, whose implicit form is its own: forces of constraints reach every body."""
+
+    def __call__(self, t: Time, y: BodiesState, args: RedundantScene) -> BodiesState:
+        return redundant_field(t, y, args)
+
+    def mass_matrix(self, y: BodiesState, args: RedundantScene) -> SparseMatrix:
+        return {}
+
+    def residual(self, y: BodiesState, rates: BodiesState, args: RedundantScene) -> Residual:
+        found = redundant_field(jnp.zeros(()), y, args)
+        return {i: a - b for i, (a, b) in enumerate(zip(found, rates, strict=True))}
+
+
 @field_of.register
 def _(scene: RedundantScene) -> VectorField:
-    return redundant_field
+    return BodiesField()
 
 
 @kept_alone
-def violation(scene: RedundantScene, state: LegsState) -> Violation:
-    """How far apart the two legs' hips are, and how fast they part.
+def violation(scene: RedundantScene, state: BodiesState) -> Violation:
+    """How far hinges are open and couplings are off, and how fast that changes.
 
     Args:
         scene: the walker and its constraint method.
         state: redundant, leaves of any common shape, SI units.
 
     Returns:
-        Distance [m], relative speed [m/s] and normalisation [–], leaves shaped as the state's.
+        Distance [m], relative speed [m/s], normalisation [–], angle [rad] and its rate [rad/s],
+        leaves shaped as the state's.
     """
-    at = constraints_of(scene.linkage, *coordinates_of(scene, state))
-    off = jnp.zeros_like(at.violation[0])
-    for value in at.violation[2:]:
-        off = jnp.maximum(off, jnp.abs(value))
-    return Violation(jnp.hypot(*at.violation[:2]), jnp.hypot(*at.rate[:2]), off)
+    linkage = scene.linkage
+    at = constraints_of(linkage, *coordinates_of(scene, state))
+    points = 2 * len(linkage.joints)
+    angles = points + len(linkage.angles)
 
+    def most(values: Sequence[Scalar]) -> Scalar:
+        return functools.reduce(jnp.maximum, map(jnp.abs, values), jnp.zeros_like(state[0]))
 
-@kept_alone
-def hip_force(scene: CompliantScene, state: PyTree) -> HipForce:
-    """The hip's reaction on leg 1, in either formulation.
+    def apart(values: Sequence[Scalar]) -> Scalar:
+        return most([jnp.hypot(*values[i : i + 2]) for i in range(0, points, 2)])
 
-    In minimal coordinates it does no work and is in no equation: it is what Newton's law for leg 1
-    leaves open, m (a − g) less the ground's force.
-
-    Args:
-        scene: the walker, in minimal or redundant coordinates.
-        state: of the scene's kind, leaves of any common shape, SI units.
-
-    Returns:
-        The force [N], leaves shaped as the state's.
-    """
-    if isinstance(scene, RedundantScene):
-        return redundant_motion(scene, state).hip_force
-    walker, second = scene.walker, accelerations(scene, state)
-    sine, cosine = sine_cosine(state.theta_1)
-    turning, square = walker.d * second.alpha_1, walker.d * state.omega_1 * state.omega_1
-    downhill, weight = _gravity(scene)
-    ax = second.hip_ax + turning * cosine - square * sine
-    az = second.hip_az + turning * sine + square * cosine
-    reaction = foot_force(scene, feet(scene, state).foot_1)
-    tangential = 0.0 if reaction.tangential is None else reaction.tangential
-    return HipForce(
-        walker.m * (ax - downhill) - tangential, walker.m * (az - weight) - reaction.normal
+    return Violation(
+        position=apart(at.violation),
+        rate=apart(at.rate),
+        normalisation=most(at.violation[angles:]),
+        angle=most(at.violation[points:angles]),
+        angle_rate=most(at.rate[points:angles]),
     )
 
 
-def _gravity(scene: AbstractWalkerScene) -> tuple[Scalar, Scalar]:
-    ground = scene.ground
-    return ground.g * jnp.sin(ground.slope), -ground.g * jnp.cos(ground.slope)
-
-
-def _linkage_motion(scene: RedundantScene, state: LegsState) -> LinkageMotion:
+def _linkage_motion(scene: RedundantScene, state: BodiesState) -> LinkageMotion:
     q, v = coordinates_of(scene, state)
-    legs = legs_of(scene, state)
-    headings = headings_of(scene.linkage, q, v, [(leg.sine, leg.cosine) for leg in legs])
-    return motion_under(
-        scene.linkage, scene.method, q, v, _applied_forces(scene, state, legs), headings
-    )
+    poses, linkage = poses_of(scene, state), scene.linkage
+    circular = list(zip(poses[0].sines, poses[0].cosines, strict=True))
+    headings = headings_of(linkage, q, v, circular)
+    applied = _applied_forces(scene, state, poses)
+    return motion_under(linkage, scene.method, q, v, applied, headings)
 
 
-def _applied_forces(scene: RedundantScene, state: LegsState, legs: tuple[Leg, Leg]) -> list[Scalar]:
-    """Forces of gravity, ground and actuators on each leg, from that leg's own coordinates."""
-    walker, linkage = scene.walker, scene.linkage
-    body, distance = leg_of(walker)
-    downhill, weight = _gravity(scene)
-    reach, size = walker.hip_to_foot - distance, linkage.coordinates
+def _applied_forces(
+    scene: RedundantScene, state: BodiesState, poses: tuple[Pose, ...]
+) -> list[Scalar]:
+    """Forces of gravity, ground, joint parts and actuators on each body by its own coordinates."""
+    mechanism, linkage = scene.mechanism, scene.linkage
+    found = feet_at(scene, poses, bristles_of(scene, state))
+    torques = with_torques(Loads.none(mechanism.structure), scene, poses, found).torques
+    downhill, weight = gravity_on(scene.ground)
     applied: list[Scalar] = []
-    both = feet_of(scene, legs)
-    driving = None
-    if scene.actuation is not None:
-        angles, rates = (legs[0].angle, legs[1].angle), (legs[0].rate, legs[1].rate)
-        driving = hip_torques(scene, hip_motion(scene, both, angles, rates))
-    for k, (leg, foot) in enumerate(zip(legs, both, strict=True)):
-        force_x, force_z = body.mass * downhill, body.mass * weight
-        torque = jnp.zeros_like(leg.rate)
-        if foot.admitted is not False:
-            reaction = foot_force(scene, foot)
-            force_z = force_z + reaction.normal
-            torque = reaction.normal * (reach * leg.sine)
-            if reaction.tangential is not None:
-                force_x = force_x + reaction.tangential
-                torque = torque + reaction.tangential * (reach * leg.cosine + walker.r)
-        if driving is not None:
-            torque = torque + driving[k]
-        own = cast("tuple[Scalar, ...]", state)[size * k : size * (k + 1)]
-        applied += [force_x, force_z, *torque_on(linkage, own, torque)]
+    for j, body in enumerate(loaded_bodies(mechanism)):
+        loads = Loads(body.mass * downhill, -(body.mass * weight), torques)
+        for k, foot in enumerate(mechanism.feet):
+            if mechanism.structure.feet[k] == j and found[k].admitted is not False:
+                reaction = foot_force(scene, found[k])
+                point = _from_centre(poses[j], j, foot.centre, body.centre)
+                loads = loads.with_force(point, reaction.tangential, reaction.normal)
+                loads = loads.with_torques(((j, 1.0),), times(reaction.tangential, foot.radius))
+        own, on_body = state[linkage.coordinates * j :], (loads.x, loads.z, loads.torques[j])
+        *force, torque = (jnp.zeros_like(own[0]) if each is None else each for each in on_body)
+        applied += [*force, *torque_on(linkage, own, torque)]
     return applied
 
 
+def _from_centre(pose: Pose, body: int, place: Point, centre: Point) -> PointMotion:
+    """A point of a body from the body's mass centre, about which it turns by itself."""
+    at, own = (
+        arm_of(p.along, p.ahead, pose.sines[body], pose.cosines[body]) for p in (place, centre)
+    )
+    arm, rate = Arm(at.dx - own.dx, at.dz - own.dz), pose.motion.rates[body]
+    return PointMotion(arm.dz, -arm.dx, arm.dx * rate, arm.dz * rate, ((body, arm),))
+
+
 def _minimal_accelerations(
-    scene: RedundantScene, q: list[Scalar], v: list[Scalar], second: list[Scalar]
-) -> tuple[Accelerations, tuple[Scalar, Scalar]]:
-    """Accelerations in minimal coordinates, and of the hip as leg 1 has it."""
-    linkage, joint = scene.linkage, scene.linkage.joints[0]
-    headings = headings_of(linkage, q, v)
-    hips, turning = [], []
-    for k in range(2):
-        hip = point_of(linkage, q, headings, k, joint.point_1)
-        ax = sum((entry * second[c] for c, entry in hip.row_x.items()), hip.convective_x)
-        az = sum((entry * second[c] for c, entry in hip.row_z.items()), hip.convective_z)
-        hips.append((ax, az))
-        own = slice(linkage.coordinates * k + 2, linkage.coordinates * (k + 1))
-        if linkage.orientation == "angle":
-            turning.append(second[own][0])
-        else:
-            (c, s), (c_second, s_second) = q[own], second[own]
-            turning.append(2.0 * (c * s_second - s * c_second))
-    (ax_1, az_1), (ax_2, az_2) = hips
-    means = (0.5 * (ax_1 + ax_2), 0.5 * (az_1 + az_2))
-    return Accelerations(*means, *turning), hips[0]
+    scene: RedundantScene, state: BodiesState, second: list[Scalar]
+) -> tuple[Any, Vector]:
+    """Accelerations in minimal coordinates, and of the root point as the first body has it."""
+    mechanism, linkage, poses = scene.mechanism, scene.linkage, poses_of(scene, state)
+    structure, bodies = mechanism.structure, loaded_bodies(mechanism)
+    q, v = coordinates_of(scene, state)
+    turns = [turn_of(linkage, q, v, j) for j in range(len(bodies))]
+    turning = [row_times(turn.row, second) + turn.convective for turn in turns]
+    roots = []
+    for j in structure.children[-1]:
+        centre = point_motion(structure, poses[j], j, bodies[j].centre)
+        own = point_acceleration(centre, poses[j].motion.rates, turning)
+        first = linkage.coordinates * j
+        roots.append((second[first] - own[0], second[first + 1] - own[1]))
+    root = (mean(values) for values in zip(*roots, strict=True))
+    kind = state_type_of(structure.accelerations)
+    return kind(*root, *(turning[j] for j in structure.free)), roots[0]

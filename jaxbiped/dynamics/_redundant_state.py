@@ -1,236 +1,169 @@
-"""State in redundant coordinates: each leg has its own."""
+"""State in redundant coordinates: each body has its own."""
 
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias, cast
+from typing import Any, NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 
-from jaxbiped._circular import sine_cosine
+from jaxbiped._checks import ArgumentError
+from jaxbiped._trigonometry import angle_of_vector, sine_cosine
 from jaxbiped._types import Scalar
-from jaxbiped.caching._cached_jit import kept_alone
-from jaxbiped.dynamics._state import BristleState, MinimalState, State, state_type
-from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene
-from jaxbiped.scene._walker import leg_of
+from jaxbiped.compiler import kept_alone
+from jaxbiped.dynamics._joint_loads import motion_of
+from jaxbiped.dynamics._legs import mean
+from jaxbiped.dynamics._state import state_type
+from jaxbiped.dynamics._tree import Motion, Pose, point_motion, pose_of
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._linkages import loaded_bodies
+from jaxbiped.scene._scene import RedundantScene
+from jaxbiped.scene._state_types import MinimalState, is_redundant, state_type_of
+from jaxbiped.scene._structure import Structure
 
-if TYPE_CHECKING:
-    from typing_extensions import TypeIs
+BodiesState: TypeAlias = Any
+"""A state with coordinates of each body, as a `RedundantState` or an `EulerState` has them."""
 
-
-class RedundantState(NamedTuple):
-    """Centre of mass and angle of each leg, and their rates: twelve scalar leaves.
-
-    The frame is that of `State`. Where the hip has a mass, half of it belongs to each leg, and the
-    centre of mass is that of both.
-
-    Attributes:
-        x_1, z_1, x_2, z_2: centres of mass [m].
-        theta_1, theta_2: leg angles [rad].
-        vx_1, vz_1, vx_2, vz_2: velocities [m/s].
-        omega_1, omega_2: leg rates [rad/s].
-        bristle_1, bristle_2: see `AbstractBristleLaw` [–]; None where friction has no memory.
-    """
-
-    x_1: Scalar
-    z_1: Scalar
-    theta_1: Scalar
-    x_2: Scalar
-    z_2: Scalar
-    theta_2: Scalar
-    vx_1: Scalar
-    vz_1: Scalar
-    omega_1: Scalar
-    vx_2: Scalar
-    vz_2: Scalar
-    omega_2: Scalar
-    bristle_1: Scalar | None = None
-    bristle_2: Scalar | None = None
-
-
-class EulerState(NamedTuple):
-    """A `RedundantState` with the planar Euler parameters of each leg: sixteen scalar leaves.
-
-    Attributes:
-        x_1, z_1, x_2, z_2: centres of mass [m].
-        cos_half_1, sin_half_1, cos_half_2, sin_half_2: cos θ/2 and sin θ/2 of each leg [–].
-        vx_1, vz_1, vx_2, vz_2: velocities [m/s].
-        cos_rate_1, sin_rate_1, cos_rate_2, sin_rate_2: rates of the Euler parameters [1/s].
-        bristle_1, bristle_2: see `AbstractBristleLaw` [–]; None where friction has no memory.
-    """
-
-    x_1: Scalar
-    z_1: Scalar
-    cos_half_1: Scalar
-    sin_half_1: Scalar
-    x_2: Scalar
-    z_2: Scalar
-    cos_half_2: Scalar
-    sin_half_2: Scalar
-    vx_1: Scalar
-    vz_1: Scalar
-    cos_rate_1: Scalar
-    sin_rate_1: Scalar
-    vx_2: Scalar
-    vz_2: Scalar
-    cos_rate_2: Scalar
-    sin_rate_2: Scalar
-    bristle_1: Scalar | None = None
-    bristle_2: Scalar | None = None
-
-    @property
-    def theta_1(self) -> Scalar:
-        """Angle of leg 1 [rad]."""
-        return _angle(self.cos_half_1, self.sin_half_1)
-
-    @property
-    def theta_2(self) -> Scalar:
-        """Angle of leg 2 [rad]."""
-        return _angle(self.cos_half_2, self.sin_half_2)
-
-    @property
-    def omega_1(self) -> Scalar:
-        """Rate of leg 1 [rad/s]."""
-        return _rate(self.cos_half_1, self.sin_half_1, self.cos_rate_1, self.sin_rate_1)
-
-    @property
-    def omega_2(self) -> Scalar:
-        """Rate of leg 2 [rad/s]."""
-        return _rate(self.cos_half_2, self.sin_half_2, self.cos_rate_2, self.sin_rate_2)
-
-
-LegsState: TypeAlias = RedundantState | EulerState
-"""A state with coordinates of each leg."""
-
-CompliantState: TypeAlias = MinimalState | LegsState
+CompliantState: TypeAlias = MinimalState | Any
 """A state of a walker with laws of contact."""
 
 
-class Leg(NamedTuple):
-    """One leg as its own coordinates have it: the hip is where this leg says it is.
+class BodyMotion(NamedTuple):
+    """A body as its own coordinates have it.
 
     Attributes:
-        hip_x, hip_z: [m]. hip_vx, hip_vz: [m/s]. angle: [rad]. rate: [rad/s].
-        sine, cosine: of the angle.
-        bristle: None where friction has no memory.
+        x, z: its mass centre [m]. vx, vz: velocity of that [m/s].
+        angle: [rad]. rate: [rad/s].
     """
 
-    hip_x: Scalar
-    hip_z: Scalar
-    hip_vx: Scalar
-    hip_vz: Scalar
+    x: Scalar
+    z: Scalar
+    vx: Scalar
+    vz: Scalar
     angle: Scalar
     rate: Scalar
-    sine: Scalar
-    cosine: Scalar
-    bristle: Scalar | None
 
 
-def is_redundant(state: object) -> "TypeIs[LegsState]":
-    """Whether a state has coordinates for each leg."""
-    return isinstance(state, RedundantState | EulerState)
+def body_motions(structure: Structure, state: BodiesState) -> tuple[BodyMotion, ...]:
+    """Every body in a redundant state."""
+    return tuple(_body_motion(state, name) for name in structure.bodies)
 
 
-def legs_of(scene: AbstractWalkerScene, state: CompliantState) -> tuple[Leg, Leg]:
-    """Both legs of a state of either formulation."""
-    return _leg(scene, state, 1), _leg(scene, state, 2)
+def _body_motion(state: BodiesState, body: str) -> BodyMotion:
+    def own(name: str) -> Scalar:
+        return getattr(state, f"{name}_{body}")
+
+    place = own("x"), own("z"), own("vx"), own("vz")
+    if f"theta_{body}" in state._fields:
+        return BodyMotion(*place, own("theta"), own("omega"))
+    c, s, c_rate, s_rate = (own(name) for name in ("cos_half", "sin_half", "cos_rate", "sin_rate"))
+    rate = 2.0 * (c * s_rate - s * c_rate) / (c * c + s * s)
+    return BodyMotion(*place, 2.0 * angle_of_vector(s, c), rate)
+
+
+def motion_in(scene: AbstractWalkerScene, state: CompliantState) -> Motion:
+    """Root point, angles and rates of all bodies in a state of either formulation.
+
+    In redundant coordinates the root point is half way between where the bodies on it have it.
+    """
+    structure = scene.mechanism.structure
+    if is_redundant(state):
+        poses = poses_of(scene, state)
+        told = [poses[j].motion for j in structure.children[-1]]
+        each = zip(*((own.x, own.z, own.vx, own.vz) for own in told), strict=True)
+        x, z, vx, vz = (mean(values) for values in each)
+        return told[0]._replace(x=x, z=z, vx=vx, vz=vz)
+    for name in (*structure.coordinates, *structure.rates):
+        if not hasattr(state, name):
+            raise ArgumentError(
+                f"state has no {name}, which the scene's walker has: give a state of this scene."
+            )
+    places = [getattr(state, name) for name in structure.coordinates]
+    rates = [getattr(state, name) for name in structure.rates]
+    return motion_of(scene.mechanism, scene.ground, places, rates)
+
+
+def poses_of(scene: AbstractWalkerScene, state: CompliantState) -> tuple[Pose, ...]:
+    """The pose of the mechanism as each of its bodies has it: in minimal coordinates the same one.
+
+    In redundant coordinates the root point is where each body says it is.
+    """
+    mechanism = scene.mechanism
+    structure = mechanism.structure
+    if not is_redundant(state):
+        return (pose_of(mechanism, motion_in(scene, state)),) * len(structure.bodies)
+    bodies, origin = body_motions(structure, state), jnp.zeros_like(state[0])
+    turned = tuple(each.angle for each in bodies), tuple(each.rate for each in bodies)
+    pose = pose_of(mechanism, Motion(origin, origin, origin, origin, *turned))
+    found = []
+    for j, (own, body) in enumerate(zip(bodies, loaded_bodies(mechanism), strict=True)):
+        at = point_motion(structure, pose, j, body.centre)
+        root = own.x - at.x, own.z - at.z, own.vx - at.vx, own.vz - at.vz
+        found.append(pose._replace(motion=Motion(*root, *turned)))
+    return tuple(found)
 
 
 @state_type.register
-def _(scene: RedundantScene) -> type[LegsState]:
-    return EulerState if scene.orientation == "euler" else RedundantState
+def _(scene: RedundantScene) -> type[BodiesState]:
+    structure, euler = scene.mechanism.structure, scene.orientation == "euler"
+    angle = ("cos_half", "sin_half") if euler else ("theta",)
+    rate = ("cos_rate", "sin_rate") if euler else ("omega",)
+    names = [
+        f"{name}_{body}"
+        for own in (("x", "z", *angle), ("vx", "vz", *rate))
+        for body in structure.bodies
+        for name in own
+    ]
+    return state_type_of((*names, *(structure.bristles if scene.has_bristles else ())))
 
 
 @kept_alone
-def redundant_state(scene: RedundantScene, state: MinimalState) -> LegsState:
+def redundant_state(scene: RedundantScene, state: MinimalState) -> BodiesState:
     """The consistent state of a redundant scene that is the same as a minimal one.
 
     Args:
         scene: says how orientations are written.
-        state: a `State` or `BristleState`, leaves of any batch shape.
+        state: of the minimal scene's kind, leaves of any batch shape.
 
     Returns:
-        A `RedundantState`, or an `EulerState` where the scene has Euler parameters.
+        Of the scene's kind: for `Walker` a `RedundantState`, or an `EulerState` where the scene has
+        Euler parameters.
     """
-    _, distance = leg_of(scene.walker)
+    mechanism = scene.mechanism
+    structure, motion = mechanism.structure, motion_in(scene, state)
+    pose = pose_of(mechanism, motion)
+    fields: dict[str, Scalar] = {}
+    for j, body in enumerate(loaded_bodies(mechanism)):
+        angle, rate = motion.angles[j], motion.rates[j]
+        at, (s, c) = point_motion(structure, pose, j, body.centre), sine_cosine(0.5 * angle)
+        own = {"x": at.x, "z": at.z, "vx": at.vx, "vz": at.vz, "theta": angle, "omega": rate}
+        own |= {"cos_half": c, "sin_half": s}
+        own |= {"cos_rate": -0.5 * rate * s, "sin_rate": 0.5 * rate * c}
+        fields |= {f"{name}_{body.name}": value for name, value in own.items()}
+    fields |= {name: getattr(state, name) for name in structure.bristles if name in state._fields}
     kind = state_type(scene)
-    fields: dict[str, Scalar | None] = {}
-    for leg, angle, rate in (
-        ("1", state.theta_1, state.omega_1),
-        ("2", state.theta_2, state.omega_2),
-    ):
-        sine, cosine = sine_cosine(angle)
-        fields |= {
-            f"x_{leg}": state.hip_x + distance * sine,
-            f"z_{leg}": state.hip_z - distance * cosine,
-            f"vx_{leg}": state.hip_vx + distance * cosine * rate,
-            f"vz_{leg}": state.hip_vz + distance * sine * rate,
-            f"bristle_{leg}": getattr(state, f"bristle_{leg}", None),
-        }
-        if kind is RedundantState:
-            fields |= {f"theta_{leg}": angle, f"omega_{leg}": rate}
-        else:
-            s, c = sine_cosine(0.5 * angle)
-            fields |= {
-                f"cos_half_{leg}": c,
-                f"sin_half_{leg}": s,
-                f"cos_rate_{leg}": -0.5 * rate * s,
-                f"sin_rate_{leg}": 0.5 * rate * c,
-            }
-    return kind(**fields)
+    return kind(**{name: fields[name] for name in kind._fields})
 
 
 def minimal_state(scene: AbstractWalkerScene, state: CompliantState) -> MinimalState:
-    """The minimal state that a redundant one stands for: the hip half way between the legs' two.
+    """The minimal state that a redundant one stands for.
 
-    A minimal state is returned as it is.
+    The root point is half way between where the bodies that hang on it have it. A minimal state is
+    returned as it is.
 
     Args:
         scene: says how orientations are written.
         state: redundant or minimal, leaves of any common shape, SI units.
 
     Returns:
-        A `State`, or a `BristleState` where there are bristles.
+        Of the minimal scene's kind: for `Walker` a `State`, or a `BristleState` where there are
+        bristles.
     """
-    return _half_way(scene, state) if is_redundant(state) else state
+    return _minimal_state(scene, state) if is_redundant(state) else state
 
 
 @kept_alone
-def _half_way(scene: AbstractWalkerScene, state: LegsState) -> MinimalState:
-    one, two = legs_of(scene, state)
-    values = dict(
-        hip_x=0.5 * (one.hip_x + two.hip_x),
-        hip_z=0.5 * (one.hip_z + two.hip_z),
-        theta_1=one.angle,
-        theta_2=two.angle,
-        hip_vx=0.5 * (one.hip_vx + two.hip_vx),
-        hip_vz=0.5 * (one.hip_vz + two.hip_vz),
-        omega_1=one.rate,
-        omega_2=two.rate,
-    )
-    if state.bristle_1 is None:
-        return State(**values)
-    return BristleState(
-        **values, bristle_1=cast("Scalar", one.bristle), bristle_2=cast("Scalar", two.bristle)
-    )
-
-
-def _leg(scene: AbstractWalkerScene, state: CompliantState, number: int) -> Leg:
-    def own(name: str) -> Scalar:
-        return getattr(state, f"{name}_{number}")
-
-    angle, rate = own("theta"), own("omega")
-    sine, cosine = sine_cosine(angle)
-    if is_redundant(state):
-        _, distance = leg_of(scene.walker)
-        x, z = own("x") - distance * sine, own("z") + distance * cosine
-        vx, vz = own("vx") - distance * cosine * rate, own("vz") - distance * sine * rate
-    else:
-        x, z, vx, vz = state.hip_x, state.hip_z, state.hip_vx, state.hip_vz
-    bristle = getattr(state, f"bristle_{number}", None)
-    return Leg(x, z, vx, vz, angle, rate, sine, cosine, bristle)
-
-
-def _angle(cosine: Scalar, sine: Scalar) -> Scalar:
-    return 2.0 * jnp.arctan2(sine, cosine)
-
-
-def _rate(cosine: Scalar, sine: Scalar, cosine_rate: Scalar, sine_rate: Scalar) -> Scalar:
-    return 2.0 * (cosine * sine_rate - sine * cosine_rate) / (cosine * cosine + sine * sine)
+def _minimal_state(scene: AbstractWalkerScene, state: BodiesState) -> MinimalState:
+    structure, motion = scene.mechanism.structure, motion_in(scene, state)
+    places = motion.x, motion.z, *(motion.angles[j] for j in structure.free)
+    rates = motion.vx, motion.vz, *(motion.rates[j] for j in structure.free)
+    values = dict(zip((*structure.coordinates, *structure.rates), (*places, *rates), strict=True))
+    values |= {name: getattr(state, name) for name in structure.bristles if name in state._fields}
+    return state_type_of(tuple(values))(**values)

@@ -1,6 +1,6 @@
 """Checks of the rigid limit: whether real feet could do what it assumes."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -11,7 +11,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rolling import rolling
-from jaxbiped.dynamics._state import RigidState
+from jaxbiped.dynamics._state import state_type
+from jaxbiped.dynamics._strike_surfaces import clearance
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene
 
@@ -55,7 +56,7 @@ class RigidChecks(NamedTuple):
         return self.needed_friction > mu
 
 
-def rigid_checks(scene: RigidScene, states: RigidState) -> RigidChecks:
+def rigid_checks(scene: RigidScene, states: Any) -> RigidChecks:
     """Checks a footstep from a series of its states, such as `gait.orbit[1]`.
 
     Args:
@@ -70,9 +71,9 @@ def rigid_checks(scene: RigidScene, states: RigidState) -> RigidChecks:
         ArgumentError: an argument of the wrong type.
     """
     scene = check_scene(scene, RigidScene)
-    check_type("states", states, RigidState)
+    check_type("states", states, state_type(scene))
     states = jtu.tree_map(lambda leaf: np.ravel(np.asarray(leaf)), states)
-    known = np.isfinite(states.theta_2)
+    known = np.isfinite(states[1])
     last = np.max(np.flatnonzero(known), initial=0)
     # Of all states: one program then serves for any number of those that are known.
     found = _checks(scene, jtu.tree_map(jnp.asarray, states), jnp.asarray(last))
@@ -88,17 +89,16 @@ def rigid_checks(scene: RigidScene, states: RigidState) -> RigidChecks:
 
 
 @cached_jit
-def _checks(scene: RigidScene, states: RigidState, last: Scalar) -> RigidChecks:
+def _checks(scene: RigidScene, states: Any, last: Scalar) -> RigidChecks:
     """The checks of n states, shape (n,), the impact's at the last of them."""
     force = rolling(scene, states).force
     normal, tangential = force.normal, jnp.abs(jnp.asarray(force.tangential))
     needed = jnp.where(normal > 0.0, tangential / jnp.where(normal > 0.0, normal, 1.0), jnp.inf)
-    heights = jnp.cos(states.theta_2) - jnp.cos(states.theta_1)
     struck = impact(scene, jtu.tree_map(lambda leaf: leaf[last], states))
     return RigidChecks(
         normal=normal,
         needed_friction=needed,
-        clearance=scene.walker.hip_to_foot * heights,
+        clearance=clearance(scene, states),
         impact_friction=jnp.abs(struck.impulse_x) / struck.impulse_z,
         lifting=struck.lifting,
     )

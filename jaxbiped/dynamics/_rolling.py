@@ -1,204 +1,160 @@
-"""Single support of the rigid walker: leg 2 rolls without slip, leg 1 swings."""
+"""Single support of the rigid walker: one foot rolls without slip, the other one swings."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
-from jaxbiped.caching._cached_jit import kept_alone
-from jaxbiped.dynamics._actuation import hip_torques
-from jaxbiped.dynamics._contacts import FootForce
-from jaxbiped.dynamics._state import RigidState, field_of
+from jaxbiped.compiler import kept_alone
+from jaxbiped.dynamics._actuation import Carriers, with_driven_joints
+from jaxbiped.dynamics._contacts import FootForce, legs_in
+from jaxbiped.dynamics._holds import Holds, Row, holds_of
+from jaxbiped.dynamics._joint_loads import of_all_bodies
+from jaxbiped.dynamics._stance import Stance, angles_and_rates, of_stance
+from jaxbiped.dynamics._state import field_of
+from jaxbiped.dynamics._tree import Loads, rehung
+from jaxbiped.dynamics._tree_balance import fold, fold_matrix
+from jaxbiped.dynamics._tree_inertia import inertial_loads
+from jaxbiped.linalg._elimination import Entry
+from jaxbiped.linalg._sparse_lu import factorise
+from jaxbiped.scene._ground import gravity_on
+from jaxbiped.scene._rigid_feet import rigid_modes
 from jaxbiped.scene._scene import RigidScene
-from jaxbiped.scene._walker import Walker
+from jaxbiped.scene._state_types import state_type_of
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 
 
-class Support(NamedTuple):
-    """Geometry of a leg that rolls without slip: velocities for each unit of its rate [m].
+def rolling_hip_motion(scene: RigidScene, state: Any) -> HipMotion:
+    """What actuators at the hip know of the rigid walker: the leg that stands carries it."""
+    return of_stance(scene, state, _hip_motion)
+
+
+def _hip_motion(stance: Stance) -> HipMotion:
+    motion = stance.pose.motion
+    structure = stance.tree.structure
+    first, second = structure.pairs[0]
+    one = jnp.ones_like(motion.angles[second])
+    carries = second in structure.bodies_of_leg(stance.leg)
+    return HipMotion(
+        (motion.angles[first], motion.angles[second]),
+        (motion.rates[first], motion.rates[second]),
+        (None, one) if carries else (one, None),
+    )
+
+
+def with_torques(loads: Loads, scene: RigidScene, stance: Stance) -> Loads:
+    """With the torques of joint parts and actuators."""
+    mechanism, motion = stance.mechanism, stance.pose.motion
+    structure = mechanism.structure
+
+    def carriers() -> Carriers:
+        legs = legs_in(mechanism, (rehung(mechanism, stance.pose),) * len(structure.bodies))
+        shares: list[Scalar | None] = [None] * len(legs)
+        shares[stance.leg] = jnp.ones_like(motion.x)
+        return legs, shares
+
+    return with_driven_joints(loads, scene, motion, carriers, lambda: _hip_motion(stance))
+
+
+class Turning(NamedTuple):
+    """Accelerations of a stance, and what holds it.
 
     Attributes:
-        hip_x, hip_z: of the hip.
-        mass_x, mass_z: of the leg's centre of mass.
-        sine, cosine: of the leg's angle.
+        free: of the free bodies' angles [rad/s²].
+        unheld: the same where nothing is held, by rows of the tree.
+        holds: what may be held; None where nothing may.
+        reactions: of what is held [N·m].
     """
 
-    hip_x: Scalar
-    hip_z: Scalar
-    mass_x: Scalar
-    mass_z: Scalar
-    sine: Scalar
-    cosine: Scalar
+    free: list[Scalar]
+    unheld: Row
+    holds: Holds | None
+    reactions: list[Scalar]
 
 
-def support_of(walker: Walker, angle: Scalar) -> Support:
-    """Geometry of a stance leg at `angle` [rad]: its foot's centre moves by −r θ̇ along x."""
-    sine, cosine = sine_cosine(angle)
-    reach, below = walker.hip_to_foot, walker.hip_to_foot - walker.d
-    return Support(
-        hip_x=-(walker.r + reach * cosine),
-        hip_z=-reach * sine,
-        mass_x=-(walker.r + below * cosine),
-        mass_z=-below * sine,
-        sine=sine,
-        cosine=cosine,
-    )
+def turning_of(scene: RigidScene, stance: Stance) -> Turning:
+    """How a stance moves under the loads on it."""
+    tree, weights = stance.tree, stance.tree.weights
+    # In the frame that falls freely the ground accelerates upwards.
+    downhill, weight = gravity_on(scene.ground)
+    still: list[Entry] = [-downhill, weight, *[None] * len(tree.bodies)]
+    loads = inertial_loads(tree.structure, tree.known, stance.pose, still)
+    loads = with_torques(loads, scene, stance)
+    factors = factorise(fold_matrix(weights, stance.mass_matrix()))
+    unheld: Any = factors.solve(fold(weights, loads.entries()))
+    if not stance.may_hold:
+        return Turning(tree.free_values(unheld), unheld, None, [])
+    holds = holds_of(stance, rigid_modes(stance.mechanism), factors)
+    reactions = holds.reactions(unheld, stance.held)
+    return Turning(tree.free_values(holds.under(unheld, reactions)), unheld, holds, reactions)
 
 
-class Inertia(NamedTuple):
-    """Symmetric mass matrix of (stance rate, swing rate) [kg·m²]."""
+def rolling_rates(scene: RigidScene, state: Any) -> tuple[Scalar, ...]:
+    """Angular accelerations at a state [rad/s²], of the bodies that it has; shaped as its leaves.
 
-    stance: Scalar
-    coupling: Scalar
-    swing: Scalar
-
-    def solved(self, stance: Scalar, swing: Scalar) -> tuple[Scalar, Scalar]:
-        """The rates or accelerations (stance, swing) that belong to these momenta or torques.
-
-        The swing leg is eliminated first: its mass may be far below the hip's.
-        """
-        inverse = 1.0 / self.swing  # a number of the walker: divided once, not at every stage
-        ratio = self.coupling * inverse
-        of_stance = (stance - ratio * swing) / (self.stance - ratio * self.coupling)
-        return of_stance, swing * inverse - ratio * of_stance
-
-
-def inertia_of(walker: Walker, stance: Support, sine: Scalar, cosine: Scalar) -> Inertia:
-    """Mass matrix; sine and cosine are those of the swing leg's angle."""
-    carried = walker.hip_mass + walker.m
-    of_hip = stance.hip_x * stance.hip_x + stance.hip_z * stance.hip_z
-    of_leg = stance.mass_x * stance.mass_x + stance.mass_z * stance.mass_z
-    return Inertia(
-        stance=carried * of_hip + walker.m * of_leg + walker.J,
-        coupling=walker.m * walker.d * (stance.hip_x * cosine + stance.hip_z * sine),
-        swing=walker.J + walker.m * walker.d * walker.d,
-    )
-
-
-def rolling_hip_motion(state: RigidState) -> HipMotion:
-    """What actuators at the hip know of the rigid walker: leg 2 carries it alone."""
-    one = jnp.ones_like(state.theta_2)
-    return HipMotion((state.theta_1, state.theta_2), (state.omega_1, state.omega_2), (None, one))
-
-
-class Rates(NamedTuple):
-    """Angular accelerations in single support [rad/s²]: of swing leg and stance leg."""
-
-    alpha_1: Scalar
-    alpha_2: Scalar
-
-
-def rolling_rates(scene: RigidScene, state: RigidState) -> Rates:
-    """Angular accelerations at a state; leaves shaped as the state's.
-
-    Lagrange's equations of the two angles, with all that does not change gathered: of the stance
-    leg's inertia only one term does. By the sources' symbols: l − r is hip to foot centre, d hip to
-    centre of mass.
+    Lagrange's equations of the free angles, by elimination from the outermost bodies inwards: the
+    mass of a leg that swings may be far below the hip's.
     """
-    walker, ground = scene.walker, scene.ground
-    m, d, r = walker.m, walker.d, walker.r
-    reach, below, carried = walker.hip_to_foot, walker.hip_to_foot - d, walker.hip_mass + m
-    g_x, g_z = ground.g * jnp.sin(ground.slope), -ground.g * jnp.cos(ground.slope)
-    moment = carried * reach + m * below
-    fixed = walker.total_mass * r * r + carried * reach * reach + m * below * below + walker.J
-    swing_inertia = walker.J + m * d * d
-    sine_1, cosine_1 = sine_cosine(state.theta_1)
-    sine_2, cosine_2 = sine_cosine(state.theta_2)
-    sine = sine_1 * cosine_2 - cosine_1 * sine_2
-    cosine = cosine_1 * cosine_2 + sine_1 * sine_2
-    swing_square, stance_square = state.omega_1 * state.omega_1, state.omega_2 * state.omega_2
-    inertia = Inertia(
-        stance=fixed + 2.0 * r * moment * cosine_2,
-        coupling=-(m * d * r * cosine_1 + m * d * reach * cosine),
-        swing=swing_inertia,
-    )
-    swing_torque = m * d * g_x * cosine_1 + m * d * g_z * sine_1
-    swing_torque = swing_torque + m * d * reach * sine * stance_square
-    stance_torque = r * moment * sine_2 * stance_square - (
-        walker.total_mass * r * g_x + moment * g_x * cosine_2 + moment * g_z * sine_2
-    )
-    stance_torque = stance_torque - swing_square * (m * d * r * sine_1 + m * d * reach * sine)
-    if scene.actuation is not None:
-        torques = hip_torques(scene, rolling_hip_motion(state))
-        if torques is not None:
-            swing_torque, stance_torque = swing_torque + torques[0], stance_torque + torques[1]
-    alpha_2, alpha_1 = inertia.solved(stance_torque, swing_torque)
-    return Rates(alpha_1, alpha_2)
-
-
-class RollingMotion(NamedTuple):
-    """Accelerations in single support.
-
-    Attributes:
-        alpha_1, alpha_2: of swing and stance leg [rad/s²].
-        force: of the ground on the stance foot, that keeps it rolling [N]. A foot that it would
-            have to pull has flown.
-    """
-
-    alpha_1: Scalar
-    alpha_2: Scalar
-    force: FootForce
+    return tuple(of_stance(scene, state, lambda stance: turning_of(scene, stance).free))
 
 
 @kept_alone
-def rolling(scene: RigidScene, state: RigidState) -> RollingMotion:
+def rolling(scene: RigidScene, state: Any) -> Any:
     """Accelerations and the ground's reaction at a state; leaves shaped as the state's.
 
-    The reaction is what the accelerations of hip and centres of mass leave of the weight.
+    The reaction is what the accelerations of all masses leave of the weight.
 
     Args:
         scene: the rigid walker.
-        state: leaves of any common shape, SI units.
+        state: of the scene's kind, leaves of any common shape, SI units.
 
     Returns:
-        Leg accelerations [rad/s²] and the force on the stance foot [N], leaves shaped as the
-        state's.
+        Accelerations `alpha_BODY` [rad/s²] of the bodies that the state has, and `force` on the
+        stance foot [N], a `FootForce`; for `Walker` a `RollingMotion`.
     """
-    walker, ground = scene.walker, scene.ground
-    alpha_1, alpha_2 = rolling_rates(scene, state)
-    stance = support_of(walker, state.theta_2)
-    sine, cosine = sine_cosine(state.theta_1)
-    stance_square, swing_square = state.omega_2**2, state.omega_1**2
-    reach, below = walker.hip_to_foot, walker.hip_to_foot - walker.d
-    hip_x = stance.hip_x * alpha_2 + reach * stance.sine * stance_square
-    hip_z = stance.hip_z * alpha_2 - reach * stance.cosine * stance_square
-    own_x = stance.mass_x * alpha_2 + below * stance.sine * stance_square
-    own_z = stance.mass_z * alpha_2 - below * stance.cosine * stance_square
-    swing_x = walker.d * (cosine * alpha_1 - sine * swing_square)
-    swing_z = walker.d * (sine * alpha_1 + cosine * swing_square)
-    carried, total = walker.hip_mass + walker.m, walker.total_mass
-    weight_x = total * ground.g * jnp.sin(ground.slope)
-    weight_z = -total * ground.g * jnp.cos(ground.slope)
-    force = FootForce(
-        normal=carried * hip_z + walker.m * (own_z + swing_z) - weight_z,
-        tangential=carried * hip_x + walker.m * (own_x + swing_x) - weight_x,
-    )
-    return RollingMotion(alpha_1, alpha_2, force)
+
+    def motion(stance: Stance) -> Any:
+        found = turning_of(scene, stance).free
+        force = ground_force(scene, stance, found)
+        return state_type_of((*stance.tree.structure.accelerations[2:], "force"))(*found, force)
+
+    return of_stance(scene, state, motion)
+
+
+def ground_force(scene: RigidScene, stance: Stance, accelerations: Sequence[Scalar]) -> FootForce:
+    """The ground's reaction where the free angles have these accelerations [N]."""
+    structure = stance.tree.structure
+    turning = of_all_bodies(structure, accelerations, accelerations[0])
+    downhill, weight = gravity_on(scene.ground)
+    along = jnp.zeros_like(accelerations[0])
+    if stance.tree.radius is not None:
+        along = -(stance.tree.radius * turning[stance.tree.body])
+    moved = [along - downhill, weight, *turning]
+    loads: Any = inertial_loads(structure, stance.tree.known, stance.pose, moved)
+    return FootForce(normal=-loads.z, tangential=-loads.x)
 
 
 @kept_alone
-def rolling_field(t: Time, state: RigidState, scene: RigidScene) -> RigidState:
+def rolling_field(t: Time, state: Any, scene: RigidScene) -> Any:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes.
 
     Args:
         t: time [s]; the field does not depend on it.
-        state: leg 2 standing, leaves of any common shape, SI units.
+        state: of the scene's kind, leaves of any common shape, SI units.
         scene: the rigid walker.
 
     Returns:
         The rates of change [SI units per second], leaves shaped as the state's.
     """
-    motion = rolling_rates(scene, state)
-    _, cosine = sine_cosine(state.theta_2)
-    walker = scene.walker
-    return RigidState(
-        hip_x=-(walker.r + walker.hip_to_foot * cosine) * state.omega_2,
-        theta_1=state.omega_1,
-        theta_2=state.omega_2,
-        omega_1=motion.alpha_1,
-        omega_2=motion.alpha_2,
-    )
+    _, rates = angles_and_rates(scene.mechanism.structure, state)
+    modes = [jnp.zeros_like(state[0])] if rigid_modes(scene.mechanism).any else []
+
+    def moves(stance: Stance) -> tuple[Scalar, list[Scalar]]:
+        return stance.root.vx, turning_of(scene, stance).free
+
+    vx, turning = of_stance(scene, state, moves)
+    return type(state)(vx, *rates, *turning, *modes)
 
 
 @field_of.register

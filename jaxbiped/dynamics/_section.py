@@ -8,25 +8,36 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
-from jaxbiped.dynamics._contacts import feet, touches
-from jaxbiped.dynamics._state import RigidState
+from jaxbiped._types import Scalar, select
+from jaxbiped.dynamics._contacts import feet, legs_at
+from jaxbiped.dynamics._footfalls import (
+    any_of,
+    carrier_place,
+    leg_depth,
+    leg_places,
+    touching_legs,
+)
+from jaxbiped.dynamics._strike_surfaces import lead, lean, opening
+from jaxbiped.dynamics._symmetry import exchange_legs, images
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene, is_rigid
+from jaxbiped.scene._state_types import SomeState
 
 
 class AbstractSection(eqx.Module):
     """A surface that the orbit crosses: a function of the state rises through zero.
 
-    It is looked at with the legs' names as they are and exchanged, so that no arrival depends on
-    which leg is called 1.
+    Of a mirrored mechanism it is looked at with the names as they are and exchanged, so that no
+    arrival depends on which side is called the first.
 
     Attributes:
         alternates: whether each arrival is another leg's than the one before, the first one another
             than that which stands alone at the start.
-        leg_2_stands: whether leg 2 stands after an arrival, which names the legs.
+        names_legs: whether the mechanism's stance leg stands after an arrival, which names the
+            legs.
     """
 
     alternates: ClassVar[bool] = False
-    leg_2_stands: ClassVar[bool] = False
+    names_legs: ClassVar[bool] = False
 
     @abc.abstractmethod
     def value(self, args: PyTree, y: PyTree) -> Scalar:
@@ -38,36 +49,60 @@ class AbstractSection(eqx.Module):
 
 
 class MidStance(AbstractSection):
-    """The leg that stands, leg 2, passes the slope's normal on its way back, and carries."""
+    """The root point passes over the feet of the stance leg, which carries.
 
-    leg_2_stands: ClassVar[bool] = True
+    It passes over the mean of their places. The stance leg of a mirrored mechanism is that of the
+    second body of its pairs, of another mechanism the last one.
+
+    Attributes:
+        body: the body that passes the slope's normal on its way back instead, as "thigh_2"; its
+            leg carries, or the stance leg where it has none.
+    """
+
+    names_legs: ClassVar[bool] = True
+    body: str | None = eqx.field(static=True, default=None)
 
     def value(self, args: PyTree, y: PyTree) -> Scalar:
-        return -y.theta_2
+        if self.body is not None:
+            return -getattr(y, f"theta_{self.body}")
+        if is_rigid(args):
+            return -lean(args, y)
+        line = legs_at(args, y)[args.mechanism.structure.stance_leg]
+        return -(line.x if line.fixed_angle is None else line.fixed_angle)
 
     def counts(self, args: PyTree, y: PyTree) -> Scalar:
-        if isinstance(y, RigidState):
+        if is_rigid(args):
             return jnp.asarray(True)
-        return touches(feet(args, y).foot_2)
+        structure = args.mechanism.structure
+        legs = [structure.stance_leg]
+        if self.body is not None:
+            body = structure.bodies.index(self.body)
+            own = range(len(structure.legs))
+            legs = [i for i in own if body in structure.bodies_of_leg(i)] or legs
+        touching = touching_legs(structure, feet(args, y))
+        return any_of([touching[i] for i in legs])
 
 
 class HeelStrike(AbstractSection):
-    """The foot ahead comes down; by then its leg is called leg 2, the new stance leg."""
+    """The leg ahead comes down; by then it is called the stance leg. A single leg just lands."""
 
     alternates: ClassVar[bool] = True
-    leg_2_stands: ClassVar[bool] = True
+    names_legs: ClassVar[bool] = True
 
     def value(self, args: PyTree, y: PyTree) -> Scalar:
-        if isinstance(y, RigidState):
-            # Both feet touch where the angles are opposite; then the one ahead comes down.
-            return -(y.theta_1 + y.theta_2)
-        return feet(args, y).foot_2.penetration
+        if is_rigid(args):
+            return -opening(args, exchange_legs(args, y, -1))
+        structure = args.mechanism.structure
+        return leg_depth(structure, feet(args, y), structure.stance_leg)
 
     def counts(self, args: PyTree, y: PyTree) -> Scalar:
-        if isinstance(y, RigidState):
-            return y.theta_2 > y.theta_1
-        both = feet(args, y)
-        return touches(both.foot_2) & (both.foot_2.x > both.foot_1.x)
+        if is_rigid(args):
+            return lead(args, exchange_legs(args, y, -1)) > 0.0
+        structure, found = args.mechanism.structure, feet(args, y)
+        leg, places = structure.stance_leg, leg_places(structure, found)
+        carrier = carrier_place(structure, found, places, leg)
+        lands = touching_legs(structure, found)[leg]
+        return lands if carrier is None else lands & (places[leg] > carrier)
 
 
 class Section(AbstractSection):
@@ -88,3 +123,17 @@ class Section(AbstractSection):
         if self.condition is None:
             return jnp.asarray(True)
         return self.condition(args, y)
+
+
+def in_nearest_names(
+    section: AbstractSection, scene: AbstractWalkerScene, near: SomeState, y: SomeState
+) -> SomeState:
+    """A state in those names, of all that its symmetry allows, that bring another to a section."""
+    *others, (_, own) = images(scene, near)
+    *renamed, (_, found) = images(scene, y)
+    nearest = jnp.abs(section.value(scene, own))
+    for (_, other), (_, image) in zip(others[::-1], renamed[::-1], strict=True):
+        off = jnp.abs(section.value(scene, other))
+        found = select(off < nearest, image, found)
+        nearest = jnp.minimum(off, nearest)
+    return found

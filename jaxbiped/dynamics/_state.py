@@ -4,7 +4,7 @@ A formulation registers its kind of scene here, by `state_type` and `field_of`.
 """
 
 import functools
-from typing import NamedTuple, TypeAlias, TypeVar, cast
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -13,8 +13,11 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._types import Scalar, VectorField, as_float, by_numpy
-from jaxbiped.caching._cached_jit import kept_alone
-from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
+from jaxbiped.compiler import kept_alone
+from jaxbiped.dynamics._stance import angles_and_rates, of_stance
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._state_types import SomeState, State, state_type_of
 
 
 @functools.singledispatch
@@ -27,31 +30,6 @@ def state_type(scene: object) -> type[PyTree]:
 def field_of(scene: object) -> VectorField:
     """A scene's vector field f(t, state, scene), in the form that `diffrax.ODETerm` takes."""
     raise TypeError(f"{type(scene).__name__} has no formulation.")
-
-
-class State(NamedTuple):
-    """Hip position, leg angles and their rates: eight scalar leaves in the slope's frame.
-
-    The frame is fixed to the slope: x along it, downhill positive; z along its outward normal. A
-    leg's angle is measured from that normal, positive when its foot is ahead of (downhill from)
-    the hip. A start whose angles are a whole turn more is the same start, and begins between −π
-    and π. Leaves may carry any common batch shape.
-
-    Attributes:
-        hip_x, hip_z: hip position [m].
-        theta_1, theta_2: leg angles [rad].
-        hip_vx, hip_vz: hip velocity [m/s].
-        omega_1, omega_2: leg rates [rad/s].
-    """
-
-    hip_x: Scalar
-    hip_z: Scalar
-    theta_1: Scalar
-    theta_2: Scalar
-    hip_vx: Scalar
-    hip_vz: Scalar
-    omega_1: Scalar
-    omega_2: Scalar
 
 
 def seed_state() -> State:
@@ -76,11 +54,22 @@ def seed_state() -> State:
     )
 
 
-_ANGLES = ("theta_1", "theta_2")
+def without_whole_turns(scene: AbstractWalkerScene, state: SomeState) -> SomeState:
+    """The same start with angles between −π and π.
+
+    A body that has turned once winds up what acts at joints: where anything does, angles stay.
+    """
+    structure = scene.mechanism.structure
+    if structure.joints:
+        return state
+    angles = [name for name in state._fields if name in structure.coordinates[2:]]
+    turned: SomeState = state._replace(
+        **{name: _within_a_turn(getattr(state, name)) for name in angles}
+    )
+    return turned
 
 
-def within_a_turn(angle: Scalar) -> Scalar:
-    """An angle [rad] without whole turns, between −π and π: the same start."""
+def _within_a_turn(angle: Scalar) -> Scalar:
     known = not isinstance(angle, jax.core.Tracer)
     if known and not np.any(np.abs(np.asarray(angle)) > np.pi):
         return angle
@@ -89,38 +78,24 @@ def within_a_turn(angle: Scalar) -> Scalar:
     return wrapped
 
 
-SomeState = TypeVar("SomeState", bound=NamedTuple)
-"""A state of any kind, which comes back as the same kind."""
-
-
-def exchange_legs(state: SomeState) -> SomeState:
-    """The same motion with the names of the two legs exchanged; of a state of any kind.
-
-    Args:
-        state: leaves of any common shape.
-
-    Returns:
-        A state of the same kind.
-    """
-    swapped = {}
-    for name in state._fields:
-        twin = name[:-1] + {"1": "2", "2": "1"}.get(name[-1], name[-1])
-        swapped[name] = getattr(state, twin)
-    return state._replace(**swapped)
-
-
 def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTree:
-    """`state` with every leaf a floating-point array of one shape, angles without whole turns.
+    """`state` with every leaf a floating-point array of one shape.
 
     Raises:
         ArgumentError: not a `kind`, an entry that is not finite, or leaves of different shapes.
     """
+    fields, given = getattr(kind, "_fields", ()), getattr(state, "_fields", ())
+    if given and not isinstance(state, kind) and kind.__qualname__ != kind.__name__:
+        raise ArgumentError(
+            f"{name} has the scalars {', '.join(given)}, which is not allowed: those of this scene "
+            f"are {', '.join(fields)}."
+        )
     check_type(name, state, kind)
     return check_leaves(state, name)
 
 
 def check_leaves(state: SomeState, name: str) -> SomeState:
-    """`state` with every leaf a floating-point array of one shape, angles without whole turns.
+    """`state` with every leaf a floating-point array of one shape.
 
     None stays where a kind of state has it.
 
@@ -138,7 +113,6 @@ def check_leaves(state: SomeState, name: str) -> SomeState:
         if field not in traced:
             check_finite(f"{name}.{field}", value)
     leaves = {field: as_float(value) for field, value in given.items()}
-    leaves |= {name: within_a_turn(leaf) for name, leaf in leaves.items() if name in _ANGLES}
     shapes = {leaf.shape for leaf in leaves.values()}
     if len(shapes) > 1:
         raise ArgumentError(
@@ -149,33 +123,9 @@ def check_leaves(state: SomeState, name: str) -> SomeState:
     return state._replace(**leaves)
 
 
-class BristleState(NamedTuple):
-    """A `State` with the bristles of both feet: ten scalar leaves.
-
-    Attributes:
-        hip_x, hip_z, theta_1, theta_2, hip_vx, hip_vz, omega_1, omega_2: as in `State`.
-        bristle_1, bristle_2: see `AbstractBristleLaw` [–].
-    """
-
-    hip_x: Scalar
-    hip_z: Scalar
-    theta_1: Scalar
-    theta_2: Scalar
-    hip_vx: Scalar
-    hip_vz: Scalar
-    omega_1: Scalar
-    omega_2: Scalar
-    bristle_1: Scalar
-    bristle_2: Scalar
-
-
-MinimalState: TypeAlias = State | BristleState
-"""A state in minimal coordinates of a walker with laws of contact."""
-
-
 @state_type.register
-def _(scene: Scene) -> type[MinimalState]:
-    return BristleState if scene.has_bristles else State
+def _(scene: Scene) -> type[Any]:
+    return state_type_of(scene.state_names)
 
 
 def state_for(scene: AbstractWalkerScene, state: PyTree, name: str = "state") -> PyTree:
@@ -185,77 +135,53 @@ def state_for(scene: AbstractWalkerScene, state: PyTree, name: str = "state") ->
         ArgumentError: not a state, bristles where the scene has none, an entry that is not finite,
             or leaves of different shapes.
     """
-    kind = state_type(scene)
-    if kind is BristleState and isinstance(state, State):
-        state = check_state(state, State, name)
-        straight = jnp.zeros_like(state.hip_x)
-        return BristleState(**state._asdict(), bristle_1=straight, bristle_2=straight)
-    if kind is State and isinstance(state, BristleState):
-        law = type(cast(Scene, scene).friction).__name__
-        raise ArgumentError(f"{name} has bristles, but friction = {law} has none: give a State.")
-    return check_state(state, kind, name)
-
-
-class RigidState(NamedTuple):
-    """Place and leg angles of a walker that rolls on leg 2; five scalar leaves.
-
-    The frame and the angles are those of `State`. The hip's height and velocity follow from the
-    stance leg. Leaves may carry any common batch shape.
-
-    Attributes:
-        hip_x: hip position along the slope [m].
-        theta_1, theta_2: angles of swing leg and stance leg [rad].
-        omega_1, omega_2: their rates [rad/s].
-    """
-
-    hip_x: Scalar
-    theta_1: Scalar
-    theta_2: Scalar
-    omega_1: Scalar
-    omega_2: Scalar
-
-
-WalkerState: TypeAlias = MinimalState | RigidState
-"""A state of a walker in minimal coordinates, compliant or rigid."""
+    kind: Any = state_type(scene)
+    given = getattr(state, "_fields", ())
+    structure = scene.mechanism.structure
+    if given and (*given, *structure.bristles) == kind._fields:
+        state = without_whole_turns(scene, check_state(state, type(state), name))
+        straight = jnp.zeros_like(state[0])
+        return kind(*state, **dict.fromkeys(structure.bristles, straight))
+    if given == (*kind._fields, *structure.bristles):
+        law = type(scene.minimal.friction).__name__
+        raise ArgumentError(
+            f"{name} has bristles, but friction = {law} has none: give a {kind.__name__}."
+        )
+    return without_whole_turns(scene, check_state(state, kind, name))
 
 
 @state_type.register
-def _(scene: RigidScene) -> type[RigidState]:
-    return RigidState
+def _(scene: RigidScene) -> type[Any]:
+    return state_type_of(scene.state_names)
 
 
 @kept_alone
-def whole_state(scene: AbstractWalkerScene, state: RigidState) -> State:
+def whole_state(scene: AbstractWalkerScene, state: Any) -> Any:
     """The same motion in the compliant walker's coordinates, its stance foot just touching.
 
     Args:
         scene: the walker, of any kind.
-        state: leaves of any common shape, SI units.
+        state: a rigid walker's, leaves of any common shape, SI units.
 
     Returns:
-        A `State`, leaves shaped as the state's.
+        For `Walker` a `State`, leaves shaped as the state's.
     """
-    walker = scene.walker
-    sine, cosine = jnp.sin(state.theta_2), jnp.cos(state.theta_2)
-    return State(
-        hip_x=state.hip_x,
-        hip_z=walker.r + walker.hip_to_foot * cosine,
-        theta_1=state.theta_1,
-        theta_2=state.theta_2,
-        hip_vx=-(walker.r + walker.hip_to_foot * cosine) * state.omega_2,
-        hip_vz=-walker.hip_to_foot * sine * state.omega_2,
-        omega_1=state.omega_1,
-        omega_2=state.omega_2,
-    )
+    z, vx, vz = of_stance(scene, state, lambda stance: stance.root[1:4])
+    structure = scene.mechanism.structure
+    angles, rates = angles_and_rates(structure, state)
+    kind = state_type_of((*structure.coordinates, *structure.rates))
+    return kind(state[0], z, *angles, vx, vz, *rates)
 
 
-def rigid_state(state: State) -> RigidState:
-    """The part of a compliant walker's state that the rigid one keeps, leg 2 standing.
+def rigid_state(state: Any) -> Any:
+    """The part of a compliant walker's state that the rigid one keeps.
 
     Args:
-        state: leg 2 standing, leaves of any common shape, SI units.
+        state: the second of each pair standing, leaves of any common shape, SI units.
 
     Returns:
-        Hip place, angles and rates, leaves shaped as the state's.
+        Place of the root point, angles and rates, leaves shaped as the state's.
     """
-    return RigidState(state.hip_x, state.theta_1, state.theta_2, state.omega_1, state.omega_2)
+    place, *names = state._fields
+    kept = [place, *(name for name in names if name.startswith(("theta_", "omega_")))]
+    return state_type_of(kept)(*(getattr(state, name) for name in kept))

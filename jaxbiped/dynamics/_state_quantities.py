@@ -7,40 +7,84 @@ from collections.abc import Iterable
 from typing import Any
 
 from jaxbiped._quantity import Quantity
+from jaxbiped.scene._state_types import is_redundant
 
+_OF_ROOT = {
+    "x": Quantity("along the slope", r"$x_S$", "m"),
+    "z": Quantity("above the slope", r"$z_S$", "m"),
+    "vx": Quantity("velocity along the slope", r"$\dot x_S$", "m/s"),
+    "vz": Quantity("velocity off the slope", r"$\dot z_S$", "m/s"),
+}
 _HIP = {
-    "hip_x": Quantity("hip along the slope", r"$x_S$", "m"),
-    "hip_z": Quantity("hip above the slope", r"$z_S$", "m"),
-    "hip_vx": Quantity("hip velocity along the slope", r"$\dot x_S$", "m/s"),
-    "hip_vz": Quantity("hip velocity off the slope", r"$\dot z_S$", "m/s"),
+    f"hip_{name}": Quantity(f"hip {each.words}", each.symbol, each.unit)
+    for name, each in _OF_ROOT.items()
 }
-_EACH_LEG = {
-    "theta": Quantity("angle of leg", r"\theta", "rad"),
-    "omega": Quantity("rate of leg", r"\omega", "rad/s"),
-    "bristle": Quantity("bristles of foot", "b"),
-    "x": Quantity("mass centre along the slope of leg", "x", "m"),
-    "z": Quantity("mass centre above the slope of leg", "z", "m"),
-    "vx": Quantity("velocity along the slope of leg", r"\dot x", "m/s"),
-    "vz": Quantity("velocity off the slope of leg", r"\dot z", "m/s"),
-    "cos_half": Quantity("cosine of half the angle of leg", "c"),
-    "sin_half": Quantity("sine of half the angle of leg", "s"),
-    "cos_rate": Quantity("rate of that cosine of leg", r"\dot c", "1/s"),
-    "sin_rate": Quantity("rate of that sine of leg", r"\dot s", "1/s"),
+_EACH_BODY = {
+    "theta": Quantity("angle of", r"\theta", "rad"),
+    "omega": Quantity("rate of", r"\omega", "rad/s"),
+    "bristle": Quantity("bristles of", "b"),
+    "x": Quantity("mass centre along the slope of", "x", "m"),
+    "z": Quantity("mass centre above the slope of", "z", "m"),
+    "vx": Quantity("velocity along the slope of", r"\dot x", "m/s"),
+    "vz": Quantity("velocity off the slope of", r"\dot z", "m/s"),
+    "cos_half": Quantity("cosine of half the angle of", "c"),
+    "sin_half": Quantity("sine of half the angle of", "s"),
+    "cos_rate": Quantity("rate of that cosine of", r"\dot c", "1/s"),
+    "sin_rate": Quantity("rate of that sine of", r"\dot s", "1/s"),
 }
-STATE_QUANTITIES = _HIP | {
-    f"{name}_{leg}": Quantity(f"{each.words} {leg}", f"${each.symbol}_{leg}$", each.unit)
-    for name, each in _EACH_LEG.items()
-    for leg in (1, 2)
-}
+OF_BODIES = tuple(_EACH_BODY)
+"""What names of coordinates of a body begin with."""
+STATE_QUANTITIES = (
+    _HIP
+    | {
+        f"{name}_{leg}": Quantity(
+            f"{each.words} {'foot' if name == 'bristle' else 'leg'} {leg}",
+            f"${each.symbol}_{leg}$",
+            each.unit,
+        )
+        for name, each in _EACH_BODY.items()
+        for leg in (1, 2)
+    }
+    | {"mode": Quantity("mode of feet and stops")}
+)
 """By the names that the fields of a state of any kind have."""
 
-CYCLIC = ("hip_x",)
-"""Coordinates that no rate depends on: they need not recur, only advance."""
+
+def state_quantity(name: str) -> Quantity | None:
+    """What a coordinate of a mechanism is, by its name; None for one that is not known."""
+    if name in STATE_QUANTITIES:
+        return STATE_QUANTITIES[name]
+    for kind, own in _EACH_BODY.items():
+        if name.startswith(f"{kind}_"):
+            body = name.removeprefix(f"{kind}_")
+            symbol = rf"${own.symbol}_\mathrm{{{body.replace('_', ' ')}}}$"
+            return Quantity(f"{own.words} {body}", symbol, own.unit)
+    root, _, kind = name.rpartition("_")
+    known = _OF_ROOT.get(kind)
+    return Quantity(f"{root} {known.words}", known.symbol, known.unit) if root and known else None
+
+
+def unit_of(name: str) -> str:
+    """The SI unit of a coordinate of a scene's states."""
+    known = state_quantity(name)
+    assert known is not None  # a scene makes no other
+    return known.unit
+
+
+def cyclic_names(state: Any) -> tuple[str, ...]:
+    """Names of the coordinates of a state, or of a kind of state, that no rate depends on.
+
+    They need not recur in a cycle, only advance: the root point's place along the slope.
+    """
+    first, *rest = state._fields
+    turns = any(name.startswith("omega_") for name in rest)
+    return (first,) if turns and first.endswith("_x") and not is_redundant(state) else ()
 
 
 def recurring_names(state: Any) -> tuple[str, ...]:
     """Names of the coordinates of a state, or of a kind of state, that recur in a cycle."""
-    return tuple(name for name in state._fields if name not in CYCLIC)
+    cyclic = cyclic_names(state)
+    return tuple(name for name in state._fields if name not in cyclic)
 
 
 def recurring_leaves(state: Any) -> list[Any]:
@@ -51,7 +95,7 @@ def recurring_leaves(state: Any) -> list[Any]:
 def state_of_recurring(kind: Any, recurring: Iterable[Any], cyclic: Any = 0.0) -> Any:
     """The state of a kind with these recurring coordinates, and `cyclic` in place of the others."""
     named = dict(zip(recurring_names(kind), recurring, strict=True))
-    return kind(**dict.fromkeys(CYCLIC, cyclic), **named)
+    return kind(**dict.fromkeys(cyclic_names(kind), cyclic), **named)
 
 
 def dimensions_of(kind: Any) -> dict[str, tuple[float, float]]:
@@ -65,8 +109,10 @@ def dimensions_of(kind: Any) -> dict[str, tuple[float, float]]:
         TypeError: a field that is not known.
     """
     own = {name: Quantity(name, unit=unit) for name, unit in getattr(kind, "own_units", {}).items()}
-    known = STATE_QUANTITIES | own
+    found = {}
     for name in kind._fields:
-        if name not in known:
+        known = own.get(name) or state_quantity(name)
+        if known is None:
             raise TypeError(f"{kind.__name__}.{name} is not known: it must tell its own_units.")
-    return {name: known[name].length_and_time for name in kind._fields}
+        found[name] = known.length_and_time
+    return found

@@ -6,7 +6,9 @@ No step may straddle one: derivatives taken through it would be wrong.
 from typing import NamedTuple
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._contacts import Foot, feet, foot_force, touches
+from jaxbiped.dynamics._contacts import feet, foot_force, legs_at
+from jaxbiped.dynamics._footfalls import FootMotion, touches
+from jaxbiped.dynamics._gaps import limits_of
 from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.scene._scene import CompliantScene
 
@@ -22,16 +24,22 @@ class Switch(NamedTuple):
             anything runs.
         corner: whether the force is there on both sides and only its slope jumps, as where
             friction peaks: a touch of it changes no derivative. Known before anything runs.
+        resets: whether the state itself jumps, and only where the value falls through zero. Known
+            before anything runs.
     """
 
     value: Scalar
     live: Scalar | bool
     force_jumps: bool = False
     corner: bool = False
+    resets: bool = False
 
 
 def switches(scene: CompliantScene, state: CompliantState) -> tuple[Switch, ...]:
-    """Every switch of a scene: touchdown, reaction leaving zero, slip at ±v0 and 0, clearance rule.
+    """Every switch of a scene: those of its feet and those of its stops.
+
+    Of a foot: touchdown, reaction leaving zero, slip at ±v0 and 0, clearance rule. Of a stop: its
+    limits, and its torque leaving zero. Springs and latches are smooth.
 
     Source: the seed paper, section 2.2, whose laws have these corners.
 
@@ -40,18 +48,20 @@ def switches(scene: CompliantScene, state: CompliantState) -> tuple[Switch, ...]
         state: scalar leaves, SI units.
 
     Returns:
-        The switches of foot 1, then those of foot 2; as many at every state of a scene.
+        The switches of each foot, then those of each stop; as many at every state of a scene.
     """
-    both = feet(scene, state)
-    rates = (state.omega_1, state.omega_2)
-    return tuple(
-        switch
-        for foot, rate in zip(both, rates, strict=True)
-        for switch in _foot_switches(scene, foot, rate)
-    )
+    structure, legs = scene.mechanism.structure, legs_at(scene, state)
+    found: list[Switch] = []
+    for foot, leg in zip(feet(scene, state), structure.leg_of_foot, strict=True):
+        found += _foot_switches(scene, foot, legs[leg].rate)
+    for law, limit in limits_of(scene, state):
+        depth, rate = limit.penetration, limit.rate
+        found.append(Switch(depth, True, force_jumps=law.jumps_at_touchdown))
+        found += [Switch(value, depth > 0.0, corner=True) for value in law.switches(depth, rate)]
+    return tuple(found)
 
 
-def _foot_switches(scene: CompliantScene, foot: Foot, rate: Scalar) -> list[Switch]:
+def _foot_switches(scene: CompliantScene, foot: FootMotion, rate: Scalar) -> list[Switch]:
     if foot.admitted is False:
         return []
     below, touching = foot.penetration > 0.0, touches(foot)

@@ -4,14 +4,27 @@ None stands for a number that is zero whatever the state, which costs nothing.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
-from jaxbiped._circular import sine_cosine
+import jax.numpy as jnp
+
+from jaxbiped._trigonometry import sine_cosine
 from jaxbiped._types import Scalar
-from jaxbiped.linalg._elimination import Entry
+from jaxbiped.linalg._elimination import Entry, plus, times
 from jaxbiped.scene._bodies import Point
-from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._structure import Structure
+from jaxbiped.scene._structure import Structure, weighted
+
+
+class Tree(Protocol):
+    """A tree of bodies on a root point: a mechanism, or the same bodies on another root."""
+
+    @property
+    def structure(self) -> Structure:
+        """How the bodies hang together."""
+
+    @property
+    def bodies(self) -> tuple[Any, ...]:
+        """Each with `mass`, `inertia`, `centre`, and `at`, its hinge on its parent."""
 
 
 class Arm(NamedTuple):
@@ -26,18 +39,6 @@ class Arm(NamedTuple):
 
 Vector: TypeAlias = tuple[Scalar, Scalar]
 """Components x and z in the slope's frame."""
-
-
-def plus(a: Entry, b: Entry) -> Entry:
-    """a + b."""
-    if a is None:
-        return b
-    return a if b is None else a + b
-
-
-def times(a: Entry, b: Entry) -> Entry:
-    """a b."""
-    return None if a is None or b is None else a * b
 
 
 def arm_of(along: Scalar, ahead: Scalar | None, sine: Scalar, cosine: Scalar) -> Arm:
@@ -79,15 +80,21 @@ class Pose(NamedTuple):
     hinges: tuple[Arm | None, ...]
 
 
-def pose_of(mechanism: Mechanism, motion: Motion) -> Pose:
-    """The pose of a mechanism in a motion."""
+def pose_of(tree: Tree, motion: Motion) -> Pose:
+    """The pose of a tree in a motion."""
     pairs = [sine_cosine(angle) for angle in motion.angles]
     sines, cosines = zip(*pairs, strict=True)
+    return rehung(tree, Pose(motion, sines, cosines, ()))
+
+
+def rehung(tree: Tree, pose: Pose) -> Pose:
+    """A pose with the arms of a tree of the same bodies."""
+    sines, cosines = pose.sines, pose.cosines
     hinges = [
         None if body.at is None else arm_of(body.at.along, body.at.ahead, sines[p], cosines[p])
-        for body, p in zip(mechanism.bodies, mechanism.structure.parents, strict=True)
+        for body, p in zip(tree.bodies, tree.structure.parents, strict=True)
     ]
-    return Pose(motion, sines, cosines, tuple(hinges))
+    return pose._replace(hinges=tuple(hinges))
 
 
 class PointMotion(NamedTuple):
@@ -122,6 +129,23 @@ def point_motion(structure: Structure, pose: Pose, body: int, point: Point) -> P
     return PointMotion(x, z, vx, vz, tuple(arms))
 
 
+def point_acceleration(
+    point: PointMotion, rates: Sequence[Scalar], turning: Sequence[Scalar]
+) -> Vector:
+    """Acceleration of a point of a body relative to the root point [m/s²].
+
+    Args:
+        point: of any body.
+        rates, turning: rates and accelerations of all bodies' angles.
+    """
+    x = z = jnp.zeros_like(turning[0])
+    for link, arm in point.arms:
+        square = rates[link] * rates[link]
+        x = x + arm.dx * turning[link] - arm.dz * square
+        z = z + arm.dz * turning[link] + arm.dx * square
+    return x, z
+
+
 class Loads(NamedTuple):
     """Generalised forces: on the root point [N], and on each body's angle [N·m]."""
 
@@ -133,6 +157,15 @@ class Loads(NamedTuple):
     def none(structure: Structure) -> "Loads":
         """No load at all."""
         return Loads(None, None, (None,) * len(structure.bodies))
+
+    def plus(self, other: "Loads") -> "Loads":
+        """Both loads together."""
+        torques = (plus(*each) for each in zip(self.torques, other.torques, strict=True))
+        return Loads(plus(self.x, other.x), plus(self.z, other.z), tuple(torques))
+
+    def entries(self) -> list[Entry]:
+        """Of all coordinates: the root point's place, then each body's angle."""
+        return [self.x, self.z, *self.torques]
 
     def with_force(self, point: PointMotion, x: Entry, z: Entry) -> "Loads":
         """With a force (x, z) on a point, which turns every body that carries it."""
@@ -149,10 +182,3 @@ class Loads(NamedTuple):
         for body, weight in weights:
             torques[body] = plus(torques[body], weighted(torque, weight))
         return self._replace(torques=tuple(torques))
-
-
-def weighted(value: Scalar, weight: float) -> Scalar:
-    """A value times a weight that is known; ones cost nothing."""
-    if weight == 1.0:
-        return value
-    return -value if weight == -1.0 else weight * value

@@ -4,12 +4,14 @@ Every body is eliminated from the leaves to the root point. Accelerations are th
 that falls freely, so that gravity enters once, at the root point.
 """
 
+import itertools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._tree import Arm, Loads, Pose, Vector, arm_of, plus, times
-from jaxbiped.linalg._elimination import Entry
-from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.dynamics._tree import Arm, Loads, Pose, Tree, Vector, arm_of
+from jaxbiped.linalg._elimination import Entry, plus, times
+from jaxbiped.linalg._sparse_lu import SparseMatrix
 from jaxbiped.scene._structure import Structure
 
 
@@ -17,7 +19,7 @@ class Composites(NamedTuple):
     """Each body with all that hangs on it as mass points at its hinges; of parameters alone.
 
     Attributes:
-        masses: [kg]. total: of everything, the root point's too.
+        masses: [kg]. total: of everything, with a mass at the root point.
         along, ahead: first moments about each body's hinge, in its frame [kg·m].
         inertias: about each body's hinge [kg·m²].
     """
@@ -29,31 +31,45 @@ class Composites(NamedTuple):
     inertias: tuple[Scalar, ...]
 
 
-def composites(mechanism: Mechanism) -> Composites:
-    """The composite bodies of a mechanism."""
-    structure, bodies = mechanism.structure, mechanism.bodies
+def composites(tree: Tree, points: Sequence[tuple[int, Any, Entry]] | None = None) -> Composites:
+    """The composite bodies of a tree.
+
+    Args:
+        tree: of bodies.
+        points: mass points [kg] on bodies: the body's number, −1 for the root point, the place on
+            it, None for its hinge, and the mass, None for none. None for a mechanism's own one.
+    """
+    structure, bodies = tree.structure, tree.bodies
+    if points is None:
+        points = [(-1, None, getattr(tree, "root_mass", None))]
     n = len(bodies)
     masses: list[Any] = [None] * n
     along, ahead, inertias = list(masses), list(masses), list(masses)
-    for j in reversed(range(n)):
+
+    def carried(j: int) -> list[tuple[Any, Any]]:
+        """Masses that hang on a body, and where."""
+        own = [(mass, at) for body, at, mass in points if body == j and mass is not None]
+        return own + [(masses[k], bodies[k].at) for k in structure.children[j]]
+
+    for j in reversed(structure.outwards):
         body = bodies[j]
         mass, first = body.mass, body.mass * body.centre.along
         second = times(body.mass, body.centre.ahead)
         inertia: Any = body.inertia + first * body.centre.along
         inertia = plus(inertia, times(second, body.centre.ahead))
-        for k in structure.children[j]:
-            mass, at = mass + masses[k], bodies[k].at
+        for more, at in carried(j):
+            mass = mass + more
             if at is None:
                 continue
-            moment = masses[k] * at.along
+            moment = more * at.along
             first, inertia = first + moment, inertia + moment * at.along
             if at.ahead is not None:
-                moment = masses[k] * at.ahead
+                moment = more * at.ahead
                 second, inertia = plus(second, moment), inertia + moment * at.ahead
         masses[j], along[j], ahead[j], inertias[j] = mass, first, second, inertia
-    total: Any = mechanism.root_mass
-    for k in structure.children[-1]:
-        total = plus(total, masses[k])
+    total: Any = None
+    for more, _ in carried(-1):
+        total = plus(total, more)
     return Composites(tuple(masses), total, tuple(along), tuple(ahead), tuple(inertias))
 
 
@@ -89,7 +105,7 @@ def eliminate(structure: Structure, known: Composites, pose: Pose) -> Eliminatio
     more: list[tuple[Any, Any, Any]] = [(None, None, None)] * n
     over: list[Scalar] = list(known.inertias)
     shares: list[Vector] = [moments[0]] * n
-    for j in reversed(range(n)):
+    for j in reversed(structure.outwards):
         cx, cz = moments[j]
         inertia = known.inertias[j]
         xx: Any = None
@@ -118,7 +134,7 @@ def substitute(structure: Structure, factors: Elimination, loads: Loads) -> list
     n, pose = len(structure.bodies), factors.pose
     forces: list[tuple[Entry, Entry]] = [(None, None)] * n
     torques: list[Any] = list(loads.torques)
-    for j in reversed(range(n)):
+    for j in reversed(structure.outwards):
         fx = fz = None
         for k in structure.children[j]:
             hx, hz = forces[k]
@@ -135,19 +151,20 @@ def substitute(structure: Structure, factors: Elimination, loads: Loads) -> list
     for k in structure.children[-1]:
         fx, fz = plus(fx, forces[k][0]), plus(fz, forces[k][1])
     ax, az = _of_symmetric(factors.root, fx, fz)
-    found: list[Any] = [ax, az]
-    hinges: list[tuple[Entry, Entry]] = []
-    for j, parent in enumerate(structure.parents):
+    found: list[Any] = [ax, az, *[None] * n]
+    hinges: list[tuple[Entry, Entry]] = [(ax, az)] * n
+    for j in structure.outwards:
+        parent = structure.parents[j]
         hx, hz = (ax, az) if parent < 0 else hinges[parent]
         arm = pose.hinges[j]
         if arm is not None:
             turning = found[2 + parent]
             hx, hz = plus(hx, times(arm.dx, turning)), plus(hz, times(arm.dz, turning))
-        hinges.append((hx, hz))
+        hinges[j] = hx, hz
         ux, uz = factors.shares[j]
         moved = plus(times(ux, hx), times(uz, hz))
         own = times(torques[j], factors.over[j])
-        found.append(own if moved is None else plus(own, -moved))
+        found[2 + j] = own if moved is None else plus(own, -moved)
     return found
 
 
@@ -162,25 +179,48 @@ def _of_symmetric(matrix: tuple[Scalar, Entry, Scalar], x: Entry, z: Entry) -> t
     return times(first, over), times(second, over)
 
 
-def centrifugal_loads(structure: Structure, known: Composites, pose: Pose) -> Loads:
-    """Generalised forces of the motion itself, in the frame that falls freely."""
+def inertial_loads(
+    structure: Structure, known: Composites, pose: Pose, accelerations: Sequence[Entry] | None
+) -> Loads:
+    """Generalised forces of the motion itself, in the frame that falls freely (d'Alembert's).
+
+    Args:
+        structure: of the tree.
+        known: its composite bodies.
+        pose: with angles and rates.
+        accelerations: of the root point and of all angles; None for centrifugal forces alone.
+    """
     n = len(structure.bodies)
     moments = moments_of(known, pose)
     squares = [rate * rate for rate in pose.motion.rates]
-    pulls: list[tuple[Entry, Entry]] = [(None, None)] * n  # of the hinges' own circles
+    turning: Sequence[Entry] = (None,) * n if accelerations is None else accelerations[2:]
+    moved = (None, None) if accelerations is None else accelerations[:2]
+    root_x, root_z = (None if each is None else -each for each in moved)
+    root = (root_x, root_z)
+
+    def pull(j: int, arm: Arm) -> tuple[Scalar, Scalar]:
+        """Minus the acceleration of a point of body j about the body's hinge."""
+        x, z = squares[j] * arm.dz, -(squares[j] * arm.dx)
+        own = turning[j]
+        return (x, z) if own is None else (x - own * arm.dx, z - own * arm.dz)
+
+    pulls: list[tuple[Entry, Entry]] = [root] * n  # of the hinges
     torques: list[Entry] = [None] * n
-    for j, parent in enumerate(structure.parents):
-        px, pz = (None, None) if parent < 0 else pulls[parent]
+    for j in structure.outwards:
+        parent = structure.parents[j]
+        px, pz = root if parent < 0 else pulls[parent]
         arm = pose.hinges[j]
         if arm is not None:
-            px = plus(px, squares[parent] * arm.dz)
-            pz = plus(pz, -(squares[parent] * arm.dx))
+            ax, az = pull(parent, arm)
+            px, pz = plus(px, ax), plus(pz, az)
         pulls[j] = px, pz
         torques[j] = plus(times(px, moments[j].dx), times(pz, moments[j].dz))
+        own = turning[j]
+        torques[j] = plus(torques[j], None if own is None else -(known.inertias[j] * own))
     forces: list[tuple[Scalar, Scalar]] = [moments[0]] * n
-    x = z = None
-    for j in reversed(range(n)):
-        fx, fz = squares[j] * moments[j].dz, -(squares[j] * moments[j].dx)
+    x, z = times(root[0], known.total), times(root[1], known.total)
+    for j in reversed(structure.outwards):
+        fx, fz = pull(j, moments[j])
         for k in structure.children[j]:
             arm = pose.hinges[k]
             if arm is not None:
@@ -191,3 +231,24 @@ def centrifugal_loads(structure: Structure, known: Composites, pose: Pose) -> Lo
     for k in structure.children[-1]:
         x, z = plus(x, forces[k][0]), plus(z, forces[k][1])
     return Loads(x, z, tuple(torques))
+
+
+def centrifugal_loads(structure: Structure, known: Composites, pose: Pose) -> Loads:
+    """Generalised forces of the motion itself without accelerations, in the falling frame."""
+    return inertial_loads(structure, known, pose, None)
+
+
+def mass_entries(structure: Structure, known: Composites, pose: Pose) -> SparseMatrix:
+    """The mass matrix of the root point's place (rows 0 and 1) and of all angles (2 on)."""
+    found: SparseMatrix = {(0, 0): known.total, (1, 1): known.total}
+    for j, moment in enumerate(moments_of(known, pose)):
+        found[2 + j, 2 + j] = known.inertias[j]
+        pairs: list[tuple[int, Scalar]] = [(0, moment.dx), (1, moment.dz)]
+        chain = structure.chains[j]
+        for above, below in itertools.pairwise(chain):
+            arm = pose.hinges[below]
+            if arm is not None:
+                pairs.append((2 + above, arm.dx * moment.dx + arm.dz * moment.dz))
+        for i, entry in pairs:
+            found[2 + j, i] = found[i, 2 + j] = entry
+    return found

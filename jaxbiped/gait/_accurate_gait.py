@@ -15,9 +15,9 @@ from jaxtyping import PyTree
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._return_map_spec import orbit_solver
-from jaxbiped.gait._search_provenance import grazing_sentence
+from jaxbiped.gait._search_provenance import unknown_derivatives
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameter_access import parameter_values
-from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
 from jaxbiped.solve._error_estimate import Judged, check_untraced, refine
 from jaxbiped.solve._units import relative_to_scene
@@ -35,6 +35,8 @@ _LOOSER_SHARE, _OTHER_SHARE = 0.65, 1.4
 Chosen on the gaits of 400 random scenes (draw 23 of `experiments/accuracy_coverage.py`): the larger
 of both changes held 99.3 % of the sensitivities, twice that 99.8 % at bars 50 times the error in
 the median, this sum 99.6 % at 29 times."""
+_SLOPES_SHARE = 0.5
+"""Part of the first of both that sensitivities have: their estimate is more than that change."""
 _MULTIPLIERS_SHARE = 0.8
 """Part of that sum that is a multiplier's bar: on the same scenes the sum was 28 times the error in
 the median, this part 23 times, and all multipliers lay within it in 99.0 % of them."""
@@ -77,7 +79,7 @@ def accurate_gait(
         witness = find(near, accuracy=precision, solver=other)
         judged = judge_gait(scene.minimal, gait, witness, radius)
         if int(gait.grazes):  # which a finer tolerance may resolve
-            return gait, (judged[0], np.inf, grazing_sentence(gait) if finest(tolerance) else "")
+            return gait, (judged[0], np.inf, unknown_derivatives(gait) if finest(tolerance) else "")
         return gait, judged
 
     def finest(tolerance: float) -> bool:
@@ -102,7 +104,10 @@ def judge_gait(scene: AbstractScene, gait: Gait, other: Gait, radius: bool) -> J
         "multipliers": _MULTIPLIERS_SHARE
         * _bar(gait.multiplier_errors, gait.multipliers, other.multipliers),
         "sensitivities": jtu.tree_map(
-            _bar, gait.sensitivity_errors, gait.sensitivities, other.sensitivities
+            lambda estimate, *both: _bar(_SLOPES_SHARE * np.asarray(estimate), *both),
+            gait.sensitivity_errors,
+            gait.sensitivities,
+            other.sensitivities,
         ),
     }
     of, found = bars["measures"], gait.measures
@@ -137,7 +142,8 @@ def _elasticity_shares(
     if not lacking:
         return shares, ""
     told = " and ".join(each.replace("_", " ") for each in lacking)
-    return shares, f"derivatives of the {told} are unknown: the law's force jumps there"
+    why = "the law's force jumps or is infinitely steep there"
+    return shares, f"derivatives of the {told} are unknown: {why}"
 
 
 def _bar(estimate: Any, told: Any, other: Any) -> np.ndarray:

@@ -18,9 +18,9 @@ from jaxbiped._progress import stage
 from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped.compiler import deferred_checks, host_jit
 from jaxbiped.dynamics._consistent_state import consistent_state
-from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
+from jaxbiped.dynamics._redundant_state import BodiesState, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import WalkerState, state_for
+from jaxbiped.dynamics._state import state_for
 from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
@@ -31,15 +31,18 @@ from jaxbiped.gait._fixed_point_search import (
     walks_only,
 )
 from jaxbiped.gait._gait import Gait, summarise_gait
+from jaxbiped.gait._held_multipliers import without_held
 from jaxbiped.gait._newton import Method
-from jaxbiped.gait._return_map_spec import return_map_spec, runs_by_lanes
+from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes
 from jaxbiped.gait._search_along import search_along
-from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_grazing
+from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_unknown
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.gait._staged_search import is_whole, origin_of, search_in_stages, spectral_radius
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
 from jaxbiped.solve._error_estimate import check_wanted
 from jaxbiped.variational._hybrid_system import section_of, with_leg_names_of
@@ -54,9 +57,9 @@ _RESIDUAL_SHARE = 0.3
 @without_switches
 def find_gait(
     scene: Scene | RigidScene | RedundantScene,
-    guess: WalkerState | LegsState | None = None,
+    guess: WalkerState | BodiesState | None = None,
     *,
-    footsteps: int = 1,
+    footsteps: int | None = None,
     section: AbstractSection | None = None,
     parameters: tuple[str, ...] | None = None,
     accuracy: str | float | Precision = "balanced",
@@ -82,12 +85,14 @@ def find_gait(
         guess: a start near the gait, on the section or not; the gait is then the one that Newton's
             method comes to from there. Unless given, the search goes through stages, each only
             where those before found no stable gait: Newton's method from the seed's start, fitted
-            to the scene's legs; walks forwards from many starts (by lanes only); continuation of
-            the seed scene's gait to this one; Newton's method from scattered starts. The gait is
-            then the stable one, or where none was seen the one of smallest spectral radius. Under
-            `jit` and `vmap` there are two stages, the first and the continuation.
-        footsteps: how many a cycle has. Without a guess the search goes on where what it finds
-            repeats itself after fewer; where there is no other `cycle_footsteps` says how many.
+            to the scene's legs; walks forwards from many starts (by lanes only); continuation from
+            the seed's scene, or that of the same walker relaxed (straight, passive, of legs alone);
+            Newton's method from scattered starts. The gait is then the stable one, or the one of
+            smallest spectral radius. Under `jit` and `vmap` only start and continuation are tried.
+        footsteps: how many a cycle has. Unless given, the fewest: one of a mirrored walker, of one
+            with unlike legs those of a stride. Without a guess the search goes on where what it
+            finds repeats itself after fewer; where there is no other `cycle_footsteps` says how
+            many.
         section: where the cycle begins, `MidStance()` unless given. A rigid walker's cycles begin
             just after its impact, at `HeelStrike()`.
         parameters: names of the parameters to differentiate with respect to (see
@@ -139,7 +144,7 @@ def find_gait(
     if isinstance(accuracy, str):
         check_accuracy_name(accuracy)
     check_choice("method", method, ("newton", "optax"))
-    check_count("footsteps", footsteps)
+    arrivals = arrivals_of(scene, footsteps)
     check_unbatched("scene", scene)
     section = section_of(scene, section)
     start = _check_start(scene, section, default_guess(scene) if guess is None else guess)
@@ -148,6 +153,7 @@ def find_gait(
     check_count("max_evaluations", most)
     modelled = scene.minimal  # a redundant scene's leaves begin with those of what it models
     names, active = select_parameters(modelled, parameters)
+    radius = radius_sensitivities and bool(names)
     precision = precision_of(accuracy, scene) if isinstance(accuracy, str) else accuracy
     named = accuracy if isinstance(accuracy, str) else "tight"
     spec = return_map_spec(
@@ -156,7 +162,7 @@ def find_gait(
         section=section,
         solver=solver,
         engine=engine,
-        steps=int(footsteps),
+        steps=arrivals,
         max_solver_steps=ACCURACIES[named].max_solver_steps,
     )
     how = Method(
@@ -169,24 +175,24 @@ def find_gait(
     columns = select_parameters(modelled, None)[1] if runs_by_lanes(spec) else ()
     problem = FixedPointProblem(spec, scene, columns, start, precision, how)
     asked = problem._replace(active=active, method=None)
-    by = FoundBy.GUESS if guess is not None else FoundBy.START
-    origin = single_stage_origin(modelled, start, by)
+    origin = single_stage_origin(modelled, start, FoundBy.START if guess is None else FoundBy.GUESS)
     staged = guess is None and max_evaluations is None and method == "newton"
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(problem)):
         if staged:
             found, origin = search_along(problem, origin)
         else:
             found = walks_only(search(problem))
-        return summarise_gait(asked, found, names, radius_sensitivities, origin)
-    _compile_once(problem, asked, names, radius_sensitivities, origin)
-    found = _search(problem)
-    if not staged:
-        found = walks_only(found)
-    elif not (_is_stable(found) and is_whole(found, problem)):
-        found, origin = _search_on(problem, found, engine)
-    gait = summarise_gait(asked, found, names, radius_sensitivities, origin)
-    warn_of_grazing(gait)
-    return gait
+        return summarise_gait(asked, found, names, radius, origin)
+    _compile_once(problem, asked, names, radius, origin)
+    found, told = _search(problem), origin
+    found = found if staged else walks_only(found)
+    if staged and not (_is_stable(found) and is_whole(found, problem)):
+        found, told = _search_on(problem, found, engine)
+    gait = summarise_gait(asked, found, names, radius, origin)
+    if told is not origin:  # its scene may be of another structure, as of motors with a share
+        gait = dataclasses.replace(gait, origin=jtu.tree_map(np.asarray, told))
+    warn_of_unknown(gait)
+    return without_held(scene, gait)
 
 
 def _is_stable(found: Found) -> bool:

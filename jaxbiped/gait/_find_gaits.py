@@ -11,13 +11,13 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._state import RigidState, State, WalkerState
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._state_types import RigidState, State, WalkerState
 
 _SAME = 1e-4
 """Largest difference of a component (SI units) between two finds of one gait."""
@@ -65,17 +65,18 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
             f"starts has leaves of shapes {sorted(shapes)}: they must all be (n,), n at least 1."
         )
 
-    gaits = _find_each(scene, jtu.tree_map(as_float, starts), options)
+    found = _find_each(scene, jtu.tree_map(as_float, starts), options)
+    gaits = jtu.tree_map(np.asarray, found)
     first, which = _told_apart(gaits)
     reached = np.bincount(which[which >= 0], minlength=len(first))
     order = np.argsort(-reached, kind="stable")
     place = np.argsort(order)
     chosen = np.asarray(first, dtype=int)[order]
     return Gaits(
-        gaits=jtu.tree_map(lambda leaf: leaf[chosen], gaits),
+        gaits=jtu.tree_map(lambda leaf: jnp.asarray(leaf[chosen]), gaits),
         reached=jnp.asarray(reached[order]),
         which=jnp.asarray([place[k] if k >= 0 else -1 for k in which], dtype=int),
-        ending=gaits.ending,
+        ending=found.ending,
     )
 
 

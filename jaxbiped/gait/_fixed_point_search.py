@@ -16,7 +16,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import NamedCode
 from jaxbiped._types import RealScalarLike, Scalar, by_numpy
-from jaxbiped.dynamics._contacts import Foot, feet, touches
+from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._footfalls import FootMotion, any_of, touches
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.gait._newton import Method, Progress, Stage, initial_progress, newton_iteration
 from jaxbiped.gait._poincare_map import (
@@ -27,7 +28,7 @@ from jaxbiped.gait._poincare_map import (
     state_with,
 )
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
-from jaxbiped.scene._scene import AbstractWalkerScene
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._tangents import Seeded
 
@@ -72,6 +73,7 @@ class Found(NamedTuple):
         evaluations: how often the return map was evaluated.
         history: residual of each evaluation, shape (max_evaluations,), NaN beyond the last.
         sound: whether the orbit is a walk (see `is_sound`).
+        again: the return solved once more, by other steps; None where it was not.
     """
 
     ending: Scalar
@@ -82,6 +84,7 @@ class Found(NamedTuple):
     evaluations: Scalar
     history: Scalar
     sound: Scalar
+    again: LinearisedReturn | None = None
 
     @property
     def last(self) -> LinearisedReturn:
@@ -242,18 +245,17 @@ def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) 
     """
     if not isinstance(scene, AbstractWalkerScene):
         return jnp.asarray(True)
-    pace = jnp.sqrt(scene.walker.l / scene.ground.g)
+    pace = jnp.sqrt(scene.mechanism.height / scene.ground.g)
     forward = (step_length > 0.0) & (period > _SHORTEST * pace)
     if not scene.compliant:
         return forward
     modelled = scene.minimal
-    weight = modelled.walker.total_mass * modelled.ground.g
+    weight = modelled.mechanism.total_mass * modelled.ground.g
 
-    def deep(foot: Foot) -> Scalar:
+    def deep(foot: FootMotion) -> Scalar:
         return touches(foot) & (modelled.normal.elastic_force(foot.penetration) > _DEEPEST * weight)
 
-    both = feet(modelled, minimal_state(scene, state))
-    return forward & ~deep(both.foot_1) & ~deep(both.foot_2)
+    return forward & ~any_of([deep(foot) for foot in feet(modelled, minimal_state(scene, state))])
 
 
 def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: RealScalarLike) -> Scalar:

@@ -14,7 +14,6 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._summary import summary
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
@@ -24,6 +23,7 @@ from jaxbiped.gait._fixed_point_search import (
     minimal_cycle,
     search_by_lanes,
 )
+from jaxbiped.gait._gait_path import nodes_of, step_lengths
 from jaxbiped.gait._orbit_derivatives import Orbit, Slopes, orbit_of, with_parameter_columns
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._search_provenance import FoundBy, Origin, OtherGait
@@ -62,8 +62,7 @@ class Measures(NamedTuple):
 class Gait(eqx.Module):
     """A periodic gait; under `vmap` every array gains the batch's axes. p parameters.
 
-    Shapes are those of the compliant walker, whose state has m = 7 components besides hip_x; the
-    rigid one's has 4.
+    A state has m components besides the root point's place along the slope.
 
     Attributes:
         ending: code of a `Search`; `outcome` names it.
@@ -82,7 +81,7 @@ class Gait(eqx.Module):
         bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
         sensitivities: derivatives of the measures with respect to each parameter, leaves of shape
             (p,); NaN where the search did not converge.
-        sensitivity_errors: their estimated errors, from what a ten times looser solve changes.
+        sensitivity_errors: their estimated errors, by two witnesses and with a floor.
         elasticities: d log |measure| / d log parameter, leaves of shape (p,); zero for a parameter
             that is zero, NaN for a measure that is.
         evaluations: evaluations of the return map that the search took.
@@ -97,11 +96,13 @@ class Gait(eqx.Module):
             and more than a fraction of a swing between crossings (boolean).
         origin: how the search came to it, which other gaits it saw, and where the seed's gait
             ended on the way to this scene; see `found_by` and `others`.
+        step_lengths: distance of each heel strike from the one before [m], shape (footsteps,).
         orbit: times [s] and states at the ends of the last cycle's solver steps, NaN beyond.
         error: error bars of `measures`, `multipliers` and `sensitivities`, an `ErrorEstimate`; None
             unless the accuracy was asked for by a number.
         parameters: names of the p parameters.
         engine: what computed it, "xla" or "lanes".
+        cycle: "step" for a mirrored walker, whose cycles are steps, "stride" for another.
         quantities: what the parameters are, with their units; () where that is not known.
     """
 
@@ -127,9 +128,11 @@ class Gait(eqx.Module):
     cycle_footsteps: Scalar
     sound: Scalar
     origin: Origin
+    step_lengths: Scalar
     orbit: tuple[Scalar, PyTree]
     parameters: tuple[str, ...] = eqx.field(static=True)
     engine: str = eqx.field(static=True)
+    cycle: str = eqx.field(static=True)
     quantities: tuple[Quantity, ...] = eqx.field(static=True, default=())
     error: ErrorEstimate | None = None
 
@@ -192,6 +195,7 @@ def summarise_gait(
     orbit = orbit_of(problem, found, radius=radius)
     stability = orbit.stability
     last, m = found.last, found.recurring.shape[0]
+    path, structure = nodes_of(last, problem.guess), problem.args.mechanism.structure
     lost = found.ending == int(Search.NO_RETURN)
 
     def known(tree: PyTree) -> PyTree:
@@ -219,6 +223,7 @@ def summarise_gait(
         multiplier_errors=stability.errors,
         directions=stability.directions,
         monodromy=last.monodromy[:, :m],
+        step_lengths=step_lengths(problem, last, path[1]),
         return_jacobian=rows[:, :m],
         unit_multiplier_error=stability.unit_error,
         sensitivities=jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes),
@@ -238,12 +243,14 @@ def summarise_gait(
         history=found.history,
         solver_steps=last.attempted,
         grazes=last.grazes,
-        cycle_footsteps=minimal_cycle(last, off, problem.precision.rtol),
+        cycle_footsteps=problem.args.arrival_footsteps
+        * minimal_cycle(last, off, problem.precision.rtol),
         sound=found.sound,
         origin=jtu.tree_map(jnp.asarray, origin),
-        orbit=_path(last, problem.guess),
+        orbit=path,
         parameters=names,
         engine=problem.spec.engine,
+        cycle="stride" if len(structure.namings) == 1 else "step",
         quantities=tuple(map(parameter_quantities(problem.args).__getitem__, names)),
     )
 
@@ -269,14 +276,6 @@ def _at_fixed_point(once: LinearisedReturn, orbit: Orbit) -> Measures:
     peak = once.peak + once.peak_row[:m] @ correction
     state = state_of_recurring(type(orbit.state), begun + correction, jnp.zeros_like(period))
     return Measures(period, length, length / period, peak, orbit.stability.spectral_radius, state)
-
-
-def _path(last: LinearisedReturn, like: WalkerState) -> tuple[Scalar, PyTree]:
-    """Times and states of a cycle's nodes, leaves of shape (footsteps, nodes); NaN beyond them."""
-    nodes = last.nodes
-    assert nodes is not None
-    times, *states = jax.vmap(lambda ends, start: ends.columns(start))(nodes.ends, nodes.start)
-    return times, jtu.tree_unflatten(jtu.tree_structure(like), states)
 
 
 def _by_parameter(orbit: Orbit, measures: Measures, slopes: Slopes, radius: Scalar) -> Measures:

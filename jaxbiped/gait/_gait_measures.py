@@ -11,7 +11,6 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.dynamics._state_quantities import recurring_names
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
@@ -20,6 +19,7 @@ from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.linalg._elimination import solution
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.simulate._derivatives import first_derivatives_only
 
 
@@ -28,7 +28,7 @@ def gait_measures(
     guess: WalkerState | None = None,
     *,
     gradient: AbstractGradient | None = None,
-    footsteps: int = 1,
+    footsteps: int | None = None,
     section: AbstractSection | None = None,
     accuracy: str = "balanced",
     engine: str = "auto",

@@ -3,19 +3,16 @@
 A search that fails from its start follows the seed's gait along this line to scenes far from it.
 """
 
-import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from itertools import islice
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._ending import NamedCode
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Scalar
 from jaxbiped.gait._pseudo_arclength import (
     Change,
     Curve,
@@ -25,13 +22,11 @@ from jaxbiped.gait._pseudo_arclength import (
     follow,
     locate,
 )
-from jaxbiped.scene._ready_scenes import seed_scene
-from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
-from jaxbiped.scene.actuation._abstract_actuator import Actuation
-from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
-from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
+from jaxbiped.gait._relaxation import relaxed, seed_like
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._walker import Walker
 
-_Law = TypeVar("_Law", bound=eqx.Module)
 _CONTROL = StepControl(first=0.08, largest=0.35, smallest=2e-4)
 _CONVERGED = 2e-5
 """Size of a correction that ends the corrector."""
@@ -70,48 +65,18 @@ def _interpolate(a: Scalar, b: Scalar, s: Scalar | float) -> tuple[Scalar, Scala
     return value, jnp.where(geometric, power * jnp.log(ratio), b - a)
 
 
-def homotopy_to(scene: AbstractWalkerScene) -> Homotopy:
+def homotopy_to(scene: AbstractWalkerScene) -> Homotopy | None:
     """The line to `scene` from the seed's scene, its laws made to resemble the seed's.
+
+    For a walker of other bodies it begins at the same walker relaxed (see `relaxed`); None where
+    there is nothing to relax.
 
     Numbers of laws that are not in the catalogue stay those of `scene`. Its actuators are idle.
     """
-    return Homotopy(scene.with_minimal(_seed_like(scene.minimal)), scene)
-
-
-def _seed_like(scene: Scene | RigidScene) -> Scene | RigidScene:
-    with jax.ensure_compile_time_eval():
-        own = jtu.tree_map(float, seed_scene())
-        if isinstance(scene, RigidScene):
-            rigid = dataclasses.replace(
-                scene, walker=own.walker, ground=own.ground, actuation=_idle(scene)
-            )
-            return jtu.tree_map(as_float, rigid)
-        begin = dataclasses.replace(
-            scene,
-            walker=own.walker,
-            ground=own.ground,
-            normal=_like_seed(scene.normal, NORMAL_LAWS, normal_law_like),
-            friction=_like_seed(scene.friction, FRICTION_LAWS, friction_law_like),
-            actuation=_idle(scene),
-        )
-        return jtu.tree_map(as_float, begin)
-
-
-def _idle(scene: Scene | RigidScene) -> Actuation:
-    """The scene's actuators at strength zero: the seed's walker is passive."""
-    return None if scene.actuation is None else tuple(part.idle() for part in scene.actuation)
-
-
-def _like_seed(law: _Law, catalogue: Mapping[str, type], like: Callable[[str], Any]) -> _Law:
-    """A law of the catalogue with numbers that resemble the seed's; its own where these lack."""
-    name = next((name for name, kind in catalogue.items() if kind is type(law)), None)
-    if name is None:
-        return law
-    alike = like(name)
-    own = [field.name for field in dataclasses.fields(law) if not field.metadata.get("static")]
-    values = {name: getattr(alike, name) for name in own if getattr(law, name) is not None}
-    known = {name: value for name, value in values.items() if value is not None}
-    return dataclasses.replace(law, **known)
+    if isinstance(scene.walker, Walker):
+        return Homotopy(scene.with_minimal(seed_like(scene.minimal)), scene)
+    both = relaxed(scene) if isinstance(scene, Scene) else None
+    return None if both is None else Homotopy(*both)
 
 
 class BranchEnd(NamedCode):
@@ -159,6 +124,11 @@ class FollowedBranch(NamedTuple):
     code: int = 0
 
     @property
+    def is_lost(self) -> bool:
+        """Whether it ended where the return map has a kink, or beyond its last walk."""
+        return self.end in (BranchEnd.WALK_ENDS, BranchEnd.BREAKS_OFF)
+
+    @property
     def farthest(self) -> int:
         """The point nearest to the scene that was asked for."""
         return int(np.argmax(self.s))
@@ -167,25 +137,27 @@ class FollowedBranch(NamedTuple):
 def follow_branch(
     change: Callable[[np.ndarray, float], Change],
     start: np.ndarray,
+    s: float = 0.0,
     *,
     scales: np.ndarray,
     smallest: float = _CONTROL.smallest,
     most_steps: int = 150,
 ) -> FollowedBranch:
-    """Follows the branch of zeros of `change` from one at s = 0 until s = 1.
+    """Follows the branch of zeros of `change` from one at s until s = 1.
 
     Args:
         change: of a point, shape (m,), and s.
-        start: the zero at s = 0.
+        start: the zero at s.
+        s: where the branch begins.
         scales: sizes of the components, shape (m,), in which arclength is measured; s in its own.
         smallest: arclength of a step below which the branch is given up.
         most_steps: steps allowed.
     """
     curve = Curve(change, np.append(scales, 1.0), _CONVERGED)
-    here = np.append(start, 0.0) / curve.sizes
+    here = np.append(start, s) / curve.sizes
     first = correct(curve, here)
     if first.found is None:
-        return FollowedBranch(start[None], np.zeros(1), BranchEnd.NO_BEGINNING, first.code)
+        return FollowedBranch(start[None], np.full(1, s), BranchEnd.NO_BEGINNING, first.code)
     control = _CONTROL._replace(smallest=smallest)
     path, end, code = [first.found], BranchEnd.UNFINISHED, 0
     for attempt in islice(follow(curve, first.found, control, high=1.0), most_steps):

@@ -1,5 +1,6 @@
 """Periodic orbit: its stability and its sensitivities."""
 
+import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -10,12 +11,17 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, with_looser
-from jaxbiped.gait._poincare_map import LinearisedReturn, linearised_return
+from jaxbiped.gait._poincare_map import (
+    PARAMETER_FLOOR,
+    LinearisedReturn,
+    linearised_return,
+)
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.gait._stability import Stability, stability_of
 from jaxbiped.linalg._small_matrices import eigensystem, solve
 from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve._units import recurring_inverse_units
 
 CLOSENESS = 1e-3
 """Distance of a multiplier from the unit circle that is flagged as a bifurcation."""
@@ -26,11 +32,23 @@ parameter's size: of the switches' crossings, which second derivatives magnify."
 
 _ROWS = ("jacobian", "monodromy", "period_row", "advance_rows", "peak_row")
 """Those of a return's leaves that are derivatives."""
+_MORE_STEPS = 4
+"""Factor of the steps that a return may take where it carries columns of parameters: small
+sensitivities are solved as exactly as large ones."""
 _NOTHING = 1e-300
-_SHARE = 0.5
-"""Of what a looser solve changes, that a first derivative may be wrong by."""
-_POOLED = 0.1
-"""Of what it changes on the whole, that every derivative is wrong by at least."""
+_POOLED = 0.2
+"""Of what a looser solve changes on the whole, that every first derivative is wrong by at least."""
+_FLOOR = 0.3
+"""Of the error up to which columns are solved however small they are, that derivatives have.
+
+With both, on 63 gaits of random scenes 99.3 % of 9,387 first derivatives lay within their bars, the
+worst 6.4 bars off, and the median bar was 25 times the error."""
+_TURNED, _TURNED_TERMS = 4.0, 0.1
+"""Of a multiplier's error over its distance to the others, by which its eigenvectors are turned,
+that derivatives of the spectral radius and their terms are wrong by.
+
+With both, on 103 gaits 99.4 % of 1,545 such derivatives lay within their bars, the worst 2.8 bars
+off, and the median bar was 28 times the error."""
 
 
 class Slopes(NamedTuple):
@@ -76,7 +94,7 @@ def with_parameter_columns(problem: FixedPointProblem, found: Found) -> Found:
     """What a search found, with derivatives with respect to parameters as well.
 
     The gait's own values and derivatives stay those of the search. Of parameters nothing is claimed
-    (NaN) where it did not converge.
+    (NaN) where it did not converge, or where a solve with these columns does not come to the end.
     """
     m, own = found.recurring.shape[0], found.both
     alone = {name: getattr(own, name)[..., :m] for name in _ROWS}
@@ -86,20 +104,24 @@ def with_parameter_columns(problem: FixedPointProblem, found: Found) -> Found:
     start = problem.state(found.recurring)
     idle = found.ending == int(Search.NO_RETURN)
     lost = idle | (found.ending == int(Search.NOT_CONVERGED))
+    most = _MORE_STEPS * problem.spec.max_solver_steps
+    spec = dataclasses.replace(problem.spec, max_solver_steps=most)
 
     def once(precision: Precision) -> LinearisedReturn:
-        return linearised_return(problem.spec, seeds, start, precision, idle)
+        return linearised_return(spec, seeds, start, precision, idle)
 
-    new = _each_of(problem.spec, once)(with_looser(problem.precision))
+    new = _each_of(spec, once)(with_looser(problem.precision))
 
     def joined(name: str) -> Scalar:
-        parameters = jnp.where(lost, jnp.nan, getattr(new, name)[..., m:])
-        return jnp.concatenate([alone[name], parameters], axis=-1)
+        parameters = getattr(new, name)[..., m:]
+        unknown = jnp.reshape(lost | (new.code != 0), (-1, *[1] * (parameters.ndim - 1)))
+        return jnp.concatenate([alone[name], jnp.where(unknown, jnp.nan, parameters)], axis=-1)
 
     changed = {name: joined(name) for name in _ROWS}
-    for name in ("jumps", "missed", "grazes"):
+    for name in ("jumps", "grazes"):
         changed[name] = jnp.maximum(getattr(own, name), getattr(new, name))
-    return found._replace(both=own._replace(nodes=new.nodes, **changed))
+    again = jax.tree.map(lambda leaf: leaf[0], new._replace(nodes=None))
+    return found._replace(both=own._replace(nodes=new.nodes, **changed), again=again)
 
 
 def orbit_of(problem: FixedPointProblem, found: Found, *, radius: bool) -> Orbit:
@@ -114,20 +136,17 @@ def orbit_of(problem: FixedPointProblem, found: Found, *, radius: bool) -> Orbit
     stability = stability_of(monodromy, witness, last.velocity, CLOSENESS)
     unknown = jnp.where(last.grazes > 0, jnp.inf, stability.errors)
     stability = stability._replace(errors=unknown)
-    slopes, looser = (slopes_of(each) for each in (last, coarse))
-    # Where the force itself jumped on the section by XLA, columns lack the jump's own correction.
-    slopes = jax.tree.map(lambda leaf: jnp.where(last.missed > 0, jnp.nan, leaf), slopes)
-    errors = _slope_errors(last, slopes, looser)
+    slopes = slopes_of(last)
     _, sizes = problem.directions(m)
+    units = 1.0 / recurring_inverse_units(problem.args, m)
+    least = jnp.asarray(problem.precision.tangent_rtol) * PARAMETER_FLOOR * units
+    errors = _slope_errors(found, slopes, least)
     radius_slopes = radius_errors = jnp.full(len(problem.active), jnp.nan)
     if radius and problem.active:
         slopes_of_radius = functools.partial(_radius_slopes, problem)
-        radius_slopes, looser_slopes = _each_of(problem.spec, slopes_of_radius)(found.both)
-        change = jnp.abs(radius_slopes - looser_slopes)
-        size = jnp.maximum(jnp.sum(radius_slopes * radius_slopes), _NOTHING)
-        share = jnp.sqrt(jnp.sum(change * change) / size)
-        pooled = _POOLED * share * jnp.abs(radius_slopes)
-        radius_errors = jnp.maximum(jnp.maximum(change, pooled), _RADIUS_FLOOR)
+        rows = found.both, with_looser(problem.precision)
+        both, terms = _each_of(problem.spec, slopes_of_radius)(rows)
+        radius_slopes, radius_errors = both[0], _radius_errors(both, terms[0], stability)
     return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)
 
 
@@ -159,31 +178,50 @@ def _chain_rule(
     return Slopes(recurring, total(last.period_row), total(last.advance_rows), total(last.peak_row))
 
 
-def _slope_errors(last: LinearisedReturn, slopes: Slopes, looser: Slopes) -> Slopes:
-    """What a looser solve changes, and no less than what it changes on the whole.
+def _slope_errors(found: Found, slopes: Slopes, least: Scalar) -> Slopes:
+    """What a looser solve changes and what one by other steps does, and no less than a floor.
 
     Where a single derivative is hardly changed that is chance: terms that make it up are as
     uncertain as others'. So the changes of a measure are pooled, each relative to the sum of its
-    terms without their signs.
+    terms without their signs. The floor is what errors of the components, `least`, shape (m,), make
+    of all else: the solve holds columns to no less.
     """
-    m = last.recurring.shape[0]
-    inverse = jnp.abs(solve(jnp.eye(m) - last.jacobian[:, :m], jnp.eye(m)))
-    sizes = _chain_rule(last, inverse @ jnp.abs(last.jacobian[:, m:]), jnp.abs)
+    last, m = found.last, found.recurring.shape[0]
+    again = found.last if found.again is None else found.again
+    sizes = _chain_rule(last, _term_sizes(last), jnp.abs)
+    reach = (jnp.abs(solve(jnp.eye(m) - last.jacobian[:, :m], jnp.eye(m))) @ least)[:, None]
+    rows = (last.period_row, last.advance_rows, last.peak_row)
+    floors = Slopes(reach, *(jnp.abs(row[..., :m]) @ reach for row in rows))
 
-    def error(slope: Scalar, other: Scalar, size: Scalar) -> Scalar:
-        change = jnp.abs(slope - other)
+    def error(slope: Scalar, looser: Scalar, other: Scalar, size: Scalar, floor: Scalar) -> Scalar:
+        change = jnp.abs(slope - looser)
         share = change / jnp.where(size == 0.0, 1.0, size)
         pooled = jnp.sqrt(jnp.mean(share * share, axis=-1, keepdims=True))
-        return _SHARE * jnp.maximum(change, _POOLED * pooled * size)
+        changes = jnp.maximum(change, _POOLED * pooled * size)
+        return changes + jnp.abs(slope - other) + _FLOOR * floor
 
-    return jax.tree.map(error, slopes, looser, sizes)
+    return jax.tree.map(error, slopes, slopes_of(found.coarse), slopes_of(again), sizes, floors)
 
 
-def _radius_slopes(problem: FixedPointProblem, last: LinearisedReturn) -> Scalar:
-    """Derivatives of the leading multiplier's absolute value, shape (p,).
+def _radius_errors(both: Scalar, terms: Scalar, stability: Stability) -> Scalar:
+    """Of derivatives of the spectral radius: what a looser solve changes, and what errors of the
+    eigenvectors make of the derivatives and of their terms without signs."""
+    multipliers = stability.multipliers
+    apart = jnp.min(jnp.abs(multipliers[1:] - multipliers[0]), initial=jnp.inf)
+    turned = stability.errors[0] / jnp.maximum(apart, _NOTHING)
+    slopes, looser = both
+    told = jnp.abs(slopes - looser) + turned * (_TURNED * jnp.abs(slopes) + _TURNED_TERMS * terms)
+    return jnp.maximum(told, _RADIUS_FLOOR)
+
+
+def _radius_slopes(
+    problem: FixedPointProblem, solved: tuple[LinearisedReturn, Precision]
+) -> tuple[Scalar, Scalar]:
+    """Derivatives of the leading multiplier's absolute value, and their terms without signs, (p,).
 
     dλ = wᵀ (dP_x) v with left and right eigenvectors, dP_x along the orbits' family.
     """
+    last, precision = solved
     m = last.recurring.shape[0]
     jacobian = last.jacobian[:, :m]
     vector, left = _leading_eigenvectors(jacobian)
@@ -194,11 +232,19 @@ def _radius_slopes(problem: FixedPointProblem, last: LinearisedReturn) -> Scalar
     weights = jnp.stack([weight.real, -weight.imag]) / jnp.abs(value)
     family = slopes_of(last).recurring
     seeds, sizes = problem.directions(m)
-    slopes = second_variation(
-        problem.spec, seeds, problem.guess, last, leading, weights, family, sizes
+    found = second_variation(
+        problem.spec, seeds, problem.guess, last, leading, weights, family, sizes, precision
     )
+    terms = jnp.abs(found.by_point) @ _term_sizes(last) + jnp.abs(found.by_parameter)
     # Second derivatives across a jump of the force itself would need more than its Jacobians'.
-    return jnp.where(last.jumps > 0, jnp.nan, slopes)
+    return jnp.where(last.jumps > 0, jnp.nan, found.slopes), terms
+
+
+def _term_sizes(last: LinearisedReturn) -> Scalar:
+    """Of the recurring components' derivatives: the sum of their terms without signs, (m, p)."""
+    m = last.recurring.shape[0]
+    inverse = jnp.abs(solve(jnp.eye(m) - last.jacobian[:, :m], jnp.eye(m)))
+    return inverse @ jnp.abs(last.jacobian[:, m:])
 
 
 def _each_of(spec: ReturnMapSpec, function: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -53,8 +53,7 @@ class LinearisedReturn(NamedTuple):
         peak, peak_row: largest load, and (n,). Zeros where the system has none.
         code: 0 or that of an `Ending`.
         attempted: solver steps attempted.
-        jumps, missed: crossings where the vector field itself jumped, and how many of them had no
-            correction.
+        jumps: crossings where the vector field itself jumped.
         grazes: how often a switch was touched, or missed, by less than the tolerance resolves:
             derivatives are then those of one side.
         nodes: the ends of the steps of each solve to the section, leaves (steps, …), where saved.
@@ -73,7 +72,6 @@ class LinearisedReturn(NamedTuple):
     code: Scalar
     attempted: Scalar
     jumps: Scalar
-    missed: Scalar
     grazes: Scalar
     nodes: Nodes | None
 
@@ -133,6 +131,7 @@ def linearised_return(
     places = recurring_indices(spec.system, y)
     count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
     start = jnp.zeros((count, n)).at[jnp.asarray(places), jnp.arange(len(places))].set(1.0)
+    state, moved = along_columns(lambda s, a: spec.system.on_held(a, s), Tangents(y, start), args)
     watch = _watch_for(spec, args.args, y)
     limit = jnp.where(idle, 0.0, spec.max_time)
 
@@ -153,7 +152,7 @@ def linearised_return(
         code = jnp.where(failed != 0, failed, found.code)
         return (Tangents(state, columns), code), (found, on_section, velocity)
 
-    begin = (Tangents(y, start), jnp.asarray(0))
+    begin = (Tangents(state, as_columns(moved)), jnp.asarray(0))
     if spec.steps == 1:
         (end, code), last = one(begin, None)
         every = jax.tree.map(lambda leaf: leaf[None], last)
@@ -247,7 +246,6 @@ def _chain_arrivals(
         code=code,
         attempted=jnp.sum(arrivals.attempted),
         jumps=jnp.sum(arrivals.jumps),
-        missed=jnp.sum(arrivals.missed),
         grazes=jnp.sum(arrivals.grazes),
         nodes=arrivals.nodes,
     )

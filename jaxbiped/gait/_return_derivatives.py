@@ -3,6 +3,7 @@
 By lanes all directions of a derivative share one solve; by diffrax each has one, in lockstep.
 """
 
+import functools
 from collections.abc import Callable
 from typing import TypeAlias
 
@@ -18,6 +19,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, select
 from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.simulate._derivatives import first_derivatives_only
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
 from jaxbiped.variational._solve_to_section import SectionArrival, solve_to_section
@@ -56,7 +58,10 @@ def _forward_jvp(
             "differentiated: it must be among args, whose derivatives are carried."
         )
     tangent = _tangent_by_lanes if spec.engine == "lanes" else _tangent_by_xla
-    (end, time_dot, code), row = tangent(primals, tangents)
+    moving, still = eqx.partition((args, state), eqx.is_array)
+    moving = first_derivatives_only(moving, "a return map with gradient = Forward()")
+    once = eqx.combine(moving, still)
+    (end, time_dot, code), row = tangent((spec, precision, *once), tangents)
     arrived = jtu.tree_unflatten(jtu.tree_structure(state), list(row))
     _, end_dot = jax.jvp(_reset(spec, code), (args, end), (full_tangents(args_dot, args), arrived))
     end_dot, time_dot = eqxi.nondifferentiable_backward((end_dot, time_dot), msg=NO_REVERSE)
@@ -125,7 +130,8 @@ def _reverse_by_xla(
     seeded = Seeded(args, jnp.zeros((0, count)), STATE_FLOOR * inverse, ())
     found = _arrival(spec, precision, seeded, start, columns_only_choose_steps=True)
     known = (found.y.state, found.time)
-    y, time = _without_derivatives(found.undetermined, known, (args, state))
+    smooth = not eqx.filter_eval_shape(spec.system.switches, args, state)
+    y, time = _known_derivatives(smooth, found.undetermined, known, (args, state))
     return _reset_on_arrival(spec, args, y, time, found.code)
 
 
@@ -142,18 +148,26 @@ def _how(spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree)
     return SectionSolve(watch, spec.solver, precision, spec.max_time, spec.max_solver_steps)
 
 
-@jax.custom_jvp
-def _without_derivatives(undetermined: Scalar, values: PyTree, given: PyTree) -> PyTree:
-    """The values, whose derivatives are NaN where `undetermined`: by all that was `given`."""
-    del undetermined, given
+@functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _known_derivatives(smooth: bool, undetermined: Scalar, values: PyTree, given: PyTree) -> PyTree:
+    """The values, whose derivatives are NaN where `undetermined`: by all that was `given`.
+
+    Unless the field is `smooth` there are first ones alone: steps end where switches were, so that
+    what these would add to second ones is not seen.
+    """
+    del smooth, undetermined, given
     return values
 
 
-@_without_derivatives.defjvp
-def _without_derivatives_jvp(
-    primals: tuple[Scalar, PyTree, PyTree], tangents: tuple[Scalar, PyTree, PyTree]
+@_known_derivatives.defjvp
+def _known_derivatives_jvp(
+    smooth: bool,
+    primals: tuple[Scalar, PyTree, PyTree],
+    tangents: tuple[Scalar, PyTree, PyTree],
 ) -> tuple[PyTree, PyTree]:
     undetermined, values, _ = primals
+    if not smooth:
+        values = first_derivatives_only(values, "a return map across switches")
     _, dots, given = tangents
     # Also by what the values do not depend on here, but may on the other side.
     nothing = jnp.where(undetermined, jnp.nan, 0.0)

@@ -10,16 +10,17 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive, check_type
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Scalar, Time, as_float, select
-from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
+from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import check_leaves
+from jaxbiped.dynamics._state import check_leaves, without_whole_turns
 from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
 from jaxbiped.gait._poincare_map import LinearisedReturn, linearised_return, seed_directions
 from jaxbiped.gait._return_derivatives import forward, reverse
-from jaxbiped.gait._return_map_spec import check_holds_none, return_map_spec
+from jaxbiped.gait._return_map_spec import arrivals_of, check_holds_none, return_map_spec
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, Precision, precision_of
 from jaxbiped.variational._hybrid_system import AbstractSystem, section_of, with_leg_names_of
 
@@ -46,7 +47,7 @@ def return_map(
     state: PyTree,
     *,
     section: AbstractSection | None = None,
-    footsteps: int = 1,
+    footsteps: int | None = None,
     gradient: AbstractGradient | None = None,
     accuracy: str = "balanced",
     system: AbstractSystem | None = None,
@@ -63,7 +64,7 @@ def return_map(
         state: start, on the section or not, either leg standing; for a redundant scene a minimal
             state too, which then comes back as one.
         section: `MidStance()` unless given, `HeelStrike()` for a rigid walker.
-        footsteps: how many arrivals to follow.
+        footsteps: how many to follow, those of one cycle unless given.
         gradient: `Forward()` (the default) or `Reverse()`.
         accuracy: "balanced" or "tight".
         system: the walker unless given.
@@ -85,13 +86,13 @@ def return_map(
     gradient = Forward() if gradient is None else gradient
     check_anywhere(gradient, "a return map")
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
-    check_count("footsteps", footsteps)
     check_positive("max_time", max_time, "s")
     if system is None:
         args = check_scene(args, Scene, RigidScene, RedundantScene)
         if not hasattr(state, "_fields"):
             raise ArgumentError(f"state = {state!r} is not allowed: give a State.")
-        state = check_leaves(state, "state")
+        state = without_whole_turns(args, check_leaves(state, "state"))
+    arrivals = arrivals_of(args, footsteps)
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
     enters = system is None and isinstance(args, RedundantScene) and not is_redundant(state)
     if enters:
@@ -113,7 +114,7 @@ def return_map(
     follow = reverse if isinstance(gradient, Reverse) else forward
     precision = precision_of(accuracy, args)
     time, code = jnp.zeros(()), jnp.asarray(0)
-    for _ in range(int(footsteps)):
+    for _ in range(arrivals):
         arrived, lasted, came = follow(spec, precision, args, state)
         state = select(code == 0, arrived, state)
         time = time + jnp.where(code == 0, lasted, 0.0)
@@ -129,7 +130,7 @@ def linearise_return_map(
     tangent_rtol: float,
     parameters: tuple[str, ...] | None = None,
     section: AbstractSection | None = None,
-    footsteps: int = 1,
+    footsteps: int | None = None,
     system: AbstractSystem | None = None,
     solver: str | diffrax.AbstractAdaptiveSolver[PyTree] | None = None,
     max_time: Time = 10.0,
@@ -153,7 +154,7 @@ def linearise_return_map(
             `parameter_names`), of other `args` those of their leaves; all of them unless given,
             none for ().
         section: `MidStance()` unless given, `HeelStrike()` for a rigid walker.
-        footsteps: how many a cycle has.
+        footsteps: how many a cycle has, the fewest unless given.
         system: the walker unless given.
         solver: a name (see `SOLVERS`) or any diffrax solver that estimates its errors; unless
             given "rodas4", for a rigid walker "rodas5p".
@@ -174,7 +175,7 @@ def linearise_return_map(
     for name, tolerance in (("rtol", rtol), ("tangent_rtol", tangent_rtol)):
         check_positive(name, tolerance)
     check_positive("max_time", max_time, "s")
-    check_count("footsteps", footsteps)
+    arrivals = arrivals_of(args, footsteps)
     check_count("max_solver_steps", max_solver_steps)
     _, active = select_parameters(args, parameters)
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
@@ -185,7 +186,7 @@ def linearise_return_map(
         solver=solver,
         engine=engine,
         system=system,
-        steps=int(footsteps),
+        steps=arrivals,
         max_time=as_float(max_time),
         max_solver_steps=int(max_solver_steps),
     )

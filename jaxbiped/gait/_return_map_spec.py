@@ -8,12 +8,13 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._types import Scalar, Time, by_numpy
-from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._gradient_modes import AbstractGradient, Reverse
-from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, is_rigid
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene, is_rigid
+from jaxbiped.scene._scene import RedundantScene
+from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.solve._solvers import solver_named
@@ -70,7 +71,19 @@ class ReturnMapSpec(eqx.Module):
             section=_Arrival(system, self.section),
             ending=system.ending,
             peak=system.load if peak and loaded else None,
+            reset=system.reset_at_switch if resets(system, args, y) else None,
         )
+
+
+def resets(system: AbstractSystem, args: PyTree, y: PyTree) -> bool:
+    """Whether a system has switches that reset its state; known before anything runs."""
+    found: list[bool] = []
+
+    def look(args: PyTree, y: PyTree) -> None:
+        found.extend(switch.resets for switch in system.switches(args, y))
+
+    eqx.filter_eval_shape(look, args, y)
+    return any(found)
 
 
 def runs_by_lanes(spec: ReturnMapSpec, *_: object, **__: object) -> bool:
@@ -116,6 +129,12 @@ def return_map_spec(
             own, within = within, None
     elif holds_arrays(system):
         obstacle = f"the system {type(system).__name__} holds arrays, which belong in args"
+    by = engine_for(engine, obstacle=obstacle, prefers_xla=system is not None)
+    if by == "xla" and resets(own, args, state):
+        raise ArgumentError(
+            f"engine = {engine!r} is not allowed for a walker whose modes change: its gaits are "
+            'found by lanes; give engine="lanes" and one of its solvers (rodas3p to rodas5p).'
+        )
     return ReturnMapSpec(
         system=own,
         section=section,
@@ -123,15 +142,35 @@ def return_map_spec(
         max_time=patience_of(args) if max_time is None else max_time,
         steps=steps,
         max_solver_steps=max_solver_steps,
-        engine=engine_for(engine, obstacle=obstacle, prefers_xla=system is not None),
+        engine=by,
         within=within,
     )
+
+
+def arrivals_of(args: PyTree, footsteps: int | None) -> int:
+    """Arrivals at the section in so many footsteps, those of one cycle unless given.
+
+    Raises:
+        ArgumentError: what is no number of whole cycles.
+    """
+    own = each = 1
+    if isinstance(args, AbstractWalkerScene):
+        own, each = args.mechanism.structure.cycle_footsteps, args.arrival_footsteps
+    if footsteps is None:
+        return own // each
+    check_count("footsteps", footsteps)
+    if int(footsteps) % own:
+        raise ArgumentError(
+            f"footsteps = {footsteps} is not allowed: a cycle of this walker has {own} footsteps, "
+            f"so give a multiple of {own}."
+        )
+    return int(footsteps) // each
 
 
 def patience_of(scene: AbstractWalkerScene) -> Scalar:
     """Time that a walker's next arrival may take [s]."""
     found: Scalar = by_numpy(
-        lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.walker.l, scene.ground.g
+        lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.mechanism.height, scene.ground.g
     )
     return found
 
@@ -184,11 +223,10 @@ def _hindrance(
 
 
 class _Arrival(eqx.Module):
-    """The section's value and whether a crossing counts, looked at after the reset."""
+    """The section's value and whether a crossing counts."""
 
     system: AbstractSystem
     section: AbstractSection
 
     def __call__(self, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
-        after_reset = minimal_state(args, self.system.reset_map(args, y))
-        return self.section.value(args, after_reset), self.section.counts(args, after_reset)
+        return self.system.arrival(self.section, args, y)

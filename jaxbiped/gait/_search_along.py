@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, search, walks_only
@@ -58,6 +60,10 @@ class _Way(NamedTuple):
 def search_along(problem: FixedPointProblem, origin: Origin) -> tuple[Found, Origin]:
     """Searches from the guess, and along the line from the seed's scene where need be."""
     line, system = homotopy_to(problem.args), problem.spec.system
+    # Origins have scenes of the problem's own kind.
+    own: PyTree = jtu.tree_structure(problem.args)
+    if line is None or jtu.tree_structure(line.last) != own:
+        return walks_only(search(problem)), origin
     fitted = recurring_components(system, problem.guess)
     first = recurring_components(system, default_guess(line.first.minimal))
 

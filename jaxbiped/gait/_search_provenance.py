@@ -1,7 +1,8 @@
 """Provenance of a gait: how a search came to it and what else it saw, also in a sentence."""
 
+import dataclasses
 import warnings
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
@@ -9,11 +10,12 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending, NamedCode
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._homotopy import BranchEnd
+from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._parameter_access import parameter_values
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._state_types import WalkerState
+from jaxbiped.scene._walker import Walker
 
 if TYPE_CHECKING:
     from jaxbiped.gait._gait import Gait
@@ -37,7 +39,8 @@ class FoundBy(NamedCode):
     - guess: Newton's method from the guess that was given.
     - start: Newton's method from the seed's start, fitted to the scene.
     - walking: walks forwards from many starts.
-    - continuation: the gait of the seed's scene, followed to this one.
+    - continuation: the gait of the seed's scene, followed to this one; for a walker of other bodies
+      that of the same walker relaxed: straight, passive, with hardly any mass outside its legs.
     - scattered starts: Newton's method from scattered starts.
     """
 
@@ -115,7 +118,7 @@ def explain_search(scene: AbstractScene, gait: "Gait") -> str:
     if gait.outcome is not Search.FOUND:
         return f"no gait found: {_search_sentence(gait)}{_branch(scene, gait)}"
     text = f"found by {gait.found_by}"
-    asked, least = np.shape(gait.orbit[0])[0], int(gait.cycle_footsteps)
+    asked, least = len(gait.step_lengths), int(gait.cycle_footsteps)
     if least < asked:
         text += f"; it closes after {least} of the {asked} footsteps, and no longer cycle was seen"
     if gait.others:
@@ -126,24 +129,31 @@ def explain_search(scene: AbstractScene, gait: "Gait") -> str:
         text += f"; other gaits seen: {seen}"
     if int(gait.origin.branch_end) != int(BranchEnd.NOT_FOLLOWED) and not bool(gait.stable):
         text += f"; no stable one was seen{_branch(scene, gait)}"
+    told = unknown_derivatives(gait)
+    return f"{text}; {told}" if told else text
+
+
+def unknown_derivatives(gait: "Gait") -> str:
+    """Why derivatives of a gait are not known, without a full stop; nothing where they are."""
     if int(gait.grazes):
-        text += f"; {grazing_sentence(gait)}"
-    return text
+        return (
+            f"the gait grazes a switch {int(gait.grazes)} times, as a foot that barely touches the "
+            "ground or misses it, by less than the tolerance resolves: its multipliers are those "
+            "of one side, its sensitivities are not known"
+        )
+    if gait.outcome is Search.FOUND and np.any(np.isnan(np.asarray(gait.sensitivities.period))):
+        return (
+            "the gait's sensitivities are not known: the solve that carries them was not at the "
+            "end of the cycle after all the steps that it may take; ask for a looser accuracy"
+        )
+    return ""
 
 
-def grazing_sentence(gait: "Gait") -> str:
-    """What a grazed switch makes of a gait's derivatives, without a full stop."""
-    return (
-        f"the gait grazes a switch {int(gait.grazes)} times, as a foot that barely touches the "
-        "ground or misses it, by less than the tolerance resolves: its multipliers are those of "
-        "one side, its sensitivities not known"
-    )
-
-
-def warn_of_grazing(gait: "Gait") -> None:
-    """Warns of a gait whose derivatives are not determined."""
-    if gait.outcome is Search.FOUND and int(gait.grazes):
-        warnings.warn(grazing_sentence(gait) + ".", RuntimeWarning, stacklevel=3)
+def warn_of_unknown(gait: "Gait") -> None:
+    """Warns of a gait whose derivatives are not known."""
+    told = unknown_derivatives(gait)
+    if gait.outcome is Search.FOUND and told:
+        warnings.warn(told + ".", RuntimeWarning, stacklevel=3)
 
 
 def _search_sentence(gait: "Gait") -> str:
@@ -160,13 +170,17 @@ def _branch(scene: AbstractScene, gait: "Gait") -> str:
     modelled = scene.minimal
     if end is BranchEnd.NOT_FOLLOWED or (end is BranchEnd.REACHED and gait.outcome is Search.FOUND):
         return ""
+    of_seed = isinstance(scene, AbstractWalkerScene) and isinstance(scene.walker, Walker)
+    begins = "the seed's gait" if of_seed else "the relaxed walker's gait"
     if end is BranchEnd.REACHED:
         return (
-            "; the branch of the seed's gait comes to this scene, but a finer search from there "
+            f"; the branch of {begins} comes to this scene, but a finer search from there "
             'does not converge: try accuracy="tight"'
         )
     if end is BranchEnd.NO_BEGINNING:
-        return "; the seed's walker has no gait under these laws, from which one could be followed"
+        said = "the seed's walker has no gait under these laws"
+        relaxed = "no gait was found of the same walker relaxed (straight, passive, of legs alone)"
+        return f"; {said if of_seed else relaxed}, from which one could be followed"
     place = _differing_parameters(modelled, gait.origin.nearest)
     walk = Ending(int(gait.origin.branch_walk_ending))
     verb, beyond = {
@@ -175,13 +189,16 @@ def _branch(scene: AbstractScene, gait: "Gait") -> str:
         BranchEnd.BREAKS_OFF: ("breaks off at", "the return map is not smooth"),
     }.get(end, ("was followed as far as", ""))
     more = f": beyond, {beyond}" if beyond else ""
-    return f"; the branch of the seed's gait {verb} {place}, which has one{more}"
+    return f"; the branch of {begins} {verb} {place}, which has one{more}"
 
 
-def _differing_parameters(scene: AbstractScene, nearest: AbstractScene) -> str:
+def _differing_parameters(scene: Any, nearest: Any) -> str:
     """The parameters of `nearest` that are not those of `scene`."""
+    if type(scene.walker) is not type(nearest.walker):
+        scene = dataclasses.replace(scene, walker=scene.mechanism)
     asked, there = parameter_values(scene), parameter_values(nearest)
-    different = [name for name in asked if float(asked[name]) != float(there[name])]
+    # A motor's share that was not written is 1.
+    different = [name for name in there if float(asked.get(name, 1.0)) != float(there[name])]
     named = ", ".join(f"{name} = {float(there[name]):.6g}" for name in different[:_MOST_NAMED])
     more = len(different) - _MOST_NAMED
     return named + (f" and {more} more" if more > 0 else "")

@@ -1,81 +1,198 @@
-"""Starts of a search: the fitted guess, scattered ones, and where walks from these settle."""
+"""Starts of a search: the fitted guess, and scattered ones."""
 
-from collections.abc import Callable
-from typing import Any, cast
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-import numpy as np
-from jaxtyping import PyTree
 
 from jaxbiped._checks import check_positive
-from jaxbiped._types import Scalar, as_float, select
+from jaxbiped._types import Scalar, as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._contacts import standing_height
-from jaxbiped.dynamics._section import MidStance
-from jaxbiped.dynamics._state import (
-    BristleState,
-    RigidState,
-    State,
-    WalkerState,
-    exchange_legs,
-    rigid_state,
-    seed_state,
-    state_for,
-    state_type,
-    whole_state,
-)
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES, recurring_leaves, recurring_names
+from jaxbiped.dynamics._contacts import legs_in
+from jaxbiped.dynamics._joint_loads import motion_of
+from jaxbiped.dynamics._state import seed_state, state_for, state_type
+from jaxbiped.dynamics._tree import pose_of
+from jaxbiped.gait._gait import Gait
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._joint_parts import Stop
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._modes import Mode
+from jaxbiped.scene._placement import root_on_feet
 from jaxbiped.scene._ready_scenes import seed_scene
-from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
+from jaxbiped.scene._rigid_feet import rigid_modes
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
-from jaxbiped.scene._walker import Walker
-from jaxbiped.simulate._simulate import rigid_walk, simulate
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.scene._state_types import State, WalkerState
+from jaxbiped.scene._structure import Angle
 
-_FOOTSTEPS = 40
-_ALIKE = 1e-2
-"""Scaled distance of two states that count as one."""
-_DEPTH = 4
-"""Longest cycle [footsteps] that is looked for in a walk's last arrivals."""
+_BEND = 1.5
+"""Largest bend of a joint with a stop in a scattered swing leg, in units of the spread [rad]."""
 
 
 def default_guess(scene: AbstractWalkerScene) -> WalkerState:
-    """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight."""
-    dtype = jnp.result_type(scene.walker.l, float)
+    """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight.
+
+    The stance leg's line from the root point to its feet has the angle and the rate of the seed's,
+    those of other legs the swing leg's. Joints with a stop are at its limit, so that legs carry;
+    bodies with several feet lie flat; all others are at rest at 0.
+    """
+    scene = scene.minimal
+    dtype = jnp.result_type(jtu.tree_leaves(scene.walker)[0], float)
     return _fitted(scene, *jax.tree.map(dtype.type, _seed()))
+
+
+def state_of_guess(
+    scene: AbstractWalkerScene, guess: Gait | WalkerState | None
+) -> WalkerState | None:
+    """The checked state from which a search begins: a gait's, or the one given; None for None.
+
+    Raises:
+        ArgumentError: no state of this scene.
+    """
+    near = guess.measures.state if isinstance(guess, Gait) else guess
+    return None if near is None else state_for(scene, near, "guess")
+
+
+class Lines(NamedTuple):
+    """Angles [rad] of the legs' lines from the slope's normal, and rates [rad/s].
+
+    Attributes:
+        swing, stance: angles of the legs that swing, and of the one that stands.
+        swing_rate, stance_rate: of all their bodies.
+        bend: how far the joints with stops are off their limits in legs that swing [rad].
+    """
+
+    swing: Scalar
+    stance: Scalar
+    swing_rate: Scalar
+    stance_rate: Scalar
+    bend: Scalar | float = 0.0
 
 
 @host_jit()  # many small operations
 def _fitted(scene: AbstractWalkerScene, seed: State, own: Scene) -> WalkerState:
     """`own` is the seed's scene. As constants XLA would divide by its numbers by reciprocals."""
-    if not scene.compliant:
-        pace = jnp.sqrt(scene.ground.g / scene.walker.l * own.walker.l / own.ground.g)
-        rates = dict(omega_1=seed.omega_1 * pace, omega_2=seed.omega_2 * pace)
-        return jax.tree.map(as_float, rigid_state(seed)._replace(**rates))
-    size = scene.walker.l / own.walker.l
+    start = _posed(scene, _lines(scene, seed, own))
+    if scene.compliant:
+        of_seed, rolling = _root(own, seed), _root(scene, start)
+        depth = (of_seed.z - seed.hip_z) * (scene.mechanism.height / own.mechanism.height)
+        forward, up = rolling.vx / of_seed.vx, rolling.vz / of_seed.vz
+        fitted = _Root(rolling.z - depth, seed.hip_vx * forward, seed.hip_vz * up)
+        start = _with_root(scene, start, fitted)
+    return jax.tree.map(as_float, start)
+
+
+def _lines(scene: AbstractWalkerScene, seed: State, own: Scene) -> Lines:
+    """The seed's, at the pace of the scene."""
+    size = scene.mechanism.height / own.mechanism.height
     pace = jnp.sqrt(scene.ground.g / own.ground.g / size)
-    depth = (standing_height(own, seed.theta_2) - seed.hip_z) * size
+    return Lines(seed.theta_1, seed.theta_2, seed.omega_1 * pace, seed.omega_2 * pace)
 
-    def reach(walker: Walker) -> tuple[Scalar, Scalar]:
-        return walker.hip_to_foot * jnp.cos(seed.theta_2) + walker.r, walker.hip_to_foot
 
-    (forward, up), (own_forward, own_up) = reach(scene.walker), reach(own.walker)
-    fitted = seed._replace(
-        hip_z=standing_height(scene, seed.theta_2, depth),
-        hip_vx=seed.hip_vx * forward / own_forward * pace,
-        hip_vz=seed.hip_vz * up / own_up * pace,
-        omega_1=seed.omega_1 * pace,
-        omega_2=seed.omega_2 * pace,
+def _posed(scene: AbstractWalkerScene, lines: Lines) -> WalkerState:
+    """Legs that turn as a whole about a root point at 0; all other bodies at rest."""
+    mechanism, kind = scene.mechanism, state_type(scene)
+    structure, limits = mechanism.structure, _limits(mechanism)
+    zero = jnp.zeros_like(lines.swing)
+    angles: dict[int, Scalar] = {}
+    legs = [structure.leg_of_body(j) for j in range(len(structure.bodies))]
+    for j, (parent, leg) in enumerate(zip(structure.parents, legs, strict=True)):
+        angles[j] = angles[parent] if parent >= 0 and legs[parent] is not None else zero
+        if j in limits:
+            limit, inwards = limits[j]
+            bend = 0.0 if leg in (structure.stance_leg, None) else inwards * lines.bend
+            angles[j] = angles[j] + limit + bend
+    rates = {
+        j: lines.stance_rate if leg == structure.stance_leg else lines.swing_rate
+        for j, leg in enumerate(legs)
+        if leg is not None
+    }
+
+    def state() -> WalkerState:
+        known = {f"theta_{structure.bodies[j]}": each for j, each in angles.items()}
+        known |= {f"omega_{structure.bodies[j]}": each for j, each in rates.items()}
+        if "mode" in kind._fields:
+            known["mode"] = _starting_mode(scene, zero)
+        made: WalkerState = kind(**{name: known.get(name, zero) for name in kind._fields})
+        return made
+
+    own = None
+    if scene.compliant or structure.turn is not None:
+        own = _leg_angles(scene, state())
+    for j, leg in enumerate(legs):
+        if leg is not None:
+            wanted = lines.stance if leg == structure.stance_leg else lines.swing
+            angles[j] = angles[j] + (wanted if own is None else wanted - own[leg])
+            if structure.parents[j] >= 0 and structure.feet.count(j) > 1:
+                angles[j], rates[j] = zero, zero
+    return state()
+
+
+def _leg_angles(scene: AbstractWalkerScene, state: WalkerState) -> list[Scalar]:
+    """Angles of the legs' lines about a root point at 0, of a state of either kind."""
+    mechanism, zero = scene.mechanism, jnp.zeros_like(state[0])
+    structure = mechanism.structure
+    places, rates = (
+        [zero, zero, *(getattr(state, name) for name in names[2:])]
+        for names in (structure.coordinates, structure.rates)
     )
-    start: State = jax.tree.map(as_float, fitted)
-    if state_type(scene) is BristleState:
-        straight = jnp.zeros_like(start.hip_x)
-        return BristleState(**start._asdict(), bristle_1=straight, bristle_2=straight)
-    return start
+    pose = pose_of(mechanism, motion_of(mechanism, scene.ground, places, rates))
+    return [line.angle for line in legs_in(mechanism, (pose,) * len(structure.bodies))]
+
+
+def _starting_mode(scene: AbstractWalkerScene, zero: Scalar) -> Scalar:
+    """The stance leg on all its feet, its stops held."""
+    modes, stance = rigid_modes(scene.mechanism), scene.mechanism.structure.stance_leg
+    yes, no = zero == 0.0, zero != 0.0
+    held = tuple(yes if limit.leg == stance else no for limit in modes.limits)
+    own = scene.mechanism.structure.feet_of_leg[stance]
+    stands = modes.standing(stance, (yes,) * len(own), zero) if modes.feet else ()
+    mode = Mode(stands, held, (no,) * len(modes.locks))
+    found: Scalar = modes.encoded(jnp, mode, zero)
+    return found
+
+
+def _limits(mechanism: Mechanism) -> dict[int, tuple[Any, Any]]:
+    """By bodies: the stop's limit nearer to 0 on the angle to its parent, and the sign inwards."""
+    found: dict[int, tuple[Any, Any]] = {}
+    structure = mechanism.structure
+    for part, angle in zip(mechanism.joints, structure.joints, strict=True):
+        for j, parent in enumerate(structure.parents):
+            if isinstance(part, Stop) and angle.is_like(Angle(((j, 1.0), (parent, -1.0)))):
+                lower, upper = part.lower, part.upper
+                if upper is None or lower is None:
+                    found[j] = (lower, 1.0) if upper is None else (upper, -1.0)
+                else:
+                    is_upper = jnp.abs(upper) <= jnp.abs(lower)
+                    found[j] = jnp.where(is_upper, upper, lower), jnp.where(is_upper, -1.0, 1.0)
+    return found
+
+
+class _Root(NamedTuple):
+    """Height of the root point [m] and its velocity [m/s]."""
+
+    z: Scalar
+    vx: Scalar
+    vz: Scalar
+
+
+def _root(scene: AbstractWalkerScene, state: WalkerState) -> _Root:
+    """The root point on the stance leg, whose lowest foot just touches and rolls."""
+    mechanism = scene.mechanism
+    structure = mechanism.structure
+    feet, values = structure.feet_of_leg[structure.stance_leg], state._asdict()
+    found = root_on_feet(jnp, mechanism, scene.ground.slope, values, feet, rolls=True)
+    return _Root(*(found[f"{structure.root}_{name}"] for name in _Root._fields))
+
+
+def _with_root(scene: AbstractWalkerScene, state: WalkerState, point: _Root) -> WalkerState:
+    root = scene.mechanism.structure.root
+    named = {f"{root}_{name}": each for name, each in point._asdict().items()}
+    placed: WalkerState = state._replace(**named)
+    return placed
 
 
 @bounded_cache(1)
@@ -97,8 +214,8 @@ def rolling_starts(
         seed: of the random numbers.
 
     Returns:
-        A `State` or `RigidState` with leaves of shape (n,): leg 2 stands as deep as in the seed's
-        start, and does not slip.
+        States with leaves of shape (n,): the stance leg stands as deep as in the seed's start,
+        and does not slip.
 
     Raises:
         ArgumentError: count below 1, or spread not above 0.
@@ -111,91 +228,52 @@ def rolling_starts(
 
 @cached_jit  # many small operations
 def _scatter(scene: Scene | RigidScene, count: int, spread: float, seed: int) -> WalkerState:
-    middle = default_guess(scene)
-    scatter = jax.random.uniform(jax.random.key(seed), (4, count), minval=-1.0, maxval=1.0)
-    factors = 1.0 + spread * scatter.at[:, 0].set(0.0)
-    theta_1, theta_2 = middle.theta_1 * factors[0], middle.theta_2 * factors[1]
-    omega_1, omega_2 = middle.omega_1 * factors[2], middle.omega_2 * factors[3]
-    rolling = RigidState(jnp.zeros_like(theta_1), theta_1, theta_2, omega_1, omega_2)
-    if isinstance(scene, RigidScene):
-        return rolling
-    depth = standing_height(scene, middle.theta_2) - cast("State", middle).hip_z
-    height = standing_height(scene, theta_2, depth)
-    return state_for(scene, whole_state(scene, rolling)._replace(hip_z=height))
+    shape = scattered_start_count(scene), count
+    scatter = jax.random.uniform(jax.random.key(seed), shape, minval=-1.0, maxval=1.0)
+    return _scattered(scene, spread * scatter.at[:, 0].set(0.0))
 
 
-def settle_walks(scene: Scene | RigidScene, starts: PyTree, *, most: int = 4) -> list[np.ndarray]:
-    """Where walks from the starts are after many footsteps, the most settled first.
+def scattered_start_count(scene: Scene | RigidScene) -> int:
+    """How many numbers scatter a start: of the legs' lines, and of each body that is on no leg."""
+    return len(Lines._fields) - 1 + bool(_limits(scene.mechanism)) + 2 * len(_alone(scene))
+
+
+def _alone(scene: AbstractWalkerScene) -> list[str]:
+    """Names of the bodies of a state that are no part of a leg."""
+    structure, fields = scene.mechanism.structure, state_type(scene)._fields
+    return [
+        name
+        for j, name in enumerate(structure.bodies)
+        if structure.leg_of_body(j) is None and f"theta_{name}" in fields
+    ]
+
+
+@cached_jit  # many small operations
+def starts_scattered_by(scene: Scene | RigidScene, scatter: Scalar) -> WalkerState:
+    """Starts like `rolling_starts`, off the seed's by these relative changes.
 
     Args:
-        scene: the walker.
-        starts: states, leaves of shape (n,).
-        most: how many to give.
-
-    Returns:
-        States on the section without hip_x, each of shape (m,), apart from each other.
+        scene: the walker, compliant or rigid.
+        scatter: shape (k, n), k as `scattered_start_count` tells.
     """
-    walked: Callable[..., tuple[Scalar, PyTree]] = _arrivals if scene.compliant else _rigid_arrivals
-    counts, last = walked(scene, starts)
-    points = np.stack(recurring_leaves(last), axis=-1)
-    walking = np.flatnonzero(np.asarray(counts) >= _FOOTSTEPS)
-    sizes = component_sizes(scene, last)
-    latest = points[walking, -1] / sizes
-    before = points[walking, -1 - _DEPTH : -1] / sizes
-    moved = np.min(np.linalg.norm(latest[:, None] - before, axis=-1), axis=-1, initial=np.inf)
-    chosen: list[int] = []
-    for i in np.argsort(moved):
-        if all(np.linalg.norm(latest[i] - latest[j]) > _ALIKE for j in chosen):
-            chosen.append(int(i))
-        if len(chosen) == most:
-            break
-    return [latest[i] * sizes for i in chosen]
+    return _scattered(scene, scatter)
 
 
-def component_sizes(scene: AbstractWalkerScene, state: WalkerState) -> np.ndarray:
-    """Size of each component of a state without hip_x, shape (m,), SI units.
-
-    Angles 1, lengths l, velocities √(g l), rates √(g/l), and bristles the number of l.
-    """
-    length, gravity = float(scene.walker.l), float(scene.ground.g)
-    speed, rate = np.sqrt(gravity * length), np.sqrt(gravity / length)
-    sizes = {"m": length, "": length, "m/s": speed, "rad/s": rate, "rad": 1.0}
-    return np.array([sizes[STATE_QUANTITIES[name].unit] for name in recurring_names(state)])
-
-
-@cached_jit
-def _arrivals(scene: Scene, starts: PyTree) -> tuple[Scalar, PyTree]:
-    """Arrivals at mid-stance of each walk, and the states at the last ones, leg 2 standing."""
-
-    def one(start: PyTree) -> tuple[Scalar, PyTree]:
-        walk = simulate(
-            scene,
-            start,
-            footsteps=_FOOTSTEPS + 1,
-            accuracy="draft",
-            save=MidStance(),
-            max_arrivals=_FOOTSTEPS,
-            engine="lanes",
-        )
-        total, last = _last_arrivals(walk)
-        stands = jnp.abs(last.theta_1) < jnp.abs(last.theta_2)
-        return total, select(stands, exchange_legs(last), last)
-
-    return jax.vmap(one)(starts)
-
-
-@cached_jit
-def _rigid_arrivals(scene: RigidScene, starts: PyTree) -> tuple[Scalar, PyTree]:
-    """Heel strikes of each walk, and the states just after the last ones."""
-
-    def one(start: PyTree) -> tuple[Scalar, PyTree]:
-        walk = rigid_walk(scene, start, footsteps=_FOOTSTEPS, max_arrivals=_FOOTSTEPS)
-        return _last_arrivals(walk)
-
-    return jax.vmap(one)(starts)
-
-
-def _last_arrivals(walk: Trajectory[Any]) -> tuple[Scalar, PyTree]:
-    """How many arrivals a walk has, and the last states that there is room for."""
-    assert walk.arrivals is not None
-    return walk.arrivals.total, jtu.tree_map(lambda leaf: leaf[-1 - _DEPTH :], walk.arrivals.state)
+def _scattered(scene: Scene | RigidScene, scatter: Scalar) -> WalkerState:
+    middle = default_guess(scene)
+    lines, structure = _lines(scene, *_seed()), scene.mechanism.structure
+    bends = bool(_limits(scene.mechanism))
+    moved = Lines(*(each * (1.0 + scatter[i]) for i, each in enumerate(lines[:4])))
+    if bends:
+        moved = moved._replace(bend=_BEND * jnp.abs(scatter[4]))
+    started = _posed(scene, moved)
+    rate = jnp.sqrt(scene.ground.g / scene.mechanism.height)
+    for i, name in enumerate(_alone(scene)):
+        angle, turning = scatter[4 + bends + 2 * i], rate * scatter[5 + bends + 2 * i]
+        started = started._replace(**{f"theta_{name}": angle, f"omega_{name}": turning})
+    if scene.compliant:
+        height = f"{structure.root}_z"
+        depth = _root(scene, middle).z - getattr(middle, height)
+        rolling = _root(scene, started)
+        started = _with_root(scene, started, rolling._replace(z=rolling.z - depth))
+    return jtu.tree_map(lambda leaf: jnp.broadcast_to(leaf, scatter.shape[1:]), started)

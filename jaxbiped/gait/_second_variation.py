@@ -4,6 +4,9 @@ The spectral radius is a function of the return map's Jacobian, so its sensitivi
 derivatives of the map.
 """
 
+import dataclasses
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -11,11 +14,34 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import LANES, XLA
-from jaxbiped.gait._poincare_map import LinearisedReturn, recurring_indices
+from jaxbiped.gait._poincare_map import (
+    LinearisedReturn,
+    linearised_return,
+    recurring_indices,
+    state_with,
+)
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._adjoint_solve import Adjoints, carry_tangents, pull_back
 from jaxbiped.variational._flow import Flow, tangent_on_section
-from jaxbiped.variational._tangents import Seeded, active_leaves
+from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
+
+_STEP = 0.3
+"""Step of these differences, in units of the fifth root of the tolerance."""
+
+
+class SecondVariation(NamedTuple):
+    """Second derivatives along p directions, as weighted sums.
+
+    Attributes:
+        slopes: the sums, shape (p,).
+        by_point: what they have by each of the m recurring components, shape (m,).
+        by_parameter: what they have by each parameter itself, moved by its size, shape (p,).
+    """
+
+    slopes: Scalar
+    by_point: Scalar
+    by_parameter: Scalar
 
 
 def second_variation(
@@ -27,11 +53,13 @@ def second_variation(
     weights: Scalar,
     tangents: Scalar,
     sizes: Scalar,
-) -> Scalar:
+    precision: Precision,
+) -> SecondVariation:
     """Second derivatives of the return map along two sets of directions, as weighted sums.
 
     An adjoint: the leading tangents go along the cycle, the sum's derivatives with respect to what
-    it starts from come back, whatever the number of parameters.
+    it starts from come back, whatever the number of parameters. Where switches reset the state, of
+    which second derivatives are not followed, differences of first ones.
 
     Args:
         spec: of the return map.
@@ -44,13 +72,19 @@ def second_variation(
             components, (v, c).
         tangents: p other directions, each of which moves one active parameter, shape (m, p).
         sizes: by how much, shape (p,).
+        precision: of the return.
 
     Returns:
-        For each of the p the sum over components and the v, shape (p,).
+        For each of the p the sum over components and the v.
     """
     engine = LANES if spec.engine == "lanes" else XLA
     watch = spec.watch(args.args, like)
     assert watch.section is not None
+    if watch.reset is not None:
+        along = _jacobian_slopes(spec, args, like, last, tangents, sizes, precision)
+        rows = along[:, -weights.shape[1] :]
+        slopes = jnp.einsum("vc,pcm,vm->p", weights, rows, leading)
+        return SecondVariation(slopes, jnp.zeros(len(tangents)), slopes)
     field = spec.system.vector_field
     flow = Flow(spec.system, watch.section, field, args, jtu.tree_structure(like))
     places = jnp.asarray(recurring_indices(spec.system, like))
@@ -68,7 +102,39 @@ def second_variation(
     adjoints = Adjoints(weights, jnp.zeros(c), jnp.zeros(p))
     for nodes, arrived, steps in reversed(carried):
         adjoints = pull_back(engine, flow, nodes, arrived, steps, adjoints)
-    return adjoints.family[places] @ tangents + adjoints.parameters * sizes
+    by_point, by_parameter = adjoints.family[places], adjoints.parameters * sizes
+    return SecondVariation(by_point @ tangents + by_parameter, by_point, by_parameter)
+
+
+def _jacobian_slopes(
+    spec: ReturnMapSpec,
+    args: Seeded,
+    like: PyTree,
+    last: LinearisedReturn,
+    tangents: Scalar,
+    sizes: Scalar,
+    precision: Precision,
+) -> Scalar:
+    """Derivatives of the Jacobian's rows along p directions, shape (p, c, m).
+
+    Central differences of order four: the step balances their error and the solve's.
+    """
+    h = _STEP * jnp.power(precision.rtol, 0.2)
+    m, parameters = len(tangents), jnp.stack([jnp.asarray(q) for q in active_leaves(args)])
+
+    # A parameter that is zero has no size of its own: what it moves has.
+    h = h / jnp.maximum(1.0, jnp.max(jnp.abs(tangents), axis=0))
+
+    def rows(tangent: Scalar, moved: Scalar, share: Scalar) -> Scalar:
+        near = dataclasses.replace(args, args=with_active(args, list(parameters + share * moved)))
+        state = state_with(spec.system, like, last.recurring + share * tangent)
+        once = linearised_return(spec, near, state, precision, False, carries_parameters=False)
+        return jnp.concatenate([once.advance_rows, once.jacobian])[:, :m]
+
+    shares = h[:, None] * jnp.array([1.0, -1.0, 2.0, -2.0])
+    each = jax.vmap(jax.vmap(rows, (None, None, 0)))
+    near, back, far, farther = jnp.moveaxis(each(tangents.T, jnp.diag(sizes), shares), 1, 0)
+    return (8.0 * (near - back) - (far - farther)) / (12.0 * h[:, None, None])
 
 
 def _behind_arrival(flow: Flow, arrival: Scalar, parameters: Scalar, leading: Scalar) -> Scalar:

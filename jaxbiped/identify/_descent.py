@@ -45,9 +45,11 @@ class Descent:
         accuracy: str,
         engine: str,
         bar: tqdm,
+        guess: PyTree | None = None,
     ) -> None:
+        """`guess` is a state near the gait of the scene's own parameters; None to search it."""
         own = parameter_values(scene)
-        self.scene, self.measured, self.bar = scene, measured, bar
+        self.scene, self.measured, self.bar, self.guess = scene, measured, bar, guess
         self.names, self.first = tuple(bounds), np.array([float(own[name]) for name in bounds])
         self.limits = np.array(list(bounds.values())).T
         self.widths = np.where(self.first == 0.0, self.limits[1] - self.limits[0], 1.0)
@@ -167,7 +169,7 @@ class Descent:
         return found
 
     def _predict(self, at: np.ndarray, each: MeasuredGait, k: int) -> Prediction | None:
-        guess: PyTree | None = None
+        guess = self.guess
         if self.best is not None:
             guess = self.best[2][k].state_at(at - self.best[1])
         values, sizes = self.parameters(at), self.sizes(at)

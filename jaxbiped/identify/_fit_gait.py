@@ -5,9 +5,12 @@ import warnings
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from jaxtyping import PyTree
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_finite, check_type
+from jaxbiped.dynamics._state import state_for, state_type
+from jaxbiped.gait._return_map_spec import arrivals_of
 from jaxbiped.identify._descent import UNLIKELY, Descent
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit
 from jaxbiped.identify._measured_gait import MeasuredGait
@@ -23,6 +26,7 @@ def fit_gait(
     vary: Sequence[str] | Mapping[str, tuple[float, float]],
     measured: MeasuredGait | Sequence[MeasuredGait],
     *,
+    guess: PyTree = None,
     accuracy: str = "balanced",
     engine: str = "auto",
     max_evaluations: int = 50,
@@ -41,8 +45,9 @@ def fit_gait(
         scene: the walker, where the fit begins.
         vary: names of the parameters to fit (see `parameter_names`), or their bounds by name (SI).
         measured: one gait or several, under conditions that are known.
+        guess: a state near the gait where the fit begins; None to search it.
         accuracy, engine: as for `find_gait`.
-        max_evaluations: scenes tried by a descent, at most.
+        max_evaluations: maximum number of scenes that a descent tries.
         progress: whether to show a bar on stderr.
 
     Returns:
@@ -70,11 +75,13 @@ def fit_gait(
         raise ArgumentError("measured = [] is not allowed: give one gait at least.")
     for each in gaits:
         _check_measured(scene, each, bounds)
+    guess = None if guess is None else state_for(scene, guess, "guess")
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_count("max_evaluations", max_evaluations)
     bar = tqdm(total=max_evaluations, unit="scenes", disable=not progress)
     with bar:
-        fit = Descent(scene, bounds, gaits, accuracy, engine, bar).run(int(max_evaluations))
+        descent = Descent(scene, bounds, gaits, accuracy, engine, bar, guess)
+        fit = descent.run(int(max_evaluations))
     if fit.ending is FitEnding.CONVERGED and fit.p_value < UNLIKELY:
         warnings.warn(
             f"the model does not fit the data: chi squared is {fit.chi_squared:.3g} at "
@@ -129,3 +136,7 @@ def _check_measured(scene: AnyScene, measured: MeasuredGait, bounds: Mapping[str
         if name in bounds:
             raise ArgumentError(f"{name} is both known (conditions) and to be fitted (vary).")
     with_parameters(scene, measured.conditions)
+    arrivals_of(scene, measured.footsteps)
+    for name in () if measured.angles is None else measured.angles.known:
+        angles = [each for each in state_type(scene)._fields if each.startswith("theta_")]
+        check_choice("an angle", name, angles)

@@ -1,6 +1,7 @@
 """Measured gait: what was observed of a walker, with standard deviations; from a file, too."""
 
 import dataclasses
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -23,25 +24,31 @@ from jaxbiped._types import JsonObject
 
 MEASURES = ("period", "step_length", "speed", "peak_normal")
 """Measures of a gait that may be given, as in `Measures`."""
-ANGLES = ("theta_1", "theta_2")
 CLOCKS = ("mid-stance", None)
 _LONGEST = 20.0
 """Time beyond which milliseconds are suspected [s]."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, init=False)
 class MeasuredAngles:
-    """Leg angles over time, from a footstep on. Entries that are masked count as missing.
+    """Angles of bodies over time, from a footstep on. Entries that are masked count as missing.
 
-    Each angle is that of one leg throughout: `theta_2` is the angle of the leg that stands at the
-    beginning, and swings in the next footstep.
+    Each angle is that of one body throughout: of two legs `theta_2` is the angle of the one that
+    stands at the beginning, and swings in the next footstep.
+
+    Args:
+        times: see below.
+        deviation: see below.
+        theta_1, theta_2: angles of the legs of a walker with bodies "1" and "2".
+        since: see below.
+        **angles: angles of any bodies by their names in states, as `theta_thigh_1`.
 
     Attributes:
         times: on the data's own clock [s], shape (n,).
         deviation: standard deviation of every angle [rad].
-        theta_1, theta_2: angles of the legs as in `State` [rad], shape (n,); None where unknown.
-        since: "mid-stance" if the clock reads zero when the standing leg (leg 2) passes the slope's
-            normal, of any model. None: the clock is unknown, and its zero is fitted along.
+        known: the angles by their names in states [rad], shape (n,) each.
+        since: "mid-stance" if the clock reads zero at mid-stance of the leg that stands where a
+            cycle begins, of any model. None: the clock is unknown, and its zero is fitted along.
 
     Raises:
         ArgumentError: numbers or shapes that are not allowed.
@@ -49,11 +56,26 @@ class MeasuredAngles:
 
     times: npt.ArrayLike
     deviation: float
-    theta_1: npt.ArrayLike | None = None
-    theta_2: npt.ArrayLike | None = None
-    since: str | None = None
+    known: dict[str, npt.ArrayLike]
+    since: str | None
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        times: npt.ArrayLike,
+        deviation: float,
+        theta_1: npt.ArrayLike | None = None,
+        theta_2: npt.ArrayLike | None = None,
+        since: str | None = None,
+        **angles: npt.ArrayLike | None,
+    ) -> None:
+        given = {"theta_1": theta_1, "theta_2": theta_2} | angles
+        known = {name: each for name, each in given.items() if each is not None}
+        fields = {"times": times, "deviation": deviation, "known": known, "since": since}
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+        self._check()
+
+    def _check(self) -> None:
         check_not_negative("times", _as_array(self.times), "s")
         if not np.size(self.times):
             raise ArgumentError("times = [] is not allowed: give one at least.")
@@ -61,8 +83,15 @@ class MeasuredAngles:
         check_positive("deviation", self.deviation, "rad")
         check_choice("since", self.since, CLOCKS)
         if not self.known:
-            raise ArgumentError("theta_1 = None and theta_2 = None: give one of them at least.")
+            raise ArgumentError(
+                "no angle is given, which is not allowed: give one of them at least, as theta_1."
+            )
         for name, values in self.known.items():
+            if not name.startswith("theta_"):
+                raise ArgumentError(
+                    f"{name} is not allowed: give angles of bodies by their names in states, as "
+                    "theta_1."
+                )
             if np.ndim(values) != 1 or np.shape(values) != np.shape(self.times):
                 raise ArgumentError(
                     f"{name} has the shape {np.shape(values)}: it must be (n,), that of times, "
@@ -75,12 +104,9 @@ class MeasuredAngles:
                     "turn: it must be in radians; are these degrees?"
                 )
         if not any(np.any(each) for each in self.seen.values()):
-            raise ArgumentError("theta_1 and theta_2 hold no angle that is known: give one.")
-
-    @property
-    def known(self) -> dict[str, npt.ArrayLike]:
-        """The angles that are known, by name."""
-        return {name: each for name in ANGLES if (each := getattr(self, name)) is not None}
+            raise ArgumentError(
+                f"{' and '.join(self.known)} hold no angle that is known: give one."
+            )
 
     @property
     def seen(self) -> dict[str, np.ndarray]:
@@ -93,7 +119,7 @@ class MeasuredAngles:
 
     @property
     def values(self) -> np.ndarray:
-        """The angles that are known, one leg behind the other."""
+        """The angles that are known, one body behind the other."""
         return np.concatenate(
             [np.asarray(_as_array(self.known[n]))[at] for n, at in self.seen.items()]
         )
@@ -122,8 +148,8 @@ class MeasuredGait:
             its standard deviation; masked ones count as missing.
         conditions: parameters that are known and were others than the scene's, by name, such as the
             slope.
-        angles: leg angles over time, if any.
-        footsteps: in a cycle.
+        angles: angles of bodies over time, if any.
+        footsteps: in a cycle; None for the fewest that a cycle of the walker has.
 
     Raises:
         ArgumentError: an unknown name, or a number that is not allowed.
@@ -138,10 +164,11 @@ class MeasuredGait:
     measures: Mapping[str, tuple[float, float]]
     conditions: Mapping[str, float] = dataclasses.field(default_factory=dict)
     angles: MeasuredAngles | None = None
-    footsteps: int = 1
+    footsteps: int | None = None
 
     def __post_init__(self) -> None:
-        check_count("footsteps", self.footsteps)
+        if self.footsteps is not None:
+            check_count("footsteps", self.footsteps)
         check_type("measures", self.measures, Mapping)
         check_type("conditions", self.conditions, Mapping)
         known = {name: pair for name, pair in self.measures.items() if not _is_masked(pair)}
@@ -192,8 +219,8 @@ def _is_masked(pair: object) -> bool:
 
 _UNITS = {"period": "s", "step_length": "m", "speed": "m_s", "peak_normal": "N"}
 _KEYS = {f"{name}_{_UNITS[name]}": name for name in MEASURES}
-_ANGLES = {"times_s": "times", "theta_1_rad": "theta_1", "theta_2_rad": "theta_2"}
-_ANGLES |= {"deviation_rad": "deviation", "since": "since"}
+_ANGLES = {"times_s": "times", "deviation_rad": "deviation", "since": "since"}
+_ANGLE = re.compile(r"(theta_\w+)_rad")
 
 
 def read_measured(path: str | Path) -> list[MeasuredGait]:
@@ -202,8 +229,8 @@ def read_measured(path: str | Path) -> list[MeasuredGait]:
     The file holds `{"gaits": [{"conditions": {"slope": 0.02}, "period_s": [0.441, 0.001],
     "step_length_m": …, "speed_m_s": …, "peak_normal_N": …, "angles": {"times_s": […],
     "theta_1_rad": […], "theta_2_rad": […], "deviation_rad": 0.001, "since": "mid-stance"},
-    "footsteps": 1}, …]}`: of each measure its value and its standard deviation; what was not
-    measured is left out, single angles are null.
+    "footsteps": 1}, …]}`, the angle of a body NAME as "theta_NAME_rad": of each measure its value
+    and its standard deviation; what was not measured is left out, single angles are null.
 
     Args:
         path: of the file.
@@ -231,9 +258,10 @@ def _gait(held: JsonObject) -> MeasuredGait:
         if key in _KEYS:
             measures[_KEYS[key]] = tuple(value) if isinstance(value, list) else value
         elif key == "angles" and isinstance(value, dict):
-            _check_keys("angles", value, _ANGLES)
+            named = {key: found[1] for key in value if (found := _ANGLE.fullmatch(key))}
+            _check_keys("angles", value, [*_ANGLES, *named, "theta_BODY_rad"])
             angles: dict[str, Any] = {
-                n: _masked_array(value.get(own)) for own, n in _ANGLES.items()
+                name: _masked_array(value.get(own)) for own, name in (_ANGLES | named).items()
             }
             options["angles"] = MeasuredAngles(**angles)
         elif (key == "conditions" and isinstance(value, dict)) or key == "footsteps":

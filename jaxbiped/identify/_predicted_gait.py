@@ -1,91 +1,130 @@
 """Predicted gait: what a scene's gait would show of what was measured, and its derivatives.
 
-A gait is periodic, so that its angles are known at any time: after each footstep the legs exchange
-their parts. A model that walks faster than the data is then off by a residual, and is not refused.
+A gait is periodic, so that its angles are known at any time: after each footstep of a mirrored
+walker the legs exchange their parts. A model that walks faster than the data is then off by a
+residual, and is not refused.
 """
 
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
+import jax
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import as_float
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.dynamics._section import MidStance
+from jaxbiped.dynamics._state import field_of
+from jaxbiped.dynamics._symmetry import exchange_legs
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.identify._measured_gait import ANGLES, MeasuredAngles, MeasuredGait
+from jaxbiped.identify._measured_gait import MeasuredAngles, MeasuredGait
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 
+AnyScene: TypeAlias = Scene | RigidScene
 Curve = Callable[[np.ndarray], np.ndarray]
+Curves: TypeAlias = dict[str, tuple[Curve, Curve]]
+"""Angles over time by their names in states, each with its rate."""
 _PHASES = 64
-"""Clock's zeros that are tried for each footstep of two cycles before the best is refined."""
+"""Clock's zeros that are tried for each part of two cycles before the best is refined."""
 _REFINED = 20
 """Gauss-Newton steps of a clock's zero, at most."""
 
 
 class AnglesInTime(NamedTuple):
-    """Leg angles of a gait between its solver's steps, by cubics, n footsteps a cycle.
+    """Angles of bodies in a gait between its solver's steps, by cubics, in the n parts of a cycle.
+
+    Each part ends by an arrival at the section, where the sides of a mirror are exchanged.
 
     Attributes:
-        splines: of both legs in each footstep, and of their rates.
-        ends: when each footstep ends, since the cycle's beginning [s], shape (n,).
-        mid_stance: when leg 2 passes the slope's normal in the first [s].
+        splines: of each part those of all angles and of their rates, by name: as the part has them,
+            and with the sides exchanged.
+        ends: when each part ends, since the cycle's beginning [s], shape (n,).
+        mid_stance: when the stance leg comes to mid-stance in the first [s].
     """
 
-    splines: list[list[tuple[Curve, Curve]]]
+    splines: list[tuple[Curves, Curves]]
     ends: np.ndarray
     mid_stance: float
 
     @classmethod
-    def of(cls, gait: Gait) -> "AnglesInTime":
+    def of(cls, scene: AnyScene, gait: Gait) -> "AnglesInTime":
         """Those of a gait that was found; NaN for one that was lost."""
-        from scipy.interpolate import CubicHermiteSpline
-
         times, states = gait.orbit
         splines, lasts = [], []
         for j, clock in enumerate(np.asarray(times)):
             known = np.isfinite(clock)
             if gait.outcome is not Search.FOUND or known.sum() < 2:
                 return cls([], np.full(len(times), np.nan), np.nan)
-            both = []
-            for name in ANGLES:
-                angle, rate = (
-                    np.asarray(getattr(states, each))[j][known]
-                    for each in (name, name.replace("theta", "omega"))
-                )
-                spline = CubicHermiteSpline(clock[known], angle, rate)
-                both.append((spline, spline.derivative()))
-            splines.append(both)
+            part = jtu.tree_map(lambda leaf, j=j, known=known: np.asarray(leaf)[j][known], states)
+            exchanged = jtu.tree_map(np.asarray, exchange_legs(scene, part))
+            splines.append((_curves(clock[known], part), _curves(clock[known], exchanged)))
             lasts.append(clock[known][-1])
-        standing = splines[0][1][0]
-        falls = [] if standing.c[-1, 0] <= 0.0 else standing.roots(extrapolate=False)
-        return cls(splines, np.cumsum(lasts), float(falls[0]) if len(falls) else 0.0)
+        return cls(splines, np.cumsum(lasts), _mid_stance(scene, gait))
 
     def at(self, seen: MeasuredAngles, shift: float) -> tuple[np.ndarray, np.ndarray]:
         """The angles that were measured and their rates where the clock's zero lies at `shift`."""
         times = np.asarray(np.ma.filled(seen.times, 0.0), dtype=float) + shift
-        found = [self._leg(ANGLES.index(n), times[at]) for n, at in seen.seen.items()]
+        found = [self._angle(name, times[at]) for name, at in seen.seen.items()]
         angles, rates = (np.concatenate(part) for part in zip(*found, strict=True))
         return angles, rates
 
-    def _leg(self, leg: int, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A leg's angle and rate; its number is that of the cycle's first footstep."""
+    def _angle(self, name: str, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """An angle and its rate; its name is that of the cycle's first part."""
         angle, rate = np.full(times.shape, np.nan), np.full(times.shape, np.nan)
         if not np.isfinite(self.ends[-1]):
             return angle, rate
         cycles = np.floor(times / self.ends[-1])
         rest = times - cycles * self.ends[-1]
-        step = np.minimum(np.searchsorted(self.ends, rest, side="right"), len(self.ends) - 1)
+        part = np.minimum(np.searchsorted(self.ends, rest, side="right"), len(self.ends) - 1)
         begins = np.append(0.0, self.ends[:-1])
-        exchanged = (cycles.astype(int) * len(self.ends) + step + leg) % 2
+        exchanged = (cycles.astype(int) * len(self.ends) + part) % 2
         for j, both in enumerate(self.splines):
-            for own, (spline, slope) in enumerate(both):
-                here = (step == j) & (exchanged == own)
-                angle[here], rate[here] = (f(rest[here] - begins[j]) for f in (spline, slope))
+            for side, curves in enumerate(both):
+                here = (part == j) & (exchanged == side)
+                angle[here], rate[here] = (f(rest[here] - begins[j]) for f in curves[name])
         return angle, rate
+
+
+def _curves(times: np.ndarray, states: PyTree) -> Curves:
+    """Cubics through all angles of states with leaves (n,), and their derivatives."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    found = {}
+    for name in states._fields:
+        if name.startswith("theta_"):
+            rate = getattr(states, name.replace("theta_", "omega_", 1))
+            spline = CubicHermiteSpline(times, getattr(states, name), rate)
+            found[name] = (spline, spline.derivative())
+    return found
+
+
+def _mid_stance(scene: AnyScene, gait: Gait) -> float:
+    """When the stance leg comes to mid-stance in a gait's first part [s]."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    if scene.compliant:
+        return 0.0  # where its cycles begin
+    clock = np.asarray(gait.orbit[0])[0]
+    known = np.isfinite(clock)
+    states = jtu.tree_map(lambda leaf: np.asarray(leaf)[0], gait.orbit[1])
+    past = (np.asarray(each)[known] for each in _past_mid_stance(scene, states))
+    rises = CubicHermiteSpline(clock[known], *past).roots(extrapolate=False)
+    return float(rises[0]) if len(rises) else 0.0
+
+
+@cached_jit
+def _past_mid_stance(scene: AnyScene, states: PyTree) -> tuple[Scalar, Scalar]:
+    """A function of states that rises through zero at mid-stance, and its rate."""
+    rates = field_of(scene)(0.0, states, scene)
+    found: tuple[Scalar, Scalar] = jax.jvp(
+        lambda y: MidStance().value(scene, y), (states,), (rates,)
+    )
+    return found
 
 
 def clock_zero(angles: AnglesInTime, seen: MeasuredAngles) -> float:
@@ -107,7 +146,6 @@ def clock_zero(angles: AnglesInTime, seen: MeasuredAngles) -> float:
     return shift
 
 
-AnyScene: TypeAlias = Scene | RigidScene
 _DIFFERENCE = 3e-3
 """Relative change of a parameter for the derivatives of angles over time."""
 
@@ -120,7 +158,7 @@ class Prediction(NamedTuple):
         slopes: derivatives with respect to the parameters in units of their sizes, shape (n, k).
         slope_errors: their estimated errors.
         state: of the gait on the section; `state_slopes` its derivatives, leaves of shape (k,).
-        found: whether there is a gait.
+        found: whether there is a gait whose derivatives are known.
     """
 
     values: np.ndarray
@@ -161,10 +199,14 @@ def predict(
     """
     names = tuple(parameters)
 
-    def gait_at(values: dict[str, float], guess: PyTree | None, wanted: tuple[str, ...]) -> Gait:
+    def scene_at(values: dict[str, float]) -> AnyScene:
         own = with_parameters(scene, {**values, **measured.conditions})
+        changed: AnyScene = jtu.tree_map(as_float, own)
+        return changed
+
+    def gait_at(values: dict[str, float], guess: PyTree | None, wanted: tuple[str, ...]) -> Gait:
         return find_gait(
-            jtu.tree_map(as_float, own),
+            scene_at(values),
             guess,
             footsteps=measured.footsteps,
             parameters=wanted,
@@ -180,8 +222,11 @@ def predict(
         for part in (gait.measures, gait.sensitivities, gait.sensitivity_errors)
     )
     slopes, errors = (part.reshape(-1, len(names)) * sizes for part in (slopes, errors))
+    found = found and bool(np.all(np.isfinite(slopes)))
     if measured.angles is not None and found:
-        along, along_errors, at = _angles_along(gait_at, gait, measured, parameters, sizes)
+        along, along_errors, at = _angles_along(
+            gait_at, scene_at, gait, measured, parameters, sizes
+        )
         values = np.append(values, at)
         slopes = np.concatenate([slopes, along])
         errors = np.concatenate([errors, along_errors])
@@ -192,6 +237,7 @@ def predict(
 
 def _angles_along(
     gait_at: Callable[[dict[str, float], PyTree, tuple[str, ...]], Gait],
+    scene_at: Callable[[dict[str, float]], AnyScene],
     gait: Gait,
     measured: MeasuredGait,
     parameters: dict[str, float],
@@ -206,7 +252,11 @@ def _angles_along(
     """
     seen = measured.angles
     assert seen is not None
-    here = AnglesInTime.of(gait)
+
+    def angles_of(values: dict[str, float], gait: Gait) -> AnglesInTime:
+        return AnglesInTime.of(scene_at(values), gait)
+
+    here = angles_of(parameters, gait)
     shift = clock_zero(here, seen)
     own, rates = here.at(seen, shift)
     slopes, errors = [], []
@@ -222,7 +272,7 @@ def _angles_along(
                 ahead,
             )
             values = parameters | {name: parameters[name] + sign * _DIFFERENCE * size}
-            there = AnglesInTime.of(gait_at(values, near, ()))
+            there = angles_of(values, gait_at(values, near, ()))
             ends.append(there.at(seen, shift if measured.clocks else there.mid_stance)[0])
         lost = [not np.all(np.isfinite(each)) for each in ends]
         up, down = (own if gone else each for each, gone in zip(ends, lost, strict=True))

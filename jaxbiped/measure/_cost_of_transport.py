@@ -5,12 +5,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_increasing, check_type
-from jaxbiped.dynamics._energy import energies, powers
-from jaxbiped.dynamics._redundant_state import EulerState, RedundantState, minimal_state
-from jaxbiped.dynamics._state import BristleState, State
-from jaxbiped.measure._energy_ledger import kept_strikes, rigid_ledger
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._energy import energies, is_driven, powers
+from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.dynamics._state import state_type
+from jaxbiped.measure._energy_ledger import rigid_ledger
 from jaxbiped.measure._footsteps import heel_strikes
-from jaxbiped.measure._samples import evaluate_at, sample
+from jaxbiped.measure._samples import evaluate_at, kept_strikes, places_of_standing, sample
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
@@ -70,20 +71,19 @@ def cost_of_transport(
         >>> jb.measure.cost_of_transport(scene, walk).cost.round(3)
         array([0.02])
     """
-    weight = float(scene.walker.total_mass * scene.ground.g)
+    weight = float(scene.mechanism.total_mass) * float(scene.ground.g)
     if isinstance(scene, RigidScene):
         if times is not None:
             raise ArgumentError(
                 "times is not allowed for a RigidScene: it is counted between heel strikes."
             )
         _, states = kept_strikes(scene, walk)
-        reach = float(scene.walker.hip_to_foot)
-        distance = np.diff(states.hip_x + reach * np.sin(states.theta_2))
+        distance = np.diff(places_of_standing(scene, states))
         books = rigid_ledger(scene, walk)
         gravity, motors = books.gravity_work, books.motor_work
     else:
         check_type("walk", walk, Trajectory)
-        check_type("walk.state", walk.state, State, BristleState, RedundantState, EulerState)
+        check_type("walk.state", walk.state, state_type(scene))
         check_scene_of(walk, scene, "walk")
         if times is not None:
             check_increasing("times", times, 2)
@@ -100,11 +100,16 @@ def _compliant(
     if count == 0:
         nothing = np.zeros(0)
         return nothing, nothing, nothing
-    place = evaluate_at(scene, walk, lambda s, y: minimal_state(s, y).hip_x, ends)
+    place = evaluate_at(scene, walk, _root_place, ends)
     gravity = -np.diff(evaluate_at(scene, walk, energies, ends).gravitational)
     driven = np.zeros(count)
-    if scene.actuation is not None:
+    if is_driven(scene):
         flows = sample(scene, walk, powers, ends)
         for power in flows.values.motors:
             driven += flows.totals(flows.positive_integral(power), ends)
     return np.diff(place), gravity, driven
+
+
+def _root_place(scene: Scene, state: Any) -> Scalar:
+    """Place of the root point along the slope [m]."""
+    return getattr(minimal_state(scene, state), scene.mechanism.structure.coordinates[0])

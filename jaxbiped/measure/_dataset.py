@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from jaxbiped._checks import check_type
-from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._contacts import feet, foot_forces, touches
+from jaxbiped.dynamics._contacts import feet, foot_forces
 from jaxbiped.dynamics._energy import energies
+from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._redundant_motion import violation
-from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._redundant_state import BodiesState, minimal_state
+from jaxbiped.dynamics._state_quantities import state_quantity
+from jaxbiped.scene._parameter_access import parameter_quantities, parameter_values
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
@@ -24,9 +25,9 @@ if TYPE_CHECKING:
 def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) -> "xarray.Dataset":
     """States, foot forces, penetrations and energies along a trajectory, labelled, in SI units.
 
-    Variables have the dimension `time` [s]; forces and penetrations also `leg` (1, 2). Attributes
-    hold how the motion ended and every parameter of the scene, with their units in
-    `parameter_units` (JSON). Write it with `to_netcdf` (or
+    Variables have the dimension `time` [s]; forces and penetrations also `foot`, by the names of
+    the feet, with that of its `leg`. Attributes hold how the motion ended and every parameter of
+    the scene, with their units in `parameter_units` (JSON). Write it with `to_netcdf` (or
     `to_zarr`, with zarr installed).
 
     Args:
@@ -47,37 +48,48 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
     if np.ndim(trajectory.t) != 1:
         raise ValueError("This is a batch of trajectories: take one of them at a time.")
     state = trajectory.state
-    both, forces = feet(scene, state), foot_forces(scene, state)
+    found, forces = feet(scene, state), foot_forces(scene, state)
     held = energies(scene, state)  # type: ignore[arg-type]
     variables = {
-        name: ("time", np.asarray(value), {"units": STATE_QUANTITIES[name].unit or "1"})
+        name: ("time", np.asarray(value), {"units": _unit_of(name)})
         for name, value in minimal_state(scene, state)._asdict().items()
     }
     if isinstance(scene, RedundantScene):
-        off = np.asarray(violation(scene, cast("LegsState", state)).position)
+        off = np.asarray(violation(scene, cast("BodiesState", state)).position)
         variables["violation"] = ("time", off, {"units": "m"})
     for name, value in held._asdict().items():
         variables[f"{name}_energy"] = ("time", np.asarray(value), {"units": "J"})
 
-    def legs(values: list[Scalar | None]) -> np.ndarray:
+    def rows(values: list[Scalar | None]) -> np.ndarray:
         return np.stack([np.asarray(value) for value in values])
 
-    per_leg = {
-        "normal_force": (legs([force.normal for force in forces]), "N"),
-        "penetration": (legs([foot.penetration for foot in both]), "m"),
-        "slip_speed": (legs([foot.slip_speed for foot in both]), "m/s"),
-        "touches": (legs([touches(foot) for foot in both]), "1"),
+    per_foot = {
+        "normal_force": (rows([force.normal for force in forces]), "N"),
+        "penetration": (rows([foot.penetration for foot in found]), "m"),
+        "slip_speed": (rows([foot.slip_speed for foot in found]), "m/s"),
+        "touches": (rows([touches(foot) for foot in found]), "1"),
     }
-    if forces.foot_1.tangential is not None:
-        per_leg["tangential_force"] = (legs([force.tangential for force in forces]), "N")
+    if forces[0].tangential is not None:
+        per_foot["tangential_force"] = (rows([force.tangential for force in forces]), "N")
+    structure = scene.mechanism.structure
     dataset = xarray.Dataset(
         variables
         | {
-            name: (("leg", "time"), data, {"units": unit}) for name, (data, unit) in per_leg.items()
+            name: (("foot", "time"), data, {"units": unit})
+            for name, (data, unit) in per_foot.items()
         },
-        coords={"time": ("time", np.asarray(trajectory.t), {"units": "s"}), "leg": [1, 2]},
+        coords={
+            "time": ("time", np.asarray(trajectory.t), {"units": "s"}),
+            "foot": list(structure.feet_told),
+            "leg": ("foot", [structure.legs[leg] for leg in structure.leg_of_foot]),
+        },
     )
     return dataset.assign_attrs(ending=str(trajectory.outcome), **_parameters(scene))
+
+
+def _unit_of(name: str) -> str:
+    quantity = state_quantity(name)
+    return (quantity.unit if quantity else "") or "1"
 
 
 def _parameters(scene: Scene | RedundantScene) -> dict[str, float | str]:
@@ -92,13 +104,9 @@ def _parameters(scene: Scene | RedundantScene) -> dict[str, float | str]:
     parts = {name: part for name, part in parts.items() if name != "actuation"} | actuators
     for part_name, part in parts.items():
         found[part_name] = type(part).__name__
-        infos = parameter_infos(part)
-        for name, value in vars(part).items():
-            several = enumerate(value, 1) if isinstance(value, tuple) else [("", value)]
-            for number, each in several:
-                full = f"{part_name}.{name}" + (f"_{number}" if number else "")
-                if each is not None:  # a parameter that the law does without
-                    found[full] = each if isinstance(each, str) else float(each)
-                if name in infos:
-                    units[full] = infos[name].quantity.unit
+        words = {name: value for name, value in vars(part).items() if isinstance(value, str)}
+        numbers = {name: float(value) for name, value in parameter_values(part).items()}
+        found |= {f"{part_name}.{name}": value for name, value in (words | numbers).items()}
+        quantities = parameter_quantities(part).items()
+        units |= {f"{part_name}.{name}": quantity.unit for name, quantity in quantities}
     return found | {"parameter_units": json.dumps(units)}

@@ -1,19 +1,33 @@
 """Energy ledgers: where the work of gravity and actuators went, on compliant and on rigid feet."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_increasing, check_type
+from jaxbiped._checks import check_increasing, check_type
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._actuation import actuator_powers
-from jaxbiped.dynamics._energy import energies, kinetic_and_moment, powers
+from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
+from jaxbiped.dynamics._energy import Energies, energies, kinetic_and_moment, powers
 from jaxbiped.dynamics._impact import push_off_work
-from jaxbiped.dynamics._rolling import rolling_hip_motion, rolling_rates
-from jaxbiped.dynamics._state import RigidState, whole_state
-from jaxbiped.measure._samples import NODES, Samples, evaluate_at, sample, states_after
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.dynamics._joint_loads import joint_energy
+from jaxbiped.dynamics._redundant_state import motion_in
+from jaxbiped.dynamics._rolling import rolling_field, rolling_hip_motion
+from jaxbiped.dynamics._state import whole_state
+from jaxbiped.measure._samples import (
+    NODES,
+    ModeChanges,
+    Samples,
+    evaluate_along,
+    evaluate_at,
+    kept_strikes,
+    mode_changes,
+    rows_of,
+    sample,
+    states_after,
+)
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -27,12 +41,12 @@ class EnergyLedger(NamedTuple):
     Attributes:
         gravity_work: work of gravity on the walker.
         damper_loss: lost in the contact's normal direction, including the elastic energy that a
-            foot leaves in the ground when it lets go.
+            foot leaves in the ground when it lets go, and in springs, stops and latches of joints.
         friction_loss: lost to friction.
         stored_change: change of kinetic and elastic energy.
         residual: what the others leave open.
-        actuation_work: work of the actuators on the walker; what a spring between the legs stores
-            and a damper there loses is in it. Zero for a passive walker.
+        actuation_work: work of motors and actuators on the walker; what a spring among the
+            actuators stores and a damper there loses is in it. Zero for a passive walker.
     """
 
     gravity_work: np.ndarray
@@ -61,7 +75,8 @@ def energy_ledger(
         The ledger of every interval [J], leaves of shape (n,); n = 1 unless `times` are given.
 
     Raises:
-        ArgumentError: times that do not increase.
+        ArgumentError: times that do not increase, or a rigid walker's scene, which has
+            `jaxbiped.measure.rigid_ledger`.
         ValueError: a trajectory without its continuous solution, or a batch of them.
 
     Examples:
@@ -73,6 +88,7 @@ def energy_ledger(
         >>> books.gravity_work.round(3), books.damper_loss.round(3)
         (array([0.195]), array([0.071]))
     """
+    check_type("scene", scene, Scene, RedundantScene)
     check_scene_of(trajectory, scene)
     trajectory.require_dense()
     if times is not None:
@@ -103,17 +119,20 @@ _BEFORE = 1e-7
 class RigidLedger(NamedTuple):
     """Works and losses of footsteps, each from one heel strike to the next [J]; leaves (n,).
 
-    gravity_work + actuation_work = impact_loss + stored_change + residual. The residual is no
-    physics: it measures the error of the solve.
+    gravity_work + actuation_work = impact_loss + stop_loss + joint_loss + stored_change + residual.
+    The residual is no physics: it measures the error of the solve.
 
     Attributes:
         gravity_work: work of gravity on the walker.
         actuation_work: of the actuators, push-off included; what a spring between the legs stores
             and a damper there loses is in it. Zero for a passive walker.
         impact_loss: lost in the impact that ends the footstep.
-        stored_change: change of kinetic energy, from just after one impact to just after the next.
+        stored_change: change of kinetic and elastic energy, from just after one impact to just
+            after the next.
         residual: what the others leave open.
         motor_work: what each motor does where its power is positive, added up, and the push-off.
+        joint_loss: lost in dampers and latches of the walker's joints.
+        stop_loss: lost where a stop is hit, or another foot of the leg that stands comes down.
     """
 
     gravity_work: np.ndarray
@@ -122,9 +141,11 @@ class RigidLedger(NamedTuple):
     stored_change: np.ndarray
     residual: np.ndarray
     motor_work: np.ndarray
+    joint_loss: np.ndarray
+    stop_loss: np.ndarray
 
 
-def rigid_ledger(scene: RigidScene, walk: Trajectory[RigidState]) -> RigidLedger:
+def rigid_ledger(scene: RigidScene, walk: Trajectory[Any]) -> RigidLedger:
     """The energy ledger of the footsteps between the heel strikes that a rigid walk kept.
 
     Works are integrals of the actuators' powers over single support, walked again tightly.
@@ -149,80 +170,129 @@ def rigid_ledger(scene: RigidScene, walk: Trajectory[RigidState]) -> RigidLedger
         (array([0.076]), array([0.066]))
     """
     times, states = kept_strikes(scene, walk)
-    starts = _rows(states, slice(-1))
+    starts = rows_of(states, slice(-1))
     periods = np.diff(times)
-    last, first = _before_impact(scene, starts, periods), _rows(states, slice(1, None))
-    held_first, held_last = _energies(scene, starts), _energies(scene, last)
-    after = _energies(scene, first)
+    last, first = _before_impact(scene, starts, periods), rows_of(states, slice(1, None))
+    held_first, held_last, after = (_held(scene, each) for each in (starts, last, first))
     push = np.asarray(push_off_work(scene, last))
-    hip, motors = _hip_works(scene, starts, periods)
-    gravity = held_first[1] - held_last[1]
-    work = hip + push
-    loss = held_last[0] + push - after[0]
-    stored = after[0] - held_first[0]
-    residual = gravity + work - loss - stored
-    return RigidLedger(gravity, work, loss, stored, residual, motors + np.maximum(push, 0.0))
+    changes = mode_changes(scene, starts, (1.0 - _BEFORE) * periods)
+    works = _works(scene, starts, periods, changes)
+    gravity = np.asarray(held_first.gravitational - held_last.gravitational)
+    loss = np.asarray(held_last.kinetic + push - after.kinetic)
+    kept = after.kinetic - held_first.kinetic + held_last.elastic - held_first.elastic
+    stored = np.asarray(kept)
+    work = works.hip + push
+    stops = _stop_losses(scene, starts, periods, changes)
+    residual = gravity + work - loss - stops - works.joints - stored
+    motors = works.motors + np.maximum(push, 0.0)
+    return RigidLedger(gravity, work, loss, stored, residual, motors, works.joints, stops)
 
 
-def kept_strikes(scene: RigidScene, walk: Trajectory[RigidState]) -> tuple[np.ndarray, RigidState]:
-    """Times [s] and states of the heel strikes that a walk kept, leaves of shape (n + 1,)."""
-    check_type("scene", scene, RigidScene)
-    check_type("walk", walk, Trajectory)
-    check_type("walk.state", walk.state, RigidState)
-    check_scene_of(walk, scene, "walk")
-    assert walk.arrivals is not None
-    times = np.asarray(walk.arrivals.t)
-    known = np.isfinite(times)
-    if times.ndim != 1 or known.sum() < 2:
-        raise ArgumentError(
-            "walk.arrivals has fewer than two heel strikes, which is not allowed: walk two "
-            "footsteps or more with max_arrivals of as many."
-        )
-    return times[known], _rows(walk.arrivals.state, known)
+def _stop_losses(
+    scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeChanges
+) -> np.ndarray:
+    """What changes of mode take in each footstep [J], shape (n,): energy at once before and behind.
+
+    NaN where there was no room for all of them.
+    """
+    number, lost = changes.number, np.zeros(len(periods))
+
+    def energy(shift: np.ndarray) -> np.ndarray:
+        states = states_after(scene, rows_of(starts, number), changes.since + shift)
+        return np.sum([np.asarray(each) for each in _held(scene, states)], axis=0)
+
+    if len(number):
+        rest = _BEFORE * periods[number]
+        # Joints lose in between as well, so that energies are continued up to the change.
+        before, behind = (2.0 * energy(r) - energy(2.0 * r) for r in (-rest, rest))
+        np.add.at(lost, number, before - behind)
+    return np.where(changes.known, lost, np.nan)
 
 
-def _rows(states: RigidState, rows: slice | np.ndarray) -> RigidState:
-    return RigidState(*[jnp.asarray(leaf)[rows] for leaf in states])
+def _held(scene: RigidScene, states: Any) -> Energies:
+    """Energies of states on rigid feet, leaves of shape (n,)."""
+    held: Energies = evaluate_along(scene, states, _energies)
+    return held
 
 
-def _energies(scene: RigidScene, states: RigidState) -> tuple[np.ndarray, np.ndarray]:
-    kinetic, moment = kinetic_and_moment(scene, whole_state(scene, states))
-    return np.asarray(kinetic), np.asarray(scene.ground.g * moment)
+def _energies(scene: RigidScene, state: Any) -> Energies:
+    whole = whole_state(scene, state)
+    kinetic, moment = kinetic_and_moment(scene, whole)
+    joints = joint_energy(
+        scene.mechanism, motion_in(scene, whole), scene.ground.slope, stops=scene.compliant
+    )
+    elastic = jnp.zeros_like(kinetic) if joints is None else joints.stored
+    return Energies(kinetic, scene.ground.g * moment, elastic)
 
 
-def _before_impact(scene: RigidScene, starts: RigidState, periods: np.ndarray) -> RigidState:
+def _before_impact(scene: RigidScene, starts: Any, periods: np.ndarray) -> Any:
     """States just before the impacts that end footsteps."""
     rest = _BEFORE * periods
     near = states_after(scene, starts, periods - rest)
-    rates = rolling_rates(scene, near)
-    angles = [
-        angle + rest * (rate + 0.5 * rest * alpha)
-        for angle, rate, alpha in zip(near[1:3], near[3:], rates, strict=True)
+    rates = jtu.tree_map(np.asarray, rolling_field(0.0, near, scene))
+    moved = jtu.tree_map(lambda leaf, rate: leaf + rest * rate, near, rates)
+    angles = {
+        angle: getattr(moved, angle) + 0.5 * rest * rest * getattr(rates, rate)
+        for rate in near._fields
+        if (angle := rate.replace("omega_", "theta_")) != rate
+    }
+    return moved._replace(**angles)
+
+
+class _Works(NamedTuple):
+    """In each footstep [J], shape (n,): of all actuators at the hip, of motors where they drive,
+    and what joints lose."""
+
+    hip: np.ndarray
+    motors: np.ndarray
+    joints: np.ndarray
+
+
+class _Flows(NamedTuple):
+    """Powers [W]: of all actuators at the hip, of each motor, and what joints lose."""
+
+    hip: Scalar
+    motors: tuple[Scalar, ...]
+    joints: Scalar
+
+
+def _flows(scene: RigidScene, state: Any) -> _Flows:
+    nothing = jnp.zeros_like(state[0])
+    driven = ActuatorPowers(nothing, ())
+    if scene.actuation is not None:
+        driven = actuator_powers(scene, rolling_hip_motion(scene, state))
+    motion = motion_in(scene, whole_state(scene, state))
+    joints = joint_energy(scene.mechanism, motion, scene.ground.slope, stops=scene.compliant)
+    return _Flows(driven.total, driven.motors, nothing if joints is None else joints.lost)
+
+
+def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeChanges) -> _Works:
+    count = len(periods)
+    if scene.actuation is None and not scene.mechanism.joints:
+        return _Works(*[np.zeros(count) for _ in _Works._fields])
+    # Powers jump where the mode changes, so that no panel straddles a change.
+    even = np.linspace(0.0, 1.0, _PANELS + 1)
+    edges = [
+        np.unique(np.append(period * even, changes.since[changes.number == k]))
+        for k, period in enumerate(periods)
     ]
-    place = near.hip_x + rest * whole_state(scene, near).hip_vx
-    return RigidState(place, *angles, *[w + rest * a for w, a in zip(near[3:], rates, strict=True)])
+    number = np.repeat(np.arange(count), [len(each) - 1 for each in edges])
+    widths = np.concatenate([np.diff(each) for each in edges])
+    begins = np.concatenate([each[:-1] for each in edges])
+    times = begins[:, None] + widths[:, None] * 0.5 * (1.0 + NODES)
+    many = rows_of(starts, np.repeat(number, len(NODES)))
+    states = states_after(scene, many, times.ravel())
+    flows = jtu.tree_map(
+        lambda leaf: leaf.reshape(times.shape), evaluate_along(scene, states, _flows)
+    )
+    samples = Samples(np.append(0.0, np.cumsum(widths)), None)
 
+    def by_footstep(works: np.ndarray) -> np.ndarray:
+        return np.bincount(number, works, count)
 
-def _hip_works(
-    scene: RigidScene, starts: RigidState, periods: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Work of all actuators at the hip in each footstep, and of motors where they drive [J]."""
-    edges = np.linspace(0.0, 1.0, _PANELS + 1)
-    if scene.actuation is None:
-        return np.zeros(len(periods)), np.zeros(len(periods))
-    shares = (edges[:-1, None] + np.diff(edges)[:, None] * 0.5 * (1.0 + NODES)).ravel()
-    many = RigidState(*[jnp.repeat(leaf, len(shares)) for leaf in starts])
-    states = states_after(scene, many, np.outer(periods, shares).ravel())
-    powers = actuator_powers(scene, rolling_hip_motion(states), (None, None))
-
-    def split(power: Scalar) -> np.ndarray:
-        rows = np.broadcast_to(np.asarray(power), (many.theta_2.size,))
-        return rows.reshape(len(periods), _PANELS, len(NODES))
-
-    works, driven = np.zeros(len(periods)), np.zeros(len(periods))
-    total, motors = split(powers.total), [split(power) for power in powers.motors]
-    for k, period in enumerate(periods):
-        samples = Samples(period * edges, None)
-        works[k] = samples.integral(total[k]).sum()
-        driven[k] = sum(samples.positive_integral(power[k]).sum() for power in motors)
-    return works, driven
+    driving = [by_footstep(samples.positive_integral(each)) for each in flows.motors]
+    return _Works(
+        hip=by_footstep(samples.integral(flows.hip)),
+        motors=np.sum(driving, axis=0) if driving else np.zeros(count),
+        joints=by_footstep(samples.integral(flows.joints)),
+    )

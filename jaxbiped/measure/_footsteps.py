@@ -1,14 +1,20 @@
 """Footsteps: what a walk is counted and measured in."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import PyTree
 
-from jaxbiped.dynamics._contacts import Contacts, Feet, contacts, landings, touches
+from jaxbiped._checks import check_type
+from jaxbiped._types import Numbers
+from jaxbiped.dynamics._contacts import Contacts, contacts
+from jaxbiped.dynamics._footfalls import landings, standing_leg
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._samples import Samples, at_steps, evaluate_at, moments_of_change, sample
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RedundantScene, Scene
+from jaxbiped.scene._structure import Structure
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -18,7 +24,7 @@ class HeelStrikes(NamedTuple):
 
     Attributes:
         time_s: when the foot comes to touch [s].
-        foot: which one does, 1 or 2.
+        foot: number of the leg that does, from 1 on in the order of the mechanism's legs.
     """
 
     time_s: np.ndarray
@@ -31,13 +37,15 @@ class Footsteps(NamedTuple):
     Attributes:
         time_s: time of the heel strike that completes the step [s].
         period_s: time since the heel strike before [s].
-        length_m: distance between the places where the two feet struck, along the slope [m].
+        length_m: distance along the slope between the places where the two legs struck, each with
+            its foot that touched first [m].
         speed_m_s: length over period [m/s].
         peak_normal_N: largest normal force on a foot [N].
         max_penetration_m: largest penetration of a foot that touches [m].
-        double_support_s: time from the first strike until a foot carries nothing again [s].
+        double_support_s: time from the first strike until one leg alone carries again [s].
         cost_of_transport: energy lost over weight times length [–].
         energy_residual_J: what the step's energy ledger leaves open [J].
+        leg: name of the leg that strikes.
     """
 
     time_s: np.ndarray
@@ -49,41 +57,44 @@ class Footsteps(NamedTuple):
     double_support_s: np.ndarray
     cost_of_transport: np.ndarray
     energy_residual_J: np.ndarray  # noqa: N815 (joule)
+    leg: np.ndarray
 
 
 def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
-    """Heel strikes: the foot ahead comes to touch, the other one having struck before.
+    """Heel strikes: a leg comes to touch ahead of the one that carries, which struck before.
+
+    All feet of a leg are one: a toe that follows its heel is no strike.
 
     Args:
         scene: what was simulated.
         trajectory: the motion, saved step by step.
 
     Returns:
-        Time [s] and foot of all n heel strikes, leaves of shape (n,).
+        Time [s] and leg of all n heel strikes, leaves of shape (n,).
 
     Raises:
+        ArgumentError: a rigid walker's scene, whose walk keeps its heel strikes itself.
         ValueError: a trajectory without its continuous solution, or a batch of them.
     """
+    check_type("scene", scene, Scene, RedundantScene)
     check_scene_of(trajectory, scene)
     trajectory.require_dense()
-    both = at_steps(scene, trajectory, contacts).feet
-    before, after = (_part(both, part) for part in (slice(-1), slice(1, None)))
-    lands = np.stack(landings(before, after))
-    # By NumPy: JAX would compile a program for this one number.
-    touch_1, touch_2 = (bool(touches(foot)) for foot in _part(both, 0))
-    last = int(touch_1 and not touch_2) + 2 * int(touch_2 and not touch_1)
+    found_feet = at_steps(scene, trajectory, contacts).feet
+    before, after = (_part(found_feet, part) for part in (slice(-1), slice(1, None)))
+    structure = scene.mechanism.structure
+    lands = np.stack(landings(structure, before, after))
+    last = int(standing_leg(structure, _part(found_feet, 0)))
     found: list[tuple[int, int]] = []
     for k in np.flatnonzero(lands.any(axis=0)):
-        for leg in (1, 2):
-            if lands[leg - 1, k] and leg != last:
+        for leg in range(1, 1 + len(lands)):
+            if lands[leg - 1, k] and (leg != last or len(lands) == 1):
                 found.append((int(k), leg))
                 last = leg
     steps = np.array([k for k, _ in found], dtype=int)
     foot = np.array([leg for _, leg in found], dtype=int)
 
     def strikes(now: Contacts) -> np.ndarray:
-        first, second = now.touching
-        return np.where(foot[:, None] == 1, first, second)
+        return np.choose(foot[:, None] - 1, _of_legs(structure, now.touching))
 
     t = np.asarray(trajectory.t)
     time = moments_of_change(scene, trajectory, contacts, strikes, t[steps], t[steps + 1])
@@ -101,6 +112,7 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
         The measures of all n footsteps (SI units, named in the fields), leaves of shape (n,).
 
     Raises:
+        ArgumentError: a rigid walker's scene, whose walk keeps its heel strikes itself.
         ValueError: a trajectory without its continuous solution, or a batch of them.
 
     Examples:
@@ -113,16 +125,16 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     """
     strikes = heel_strikes(scene, trajectory)
     count = max(len(strikes.time_s) - 1, 0)
+    structure = scene.mechanism.structure
+    leg = np.array(structure.legs)[strikes.foot[1:] - 1]
     if count == 0:
-        return Footsteps(*[np.zeros(0)] * len(Footsteps._fields))
-    time, foot = strikes
-    both = evaluate_at(scene, trajectory, contacts, time).feet
-    place = np.where(foot == 1, both.foot_1.x, both.foot_2.x)
-    period, length = np.diff(time), np.diff(place)
+        nothing = Footsteps(*[np.zeros(0)] * len(Footsteps._fields))
+        return nothing._replace(leg=leg[:0])
+    time = strikes.time_s
+    period, length = np.diff(time), np.diff(strike_places(scene, trajectory, strikes))
     loads = sample(scene, trajectory, contacts, time)
     ledger = energy_ledger(scene, trajectory, time)
-    own = jax.tree_util.tree_map(np.asarray, (scene.walker, scene.ground))
-    weight = float(own[0].total_mass * own[1].g)
+    weight = float(scene.mechanism.total_mass) * float(scene.ground.g)
     return Footsteps(
         time_s=time[1:],
         period_s=period,
@@ -133,25 +145,44 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
         double_support_s=_double_support(scene, trajectory, time, loads),
         cost_of_transport=(ledger.damper_loss + ledger.friction_loss) / (weight * length),
         energy_residual_J=ledger.residual,
+        leg=leg,
     )
 
 
-def _part(both: Feet, part: slice | int) -> Feet:
-    return jax.tree_util.tree_map(lambda leaf: leaf[part], both)
+def strike_places(scene: Scene, trajectory: Trajectory, strikes: HeelStrikes) -> np.ndarray:
+    """Where legs strike along the slope [m], shape (n,): each with its foot that touches first."""
+    feet = evaluate_at(scene, trajectory, contacts, strikes.time_s).feet
+    places = np.zeros(len(strikes.time_s))
+    for leg, own in enumerate(scene.mechanism.structure.feet_of_leg, 1):
+        first = np.argmax([feet[k].penetration for k in own], axis=0)
+        place = np.choose(first, [feet[k].x for k in own])
+        places = np.where(strikes.foot == leg, place, places)
+    return places
+
+
+def _part(feet: PyTree, part: slice | int) -> PyTree:
+    return jax.tree_util.tree_map(lambda leaf: leaf[part], feet)
+
+
+def _of_legs(structure: Structure, of_feet: Sequence[Numbers]) -> list[np.ndarray]:
+    """Of each leg whether any of its feet does (booleans)."""
+    return [
+        np.asarray(np.any([of_feet[k] for k in feet], axis=0)) for feet in structure.feet_of_leg
+    ]
 
 
 def _normal(now: Contacts) -> np.ndarray:
-    """The larger normal force [N]."""
-    return np.maximum(now.forces.foot_1.normal, now.forces.foot_2.normal)
+    """The largest normal force on a foot [N]."""
+    return np.max([np.asarray(force.normal) for force in now.forces], axis=0)
 
 
 def _depth(now: Contacts) -> np.ndarray:
-    """The larger penetration of a foot that touches [m]."""
-    depths = (
+    """The largest penetration of a foot that touches [m]."""
+    depths = [
         np.where(touching, foot.penetration, 0.0)
         for touching, foot in zip(now.touching, now.feet, strict=True)
-    )
-    return np.maximum(*depths)
+    ]
+    return np.max(depths, axis=0)
 
 
 def _largest(values: np.ndarray, loads: Samples, time: np.ndarray) -> np.ndarray:
@@ -165,9 +196,14 @@ def _largest(values: np.ndarray, loads: Samples, time: np.ndarray) -> np.ndarray
 def _double_support(
     scene: Scene, trajectory: Trajectory, time: np.ndarray, loads: Samples
 ) -> np.ndarray:
-    """Time from each heel strike but the last until a foot carries nothing again [s]."""
+    """Time from each heel strike but the last until one leg alone carries again [s]."""
     durations, edges = np.zeros(len(time) - 1), loads.edges
-    carried = loads.values.both_carry.all(axis=1)
+
+    def shared(now: Contacts) -> np.ndarray:
+        carry = [force.normal > 0.0 for force in now.forces]
+        return np.asarray(np.sum(_of_legs(scene.mechanism.structure, carry), axis=0) > 1)
+
+    carried = np.asarray(shared(loads.values).all(axis=1))
     spans = []
     for k, start in enumerate(time[:-1]):
         first = int(np.searchsorted(edges, start))
@@ -176,8 +212,6 @@ def _double_support(
             spans.append((k, edges[first + ends[0] - 1], edges[first + ends[0] + 1]))
     if spans:
         which, left, right = (np.array(column) for column in zip(*spans, strict=True))
-        released = moments_of_change(
-            scene, trajectory, contacts, lambda now: now.both_carry, left, right
-        )
+        released = moments_of_change(scene, trajectory, contacts, shared, left, right)
         durations[which] = released - time[which]
     return durations

@@ -1,7 +1,8 @@
-"""Samples of a trajectory between its steps: values, integrals and moments of change."""
+"""Samples of a walk: between its steps, with integrals and moments of change; at heel strikes."""
 
+import dataclasses
 from collections.abc import Callable
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import jax
 import jax.numpy as jnp
@@ -9,12 +10,21 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, as_float
-from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._state import RigidState, State
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._types import Scalar, as_array, as_float
+from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._stance import of_stance
+from jaxbiped.dynamics._state import check_state, state_type
+from jaxbiped.dynamics._strike_surfaces import standing_place
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._state_types import RigidState, SomeState, State
 from jaxbiped.simulate._simulate import rigid_walk
-from jaxbiped.solve._trajectory import AT_ONCE, Trajectory, join_parts, split_evenly
+from jaxbiped.solve._scene_key import check_scene_of
+from jaxbiped.solve._trajectory import AT_ONCE, Arrivals, Trajectory, join_parts, split_evenly
+
+SomeScene = TypeVar("SomeScene", bound=AbstractWalkerScene)
+_Taken = TypeVar("_Taken")
 
 NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _RESOLUTION = 2.0**48
@@ -96,7 +106,7 @@ def at_steps(
 
 
 def evaluate_along(
-    scene: Scene, state: State, function: Callable[[Scene, State], PyTree]
+    scene: SomeScene, state: SomeState, function: Callable[[SomeScene, SomeState], PyTree]
 ) -> PyTree:
     """`function(scene, state)` at states with leaves of shape (n,), as NumPy arrays."""
     # With every leaf an array: a plain number would be compiled in.
@@ -136,8 +146,8 @@ def moments_of_change(
     return right
 
 
-@cached_jit
-def _apply(function: Callable[..., PyTree], scene: Scene, states: State) -> PyTree:
+@host_jit()
+def _apply(function: Callable[..., PyTree], scene: PyTree, states: PyTree) -> PyTree:
     values = function(scene, states)
     shape = jnp.shape(jtu.tree_leaves(states)[0])
     return jtu.tree_map(lambda leaf: jnp.broadcast_to(leaf, shape), values)
@@ -145,9 +155,94 @@ def _apply(function: Callable[..., PyTree], scene: Scene, states: State) -> PyTr
 
 def states_after(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> RigidState:
     """States so long after their starts [s], within their footsteps; leaves of shape (n,)."""
+    return _walked(jtu.tree_map(as_float, scene), starts, durations)
 
-    def walked(start: RigidState, duration: Scalar) -> RigidState:
-        return rigid_walk(scene, start, duration=cast("float", duration), accuracy="tight").final
 
-    each: Callable[[RigidState, Scalar], RigidState] = jax.vmap(walked)
+@host_jit(within=True)
+def _walked(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> RigidState:
+    return _walked_again(scene, starts, durations, lambda walk: walk.final)
+
+
+class ModeChanges(NamedTuple):
+    """Changes of mode within footsteps.
+
+    Attributes:
+        number: of each one's footstep, shape (m,).
+        since: when they come in it [s], shape (m,).
+        known: whether there was room for all of a footstep, shape (n,).
+    """
+
+    number: np.ndarray
+    since: np.ndarray
+    known: np.ndarray
+
+
+def mode_changes(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> ModeChanges:
+    """The changes of mode so far after starts [s], shape (n,), which are walked again tightly."""
+    history = _walked_again(scene, starts, durations, lambda walk: walk.mode_history)
+    if history is None:
+        return ModeChanges(np.zeros(0, int), np.zeros(0), np.ones(len(durations), bool))
+    began = np.asarray(history.t)
+    within = (began > 0.0) & (began < durations[:, None])
+    known = np.asarray(history.total) < began.shape[1]
+    return ModeChanges(np.nonzero(within)[0], began[within], known)
+
+
+def _walked_again(
+    scene: RigidScene,
+    starts: RigidState,
+    durations: np.ndarray,
+    taken: Callable[[Trajectory[Any]], _Taken],
+) -> _Taken:
+    def walked(start: RigidState, duration: Scalar) -> _Taken:
+        return taken(rigid_walk(scene, start, duration=cast("float", duration), accuracy="tight"))
+
+    each: Callable[[RigidState, Scalar], _Taken] = jax.vmap(walked)
     return each(starts, jnp.asarray(durations))
+
+
+def kept_strikes(scene: RigidScene, walk: Trajectory[Any]) -> tuple[np.ndarray, Any]:
+    """Times [s] and states of the heel strikes that a walk kept, leaves of shape (n + 1,)."""
+    check_type("scene", scene, RigidScene)
+    check_type("walk", walk, Trajectory)
+    check_type("walk.state", walk.state, state_type(scene))
+    check_scene_of(walk, scene, "walk")
+    assert walk.arrivals is not None
+    times = np.asarray(walk.arrivals.t)
+    known = np.isfinite(times)
+    if times.ndim != 1 or known.sum() < 2:
+        raise ArgumentError(
+            "walk.arrivals has fewer than two heel strikes, which is not allowed: walk two "
+            "footsteps or more with max_arrivals of as many."
+        )
+    return times[known], rows_of(walk.arrivals.state, known)
+
+
+def from_start(scene: RigidScene, walk: Trajectory[Any], start: Any) -> Trajectory[Any]:
+    """A rigid walk whose start is kept as a heel strike is, at time 0."""
+    first, kept = check_state(start, state_type(scene), "start"), walk.arrivals
+    total, t, state = (
+        1,
+        np.zeros(1),
+        jtu.tree_map(lambda leaf: np.reshape(np.asarray(leaf), (1,)), first),
+    )
+    if kept is not None:
+        total, t = 1 + int(kept.total), np.append(t, np.asarray(kept.t))
+        state = jtu.tree_map(lambda a, b: np.append(a, np.asarray(b)), state, kept.state)
+    arrivals = Arrivals(as_array(np.asarray(total)), as_array(t), state)
+    return dataclasses.replace(walk, arrivals=arrivals)
+
+
+def rows_of(states: Any, rows: slice | np.ndarray) -> Any:
+    """Some of several states."""
+    return type(states)(*[np.asarray(leaf)[rows] for leaf in states])
+
+
+def places_of_standing(scene: RigidScene, states: Any) -> np.ndarray:
+    """Where the standing foot of each state is along the slope [m]: below its centre, (n,)."""
+    return np.asarray(evaluate_along(scene, states, _place_of_standing))
+
+
+def _place_of_standing(scene: RigidScene, state: Any) -> Scalar:
+    ahead = of_stance(scene, state, lambda stance: standing_place(stance) - stance.root.x)
+    return state[0] + ahead

@@ -1,125 +1,48 @@
-"""Augmented cycles: a walker's state with further coordinates, and cycles disturbed by one of them.
+"""Augmented cycles: cycles disturbed by a further coordinate, and where a swing foot is lowest.
 
-Further coordinates are what the walker itself does not know: integrals over a cycle, a clock, a
-disturbance. A disturbance rests during the cycle and is zero behind it, so that the response to it
-is a column of the return map's Jacobian, and the response's derivatives a second variation: a push
-along the slope for one cycle, or ground on which the next footstep comes down lower. Behind that
-step heights are those above the lower ground.
+A disturbance rests during the cycle and is zero behind it, so that the response to it is a column
+of the return map's Jacobian, and the response's derivatives a second variation: a push along the
+slope for one cycle, or ground on which the next footstep comes down lower. Behind that step heights
+are those above the lower ground.
 """
 
 import dataclasses
-from collections import namedtuple
-from typing import Any, ClassVar
+from typing import ClassVar, cast
 
 import equinox as eqx
 import jax.numpy as jnp
-from equinox import AbstractVar
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, Time, by_numpy
+from jaxbiped._types import Scalar, Time, select
+from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._footfalls import FootMotion
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import RigidState, WalkerState
+from jaxbiped.dynamics._strike_surfaces import clearance, clearance_rate, distance_ahead
 from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._symmetry import exchange_legs
+from jaxbiped.optimise._augmented_system import (
+    AbstractAugmentedSystem,
+    MotionSection,
+    join,
+    motion_of,
+)
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene, is_rigid
 from jaxbiped.scene._ground import Ground, SteppedGround
-from jaxbiped.scene._scene import AbstractWalkerScene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.variational._hybrid_system import AbstractSystem
 
-_KINDS: dict[tuple[type, tuple[str, ...]], Any] = {}
-"""Of each walker's state the augmented ones: always the same types, or all would compile again."""
 _APART = 1e-2
-"""Sine of half the angle between the legs from which a rigid walker's foot can come down."""
+"""How far ahead a rigid walker's foot is that can come down, as a share of the walker's height."""
 PUSH, DROP = "push", "drop"
 
 
-def _augmented_type(walker: Any, names: tuple[str, ...]) -> Any:
-    if (walker, names) not in _KINDS:
-        place, *recurring = walker._fields
-        fields: Any = namedtuple("_Augmented", (place, *names, *recurring))  # type: ignore[misc]
-        # By this other processes know it, see `jaxbiped.caching._fingerprint`.
-        made_by = (_augmented_type, walker, names)
-        own: dict[str, Any] = {"__slots__": (), "__made_by__": made_by, "__reduce__": _taken_apart}
-        # Whatever they are, their errors count in SI units.
-        own["own_units"] = getattr(walker, "own_units", {}) | dict.fromkeys(names, "")
-        _KINDS.setdefault((walker, names), type("_Augmented", (fields,), own))
-    return _KINDS[walker, names]
-
-
-def _taken_apart(y: Any) -> tuple[Any, ...]:
-    """An augmented state as `pickle` keeps it."""
-    _, _, names = type(y).__made_by__
-    return _put_together, (motion_of(y), {name: getattr(y, name) for name in names})
-
-
-def _put_together(motion: Any, coordinates: dict[str, Any]) -> Any:
-    return _augmented_type(type(motion), tuple(coordinates))(**coordinates, **motion._asdict())
-
-
-def augment(state: WalkerState, names: tuple[str, ...]) -> PyTree:
-    """A walker's state with coordinates of these names, which begin at zero."""
-    zero = by_numpy(lambda numpy, hip_x: numpy.zeros_like(hip_x), state.hip_x)
-    return _augmented_type(type(state), names)(**dict.fromkeys(names, zero), **state._asdict())
-
-
-def motion_of(y: PyTree) -> Any:
-    """The walker's own state."""
-    _, walker, _ = type(y).__made_by__
-    return walker(*(getattr(y, name) for name in walker._fields))
-
-
-def join(like: PyTree, motion: PyTree, coordinates: dict[str, Scalar]) -> PyTree:
-    """A walker's state or rates, and those of the further coordinates, as one."""
-    return type(like)(**motion._asdict(), **coordinates)
-
-
-class AbstractAugmentedSystem(AbstractSystem):
-    """A walker with further coordinates.
-
-    Attributes:
-        walker: the walker without them, or with others.
-        coordinates: their names, as they lie behind hip_x.
-        recurring: how many of them, the last ones, must return.
-    """
-
-    walker: AbstractVar[AbstractSystem]
-    coordinates: AbstractVar[tuple[str, ...]]
-    recurring: ClassVar[int] = 0
-
-    @property
-    def cyclic_coordinates(self) -> tuple[int, ...]:  # type: ignore[override]
-        """The walker's, and those that need not return."""
-        own = len(self.coordinates) - self.recurring
-        return tuple(range(own + len(self.walker.cyclic_coordinates)))
-
-    def begin(self, state: WalkerState) -> PyTree:
-        """A walker's state with coordinates that begin at zero."""
-        inner = (
-            self.walker.begin(state) if isinstance(self.walker, AbstractAugmentedSystem) else state
-        )
-        return augment(inner, self.coordinates)
-
-
-class MotionSection(AbstractSection):
-    """The walker's own section, of an augmented state.
-
-    Attributes:
-        section: of the walker.
-    """
-
-    section: AbstractSection
-
-    def value(self, args: PyTree, y: PyTree) -> Scalar:
-        return self.section.value(args, motion_of(y))
-
-    def counts(self, args: PyTree, y: PyTree) -> Scalar:
-        return self.section.counts(args, motion_of(y))
-
-
 class DisturbedCycle(AbstractAugmentedSystem):
-    """A walker that is pushed for one cycle, or whose leg 1 comes down on ground that lies lower.
+    """A walker that is pushed for one cycle, or whose swing leg comes down on lower ground.
 
-    `push` is in units of the weight, which leans downhill by it; `drop` in leg lengths. Behind the
-    arrival `drop` is zero and its value is `fallen`: the hip is that much higher above the ground.
-    By then the leg behind has left the upper ground.
+    `push` is in units of the weight, which leans downhill by it, and with it the vertical that
+    parts at joints refer to; `drop` in the walker's height, a leg length. Behind the arrival `drop`
+    is zero and its value is `fallen`: the root point is that much higher above the ground. By then
+    the leg behind has left the upper ground.
 
     Attributes:
         walker: the walker, undisturbed.
@@ -140,6 +63,9 @@ class DisturbedCycle(AbstractAugmentedSystem):
     def switches(self, args: AbstractWalkerScene, y: PyTree) -> tuple[Switch, ...]:
         return self.walker.switches(self._scene(args, y), motion_of(y))
 
+    def reset_at_switch(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
+        return super().reset_at_switch(self._scene(args, y), y)
+
     def ending(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
         return self.walker.ending(self._scene(args, y), motion_of(y))
 
@@ -148,8 +74,10 @@ class DisturbedCycle(AbstractAugmentedSystem):
         told = {"clock": y.clock, self.disturbance: jnp.zeros_like(y.clock)}
         if self.disturbance == DROP:
             told["fallen"] = y.drop
-            if not isinstance(after, RigidState):
-                after = after._replace(hip_z=after.hip_z + y.drop * args.walker.l)
+            if args.compliant:
+                height = args.mechanism.structure.coordinates[1]
+                raised = getattr(after, height) + y.drop * args.mechanism.height
+                after = after._replace(**{height: raised})
         return join(y, after, told)
 
     def load(self, args: AbstractWalkerScene, y: PyTree) -> None:
@@ -161,7 +89,8 @@ class DisturbedCycle(AbstractAugmentedSystem):
         if self.disturbance == PUSH:
             ground = dataclasses.replace(scene.ground, slope=scene.ground.slope + y.push)
         elif scene.compliant:
-            ground = SteppedGround(scene.ground.slope, scene.ground.g, y.drop * scene.walker.l)
+            depth, leg = y.drop * scene.mechanism.height, scene.mechanism.structure.swing_leg
+            ground = SteppedGround(scene.ground.slope, scene.ground.g, depth, leg)
         else:
             return scene
         found: AbstractWalkerScene = eqx.tree_at(lambda each: each.ground, scene, ground)
@@ -188,12 +117,102 @@ class SteppedSection(AbstractSection):
     section: AbstractSection
 
     def value(self, args: PyTree, y: PyTree) -> Scalar:
-        if not isinstance(motion_of(y), RigidState):
+        if not is_rigid(args):
             return MotionSection(self.section).value(args, y)
-        # Feet differ in height by (l − r)(cos θ₁ − cos θ₂), which is a product of two sines.
-        apart = jnp.maximum(jnp.sin(0.5 * (y.theta_2 - y.theta_1)), _APART)
-        fall = y.fallen * args.walker.l / args.walker.hip_to_foot
-        return -2.0 * jnp.sin(0.5 * (y.theta_1 + y.theta_2)) - fall / apart
+        before, unit = exchange_legs(args, motion_of(y)), args.mechanism.height
+        # In units of the feet's distance: the height itself is flat where the legs pass.
+        apart = jnp.maximum(distance_ahead(args, before), _APART * unit)
+        return -2.0 * (clearance(args, before) + y.fallen * unit) / apart
 
     def counts(self, args: PyTree, y: PyTree) -> Scalar:
         return MotionSection(self.section).counts(args, y)
+
+
+class LowestSwing(AbstractAugmentedSystem):
+    """A disturbed walker whose `clearance`, in its heights, is told at its foot's lowest place.
+
+    `passed` is 1 from there to the section, else 0. Clearances of several footsteps add up, as
+    their lengths do. A compliant walker's cycle has the footstep in its middle: by the lowest place
+    the foot that stands is on the lower ground, and the one that swings has left the upper.
+
+    Attributes:
+        walker: the disturbed walker.
+    """
+
+    walker: DisturbedCycle
+    coordinates: tuple[str, ...] = eqx.field(static=True, default=("clearance", "passed"))
+
+    def vector_field(self, t: Time, y: PyTree, args: AbstractWalkerScene) -> PyTree:
+        zero = jnp.zeros_like(y.passed)
+        rates = self.walker.vector_field(t, motion_of(y), args)
+        return join(y, rates, dict.fromkeys(self.coordinates, zero))
+
+    def switches(self, args: AbstractWalkerScene, y: PyTree) -> tuple[Switch, ...]:
+        return self.walker.switches(args, motion_of(y))
+
+    def ending(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
+        return self.walker.ending(args, motion_of(y))
+
+    def reset_map(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
+        motion, zero = motion_of(y), jnp.zeros_like(y.passed)
+        lowered = zero
+        if self.walker.disturbance == DROP and args.compliant:
+            lowered = y.drop * args.mechanism.height
+        height = _swing_height(args, motion_of(motion)) + lowered
+        told = {"clearance": y.clearance + height / args.mechanism.height, "passed": y.passed + 1.0}
+        after = self.walker.reset_map(args, motion)
+        at_section = join(y, after, {"clearance": y.clearance, "passed": zero})
+        return select(y.passed < 0.5, join(y, motion, told), at_section)
+
+    def load(self, args: AbstractWalkerScene, y: PyTree) -> None:
+        return None
+
+
+class LowestSwingSection(AbstractSection):
+    """Behind the arrival `passed` tells which it was: the lowest place, or a walker's own section.
+
+    Attributes:
+        section: of the disturbed walker.
+    """
+
+    section: AbstractSection
+
+    def value(self, args: PyTree, y: PyTree) -> Scalar:
+        motion = motion_of(y)
+        rises = _swing_height_rate(args, motion_of(motion))
+        return jnp.where(y.passed > 0.5, rises, self.section.value(args, motion))
+
+    def counts(self, args: PyTree, y: PyTree) -> Scalar:
+        motion = motion_of(y)
+        swings = _swings(args, motion_of(motion))
+        return jnp.where(y.passed > 0.5, swings, self.section.counts(args, motion))
+
+
+def _swing_foot(args: AbstractWalkerScene, state: PyTree) -> FootMotion:
+    """A compliant walker's stance leg's, the lower one of several: its cycle has the footstep
+    before, and the exchange of legs behind."""
+    structure, found = args.mechanism.structure, feet(cast("Scene", args), state)
+    lowest, *others = (found[k] for k in structure.feet_of_leg[structure.stance_leg])
+    for foot in others:
+        lowest = select(foot.penetration > lowest.penetration, foot, lowest)
+    return lowest
+
+
+def _swing_height(args: AbstractWalkerScene, state: PyTree) -> Scalar:
+    """Of the foot that swings above its ground [m]."""
+    if not args.compliant:
+        return clearance(cast("RigidScene", args), state)
+    return -_swing_foot(args, state).penetration
+
+
+def _swing_height_rate(args: AbstractWalkerScene, state: PyTree) -> Scalar:
+    if not args.compliant:
+        return clearance_rate(cast("RigidScene", args), state)
+    return -_swing_foot(args, state).penetration_rate
+
+
+def _swings(args: AbstractWalkerScene, state: PyTree) -> Scalar:
+    """Whether the clearance rule lets that foot pass."""
+    if not args.compliant:
+        return jnp.asarray(True)
+    return jnp.logical_not(jnp.asarray(_swing_foot(args, state).admitted))

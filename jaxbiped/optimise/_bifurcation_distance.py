@@ -113,7 +113,7 @@ def bifurcation_distance(
     kind, names = BranchEvent(kind), parameter_names(scene)
     own, bounds = float(parameter_values(scene)[along]), range_of(scene, along)
     axis = axis_of(scene, along, bounds, None)
-    steps = int(gait.orbit[0].shape[0])
+    steps = int(gait.step_lengths.shape[0])
     setup = continuation_setup(scene, axis, footsteps=steps, accuracy=accuracy, engine=gait.engine)
     parts = _both_ways(setup, gait, kind)
     seen = [each for part in parts for each in part.bifurcations]
@@ -202,7 +202,7 @@ def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> Func
         scene,
         setup.state_of(event.point.recurring),
         MODULI,
-        footsteps=setup.footsteps,
+        arrivals=setup.arrivals,
         accuracy=setup.accuracy,
         engine=setup.problem.spec.engine,
     )

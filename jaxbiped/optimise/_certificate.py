@@ -3,7 +3,7 @@
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from tqdm import tqdm
@@ -19,7 +19,7 @@ from jaxbiped.continuation._nearest_bifurcation import (
     range_of,
 )
 from jaxbiped.dynamics._section import HeelStrike
-from jaxbiped.dynamics._state import RigidState, WalkerState
+from jaxbiped.dynamics._state_quantities import recurring_leaves, unit_of
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -28,9 +28,11 @@ from jaxbiped.optimise._optimality import Optimality
 from jaxbiped.optimise._runs import Optimum
 from jaxbiped.scene._parameter_access import parameter_names
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.simulate._simulate import rigid_walk, simulate
+from jaxbiped.scene._state_types import WalkerState
+from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._engine_names import ENGINES
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.sweep._admissible import independent_names
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure
@@ -51,7 +53,7 @@ class PushedWalk(NamedTuple):
     Attributes:
         push: relative change of all velocities of the gait's state.
         footsteps: how many were walked; `asked` for how many.
-        period_difference: relative difference of the last footstep's duration from the gait's.
+        period_difference: relative difference of the last cycle's duration from the gait's.
         returned: whether it walked to the end, and to the gait.
     """
 
@@ -121,20 +123,21 @@ def certify(
     """Tests an optimum by what its search did not use.
 
     Args:
-        optimum: from `optimise_gait`, of a gait of one footstep.
-        starts: how many starts about the gait are labelled for its basin; 0 for none.
-        scatter: half-width of their angles [rad], and of their rates in units of √(g/l).
-        footsteps: of the walk from a pushed start; 0 for none.
-        push: relative change of all its velocities.
-        fatal_push: whether to look for the smallest push that is fatal, which labels some
-            thousands of starts.
-        other_engine: whether to find the gait by the other engine, too, which compiles for minutes
-            where that is XLA.
+        optimum: from `optimise_gait`, of a gait whose cycle is the shortest.
+        starts: number of starts around the gait that are labelled for its basin; 0 for none.
+        scatter: half-width of all bodies' angles [rad], and of their rates in units of √(g/l), l
+            the walker's height.
+        footsteps: number of footsteps of the walk from a pushed start; 0 for none.
+        push: relative change of all velocities of that start.
+        fatal_push: whether to search for the smallest fatal push, which labels some thousands of
+            starts.
+        other_engine: whether to find the gait with the other engine too, which compiles for
+            minutes if that engine is XLA.
         bifurcations_along: parameters in each of which the gait is followed to its nearest
             bifurcation, from an eighth to eight times the value, as far as the walker allows (from
             level ground by 0.1 rad to both sides); each compiles a program.
-        seed: of the starts.
-        progress: whether to show on stderr which part it is at.
+        seed: random seed of the starts.
+        progress: whether to show the current part on stderr.
 
     Returns:
         The certificate. A part that cannot be told, or that Ctrl-C cuts off, takes no other with
@@ -148,7 +151,8 @@ def certify(
     check_not_negative("footsteps", footsteps)
     check_positive("scatter", scatter)
     scene, gait = optimum.scene, optimum.gait
-    check_choice("footsteps of the gait", gait.orbit[0].shape[0], (1,))
+    own = scene.mechanism.structure.cycle_footsteps
+    check_choice("footsteps of the gait", gait.step_lengths.shape[0], (own,))
     for name in bifurcations_along:
         check_choice("bifurcations_along", name, parameter_names(scene))
         range_of(scene, name)  # refused where it has none
@@ -234,22 +238,20 @@ def _labelling(scene: Scene | RigidScene, gait: Gait) -> Labelling | None:
 
 
 def _basin(knows: Labelling, gait: Gait, count: int, scatter: float, seed: int) -> Fraction:
-    """The fraction of starts about the gait, stance foot on the ground, that come back to it."""
-    scene = knows.scene
-    pace = float(np.sqrt(float(scene.ground.g) / float(scene.walker.l)))
-    state = gait.measures.state
-    about = {
-        "theta_stance": (float(state.theta_2), scatter),
-        "theta_swing": (float(state.theta_1), scatter),
-        "omega_stance": (float(state.omega_2), scatter * pace),
-        "omega_swing": (float(state.omega_1), scatter * pace),
+    """The fraction that comes back of starts about the gait: on the ground, and beyond no stop."""
+    scene, free = knows.scene, independent_names(knows.scene, gait.measures.state)
+    pace = float(np.sqrt(float(scene.ground.g) / float(scene.mechanism.height)))
+    halves = {"rad": scatter, "rad/s": scatter * pace}
+    bounds = {
+        name: (float(centre) - halves[unit], float(centre) + halves[unit])
+        for name, centre in gait.measures.state._asdict().items()
+        if (unit := unit_of(name)) in halves and name in free
     }
-    bounds = {name: (centre - half, centre + half) for name, (centre, half) in about.items()}
     batch = sample(scene, bounds, count, seed=seed, place=True).at(knows, np.arange(count))
-    labels = knows(batch.states).label
-    walking = int(np.sum(labels == int(Label.WALKING)))
-    low, high = wilson_interval(walking, count)
-    return Fraction(walking / count, float(low), float(high), walking)
+    labels, places = knows(batch.states).label, recurring_leaves(batch.states)
+    possible, walking = np.isfinite(places).all(axis=0).sum(), np.sum(labels == int(Label.WALKING))
+    low, high = wilson_interval(walking, possible)
+    return Fraction(float(walking / max(possible, 1)), float(low), float(high), int(walking))
 
 
 def _fatal_push(knows: Labelling) -> FatalShock:
@@ -259,28 +261,26 @@ def _fatal_push(knows: Labelling) -> FatalShock:
 
 def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> PushedWalk:
     state: WalkerState = gait.measures.state
-    fast = [name for name in state._fields if name.startswith(("hip_v", "omega"))]
+    fast = [name for name in state._fields if unit_of(name) in ("m/s", "rad/s")]
     faster = {name: as_float(float(getattr(state, name)) * (1.0 + push)) for name in fast}
     pushed = state._replace(**faster)
-    walk: Trajectory[Any]
-    if isinstance(scene, RigidScene):
-        walk = rigid_walk(scene, cast("RigidState", pushed), footsteps=count, max_arrivals=count)
-    else:
-        walk = simulate(
-            scene,
-            pushed,
-            footsteps=count,
-            save=HeelStrike(),
-            max_arrivals=count,
-            max_solver_steps=max(65536, 1024 * count),
-        )
+    walk: Trajectory[Any] = simulate(
+        scene,
+        pushed,
+        footsteps=count,
+        save=HeelStrike(),
+        max_arrivals=count,
+        max_solver_steps=max(65536, 1024 * count),
+    )
     assert walk.arrivals is not None
     times = np.asarray(walk.arrivals.t)
     times = times[np.isfinite(times)]
-    last = float(times[-1] - times[-2]) if len(times) > 1 else np.nan
+    own, each = scene.mechanism.structure.cycle_footsteps, scene.arrival_footsteps
+    cycle = own // each
+    last = float(times[-1] - times[-1 - cycle]) if len(times) > cycle else np.nan
     difference = abs(last / float(gait.measures.period) - 1.0)
-    done = len(times)
-    return PushedWalk(push, done, count, difference, done >= count - 1 and difference < _SETTLED)
+    done = each * len(times)
+    return PushedWalk(push, done, count, difference, done >= count - own and difference < _SETTLED)
 
 
 def _by_other(scene: Scene | RigidScene, gait: Gait) -> OtherEngine:

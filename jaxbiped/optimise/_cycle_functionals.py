@@ -8,10 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._fixed_point_search import looser
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import (
@@ -21,12 +22,18 @@ from jaxbiped.gait._poincare_map import (
     seed_directions,
     state_with,
 )
-from jaxbiped.gait._return_map_spec import ReturnMapSpec, orbit_solver, patience_of
+from jaxbiped.gait._return_map_spec import (
+    ReturnMapSpec,
+    orbit_solver,
+    patience_of,
+    runs_by_lanes,
+)
 from jaxbiped.linalg._small_matrices import solve
-from jaxbiped.optimise._augmented_cycles import MotionSection
+from jaxbiped.optimise._augmented_system import MotionSection
 from jaxbiped.optimise._cycle_integrals import integrals_of
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, precision_of
 from jaxbiped.variational._hybrid_system import AbstractSystem, section_of
 from jaxbiped.variational._tangents import Seeded
@@ -37,6 +44,9 @@ errors of derivatives of the spectral radius, of slip and of losses are then bel
 elasticity, as those of the gait's own measures are; it doubles what an evaluation costs."""
 _DRIVEN, _BOUND = 0.3, 0.1
 """Shares of these tolerances that keep the motors' work, and the bound of the radius, to 1e-5."""
+
+_AWAY = 1e-3
+"""Relative distance from an orbit at which a cycle of it does not end."""
 
 
 class Functional(NamedTuple):
@@ -83,7 +93,7 @@ def cycle_functionals(
     scene: Scene | RigidScene,
     state: WalkerState,
     *,
-    footsteps: int = 1,
+    arrivals: int = 1,
     accuracy: str = "balanced",
     engine: str = "lanes",
 ) -> Functionals:
@@ -92,7 +102,7 @@ def cycle_functionals(
     Args:
         scene: the walker.
         state: of its gait, on the section.
-        footsteps: how many a cycle has.
+        arrivals: how often a cycle comes to the section.
         accuracy: "balanced" or "tight".
         engine: "xla" or "lanes".
 
@@ -101,7 +111,7 @@ def cycle_functionals(
         respect to all parameters in the order of `parameter_names`.
     """
     system, section = integrals_of(scene), MotionSection(section_of(scene, None))
-    spec = cycle_spec(scene, system, section, footsteps, engine)
+    spec = cycle_spec(scene, system, section, arrivals, engine)
     return _functionals(spec, scene, system.begin(state), functional_precision(accuracy, scene))
 
 
@@ -114,7 +124,7 @@ def cycle_spec(
     scene: Scene | RigidScene,
     system: AbstractSystem,
     section: AbstractSection,
-    footsteps: int,
+    arrivals: int,
     engine: str,
 ) -> ReturnMapSpec:
     """The return map of a walker's scene whose state has more coordinates, at any precision."""
@@ -123,7 +133,7 @@ def cycle_spec(
         section=section,
         solver=orbit_solver(None, rigid=not scene.compliant),
         max_time=patience_of(scene),
-        steps=footsteps,
+        steps=arrivals,
         max_solver_steps=max(each.max_solver_steps for each in ACCURACIES.values()),
         engine=engine,
     )
@@ -135,7 +145,7 @@ def functional_precision(
     """How exactly functionals are solved, as arrays: one program serves every accuracy."""
     found, share = precision_of(accuracy, scene), 1.0
     if scene.compliant and accuracy in _COMPLIANT:
-        found, share = _COMPLIANT[accuracy], 1.0 if scene.actuation is None else _DRIVEN
+        found, share = _COMPLIANT[accuracy], _DRIVEN if is_driven(scene) else 1.0
         share = _BOUND if "radius_bound" in names else share
     return Precision(*(as_float(share * tolerance) for tolerance in found))
 
@@ -172,13 +182,17 @@ def orbits_near(
         )
         own = point + jnp.where(by_state.code == 0, _newton_step(by_state, point), 0.0)
         start = state_with(spec.system, y, own)
-        return own, linearised_return(spec, seeds, start, precision, jnp.asarray(False))
+        found = linearised_return(spec, seeds, start, precision, jnp.asarray(False))
+        # As where the swing foot is lowest behind the section, and another arrival is the next.
+        away = jnp.any(jnp.abs(found.recurring - own) > _AWAY * (1.0 + jnp.abs(own)))
+        lost = jnp.where(away, int(Ending.TIMED_OUT), 0)
+        return own, found._replace(code=jnp.where(found.code == 0, lost, found.code))
 
     pairs = zip(fine, looser(fine), strict=True)
     return Orbits(seeds, sizes, *jax.vmap(once)(Precision(*map(jnp.stack, pairs))))
 
 
-@cached_jit
+@host_jit(runs_by_lanes)
 def _functionals(
     spec: ReturnMapSpec, scene: Scene | RigidScene, y: PyTree, fine: Precision
 ) -> Functionals:

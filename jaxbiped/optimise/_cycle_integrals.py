@@ -4,19 +4,23 @@ A coordinate whose rate is the integrand, and on which no rate depends, gains th
 cycle. The return map then has its value, its derivatives and their errors from one solve.
 """
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._actuation import actuator_powers
-from jaxbiped.dynamics._contacts import feet, touches
-from jaxbiped.dynamics._energy import powers
+from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._energy import is_driven, powers
+from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._impact import impact, push_off_work
-from jaxbiped.dynamics._rolling import inertia_of, rolling_hip_motion, support_of
-from jaxbiped.dynamics._state import RigidState, whole_state
+from jaxbiped.dynamics._rolling import rolling_hip_motion
+from jaxbiped.dynamics._stance import kinetic_energy
+from jaxbiped.dynamics._strike_surfaces import clearance
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.optimise._augmented_cycles import AbstractAugmentedSystem, join, motion_of
+from jaxbiped.optimise._augmented_system import AbstractAugmentedSystem, join, motion_of
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.variational._hybrid_system import Rolling, Walking
 
@@ -50,7 +54,7 @@ class WalkingIntegrals(AbstractAugmentedSystem):
     def vector_field(self, t: Time, y: PyTree, args: Scene) -> PyTree:
         state = motion_of(y)
         power = powers(args, state)
-        slip = jnp.zeros_like(state.hip_x)
+        slip = jnp.zeros_like(state[0])
         for foot in feet(args, state):
             slip = slip + jnp.where(touches(foot), jnp.abs(foot.slip_speed), 0.0)
         rates = {
@@ -85,11 +89,12 @@ class WalkingIntegrals(AbstractAugmentedSystem):
 
     def load(self, args: Scene, y: PyTree) -> Scalar:
         """How deep a foot is underground that the clearance rule lets pass [m]."""
-        found = -args.walker.l
+        none = -args.mechanism.height
+        found = none
         for foot in feet(args, motion_of(y)):
             if foot.admitted is not None and foot.admitted is not False:
                 admitted = jnp.asarray(foot.admitted)
-                found = jnp.maximum(found, jnp.where(admitted, -args.walker.l, foot.penetration))
+                found = jnp.maximum(found, jnp.where(admitted, none, foot.penetration))
         return found
 
 
@@ -108,9 +113,9 @@ class RollingIntegrals(AbstractAugmentedSystem):
 
     def vector_field(self, t: Time, y: PyTree, args: RigidScene) -> PyTree:
         state = motion_of(y)
-        rates = {"impact_loss": jnp.zeros_like(state.hip_x)}
+        rates = {"impact_loss": jnp.zeros_like(state[0])}
         if MOTOR_WORK in self.coordinates:
-            rates[MOTOR_WORK] = _driving(_rolling_motors(args, state), state.hip_x)
+            rates[MOTOR_WORK] = _driving(_rolling_motors(args, state), state[0])
         return join(y, self.walker.vector_field(t, state, args), rates)
 
     def switches(self, args: RigidScene, y: PyTree) -> tuple[Switch, ...]:
@@ -124,7 +129,7 @@ class RollingIntegrals(AbstractAugmentedSystem):
         state = motion_of(y)
         after = impact(args, state).state
         push = push_off_work(args, state)
-        lost = _kinetic(args, state) + push - _kinetic(args, after)
+        lost = kinetic_energy(args, state) + push - kinetic_energy(args, after)
         gained = {"impact_loss": y.impact_loss + lost}
         if MOTOR_WORK in self.coordinates:
             gained[MOTOR_WORK] = y.motor_work + jnp.maximum(push, 0.0)
@@ -132,28 +137,19 @@ class RollingIntegrals(AbstractAugmentedSystem):
 
     def load(self, args: RigidScene, y: PyTree) -> Scalar:
         """How deep the swing foot is underground [m]."""
-        return args.walker.hip_to_foot * (jnp.cos(y.theta_1) - jnp.cos(y.theta_2))
+        return -clearance(args, motion_of(y))
 
 
-def _rolling_motors(scene: RigidScene, state: RigidState) -> tuple[Scalar, ...]:
+def _rolling_motors(scene: RigidScene, state: Any) -> tuple[Scalar, ...]:
     """Power of each motor at the hip of the walker that rolls on leg 2 [W]."""
     if scene.actuation is None:
         return ()
-    return actuator_powers(scene, rolling_hip_motion(state), (None, None)).motors
-
-
-def _kinetic(scene: RigidScene, state: RigidState) -> Scalar:
-    """Kinetic energy of the walker that rolls on leg 2 [J]."""
-    whole = whole_state(scene, state)
-    sine, cosine = jnp.sin(whole.theta_1), jnp.cos(whole.theta_1)
-    inertia = inertia_of(scene.walker, support_of(scene.walker, state.theta_2), sine, cosine)
-    own = inertia.stance * state.omega_2**2 + inertia.swing * state.omega_1**2
-    return 0.5 * own + inertia.coupling * state.omega_1 * state.omega_2
+    return actuator_powers(scene, rolling_hip_motion(scene, state)).motors
 
 
 def integrals_of(scene: Scene | RigidScene) -> WalkingIntegrals | RollingIntegrals:
     """The walker with its integrals."""
-    driven = () if scene.actuation is None else (MOTOR_WORK,)
+    driven = (MOTOR_WORK,) if is_driven(scene) else ()
     if scene.compliant:
         return WalkingIntegrals(Walking(), (*COMPLIANT, *driven))
     return RollingIntegrals(Rolling(), (*RIGID, *driven))

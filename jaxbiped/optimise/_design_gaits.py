@@ -1,7 +1,8 @@
-"""Gaits of designs: of one, or of many as one batch by lanes, with their functionals."""
+"""Gaits of designs: of one, of many as one batch by lanes, of an ensemble under scatter."""
 
+import itertools
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -9,20 +10,29 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._checks import ArgumentError, check_choice, check_count, check_within
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import state_type
+from jaxbiped.dynamics._state_quantities import state_of_recurring
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._objective_values import BothFunctionals, functionals_of
-from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.optimise._jacobian_weights import CLUSTER
+from jaxbiped.optimise._objective_values import (
+    BothFunctionals,
+    Evaluation,
+    evaluate,
+    functionals_of,
+)
+from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._state_types import WalkerState
 
 
 class GaitSettings(NamedTuple):
     """How gaits are found; see `find_gait`."""
 
-    footsteps: int = 1
+    footsteps: int | None = None
     accuracy: str = "balanced"
     engine: str = "auto"
 
@@ -32,8 +42,12 @@ class GaitSettings(NamedTuple):
 
     def find_near(self, scene: Scene | RigidScene, point: np.ndarray) -> Gait:
         """The gait of a scene near recurring components of a state, shape (m,)."""
-        start = state_type(scene)(0.0, *point.tolist())
-        return self.find(scene, jtu.tree_map(np.float64, start))
+        return self.find(scene, self.state_of(scene, point))
+
+    def state_of(self, scene: Scene | RigidScene, point: np.ndarray) -> WalkerState:
+        """The state with these recurring components."""
+        found: WalkerState = state_of_recurring(state_type(scene), map(np.float64, point))
+        return jtu.tree_map(np.float64, found)
 
 
 def are_walks(gaits: Gait) -> np.ndarray:
@@ -66,7 +80,7 @@ def gaits_near(
     count = len(points)
     scenes = with_parameters(scene, {name: jnp.asarray(each) for name, each in values.items()})
     scenes = jtu.tree_map(lambda leaf: jnp.broadcast_to(jnp.asarray(leaf), (count,)), scenes)
-    starts = state_type(scene)(jnp.zeros(count), *map(jnp.asarray, points.T))
+    starts = state_of_recurring(state_type(scene), map(jnp.asarray, points.T), jnp.zeros(count))
     return scenes, *jax.device_get(_find_each(scenes, starts, wanted, settings))
 
 
@@ -76,6 +90,194 @@ def _find_each(
 ) -> tuple[Gait, BothFunctionals]:
     def one(scene: Scene | RigidScene, start: PyTree) -> tuple[Gait, BothFunctionals]:
         gait = settings.find(scene, start)
-        return gait, functionals_of(scene, gait, wanted, settings.footsteps, settings.accuracy)
+        return gait, functionals_of(scene, gait, wanted, settings.accuracy)
 
     return jax.vmap(one)(scenes, starts)
+
+
+CRITERIA = ("mean", "worst")
+_CORNERS = 6
+"""Scattered parameters up to which the worst case is sought at all corners of their box."""
+_WIDTHS = (1.0, 0.5, 0.25, 0.1)
+"""Half-widths, as shares of the box's, about the worst member so far in which others are tried."""
+_WORSE = 1e-4
+"""Relative difference by which another member counts as worse."""
+
+
+class Ensemble(NamedTuple):
+    """Members that differ from a design by factors of some parameters.
+
+    Attributes:
+        names: of the parameters.
+        factors: shape (n, k).
+        criterion: "mean" of the members, which are a sample; or "worst" of the box, whose corners
+            are the last of them.
+        larger_is_worse: of each measure that plays a part, for "worst".
+        spread: half-widths of the box, shape (k,).
+    """
+
+    names: tuple[str, ...]
+    factors: np.ndarray
+    criterion: str
+    larger_is_worse: dict[str, bool]
+    spread: np.ndarray
+
+    @property
+    def words(self) -> str:
+        """What a worst case is the worst of."""
+        k = len(self.names)
+        corners = f"the {2**k} corners" if k <= _CORNERS else f"no corners, which are {2**k},"
+        return f"Worst of the box of {k} scattered parameters: {corners}, a sample and a search."
+
+
+def ensemble_of(
+    scene: Scene | RigidScene,
+    scatter: Mapping[str, float],
+    members: int,
+    criterion: str,
+    larger_is_worse: dict[str, bool],
+    seed: int,
+) -> Ensemble:
+    """Members evenly spread over factors 1 − s to 1 + s of each parameter.
+
+    For the worst case the corners of this box come along.
+
+    Raises:
+        ArgumentError: an unknown parameter or criterion, one that is zero, or a scatter not
+            between 0 and 1.
+    """
+    from scipy.stats import qmc
+
+    check_choice("criterion", criterion, CRITERIA)
+    check_count("members", members)
+    own = parameter_values(scene)
+    for name, share in scatter.items():
+        check_choice("scatter", name, own)
+        check_within(f"scatter of {name}", share, 0.0, 1.0)
+        if float(own[name]) == 0.0:
+            raise ArgumentError(
+                f"scatter of {name} is not allowed: it is relative, and {name} = 0."
+            )
+    k, spread = len(scatter), np.asarray(list(scatter.values()))
+    shares = 2.0 * qmc.Sobol(k, seed=seed).random(int(members)) - 1.0
+    if criterion == "worst" and k <= _CORNERS:
+        shares = np.concatenate([shares, list(itertools.product((-1.0, 1.0), repeat=k))])
+    return Ensemble(tuple(scatter), 1.0 + shares * spread, criterion, larger_is_worse, spread)
+
+
+def with_worse_members(
+    ensemble: Ensemble,
+    scene: Scene | RigidScene,
+    nominal: Evaluation,
+    wanted: tuple[str, ...],
+    settings: GaitSettings,
+    seed: int,
+) -> Ensemble | None:
+    """The ensemble with worse members than it has, which a search in its box comes upon.
+
+    They take the places of members that are sampled. None where nothing worse is found.
+    """
+    random, found = np.random.default_rng(seed), []
+    low, high = 1.0 - ensemble.spread, 1.0 + ensemble.spread
+    for name in wanted:
+        sign = 1.0 if ensemble.larger_is_worse.get(name, True) else -1.0
+        factors, worst, centre = ensemble.factors, [-np.inf], ensemble.factors[0]
+        for width in (*_WIDTHS, 0.0):
+            tried = ensemble._replace(factors=factors)
+            each = evaluate_members(tried, scene, nominal, wanted, settings)
+            # A member without a gait is worse than any that has one.
+            told = [np.inf if known is None else sign * known.values[name] for known in each]
+            values = np.nan_to_num(told, nan=np.inf, posinf=np.inf, neginf=-np.inf)
+            place = int(np.argmax(values))
+            if values[place] > worst[-1]:
+                worst, centre = [*worst, values[place]], factors[place]
+            aside = random.uniform(-1.0, 1.0, factors.shape)
+            factors = np.clip(centre + width * ensemble.spread * aside, low, high)
+        if worst[-1] > worst[1] + _WORSE * abs(worst[1]):
+            found.append(centre)
+    if not found:
+        return None
+    return ensemble._replace(factors=np.concatenate([ensemble.factors[len(found) :], found]))
+
+
+def evaluate_ensemble(
+    ensemble: Ensemble,
+    scene: Scene | RigidScene,
+    nominal: Evaluation,
+    wanted: tuple[str, ...],
+    settings: GaitSettings,
+) -> Evaluation | None:
+    """The nominal design's evaluation with the measures wanted taken over all members.
+
+    None where any of them has no gait.
+    """
+    each = evaluate_members(ensemble, scene, nominal, wanted, settings)
+    known = [one for one in each if one is not None]
+    return _together(ensemble, nominal, known) if len(known) == len(each) else None
+
+
+def evaluate_members(
+    ensemble: Ensemble,
+    scene: Scene | RigidScene,
+    nominal: Evaluation,
+    wanted: tuple[str, ...],
+    settings: GaitSettings,
+) -> list[Evaluation | None]:
+    """Of each member the measures wanted; None where it has no gait."""
+    names, own = parameter_names(scene), parameter_values(scene)
+    places = [names.index(name) for name in ensemble.names]
+    values = np.asarray([float(own[name]) for name in ensemble.names]) * ensemble.factors
+    changes = values - values / ensemble.factors
+    points = nominal.state + changes @ nominal.state_slopes[:, places].T
+    columns = dict(zip(ensemble.names, values.T, strict=True))
+    try:
+        found = gaits_near(scene, columns, points, settings, wanted)
+    except ArgumentError:  # parameters that do not go together
+        return [None] * len(values)
+    each: list[Evaluation | None] = []
+    for k, factors in enumerate(ensemble.factors):
+        scene_k, gait, functionals = jtu.tree_map(lambda leaf, k=k: leaf[k], found)
+        known = None
+        if are_walks(gait):
+            known = evaluate(scene_k, gait, wanted, settings.accuracy, functionals)
+            known = _by_nominal(known, factors, places)
+        each.append(known)
+    return each
+
+
+def _by_nominal(known: Evaluation, factors: np.ndarray, places: list[int]) -> Evaluation:
+    """Derivatives with respect to the nominal parameters, of which a member's are multiples."""
+    scales = np.ones(known.state_slopes.shape[1])
+    scales[places] = factors
+    return known._replace(
+        slopes={name: row * scales for name, row in known.slopes.items()},
+        slope_errors={name: row * scales for name, row in known.slope_errors.items()},
+    )
+
+
+def _together(ensemble: Ensemble, nominal: Evaluation, each: list[Evaluation]) -> Evaluation:
+    chosen = {name: each for name in each[0].values}
+    if ensemble.criterion == "worst":
+        for name in [name for name in chosen if name not in CLUSTER[1:]]:
+            values = [known.values[name] for known in each]
+            larger = ensemble.larger_is_worse.get(name, True)
+            place = int(np.argmax(values) if larger else np.argmin(values))
+            chosen[name] = [each[place]]
+            if name == CLUSTER[0]:  # one member's multipliers
+                chosen |= {other: chosen[name] for other in CLUSTER[1:] if other in chosen}
+
+    def means(field: str) -> dict[str, Any]:
+        return {
+            name: np.mean([getattr(known, field)[name] for known in those], axis=0)
+            for name, those in chosen.items()
+        }
+
+    return nominal._replace(
+        values={name: float(value) for name, value in means("values").items()},
+        errors={name: float(value) for name, value in means("errors").items()},
+        slopes=means("slopes"),
+        slope_errors=means("slope_errors"),
+        beyond_range=tuple(
+            name for name, those in chosen.items() if any(name in k.beyond_range for k in those)
+        ),
+    )

@@ -14,13 +14,18 @@ from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_provenance import explain_search
 from jaxbiped.optimise._cycle_functionals import Functional, weighted_sum
-from jaxbiped.optimise._design_gaits import GaitSettings, are_walks
+from jaxbiped.optimise._design_gaits import (
+    Ensemble,
+    GaitSettings,
+    are_walks,
+    evaluate_ensemble,
+    with_worse_members,
+)
 from jaxbiped.optimise._design_variables import Requirement, Variables
-from jaxbiped.optimise._ensemble import Ensemble, evaluate_ensemble, with_worse_members
-from jaxbiped.optimise._evaluations import Evaluations
-from jaxbiped.optimise._objective_values import Evaluation, evaluate
+from jaxbiped.optimise._objective_values import Evaluation, Evaluations, evaluate
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._state_types import WalkerState
 
 KEPT = 1e-6
 """Part of its bound by which a requirement may be missed and still counts as kept, at least."""
@@ -78,8 +83,8 @@ class DesignProblem:
         """Whether multipliers are those of one gait, and not means over an ensemble."""
         return self.ensemble is None or self.ensemble.criterion != "mean"
 
-    def begin(self, u: np.ndarray) -> Design:
-        """The first design; its gait is found from nothing, or followed from the scene's own.
+    def begin(self, u: np.ndarray, guess: WalkerState | None = None) -> Design:
+        """The first design; its gait is found near a guess, or from nothing.
 
         Raises:
             ArgumentError: no gait, or a measure that cannot be differentiated.
@@ -87,7 +92,7 @@ class DesignProblem:
         known = self.evaluations.get(u)
         if known is None:
             scene = self.scene_at(u)
-            gait = self.settings.find(scene, None)
+            gait = self.settings.find(scene, guess)
             if not are_walks(gait):
                 raise ArgumentError(
                     f"the design to start from has no gait: {explain_search(scene, gait)}."
@@ -124,7 +129,7 @@ class DesignProblem:
         self.ensemble, self.asked, self.evaluations = ensemble, [], Evaluations(None, {})
         self.evaluations.count = before[2].count
         try:
-            return self.begin(design.u)
+            return self.begin(design.u, self.settings.state_of(self.scene, design.known.state))
         except BaseException:
             self.ensemble, self.asked, self.evaluations, self.latest = before
             raise

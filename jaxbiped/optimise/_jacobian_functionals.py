@@ -9,21 +9,22 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import WalkerState
+from jaxbiped.gait._fixed_point_search import with_looser
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.linalg._small_matrices import singular_pairs
 from jaxbiped.optimise._augmented_cycles import (
-    AbstractAugmentedSystem,
-    MotionSection,
+    LowestSwing,
+    LowestSwingSection,
     SteppedSection,
     drop_cycle,
     push_cycle,
 )
+from jaxbiped.optimise._augmented_system import AbstractAugmentedSystem, MotionSection
 from jaxbiped.optimise._cycle_functionals import (
     Functionals,
     cycle_spec,
@@ -37,8 +38,8 @@ from jaxbiped.optimise._jacobian_weights import (
     entry_weights,
     leading_multipliers,
 )
-from jaxbiped.optimise._lowest_swing import LowestSwing, LowestSwingSection
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._adjoint_solve import COUNT
 from jaxbiped.variational._hybrid_system import section_of, system_of
@@ -60,7 +61,7 @@ def jacobian_functionals(
     state: WalkerState,
     names: tuple[str, ...] = JACOBIAN_FUNCTIONALS,
     *,
-    footsteps: int = 1,
+    arrivals: int = 1,
     accuracy: str = "balanced",
     engine: str = "lanes",
 ) -> Functionals:
@@ -94,7 +95,7 @@ def jacobian_functionals(
         state: of its gait, on the section.
         names: which of `JACOBIAN_FUNCTIONALS`, or of `CLUSTER`; each costs adjoint solves of its
             own.
-        footsteps: how many a cycle has.
+        arrivals: how often a cycle comes to the section.
         accuracy: "balanced" or "tight".
         engine: "xla" or "lanes".
 
@@ -107,14 +108,14 @@ def jacobian_functionals(
         groups[kind] = (*groups.get(kind, ()), name)
     told = []
     for (by_step, has_clearance), group in groups.items():
-        on, arrivals = section_of(scene, None), footsteps
+        on, count = section_of(scene, None), arrivals
         disturbed = (drop_cycle if by_step else push_cycle)(system_of(scene))
         system: AbstractAugmentedSystem = disturbed
         section: AbstractSection = SteppedSection(on) if by_step else MotionSection(on)
         if has_clearance:
             system, section = LowestSwing(disturbed), LowestSwingSection(section)
-            arrivals *= 2
-        spec = cycle_spec(scene, system, section, arrivals, engine)
+            count *= 2
+        spec = cycle_spec(scene, system, section, count, engine)
         precision = functional_precision(accuracy, scene, group)
         told.append(_functionals(spec, scene, system.begin(state), group, precision))
     if len(told) == 1:
@@ -125,7 +126,7 @@ def jacobian_functionals(
     return Functionals._make([*rows, jnp.max(jnp.stack([each.code for each in told]))])
 
 
-@cached_jit
+@host_jit(runs_by_lanes)
 def _functionals(
     spec: ReturnMapSpec,
     scene: Scene | RigidScene,
@@ -137,7 +138,7 @@ def _functionals(
     m = points.shape[1]
     leading = leading_multipliers(returns.jacobian[0, :, :m])
 
-    def at(once: LinearisedReturn) -> tuple[Scalar, Scalar]:
+    def at(once: LinearisedReturn, precision: Precision) -> tuple[Scalar, Scalar]:
         first = slopes_of(once)
         # The Jacobian's rows, as components lie: hip_x, the clock, a fall, and what must return.
         rows = jnp.concatenate([once.advance_rows, once.jacobian])[:, :m]
@@ -147,7 +148,10 @@ def _functionals(
         along, weights = (jnp.concatenate(part) for part in zip(*pairs, strict=True))
 
         def part(along: Scalar, weights: Scalar) -> Scalar:
-            return second_variation(spec, seeds, y, once, along, weights, first.recurring, sizes)
+            tangents = first.recurring
+            return second_variation(
+                spec, seeds, y, once, along, weights, tangents, sizes, precision
+            ).slopes
 
         parts, done, slopes = jax.vmap(part)(along, weights), 0, []
         by_length = jnp.stack([first.advance[0], first.period])
@@ -158,7 +162,7 @@ def _functionals(
         found = jnp.where(once.jumps > 0, jnp.nan, jnp.stack(slopes))
         return jnp.stack([each.value for each in told]), found / sizes
 
-    return with_errors(*jax.vmap(at)(returns), returns.code)
+    return with_errors(*jax.vmap(at)(returns, with_looser(fine)), returns.code)
 
 
 def _in_pairs(weights: Scalar, rank: int) -> tuple[Scalar, Scalar]:

@@ -1,11 +1,28 @@
-"""Values of objectives: those of one gait by name, their gradients and their error bars."""
+"""Values of objectives: those of one gait by name, with gradients and error bars, and kept.
 
+In memory and, where asked for, in a file to resume from, a line of JSON for each design. An
+optimiser that is run again asks for the same designs in the same order, finds them there, and goes
+on where it was.
+"""
+
+import contextlib
+import json
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._checks import ArgumentError
+from jaxbiped._files import failure_kind, strict_json
+from jaxbiped._identity import difference_of
+from jaxbiped._types import JsonObject, Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.continuation._bifurcations import BranchEvent
+from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
@@ -19,7 +36,7 @@ from jaxbiped.optimise._cycle_functionals import (
 from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import CLEARANCE_NORMS, CLUSTER, SYMMETRIC
 from jaxbiped.optimise._objectives import OBJECTIVES
-from jaxbiped.scene._parameter_access import parameter_names, parameter_values
+from jaxbiped.scene._parameter_access import parameter_names, select_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 
 _OF_THE_GAIT = ("speed", "step_length", "period", "peak_normal")
@@ -55,9 +72,7 @@ class Evaluation(NamedTuple):
 
     def functional(self, name: str) -> Functional:
         """All that is known of one objective."""
-        return Functional(
-            self.values[name], self.errors[name], self.slopes[name], self.slope_errors[name]
-        )
+        return _row(*(part[name] for part in self[:4]))
 
 
 BothFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None]
@@ -65,11 +80,11 @@ BothFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None]
 
 
 def functionals_of(
-    scene: Scene | RigidScene, gait: Gait, wanted: tuple[str, ...], footsteps: int, accuracy: str
+    scene: Scene | RigidScene, gait: Gait, wanted: tuple[str, ...], accuracy: str
 ) -> BothFunctionals:
     """What measures need beside the gait itself."""
     of_jacobian, of_cycle = _names_for(wanted)
-    how: dict[str, Any] = dict(footsteps=footsteps, accuracy=accuracy, engine=gait.engine)
+    how: Any = {"arrivals": len(gait.orbit[0]), "accuracy": accuracy, "engine": gait.engine}
     state, first, second = gait.measures.state, None, None
     if of_jacobian:
         first = jacobian_functionals(scene, state, of_jacobian, **how)
@@ -110,20 +125,16 @@ def evaluate(
     rows = {name: _row(*(getattr(each, name) for each in both)) for name in _OF_THE_GAIT}
     rows |= {name: Functional(*measured(scene, gait)) for name, measured in _own(wanted).items()}
     if functionals is None:
-        footsteps = gait.orbit[0].shape[0]
-        functionals = functionals_of(scene, gait, wanted, footsteps, accuracy)
+        functionals = functionals_of(scene, gait, wanted, accuracy)
     of_jacobian, _ = _names_for(wanted)
     first, second = functionals
     if first is not None:
         # The orbit's own error moves the Jacobian, too, as its multipliers tell.
         shares = np.asarray(gait.multiplier_errors) / float(gait.measures.spectral_radius)
-        rows |= {
+        for name, row in zip(of_jacobian, _rows_of(first), strict=True):
             # Symmetric functions do not move as multipliers that meet do.
-            name: row
-            if name in SYMMETRIC
-            else row._replace(error=max(row.error, abs(row.value) * float(shares[0])))
-            for name, row in zip(of_jacobian, _rows_of(first), strict=True)
-        }
+            moved = 0.0 if name in SYMMETRIC else abs(row.value) * float(shares[0])
+            rows[name] = row._replace(error=max(row.error, moved))
     if "whole_sensitivity" in wanted:
         rows["whole_sensitivity"] = _root_of_squares([rows[name] for name in _WHOLE])
     if second is not None:
@@ -134,18 +145,15 @@ def evaluate(
         told = bifurcation_distance(scene, gait, _DISTANCES[name], accuracy=accuracy)
         rows[name] = Functional(told.distance, told.error, told.slopes, told.slope_errors)
         if told.outcome is Sought.NONE_IN_RANGE:
-            none = np.zeros_like(told.slopes)
-            rows[name] = Functional(told.distance, 0.0, none, none)
+            rows[name] = Functional(told.distance, 0.0, *[np.zeros_like(told.slopes)] * 2)
             beyond_range.append(name)
-    kept = {
-        name: _row(*rows[name]) for name in dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))
-    }
+    needed = dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))
+    kept = {name: _row(*rows[name]) for name in needed}
     state, slopes = gait.measures.state, gait.sensitivities.state
+    columns: Any = zip(*kept.values(), strict=True)
+    named = [dict(zip(kept, column, strict=True)) for column in columns]
     return Evaluation(
-        values={name: row.value for name, row in kept.items()},
-        errors={name: row.error for name, row in kept.items()},
-        slopes={name: row.slopes for name, row in kept.items()},
-        slope_errors={name: row.slope_errors for name, row in kept.items()},
+        **dict(zip(Evaluation._fields[:4], named, strict=True)),
         state=np.stack(recurring_leaves(state)),
         state_slopes=np.stack(recurring_leaves(slopes)),
         beyond_range=tuple(beyond_range),
@@ -168,7 +176,7 @@ def _root_of_squares(rows: list[Functional]) -> Functional:
 
 def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, Functional]) -> Functional:
     """Losses, or what the motors do and gravity's share, over weight times length."""
-    if scene.actuation is None:
+    if not is_driven(scene):
         losses = [rows[name] for name in ("impact_loss", "friction_loss") if name in rows]
         return _over_weight_and_length(scene, losses, rows["step_length"])
     driven = _over_weight_and_length(scene, [rows["motor_work"]], rows["step_length"])
@@ -181,13 +189,10 @@ def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, Functional]) -
 def _over_weight_and_length(
     scene: Scene | RigidScene, works: list[Functional], length: Functional
 ) -> Functional:
-    known = {name: float(value) for name, value in parameter_values(scene).items()}
-    mass, names = float(scene.walker.total_mass), parameter_names(scene)
-    own = length.slopes / length.value
-    for name, share in (("m", 2.0 / mass), ("hip_mass", 1.0 / mass), ("g", 1.0 / known["g"])):
-        own[names.index(name)] += share
-    divisor = mass * known["g"] * length.value
-    work = weighted_sum([1.0] * len(works), works, len(names))
+    weight, by_parameters = map(np.asarray, _weight(scene))
+    own = length.slopes / length.value + by_parameters / weight
+    divisor = float(weight) * length.value
+    work = weighted_sum([1.0] * len(works), works, len(own))
     cost = work.value / divisor
     return Functional(
         value=cost,
@@ -195,3 +200,100 @@ def _over_weight_and_length(
         slopes=work.slopes / divisor - cost * own,
         slope_errors=work.slope_errors / divisor + cost * length.slope_errors / length.value,
     )
+
+
+@cached_jit
+def _weight(scene: Scene | RigidScene) -> tuple[Scalar, Scalar]:
+    """The walker's weight [N], and its derivatives with respect to all parameters, shape (p,)."""
+
+    def of(there: Any) -> Scalar:
+        weight: Scalar = there.mechanism.total_mass * there.ground.g
+        return weight
+
+    value, slopes = jax.value_and_grad(of)(scene)
+    (_, places), leaves = select_parameters(scene, None), jtu.tree_leaves(slopes)
+    return value, jnp.stack([leaves[k] for k in places])
+
+
+class Evaluations:
+    """Designs by their u, with what is known of each; None for one whose gait was lost."""
+
+    def __init__(self, path: Path | None = None, settings: JsonObject | None = None) -> None:
+        self._known: dict[bytes, Evaluation | None] = {}
+        self._path, self.count = path, 0
+        if path is None:
+            return
+        try:
+            text = path.read_text(errors="replace") if path.exists() else ""
+        except OSError as error:
+            raise failure_kind(error)(f"store = {str(path)!r}: {error.strerror}.") from None
+        if text:
+            self._read(path, text.splitlines(), json.loads(strict_json(settings)))
+        else:
+            self._append(settings)
+        if text and not text.endswith("\n"):
+            self._append(None)  # what was cut off ends: the next line stands by itself
+
+    def get(self, u: np.ndarray) -> Evaluation | None:
+        """What is known of a design."""
+        return self._known.get(u.tobytes())
+
+    def is_lost(self, u: np.ndarray) -> bool:
+        """Whether no gait was found there."""
+        return self._known.get(u.tobytes(), ...) is None
+
+    def add(self, u: np.ndarray, known: Evaluation | None) -> None:
+        """Keeps a design, None for one that has no gait."""
+        self._known[u.tobytes()] = known
+        self.count += known is not None
+        self._append({"u": u, "known": None if known is None else known._asdict()})
+
+    def nearest(self, u: np.ndarray) -> tuple[np.ndarray, Evaluation]:
+        """Of the designs with a gait the nearest one."""
+        found = [(np.frombuffer(key), e) for key, e in self._known.items() if e is not None]
+        return min(found, key=lambda each: float(np.linalg.norm(each[0] - u)))
+
+    def _read(self, path: Path, lines: list[str], settings: JsonObject) -> None:
+        rows: list[Any] = []
+        for line in lines:
+            with contextlib.suppress(json.JSONDecodeError):  # one that was cut off
+                rows.append(json.loads(line))
+        difference = "it holds something else"
+        if rows and isinstance(rows[0], dict):
+            difference = difference_of(rows[0], settings) or ""
+        if difference:
+            raise ArgumentError(
+                f"store = {str(path)!r} belongs to another problem ({difference}): give another "
+                "file, or the same scene, variables, measures and settings."
+            )
+        for row in rows:
+            # Two runs that begin one store both write what it is of.
+            if isinstance(row, dict) and "u" in row:
+                known = row["known"]
+                u = np.asarray(row["u"], dtype=float)
+                self._known[u.tobytes()] = None if known is None else _evaluation(known)
+        self.count = sum(each is not None for each in self._known.values())
+
+    def _append(self, row: JsonObject | None) -> None:
+        """In one piece, so that another run may add to the same file; without a row a line's end.
+
+        What is no finite number is a word that `float` reads.
+        """
+        if self._path is None:
+            return
+        text = "" if row is None else strict_json(row, unknown=str)
+        try:
+            with self._path.open("a") as file:
+                file.write(text + "\n")
+        except OSError as error:
+            raise failure_kind(error)(f"store = {str(self._path)!r}: {error.strerror}.") from None
+
+
+def _evaluation(told: JsonObject) -> Evaluation:
+    def read(part: Any) -> Any:
+        if isinstance(part, dict):
+            return {name: read(each) for name, each in part.items()}
+        return np.asarray(part, float)[()]
+
+    beyond = tuple(told.pop("beyond_range"))
+    return Evaluation(**read(told), beyond_range=beyond)

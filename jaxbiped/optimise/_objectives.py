@@ -8,13 +8,14 @@ import jax.numpy as jnp
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
+from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
 
 def _of_driven(scene: Scene | RigidScene) -> str | None:
-    return "it has no actuators" if scene.actuation is None else None
+    return None if is_driven(scene) else "it has no actuators"
 
 
 def _of_slip(scene: Scene | RigidScene) -> str | None:
@@ -30,14 +31,25 @@ def _of_friction(scene: Scene | RigidScene) -> str | None:
 def _of_strike(scene: Scene | RigidScene) -> str | None:
     if isinstance(scene, Scene):
         return "its feet press into the ground for a while instead of striking at once"
-    if scene.actuation is not None:
+    if is_driven(scene):
         return "what drives it changes volumes of phase space, too"
     return None
 
 
+def _of_steps(scene: Scene | RigidScene) -> str | None:
+    structure = scene.mechanism.structure
+    if structure.swing_leg == structure.stance_leg or structure.cycle_footsteps > 1:
+        return "it is known of mirrored walkers alone, whose cycle is a step"
+    return None
+
+
+def _of_clearance(scene: Scene | RigidScene) -> str | None:
+    return _of_swing(scene) or _of_steps(scene)
+
+
 def _of_swing(scene: Scene | RigidScene) -> str | None:
     if isinstance(scene, Scene) and not isinstance(
-        scene.clearance.admits(1, jnp.ones(())), jax.Array
+        scene.clearance.admits(scene.mechanism.structure.legs[0], jnp.ones(())), jax.Array
     ):
         return f"its clearance rule is {type(scene.clearance).__name__}, which lets no foot pass"
     return None
@@ -66,15 +78,17 @@ OBJECTIVES = {
     "spectral_radius": Objective(Quantity("spectral radius", "$\\rho$")),
     "radius_bound": Objective(Quantity("smooth bound of the spectral radius", "$\\rho_q$")),
     "sensitivity_norm": Objective(Quantity("gait sensitivity norm", "$\\|G\\|$")),
-    "floor_sensitivity": Objective(Quantity("gait sensitivity norm to steps", "$\\|G_h\\|$")),
+    "floor_sensitivity": Objective(
+        Quantity("gait sensitivity norm to steps", "$\\|G_h\\|$"), _of_steps
+    ),
     "clearance_sensitivity": Objective(
-        Quantity("sensitivity norm of clearance", "$\\|G_c\\|$"), _of_swing
+        Quantity("sensitivity norm of clearance", "$\\|G_c\\|$"), _of_clearance
     ),
     "floor_clearance_sensitivity": Objective(
-        Quantity("sensitivity norm of clearance to steps", "$\\|G_{hc}\\|$"), _of_swing
+        Quantity("sensitivity norm of clearance to steps", "$\\|G_{hc}\\|$"), _of_clearance
     ),
     "whole_sensitivity": Objective(
-        Quantity("gait sensitivity norm of all", "$\\|G_a\\|$"), _of_swing
+        Quantity("gait sensitivity norm of all", "$\\|G_a\\|$"), _of_clearance
     ),
     "strike_divergence": Objective(
         Quantity("divergence of foot strike", "$\\ln|\\det S|$"), _of_strike
@@ -92,8 +106,8 @@ OBJECTIVES = {
 
 - cost of transport: work of gravity and of the motors over weight times way, as
   `measure.cost_of_transport` has it; a passive walker's is what it loses, sin(slope) in all.
-- impact loss: work of the normal reactions; a rigid walker's kinetic energy lost in its impacts,
-  after its push-off.
+- impact loss: work of the normal reactions, and what springs, stops and latches lose; a rigid
+  walker's kinetic energy lost in its impacts, after its push-off.
 - motor work: of each motor where its power is positive, added up, and the push-off's.
 - slip distance: path of the feet that touch, along the ground.
 - foot clearance: least height of the swinging foot, negative where it passes underground.

@@ -17,7 +17,10 @@ from jaxbiped._checks import (
 from jaxbiped._files import user_path
 from jaxbiped._identity import DECISIVE, provenance
 from jaxbiped._types import JsonObject
-from jaxbiped.optimise._design_gaits import GaitSettings
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._return_map_spec import arrivals_of
+from jaxbiped.gait._search_starts import state_of_guess
+from jaxbiped.optimise._design_gaits import Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._design_variables import (
     SubjectTo,
@@ -26,15 +29,14 @@ from jaxbiped.optimise._design_variables import (
     start_of,
     variables_of,
 )
-from jaxbiped.optimise._ensemble import Ensemble, ensemble_of
-from jaxbiped.optimise._evaluations import Evaluations
+from jaxbiped.optimise._objective_values import Evaluations
 from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
-from jaxbiped.optimise._runs import Optimum, Runs, optimum_of
-from jaxbiped.optimise._scattered_designs import scattered_designs
+from jaxbiped.optimise._runs import Optimum, Runs, optimum_of, scattered_designs
 from jaxbiped.scene._parameter_access import scene_identity
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 if TYPE_CHECKING:
@@ -53,6 +55,7 @@ def optimise_gait(
     maximise: Goal = None,
     minimise: Goal = None,
     subject_to: SubjectTo = None,
+    guess: Gait | WalkerState | None = None,
     optimiser: "str | optax.GradientTransformation" = "trust-region",
     iterations: int = 200,
     restarts: int = 0,
@@ -60,7 +63,7 @@ def optimise_gait(
     members: int = 8,
     criterion: str = "mean",
     seed: int = 0,
-    footsteps: int = 1,
+    footsteps: int | None = None,
     accuracy: str = "balanced",
     engine: str = "auto",
     progress: bool = False,
@@ -70,7 +73,7 @@ def optimise_gait(
 
     The gait of every design is found anew, from where the last one's derivatives point; gradients
     are exact, by the implicit function theorem. A design without a gait, or one whose gait is no
-    walk, turns the search back. No guess of a gait is needed.
+    walk, turns the search back.
 
     Args:
         scene: the walker to begin from; a parameter outside its bounds is moved onto them.
@@ -80,6 +83,8 @@ def optimise_gait(
             weights of several.
         subject_to: bounds (low, high) by measure, None for no bound and equal ones for an equality;
             or words, "spectral_radius<0.4", one or a sequence of them.
+        guess: a gait or a start near the gait of the design to begin from; the gait that
+            `find_gait` finds unless given.
         optimiser: "trust-region", "slsqp", "trust-constr"; or without requirements "optax" (Adam in
             logits of u) or any optax transformation.
         iterations: most of the optimiser, of each run.
@@ -92,13 +97,14 @@ def optimise_gait(
             the whole box: the sample, up to 64 corners, and what a search comes upon about the
             best design, which is then optimised anew.
         seed: of scattered designs and of members.
-        footsteps: how many a cycle has.
+        footsteps: how many a cycle has; one of a mirrored walker unless given, of one with unlike
+            legs those of a stride.
         accuracy: "balanced" or "tight".
         engine: as for `find_gait`.
         progress: whether to show a bar on stderr.
-        store: file that keeps every evaluation; the same call with it goes on where it was. It
-            serves whatever asks for the same measures of the same designs, so another optimiser
-            and other bounds of these measures too.
+        store: file that keeps every evaluation, from which the same call continues. It serves any
+            call for the same measures of the same designs, also with another optimiser or other
+            bounds of these measures.
 
     Returns:
         The best design, its gait, and how good it is: see `certify` for more.
@@ -126,7 +132,8 @@ def optimise_gait(
 
         check_type("optimiser", optimiser, optax.GradientTransformation)
     check_count("iterations", iterations)
-    check_count("footsteps", footsteps)
+    near = state_of_guess(scene, guess)
+    arrivals_of(scene, footsteps)  # refused where they are no whole cycles
     check_not_negative("restarts", restarts)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     if requirements and optimiser not in OPTIMISERS[:3]:
@@ -143,11 +150,13 @@ def optimise_gait(
     if store is not None:
         path = user_path(store, "store")
         own = _problem_settings(scene, vary, measures, settings, ensemble)
+        if near is not None:  # which of several gaits is followed may depend on it
+            own["guess"] = {name: float(leaf) for name, leaf in near._asdict().items()}
         evaluations = Evaluations(path, own)
     problem = DesignProblem(
         scene, variables, told, sense, requirements, settings, evaluations, ensemble
     )
-    begin = problem.begin(start_of(scene, variables))
+    begin = problem.begin(start_of(scene, variables), near)
     runs = Runs(problem, iterations, optimiser, progress)
     with runs.bar:
         try:

@@ -1,4 +1,4 @@
-"""Runs of an optimiser over a design problem, and the optimum: the best design of all of them."""
+"""Runs of an optimiser over a design problem, restarts among them, and the best design of all."""
 
 import enum
 import functools
@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from tqdm import tqdm
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped.continuation._nearest_bifurcation import range_of
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
 from jaxbiped.optimise._objective_values import Evaluation
 from jaxbiped.optimise._optimality import OPTIMAL, Optimality, optimality_of
@@ -26,6 +29,11 @@ from jaxbiped.scene._scene import RigidScene, Scene
 
 if TYPE_CHECKING:
     import optax
+
+_DRAWN = 8
+"""Designs that are drawn for each one that is kept."""
+_STAGES = 4
+"""Steps in which the gaits of all of them are followed from the first design's."""
 
 
 _BY_NAME: dict[str, Callable[[Functions, np.ndarray, int, Callback], RunEnding]] = {
@@ -107,7 +115,7 @@ class Runs:
     @property
     def best(self) -> Design:
         """Of all designs that were asked for."""
-        return min(self.problem.asked, key=self._rank)
+        return min(self.problem.asked, key=functools.partial(rank_of, self.problem))
 
     def run(self, begin: Design) -> None:
         """From a design whose gait is known."""
@@ -120,7 +128,8 @@ class Runs:
         else:
             optimise = functools.partial(run_optax, transformation=self.optimiser)
         ended = optimise(functions, begin.u, self.iterations, self.note)
-        if not self.ended.message or self._rank(self.best) < self._rank(before):
+        better = rank_of(self.problem, self.best) < rank_of(self.problem, before)
+        if not self.ended.message or better:
             self.ended = ended
 
     def outcome(self) -> Outcome:
@@ -151,10 +160,11 @@ class Runs:
         self.history.append(Iteration(named, value, excess, measures, beyond))
         self.bar.set_postfix(objective=f"{value:.6g}", excess=f"{excess:.1e}")
 
-    def _rank(self, design: Design) -> tuple[float, float]:
-        """Designs nearer to the requirements come first, and of those that keep them the better."""
-        excess = self.problem.excess(design.known)
-        return 0.0 if excess <= KEPT else excess, self.problem.objective(design.known).value
+
+def rank_of(problem: DesignProblem, design: Design) -> tuple[float, float]:
+    """Designs nearer to the requirements come first, and of those that keep them the better."""
+    excess = problem.excess(design.known)
+    return 0.0 if excess <= KEPT else excess, problem.objective(design.known).value
 
 
 class Optimum(NamedTuple):
@@ -202,16 +212,9 @@ def _message(problem: DesignProblem, best: Design, ended: RunEnding) -> str:
     """The optimiser's own words, and which bifurcations the best design does not meet."""
     low, high = range_of(problem.scene_at(best.u), "slope")
     ensemble = problem.ensemble
-    return " ".join(
-        [
-            ended.message,
-            *([ensemble.words] if ensemble and ensemble.criterion == "worst" else []),
-            *(
-                f"{name}: none from {low:.6g} to {high:.6g} rad."
-                for name in best.known.beyond_range
-            ),
-        ]
-    )
+    worst = [ensemble.words] if ensemble and ensemble.criterion == "worst" else []
+    none = [f"{name}: none from {low:.6g} to {high:.6g} rad." for name in best.known.beyond_range]
+    return " ".join([ended.message, *worst, *none])
 
 
 def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
@@ -233,3 +236,61 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
         lost=problem.lost,
         unmeasured=problem.unmeasured,
     )
+
+
+def scattered_designs(problem: DesignProblem, begin: Design, count: int, seed: int) -> list[Design]:
+    """The best of many scattered designs, those that keep the requirements before all others."""
+    from scipy.stats import qmc
+
+    u = qmc.Sobol(len(begin.u), seed=seed).random(_DRAWN * count)
+    found: list[Design] = []
+    for each, point in zip(u, follow_designs(problem, begin, u), strict=True):
+        if not np.all(np.isfinite(point)):
+            continue
+        known = problem.evaluations.get(each) or problem.from_guess(each, point)
+        if known is not None:
+            found.append(Design(each, known))
+    return sorted(found, key=lambda design: rank_of(problem, design))[:count]
+
+
+def follow_designs(problem: DesignProblem, begin: Design, u: np.ndarray) -> np.ndarray:
+    """States of the gaits of designs (n, k) on the section, shape (n, m); NaN where lost."""
+    variables, known = problem.variables, begin.known
+    points, slopes = (
+        np.broadcast_to(each, (len(u), *each.shape)) for each in (known.state, known.state_slopes)
+    )
+    before = np.broadcast_to(begin.u, u.shape)
+    for share in np.linspace(0.0, 1.0, _STAGES + 1)[1:]:
+        here = begin.u + share * (u - begin.u)
+        moves = variables.values(here) - variables.values(before)
+        points = points + np.einsum("nmk,nk->nm", slopes[:, :, variables.places], moves)
+        points, slopes = _gaits_of_designs(problem, here, points)
+        before = here
+    return points
+
+
+def _gaits_of_designs(
+    problem: DesignProblem, u: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gaits of designs near guesses, and their derivatives (n, m, p); NaN where there are none."""
+    columns, allowed = problem.variables.values(u), np.asarray([_is_allowed(problem, x) for x in u])
+    own = np.where(allowed[:, None], columns, columns[np.argmax(allowed)])
+    known = np.isfinite(points)
+    values = dict(zip(problem.variables.names, own.T, strict=True))
+    starts = np.where(known, points, 0.0)
+    _, gaits, _ = gaits_near(problem.scene, values, starts, problem.settings)
+    good = are_walks(gaits) & allowed & np.all(known, axis=1)
+    found, slopes = (
+        np.stack(recurring_leaves(states), axis=1)
+        for states in (gaits.measures.state, gaits.sensitivities.state)
+    )
+    lost = ~good[:, None]
+    return np.where(lost, np.nan, found), np.where(lost[:, None], np.nan, slopes)
+
+
+def _is_allowed(problem: DesignProblem, u: np.ndarray) -> bool:
+    try:
+        problem.scene_at(u)
+    except ArgumentError:
+        return False
+    return True

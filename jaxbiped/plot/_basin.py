@@ -1,10 +1,10 @@
-"""Basin picture in two coordinates of the start."""
+"""Basin pictures in two coordinates of the start: on a grid, and refined about a boundary."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from jaxbiped._checks import ArgumentError, check_finite
+from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._quantity import Quantity
-from jaxbiped.basins._arguments import check_known
 from jaxbiped.basins._fractions import fractions as fractions_of
-from jaxbiped.basins._labels import Label, label_names
+from jaxbiped.basins._labels import Label, check_known, label_names
+from jaxbiped.basins._refined_boundary import RefinedBoundary
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import axis_label
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _HATCH = "////"
 """Over what is pending, so that it reads as missing in print without colour too."""
+_CORNERS = np.asarray([(0, 0), (1, 0), (1, 1), (0, 1)])
 
 
 def basin(
@@ -77,13 +78,72 @@ def basin(
             each.transpose(*along[::-1]) if hasattr(each, "dims") else each for each in parts
         )
     if x is None or y is None or names is None:
-        raise ArgumentError("x, y and names are needed: these labels do not know their axes.")
-    words = names_of(labels, cycle_footsteps, gait)
+        raise ArgumentError("x, y and names are needed, because these labels carry no axes.")
+    words = _names_of(labels, cycle_footsteps, gait)
     x_edges, y_edges = _edges("x", x, words.shape[1]), _edges("y", y, words.shape[0])
     ax = style.axes_or_new(ax, 7.2, 4.4)
-    draw_labels(ax, words, x_edges, y_edges)
-    finish(ax, words, names, units, mark, title)
-    return style.figure_of(ax)
+    _draw_labels(ax, words, x_edges, y_edges)
+    return _finish(ax, words, names, units, mark, title)
+
+
+def refined_basin(
+    boundary: RefinedBoundary,
+    *,
+    names: tuple[str | Quantity, str | Quantity],
+    units: tuple[str, str] = ("", ""),
+    codes: Mapping[int, str] | None = None,
+    cells: bool = True,
+    mark: tuple[float, float] | None = None,
+    title: str = "",
+    ax: Axes | None = None,
+) -> Figure:
+    """Draws the labels about a refined boundary, and outlines the cells that were halved.
+
+    Fractions are those of the full grid of the finest level, its labels filled in as by
+    `RefinedBoundary.on_grid`.
+
+    Args:
+        boundary: of two dimensions; x is the first.
+        names, units: what the axes are, and in which units (see `basin`).
+        codes: names of the label codes; those of `Label` unless given.
+        cells: whether to outline the boundary cells of every level but the finest, which
+            are those that were halved.
+        mark: where the gait is, in the units of the axes.
+        title: above the axes; how many labels were asked for unless given.
+        ax: axes to draw into; a new figure unless given.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
+
+    Raises:
+        ArgumentError: not a refined boundary of two dimensions, or a code without a name.
+    """
+    check_type("boundary", boundary, RefinedBoundary)
+    if len(boundary.shape) != 2:
+        raise ArgumentError(f"boundary has {len(boundary.shape)} dimensions: it must have 2.")
+    words = boundary.on_grid().T
+    if codes is None:
+        words = _names_of(words)
+    elif nameless := sorted(set(boundary.labels.tolist()) - set(codes)):
+        raise ArgumentError(f"codes has no name for label {nameless[0]}: each must have one.")
+    else:
+        words = np.vectorize(codes.__getitem__, otypes=[object])(words)
+    ax = style.axes_or_new(ax, 7.2, 4.4)
+    half = 0.5 * boundary.cell_size(boundary.levels)
+    axes = (np.append(boundary.axis(k) - half[k], boundary.axis(k)[-1] + half[k]) for k in (0, 1))
+    _draw_labels(ax, words, *axes)
+    handles = []
+    for level in range(boundary.levels) if cells else ():
+        size = boundary.cell_size(level)
+        corners = boundary.lower + (boundary.cells[level][:, None] + _CORNERS) * size
+        # Finer levels in thinner lines.
+        look: dict[str, Any] = {"edgecolors": "black", "linewidths": 0.7 * 0.7**level}
+        ax.add_collection(PolyCollection(list(corners), facecolors="none", **look), autolim=False)
+        handles = [Line2D([], [], color="black", linewidth=0.6, label="halved cells")]
+    ax.set_xlim(boundary.lower[0], boundary.upper[0])
+    ax.set_ylim(boundary.lower[1], boundary.upper[1])
+    title = title or f"{boundary.asked} labels of the full grid's {boundary.full}"
+    return _finish(ax, words, names, units, mark, title, handles)
 
 
 def _axes_of(labels: Any, x: Any, y: Any, names: Any) -> tuple[str, str]:
@@ -99,10 +159,8 @@ def _axes_of(labels: Any, x: Any, y: Any, names: Any) -> tuple[str, str]:
     return (second, first) if second in told or as_given else (first, second)
 
 
-def names_of(
-    labels: Any,
-    cycle_footsteps: npt.ArrayLike | None = None,
-    gait: npt.ArrayLike | None = None,
+def _names_of(
+    labels: Any, cycle_footsteps: npt.ArrayLike | None = None, gait: npt.ArrayLike | None = None
 ) -> np.ndarray:
     """Names on a grid of two dimensions, from names or codes, footsteps in a cycle and gaits."""
     grid = np.asarray(labels)
@@ -152,46 +210,33 @@ def _edges(name: str, value: npt.ArrayLike, n: int) -> np.ndarray:
     return np.concatenate([[2 * array[0] - middle[0]], middle, [2 * array[-1] - middle[-1]]])
 
 
-def draw_labels(ax: Axes, words: np.ndarray, x_edges: np.ndarray, y_edges: np.ndarray) -> None:
+def _draw_labels(ax: Axes, words: np.ndarray, x_edges: np.ndarray, y_edges: np.ndarray) -> None:
     """Fills each cell with its label's colour, and hatches what is pending."""
-    present = style.in_order(set(words.ravel().tolist()))
-    codes = np.searchsorted(np.sort(present), words.astype(str))
-    places = np.argsort(present)[codes]
+    present = sorted(set(words.ravel().tolist()))
+    codes = np.searchsorted(present, words.astype(str))
     colours = ListedColormap([style.label_colour(name) for name in present])
     norm = BoundaryNorm(np.arange(len(present) + 1) - 0.5, len(present))
-    ax.pcolormesh(x_edges, y_edges, places, cmap=colours, norm=norm, rasterized=True)
-    pending = words == str(Label.PENDING)
-    if pending.any():
-        _hatch(ax, pending, x_edges, y_edges)
+    ax.pcolormesh(x_edges, y_edges, codes, cmap=colours, norm=norm, rasterized=True)
+    # Each run of pending cells in a row is one rectangle: few of them on a large grid.
+    turns = np.diff(np.pad((words == str(Label.PENDING)).astype(int), ((0, 0), (1, 1))), axis=1)
+    (row, left), (_, right) = np.nonzero(turns == 1), np.nonzero(turns == -1)
+    if row.size:
+        across = x_edges[np.stack([left, right, right, left], axis=1)]
+        along = y_edges[np.stack([row, row, row + 1, row + 1], axis=1)]
+        runs = list(np.stack([across, along], axis=-1))
+        look: dict[str, Any] = {"edgecolors": "#A0A0A0", "linewidths": 0.0, "hatch": _HATCH}
+        ax.add_collection(PolyCollection(runs, facecolors="none", **look), autolim=False)
 
 
-def _hatch(ax: Axes, pending: np.ndarray, x_edges: np.ndarray, y_edges: np.ndarray) -> None:
-    """Hatches each run of pending cells in a row as one rectangle: few of them on a large grid."""
-    beyond = np.zeros((len(pending), 1), dtype=bool)
-    turns = np.diff(np.concatenate([beyond, pending, beyond], axis=1).astype(int), axis=1)
-    row, left = np.nonzero(turns == 1)
-    _, right = np.nonzero(turns == -1)
-    across = x_edges[np.stack([left, right, right, left], axis=1)]
-    along = y_edges[np.stack([row, row, row + 1, row + 1], axis=1)]
-    runs = PolyCollection(
-        list(np.stack([across, along], axis=-1)),
-        facecolors="none",
-        edgecolors="#A0A0A0",
-        linewidths=0.0,
-        hatch=_HATCH,
-    )
-    ax.add_collection(runs, autolim=False)
-
-
-def finish(
+def _finish(
     ax: Axes,
     words: np.ndarray,
     names: tuple[str | Quantity, str | Quantity],
     units: tuple[str, str],
     mark: tuple[float, float] | None,
     title: str,
-    more: tuple[Artist, ...] = (),
-) -> None:
+    more: Sequence[Line2D] = (),
+) -> Figure:
     """Names of the axes, the gait's mark, and the legend with fractions right of the axes."""
     handles = [*_patches(words), *more]
     if mark is not None:
@@ -205,26 +250,22 @@ def finish(
         ax.plot(*mark, clip_on=False, zorder=5, **look)
         handles.append(Line2D([], [], label="gait", **look))
     style.legend_right(ax, handles=handles)
-    x_label, y_label = (axis_label(*each) for each in zip(names, units, strict=True))
-    ax.set_xlabel(x_label)
-    ax.set_ylabel(y_label)
+    ax.set_xlabel(axis_label(names[0], units[0]))
+    ax.set_ylabel(axis_label(names[1], units[1]))
     ax.set_title(title, loc="left", fontsize="medium")
+    return style.figure_of(ax)
 
 
-def _patches(words: np.ndarray) -> list[Patch]:
+def _patches(words: np.ndarray) -> Iterator[Patch]:
     """Entries of the legend: labels that occur, with their parts of what is labelled."""
-    fractions = fractions_of(words)
-    patches = []
+    fractions, pending = fractions_of(words), str(Label.PENDING)
     for name in style.in_order(set(words.ravel().tolist())):
-        if name == str(Label.PENDING):
-            text = f"{name}: {int((words == name).sum())} of {words.size}"
-            patch = Patch(facecolor=style.label_colour(name), edgecolor="#A0A0A0", hatch=_HATCH)
-        else:
-            text = f"{name}: {_percent(fractions[name].estimate)}"
-            patch = Patch(facecolor=style.label_colour(name), edgecolor="#404040", linewidth=0.5)
-        patch.set_label(text)
-        patches.append(patch)
-    return patches
+        part = f"{int((words == name).sum())} of {words.size}"
+        look: dict[str, Any] = {"edgecolor": "#A0A0A0", "hatch": _HATCH}
+        if name != pending:
+            part = _percent(fractions[name].estimate)
+            look = {"edgecolor": "#404040", "linewidth": 0.5}
+        yield Patch(facecolor=style.label_colour(name), label=f"{name}: {part}", **look)
 
 
 def _percent(part: float) -> str:

@@ -55,30 +55,21 @@ def multipliers(gait: Gait, *, ax: Axes | None = None) -> Figure:
         if error > _VISIBLE:
             place = (value.real, value.imag)
             ax.add_patch(Circle(place, error, facecolor=style.LEG_COLOURS[1], alpha=0.25))
-    ax.plot(
-        values.real, values.imag, "o", color=style.LEG_COLOURS[0], markersize=5, label="multipliers"
-    )
+    look: dict[str, Any] = {"color": style.LEG_COLOURS[0], "markersize": 5}
+    ax.plot(values.real, values.imag, "o", label="multipliers", **look)
     _name(ax, values)
     _frame(ax, max(1.0, float(np.max(np.abs(values) + errors))))
     largest = float(np.max(errors))
-    ax.text(
-        0.02,
-        0.02,
-        f"largest error {largest:.1e}" + ("" if largest > _VISIBLE else ": within the dots"),
-        transform=ax.transAxes,
-        fontsize="small",
-        color=style.GROUND_COLOUR,
-    )
-    ax.set_title(_title(gait), loc="left", fontsize="medium")
-    return style.figure_of(ax)
-
-
-def _title(gait: Gait) -> str:
+    said = f"largest error {largest:.1e}" + ("" if largest > _VISIBLE else ": within the dots")
+    look = {"fontsize": "small", "color": style.GROUND_COLOUR}
+    ax.text(0.02, 0.02, said, transform=ax.transAxes, **look)
     verdict = "stable" if bool(gait.stable) else "not stable"
     if gait.critical is not Bifurcation.NONE:
         verdict += f", at a bifurcation ({gait.critical})"
     radius = float(gait.measures.spectral_radius)
-    return f"Floquet multipliers: spectral radius {radius:.4f}\n{verdict}"
+    title = f"Floquet multipliers: spectral radius {radius:.4f}\n{verdict}"
+    ax.set_title(title, loc="left", fontsize="medium")
+    return style.figure_of(ax)
 
 
 def _frame(ax: Axes, reach: float) -> None:
@@ -166,21 +157,17 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
     height = 1.3 + 0.2 * len(gait.parameters)
     figure = style.new_figure(max(3.9 * columns, 4.6), height * rows)
     panels = list(figure.subplots(rows, columns, squeeze=False).flat)
-    values = {name: np.asarray(getattr(gait.elasticities, name)) for name in names}
-    largest = max(float(np.max(np.abs(_finite(each)))) for each in values.values())
-    for ax, name in zip(panels, names, strict=False):
-        _panel(ax, MEASURES[name], gait.quantities or gait.parameters, values[name])
+    found = [np.asarray(getattr(gait.elasticities, name)) for name in names]
+    largest = float(np.max(np.abs(np.nan_to_num(found, posinf=0.0, neginf=0.0))))
+    for ax, name, values in zip(panels, names, found, strict=False):
+        _panel(ax, MEASURES[name], gait.quantities or gait.parameters, values)
         _scale(ax, largest)
     spare = panels[len(names) :]
     for ax in spare:
         ax.set_axis_off()
     if spare:
-        spare[0].text(0.0, 0.95, _READING, va="top", fontsize="small", color=style.GROUND_COLOUR)
+        spare[0].text(-0.4, 0.95, _READING, va="top", fontsize="small", color=style.GROUND_COLOUR)
     return figure
-
-
-def _finite(values: np.ndarray) -> np.ndarray:
-    return np.where(np.isfinite(values), values, 0.0)
 
 
 def _panel(
@@ -189,17 +176,17 @@ def _panel(
     """One measure: bars from the largest down, unknown ones last, and their numbers beside."""
     order = np.argsort(-np.where(np.isfinite(values), np.abs(values), -1.0), kind="stable")
     values = values[order]
-    drawn = _finite(values)
-    places = np.arange(len(values))
-    colours = [style.LEG_COLOURS[0] if value >= 0.0 else style.LEG_COLOURS[1] for value in drawn]
+    drawn, places = np.nan_to_num(values, posinf=0.0, neginf=0.0), np.arange(len(values))
+    colours = [style.LEG_COLOURS[int(value < 0.0)] for value in drawn]
     ax.barh(places, drawn, color=colours, height=0.7)
     ax.axvline(0.0, color=style.GROUND_COLOUR, linewidth=0.8)
     ax.set_yticks(places, [row_label(parameters[i]) for i in order], fontsize="small")
     ax.set_ylim(len(values) - 0.4, -0.6)
-    look: dict[str, Any] = {"fontsize": "x-small", "color": style.GROUND_COLOUR}
+    look: dict[str, Any] = {"fontsize": "x-small", "color": style.GROUND_COLOUR, "va": "center"}
     for place, value in enumerate(values):
-        beside = ax.get_yaxis_transform()
-        ax.text(1.02, place, _format(value), transform=beside, va="center", **look)
+        text = "0" if value == 0.0 else f"{value:+.2g}".replace("-", "−")
+        text = "unknown" if np.isnan(value) else text
+        ax.text(1.02, place, text, transform=ax.get_yaxis_transform(), **look)
     ax.set_title(title, loc="left", fontsize="medium")
     ax.set_xlabel("d log measure / d log parameter", fontsize="small")
     ax.grid(axis="x", color="#E6E6E6", linewidth=0.6)
@@ -213,16 +200,8 @@ def _scale(ax: Axes, largest: float) -> None:
     ax.set_xscale("symlog", linthresh=_LINEAR, linscale=0.5)
     reach = max(1.6 * largest, 10.0 * _LINEAR)
     ax.set_xlim(-reach, reach)
-    powers = [10.0**k for k in range(6, -4, -2) if 10.0**k <= reach]
-    ax.set_xticks(
-        [*(-power for power in powers), 0.0, *reversed(powers)],
-        [*(f"−{power:g}" for power in powers), "0", *(f"{power:g}" for power in reversed(powers))],
-        fontsize="small",
-    )
+    powers = [10.0**k for k in range(-2, 7, 2) if 10.0**k <= reach]
+    marks = {-power: f"−{power:g}" for power in reversed(powers)} | {0.0: "0"}
+    marks |= {power: f"{power:g}" for power in powers}
+    ax.set_xticks(list(marks), list(marks.values()), fontsize="small")
     ax.xaxis.set_minor_locator(NullLocator())
-
-
-def _format(value: float) -> str:
-    if np.isnan(value):
-        return "unknown"
-    return "0" if value == 0.0 else f"{value:+.2g}".replace("-", "−")

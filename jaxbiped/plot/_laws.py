@@ -28,7 +28,6 @@ _MOST_STEPS = 16384
 _LONGEST = 2.0
 """How long a drop is followed [s]: a strongly damped foot may creep for ever."""
 _Drop: TypeAlias = tuple[Scalar, Scalar]
-_Falling: TypeAlias = tuple[AbstractNormalLaw, float]
 
 
 def normal_law(
@@ -142,12 +141,10 @@ def _draw_drop(ax: Axes, law: AbstractNormalLaw, mass: float, speed: float) -> N
     depth, force = (np.concatenate([[0.0], part, leaving]) for part in (depth, force))
     turn = int(np.argmax(depth)) + 1
     ax.fill(1e3 * depth, force, color=style.LEG_COLOURS[0], alpha=0.12, linewidth=0)
-    for part, dashes, label in (
-        (slice(None, turn), "-", "going in"),
-        (slice(turn - 1, None), (0, (5, 1.5)), "coming out"),
-    ):
-        look: dict[str, Any] = {"linestyle": dashes, "label": label}
-        ax.plot(1e3 * depth[part], force[part], color=style.LEG_COLOURS[0], linewidth=1.4, **look)
+    parts = {"going in": slice(None, turn), "coming out": slice(turn - 1, None)}
+    look: dict[str, Any] = {"color": style.LEG_COLOURS[0], "linewidth": 1.4}
+    for (label, part), dashes in zip(parts.items(), style.LEG_STYLES, strict=False):
+        ax.plot(1e3 * depth[part], force[part], linestyle=dashes, label=label, **look)
     ax.margins(x=0.02)
     restitution = max(-rate[-1], 0.0) / speed
     title = f"Drop of {mass:g} kg at {speed:g} m/s: restitution {restitution:.3f}"
@@ -178,12 +175,12 @@ def _drop(law: AbstractNormalLaw, mass: float, speed: float) -> tuple[np.ndarray
     return np.maximum(depth[saved], 0.0), rate[saved]
 
 
-def _fall(t: ArrayLike, y: _Drop, args: _Falling) -> _Drop:
+def _fall(t: ArrayLike, y: _Drop, args: Any) -> _Drop:
     law, mass = args
     return y[1], -law.force(*y) / mass
 
 
-def _is_out(t: ArrayLike, y: _Drop, args: _Falling, **rest: object) -> Scalar:
+def _is_out(t: ArrayLike, y: _Drop, args: Any, **rest: object) -> Scalar:
     return (y[0] < 0.0) | ((y[1] < 0.0) & (args[0].force(*y) <= 0.0))
 
 
@@ -244,7 +241,7 @@ def bristle_law(
         times, bristles = _bristle_deflection(law, speed, bristle)
         places = place + speed * times
         friction = law.coefficient(jnp.asarray(speed), jnp.asarray(bristles))
-        look = style.leg_line(min(k, 1)) | {"label": label if k < 2 else None}
+        look = style.Look(min(k, 1)).line | {"label": label if k < 2 else None}
         ax.plot(1e3 * places, friction, linewidth=1.4, **look)
         place, bristle = places[-1], bristles[-1]
     title = f"{law_name(law)} at {slip_speed:g} m/s"

@@ -1,5 +1,6 @@
-"""Phase portraits: a leg of a walk (paper, figure 5), and the periodic orbit of a gait."""
+"""Phase portraits: bodies of a walk (paper, figure 5), and the periodic orbit of a gait."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,16 +8,15 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._ending import Ending
-from jaxbiped._types import Numbers
 from jaxbiped.gait._gait import Gait
-from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.plot import style
 from jaxbiped.plot._gait_charts import check_drawable
-from jaxbiped.plot._samples import sample
-from jaxbiped.plot._symbols import LEG_ANGLE, LEG_RATE
-from jaxbiped.scene._scene import Scene
+from jaxbiped.plot._samples import AnyScene, DrawnMotion
+from jaxbiped.plot._skeleton import Part, Skeleton, skeleton_of
+from jaxbiped.plot._symbols import angle_of, rate_of
+from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -24,7 +24,7 @@ _PLACES = (0.12, 0.37, 0.62, 0.87)
 """Of the arrows, in parts of the curve's length."""
 
 
-def direction_arrows(ax: Axes, x: npt.ArrayLike, y: npt.ArrayLike, colour: str) -> None:
+def _draw_arrows(ax: Axes, x: npt.ArrayLike, y: npt.ArrayLike, colour: str) -> None:
     """Puts arrow heads along a curve, evenly over its length as it is seen."""
     points = np.stack([np.asarray(x, dtype=float), np.asarray(y, dtype=float)], axis=-1)
     spans = np.ptp(points, axis=0)
@@ -34,19 +34,8 @@ def direction_arrows(ax: Axes, x: npt.ArrayLike, y: npt.ArrayLike, colour: str) 
     for place in _PLACES:
         ends = np.array([place - 0.004, place + 0.004]) * along[-1]
         tail, head = (tuple(np.interp(end, along, part) for part in points.T) for end in ends)
-        ax.annotate(
-            "",
-            head,
-            tail,
-            arrowprops={
-                "arrowstyle": "-|>",
-                "color": colour,
-                "linewidth": 0.0,
-                "mutation_scale": 15.0,
-                "shrinkA": 0.0,
-                "shrinkB": 0.0,
-            },
-        )
+        look = {"arrowstyle": "-|>", "color": colour, "linewidth": 0.0, "mutation_scale": 15.0}
+        ax.annotate("", head, tail, arrowprops=look | {"shrinkA": 0.0, "shrinkB": 0.0})
 
 
 _FAINT = 0.35
@@ -54,13 +43,14 @@ _FAINT = 0.35
 
 
 def phase_portrait(
-    scene: Scene,
-    trajectory: Trajectory,
+    scene: AnyScene,
+    trajectory: Trajectory[Any],
     *,
     ax: Axes | None = None,
     legs: tuple[int, ...] = (1,),
+    bodies: Sequence[str] = (),
 ) -> Figure:
-    """Draws the rate of a leg [rad/s] over its angle from the slope's normal [rad].
+    """Draws the rate of bodies [rad/s] over their angle from the slope's normal [rad].
 
     A leg swings forward along the upper half and carries the walker along the lower one; the
     two near-vertical ends are its heel strike (right) and its lifting (left). Faint, the whole
@@ -69,102 +59,125 @@ def phase_portrait(
 
     Args:
         scene: what was simulated.
-        trajectory: the motion, saved step by step.
+        trajectory: the motion, saved step by step; of a rigid walker with its heel strikes.
         ax: axes to draw into; a new figure unless given.
-        legs: which legs to draw: (1,), (2,) or (1, 2).
+        legs: whose bodies to draw, counted from 1: (1,), (2,) or (1, 2).
+        bodies: names of the bodies to draw, such as ("torso",), in place of these.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ValueError: the trajectory was not saved step by step, or a leg of another number.
+        ValueError: the trajectory was not saved step by step, or a leg or a body that there is not.
     """
     check_scene_of(trajectory, scene)
-    if not legs or not set(legs) <= {1, 2}:
-        raise ArgumentError(f"legs = {legs!r} is not allowed: it must name legs 1, 2 or both.")
-    t, state = sample(trajectory)
-    strikes = heel_strikes(scene, trajectory)
-    angles, rates = (state.theta_1, state.theta_2), (state.omega_1, state.omega_2)
+    skeleton = skeleton_of(scene.mechanism)
+    shown = _chosen(skeleton, legs, bodies)
+    drawn = DrawnMotion(scene, trajectory)
+    (t, motion), strikes = drawn.sampled(), drawn.strikes()
     ax = style.axes_or_new(ax, 5.8, 5.0)
-    for k in sorted({leg - 1 for leg in legs}):
-        own = strikes.time_s[strikes.foot == k + 1]
+    ended = trajectory.outcome != Ending.WALKING
+    for part in shown:
+        angle, rate = motion[f"theta_{part.name}"], motion[f"omega_{part.name}"]
+        # What belongs to no leg strides with the first one.
+        leg = part.look.group if part.look.group < len(skeleton.legs) else 0
+        own = strikes.time_s[strikes.foot == leg + 1]
         since = float(own[-2]) if own.size > 1 else 0.0
-        _draw_leg(ax, k, t, angles[k], rates[k], since)
-    if trajectory.outcome != Ending.WALKING:
-        for k in sorted({leg - 1 for leg in legs}):
-            ax.plot(angles[k][-1], rates[k][-1], "X", color=style.LEG_COLOURS[k], markersize=9)
-        _explain(ax, "X", str(trajectory.outcome))
-    _explain(ax, "o", "start")
-    style.dress(ax, "Phase portrait", LEG_ANGLE.on_axis(), LEG_RATE.on_axis())
+        _draw_body(ax, part, t, angle, rate, since)
+        if ended:
+            ax.plot(angle[-1], rate[-1], "X", color=part.look.colour, markersize=9)
+    # Marks that each body has in its own colour.
+    for marker, words in [("X", str(trajectory.outcome))] * ended + [("o", "start")]:
+        ax.plot([], [], marker, color=style.GROUND_COLOUR, label=words)
+    noun = skeleton.noun
+    style.dress(ax, "Phase portrait", angle_of(noun).on_axis(), rate_of(noun).on_axis())
     style.legend_below(ax, columns=2)
     return style.figure_of(ax)
 
 
-def _draw_leg(ax: Axes, k: int, t: np.ndarray, angle: Numbers, rate: Numbers, since: float) -> None:
+def _chosen(skeleton: Skeleton, legs: tuple[int, ...], bodies: Sequence[str]) -> list[Part]:
+    """The bodies of some legs, or those named; all where no body belongs to these legs alone."""
+    for name in bodies:
+        check_choice("bodies", name, [part.name for part in skeleton.parts])
+    count = len(skeleton.legs)
+    if not bodies and (not legs or not set(legs) <= set(range(1, count + 1))):
+        raise ArgumentError(
+            f"legs = {legs!r} is not allowed: it must name some of the legs 1 to {count}."
+        )
+    chosen = [
+        part
+        for part in skeleton.parts
+        if (part.name in bodies if bodies else part.look.group + 1 in legs)
+    ]
+    return chosen or list(skeleton.parts)
+
+
+def _draw_body(
+    ax: Axes, part: Part, t: np.ndarray, angle: np.ndarray, rate: np.ndarray, since: float
+) -> None:
     """The whole walk, faint where a last stride is drawn over it."""
-    look = style.leg_line(k)
-    whole: dict[str, Any] = {"linewidth": 1.3, "label": style.LEG_NAMES[k]}
+    look = part.look.line
+    whole: dict[str, Any] = {"linewidth": 1.3, "label": part.label}
     last = t >= since
     if since > 0.0:
-        whole = {"linewidth": 0.8, "alpha": _FAINT, "label": f"{style.LEG_NAMES[k]}, whole walk"}
+        whole = {"linewidth": 0.8, "alpha": _FAINT, "label": f"{part.label}, whole walk"}
     ax.plot(angle, rate, **look, **whole)
     if since > 0.0:
-        label = f"last stride of {style.LEG_NAMES[k]}, from {since:.2f} s"
+        label = f"last stride of {part.label}, from {since:.2f} s"
         ax.plot(angle[last], rate[last], linewidth=1.5, label=label, **look)
-    direction_arrows(ax, angle[last], rate[last], style.LEG_COLOURS[k])
-    ax.plot(angle[0], rate[0], "o", color=style.LEG_COLOURS[k], markersize=5)
+    _draw_arrows(ax, angle[last], rate[last], part.look.colour)
+    ax.plot(angle[0], rate[0], "o", color=part.look.colour, markersize=5)
 
 
-def _explain(ax: Axes, marker: str, words: str) -> None:
-    """An entry of the legend for a mark that each leg has in its own colour."""
-    ax.plot([], [], marker, color="#595959", label=words)
+def gait_orbit(gait: Gait, *, scene: Any = None, ax: Axes | None = None) -> Figure:
+    """Draws the rates of all bodies [rad/s] over their angles from the slope's normal [rad].
 
-
-def gait_orbit(gait: Gait, *, ax: Axes | None = None) -> Figure:
-    """Draws the rate of both legs [rad/s] over their angles from the slope's normal [rad].
-
-    One cycle: the legs are exchanged at each footstep, so the two curves of an odd number of
-    footsteps make one closed curve. The dots are the legs on the section, where the cycle begins.
-    Arrows tell the direction.
+    One cycle: where it is a step, mirrored bodies are exchanged at each footstep, so the two curves
+    of an odd number of footsteps make one closed curve. The dots are the bodies on the section,
+    where the cycle begins. Arrows tell the direction.
 
     Args:
         gait: a gait that was found.
+        scene: what walks, as names and pairs of bodies are its; the seed's walker unless given.
         ax: axes to draw into; a new figure unless given.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ValueError: no gait was found, or this is a batch.
+        ValueError: no gait was found, this is a batch, or the scene is another walker's.
     """
     check_drawable(gait)
-    ax = style.axes_or_new(ax, 5.6, 4.4)
+    mechanism = (seed_scene() if scene is None else scene).mechanism
+    structure, skeleton = mechanism.structure, skeleton_of(mechanism)
     start = gait.measures.state
-    begins = ((start.theta_1, start.omega_1), (start.theta_2, start.omega_2))
-    for k, (angle, rate) in enumerate(_legs(gait)):
-        ax.plot(angle, rate, linewidth=1.1, label=style.LEG_NAMES[k], **style.leg_line(k))
-        direction_arrows(ax, angle, rate, style.LEG_COLOURS[k])
-        ax.plot(*map(float, begins[k]), "o", color=style.LEG_COLOURS[k], markersize=6)
-    style.dress(
-        ax,
-        "Periodic orbit (dots: on the section)",
-        LEG_ANGLE.on_axis(),
-        LEG_RATE.on_axis(),
-    )
+    if not set(structure.coordinates[2:]) <= set(start._fields):
+        raise ArgumentError(
+            f"scene is not allowed: the gait has the state {', '.join(start._fields)}; give the "
+            "scene that it was found in."
+        )
+    ax = style.axes_or_new(ax, 5.6, 4.4)
+    for body in structure.free:
+        part, twin = skeleton.parts[body], (structure.body_twins or range(body + 1))[body]
+        names = part.name, skeleton.parts[twin].name
+        angle, rate = (_along_cycle(gait, word, *names) for word in ("theta", "omega"))
+        ax.plot(angle, rate, linewidth=1.1, label=part.label, **part.look.line)
+        _draw_arrows(ax, angle, rate, part.look.colour)
+        begin = (float(getattr(start, f"{word}_{part.name}")) for word in ("theta", "omega"))
+        ax.plot(*begin, "o", color=part.look.colour, markersize=6)
+    noun = skeleton.noun
+    title = "Periodic orbit (dots: on the section)"
+    style.dress(ax, title, angle_of(noun).on_axis(), rate_of(noun).on_axis())
     style.legend_above(ax)
     return style.figure_of(ax)
 
 
-def _legs(gait: Gait) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Angle and rate of either leg over the cycle, each under its own name throughout."""
-    times = np.asarray(gait.orbit[0])
-    states = gait.orbit[1]
-    first = np.stack([np.asarray(states.theta_1), np.asarray(states.omega_1)])
-    second = np.stack([np.asarray(states.theta_2), np.asarray(states.omega_2)])
-    parts: list[list[np.ndarray]] = [[], []]
-    for k, known in enumerate(np.isfinite(times)):
-        exchanged = k % 2
-        parts[exchanged].append(first[:, k, known])
-        parts[1 - exchanged].append(second[:, k, known])
-    legs = [np.concatenate(part, axis=1) for part in parts]
-    return [(angle, rate) for angle, rate in legs]
+def _along_cycle(gait: Gait, word: str, name: str, twin: str) -> np.ndarray:
+    """Angle or rate of a body over the cycle, under its own name throughout.
+
+    At each footstep it takes the name of its twin.
+    """
+    times, states = np.asarray(gait.orbit[0]), gait.orbit[1]
+    own, others = (np.asarray(getattr(states, f"{word}_{each}")) for each in (name, twin))
+    parts = [(others if k % 2 else own)[k, known] for k, known in enumerate(np.isfinite(times))]
+    return np.concatenate(parts)

@@ -1,17 +1,20 @@
-"""Samples of a trajectory on times fit for drawing: even ones, solver steps, force peaks."""
+"""Samples of a trajectory on times fit for drawing: even ones and the solver's steps."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped.dynamics._contacts import Contacts, contacts
-from jaxbiped.dynamics._state import State
-from jaxbiped.measure._samples import evaluate_along, evaluate_at
-from jaxbiped.scene._scene import Scene
+from jaxbiped.measure._footsteps import HeelStrikes, heel_strikes
+from jaxbiped.measure._samples import evaluate_along
+from jaxbiped.plot._rigid_motion import rigid_motion
+from jaxbiped.plot._skeleton import body_motion
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._state_types import State
 from jaxbiped.solve._trajectory import Trajectory
 
+AnyScene: TypeAlias = Scene | RedundantScene | RigidScene
 _EVEN = 2048
 """Evenly spaced times; a fixed number, so that evaluating them compiles once."""
 
@@ -56,55 +59,43 @@ def sample(
     return Samples(t, state)
 
 
-_ROUNDS = 3
-_PARTS = 8
-"""Into which the intervals beside an extreme are split in each round: 512 in all."""
-_FLOOR = 1e-3
-"""Extremes below this part of the largest force of their kind are too small to be seen."""
+class DrawnMotion:
+    """What the bodies of a walk do, on any kind of feet, by name.
 
-
-def sampled_forces(
-    scene: Scene,
-    trajectory: Trajectory,
-    *,
-    start: float | None = None,
-    stop: float | None = None,
-) -> tuple[np.ndarray, Contacts]:
-    """Times [s] of shape (n,) between two times, and the contacts at them, leaves (n,).
-
-    The solver's steps follow the state, which does not feel how sharp a peak of the force is:
-    where slip passes the peak of friction, the force has a corner and then loses two thirds of
-    itself within half a microsecond, less than a step. So the intervals on both sides of every
-    local extreme of a force are split again and again, until peaks no longer depend on where
-    the steps happen to end.
+    Attributes:
+        first, last: times between which it is known [s]; a rigid walk is known from its first heel
+            strike on.
     """
-    samples = sample(trajectory, start=start, stop=stop)
-    t, found = samples.t, evaluate_along(scene, samples.state, contacts)
-    for _ in range(_ROUNDS):
-        times = _beside_extremes(t, found)
-        if not times.size:
-            break
-        more = evaluate_at(scene, trajectory, contacts, times)
-        t, order = np.unique(np.concatenate([t, times]), return_index=True)
-        found = jtu.tree_map(
-            lambda old, new, order=order: np.concatenate([old, new])[order], found, more
-        )
-    return t, found
 
+    def __init__(self, scene: AnyScene, trajectory: Trajectory[Any]) -> None:
+        self._scene, self._trajectory = scene, trajectory
+        self._rigid = None
+        if isinstance(scene, RigidScene):
+            self._rigid = rigid_motion(scene, trajectory)
+            self.first, self.last = float(self._rigid.began[0]), self._rigid.end
+        else:
+            self.first, self.last = 0.0, end_time(trajectory)
 
-def _beside_extremes(t: np.ndarray, found: Contacts) -> np.ndarray:
-    """Times that split the intervals beside the extremes of any force."""
-    split = np.zeros(len(t) - 1, dtype=bool)
-    for kind in zip(*found.forces, strict=True):
-        forces = [np.asarray(force) for force in kind if force is not None]
-        largest = max((float(np.max(np.abs(force))) for force in forces), default=0.0)
-        for force in forces:
-            rises = np.diff(force)
-            turns = rises[:-1] * rises[1:] < 0.0
-            turns &= np.abs(force[1:-1]) > _FLOOR * largest
-            split[:-1] |= turns
-            split[1:] |= turns
-    # Nothing lies between two neighbours among the floating-point numbers.
-    split &= np.diff(t) > 64.0 * _PARTS * np.spacing(t[-1])
-    left, width = t[:-1][split], np.diff(t)[split]
-    return np.ravel(left[:, None] + width[:, None] * np.arange(1, _PARTS) / _PARTS)
+    def at(self, t: np.ndarray) -> dict[str, np.ndarray]:
+        """Places, angles and rates at times [s]."""
+        if self._rigid is not None:
+            return self._rigid.motion(t)
+        states = state_at(self._trajectory, t)
+        found: dict[str, np.ndarray] = evaluate_along(self._scene, states, body_motion)
+        return found
+
+    def sampled(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Times fit for drawing [s], and the motion at them with all scalars of its state."""
+        if self._rigid is not None:
+            even = np.linspace(self.first, self.last, _EVEN)
+            t = np.union1d(even, self._rigid.both_sides())
+            return t, self._rigid.motion(t)
+        t, states = sample(self._trajectory)
+        motion = evaluate_along(self._scene, states, body_motion)
+        return t, states._asdict() | motion
+
+    def strikes(self) -> HeelStrikes:
+        """Its heel strikes."""
+        if self._rigid is not None:
+            return self._rigid.strikes()
+        return heel_strikes(cast("Scene", self._scene), self._trajectory)

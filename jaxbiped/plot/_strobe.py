@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import jax.tree_util as jtu
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, LineCollection
@@ -11,10 +12,9 @@ from matplotlib.lines import Line2D
 
 from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.plot import style
-from jaxbiped.plot._animation import Pose, poses
-from jaxbiped.plot._samples import end_time, state_at
+from jaxbiped.plot._samples import AnyScene, DrawnMotion
+from jaxbiped.plot._skeleton import Pose, Skeleton, poses, skeleton_of
 from jaxbiped.plot._symbols import HEIGHT, HORIZONTAL
-from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -32,8 +32,8 @@ _FAINTEST = 0.3
 
 
 def gait_strobe(
-    scene: Scene,
-    trajectory: Trajectory,
+    scene: AnyScene,
+    trajectory: Trajectory[Any],
     *,
     ax: Axes | None = None,
     start: float = 0.0,
@@ -42,12 +42,13 @@ def gait_strobe(
 ) -> Figure:
     """Draws the walker at equal times, older poses fainter, over the slope as it is inclined.
 
-    The title tells which seconds are shown. Legs are lines from the hip to the centre of the foot,
-    feet are circles, the thin grey line is the hip's path. Gravity points down the page.
+    The title tells which seconds are shown. Bodies are lines between their hinges, their feet and,
+    where there is neither, their mass centres; feet are circles, the thin grey line is the root
+    point's path. Gravity points down the page.
 
     Args:
         scene: what was simulated.
-        trajectory: the motion, saved step by step.
+        trajectory: the motion, saved step by step; of a rigid walker with its heel strikes.
         ax: axes to draw into; a new figure unless given.
         start, stop: first and last time drawn [s]; the end is 1.8 s, about four footsteps of the
             paper's walk, after the start unless given, and never after the motion's own.
@@ -62,7 +63,8 @@ def gait_strobe(
     check_scene_of(trajectory, scene)
     if count is not None:
         check_positive("count", count)
-    last = end_time(trajectory)
+    motion = DrawnMotion(scene, trajectory)
+    start, last = max(start, motion.first) if start >= 0.0 else start, motion.last
     stop = min(start + _SHOWN if stop is None else stop, last)
     if not 0.0 <= start < stop:
         raise ArgumentError(
@@ -73,81 +75,60 @@ def gait_strobe(
     times = np.concatenate(
         [np.linspace(start, stop, count), np.linspace(start, stop, _PATH_POINTS)]
     )
-    everything = poses(scene, state_at(trajectory, times))
-    shown = Pose(everything.hip[:count], (everything.feet[0][:count], everything.feet[1][:count]))
-
-    corners = _corners(scene, everything)
-    ax = style.axes_or_new(ax, _WIDTH, _height(corners))
-    x, steepness = float(shown.hip[0, 0]), -math.tan(float(scene.ground.slope))
+    skeleton, everything = skeleton_of(scene.mechanism), poses(scene, motion.at(times))
+    shown = jtu.tree_map(lambda points: points[:count], everything)
+    corners = _corners(skeleton, everything)
+    across, up = corners[1] - corners[0]
+    if ax is None:
+        # On equal scales the picture fills a new figure.
+        height = (_WIDTH - _LABELS[0]) * up / across + _LABELS[1]
+        ax = style.new_figure(_WIDTH, float(np.clip(height, _LEAST, _MOST))).add_subplot()
+    slope = float(scene.ground.slope)
+    x, steepness = float(shown.root[0, 0]), -math.tan(slope)
     # A straight line that runs on past both edges, whatever the limits become.
     look: dict[str, Any] = {"color": style.GROUND_COLOUR, "linewidth": 1.4, "zorder": 1}
     ax.axline((x, steepness * x), slope=steepness, **look)
-    ax.plot(*everything.hip[count:].T, color="#8C8C8C", linewidth=0.8, zorder=1)
-    _draw_legs(ax, scene, shown)
+    ax.plot(*everything.root[count:].T, color="#8C8C8C", linewidth=0.8, zorder=1)
+    _draw_bodies(ax, skeleton, shown)
     ax.set_aspect("equal", adjustable="box")
     ax.set_xlim(*corners[:, 0])
     ax.set_ylim(*corners[:, 1])
-    interval = (stop - start) / max(count - 1, 1)
-    style.dress(
-        ax,
-        f"Gait from {start:.2f} s to {stop:.2f} s, a pose every {interval * 1e3:.3g} ms",
-        HORIZONTAL.on_axis(),
-        HEIGHT.on_axis(),
-    )
+    interval = 1e3 * (stop - start) / max(count - 1, 1)
+    title = f"Gait from {start:.2f} s to {stop:.2f} s, a pose every {interval:.3g} ms"
+    style.dress(ax, title, HORIZONTAL.on_axis(), HEIGHT.on_axis())
     handles = [
-        Line2D([], [], linewidth=2.0, label=name, **style.leg_line(k))
-        for k, name in enumerate(style.LEG_NAMES)
+        Line2D([], [], linewidth=2.0, label=part.label, **part.look.line) for part in skeleton.parts
     ]
-    ground = Line2D(
-        [], [], color=style.GROUND_COLOUR, label=f"slope {float(scene.ground.slope):.3g} rad"
-    )
-    style.legend_above(ax, handles=[*handles, ground])
-    return style.figure_of(ax)
+    handles.append(Line2D([], [], color=style.GROUND_COLOUR, label=f"slope {slope:.3g} rad"))
+    extent, figure = ax.get_window_extent(), style.figure_of(ax)
+    width = min(1.1 * extent.width, extent.height * across / up) / figure.dpi
+    style.legend_above(ax, width=width, handles=handles)
+    return figure
 
 
-def _draw_legs(ax: Axes, scene: Scene, shown: Pose) -> None:
-    count = len(shown.hip)
+def _draw_bodies(ax: Axes, skeleton: Skeleton, shown: Pose) -> None:
+    count = len(shown.root)
     opacity = np.linspace(_FAINTEST, 1.0, count) if count > 1 else np.ones(1)
-    diameter = np.full(count, 2.0 * float(scene.walker.r))
-    for k, feet in enumerate(shown.feet):
-        look: dict[str, Any] = {"linestyles": [style.LEG_STYLES[k]], "alpha": opacity}
-        legs = LineCollection(
-            list(np.stack([shown.hip, feet], axis=1)),
-            colors=style.LEG_COLOURS[k],
-            linewidths=1.6,
-            zorder=3,
-            label=style.LEG_NAMES[k],
-            **look,
-        )
-        circles = EllipseCollection(
-            diameter,
-            diameter,
-            np.zeros(count),
-            units="xy",
-            offsets=feet,
-            transOffset=ax.transData,
-            facecolors="none",
-            edgecolors=style.LEG_COLOURS[k],
-            linewidths=0.8,
-            zorder=2,
-            **look,
-        )
-        ax.add_collection(legs, autolim=False)
+    for part, lines in zip(skeleton.parts, shown.lines, strict=True):
+        dashes = [part.look.line["linestyle"]]
+        look: dict[str, Any] = {"colors": part.look.colour, "linestyles": dashes, "alpha": opacity}
+        drawn = LineCollection(list(lines), linewidths=1.6, zorder=3, label=part.label, **look)
+        ax.add_collection(drawn, autolim=False)
+    for sole, feet in zip(skeleton.feet, shown.feet, strict=True):
+        diameter, dashes = np.full(count, 2.0 * sole.radius), [sole.look.line["linestyle"]]
+        look = {"edgecolors": sole.look.colour, "linestyles": dashes, "alpha": opacity}
+        look |= {"facecolors": "none", "linewidths": 0.8, "zorder": 2}
+        place: dict[str, Any] = {"units": "xy", "offsets": feet, "transOffset": ax.transData}
+        circles = EllipseCollection(diameter, diameter, np.zeros(count), **place, **look)
         ax.add_collection(circles, autolim=False)
 
 
-def _corners(scene: Scene, shown: Pose) -> np.ndarray:
+def _corners(skeleton: Skeleton, shown: Pose) -> np.ndarray:
     """The least and the largest X and Z of all that is drawn, with a margin; shape (2, 2)."""
-    radius = float(scene.walker.r)
-    points = np.concatenate([shown.hip, *(feet - radius for feet in shown.feet)])
-    points = np.concatenate([points, *(feet + radius for feet in shown.feet)])
+    soles = zip(skeleton.feet, shown.feet, strict=True)
+    reach = [feet + sign * sole.radius for sole, feet in soles for sign in (-1.0, 1.0)]
+    lines = [line.reshape(-1, 2) for line in shown.lines]
+    points = np.concatenate([shown.root, *lines, *reach])
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.04 * float(np.max(high - low))
     return np.stack([low - margin, high + margin])
-
-
-def _height(corners: np.ndarray) -> float:
-    """Of a new figure that the picture, on equal scales, fills [inches]."""
-    width, height = corners[1] - corners[0]
-    needed = (_WIDTH - _LABELS[0]) * height / width + _LABELS[1]
-    return float(np.clip(needed, _LEAST, _MOST))

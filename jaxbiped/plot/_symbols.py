@@ -5,7 +5,7 @@ Symbols are the paper's; those of laws that it does not have are the ones of the
 
 from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._quantity import Quantity
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES, state_quantity
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
@@ -16,13 +16,21 @@ from jaxbiped.sweep.starts._coordinates import START_QUANTITIES
 TIME = Quantity("time", r"$t$", "s")
 HORIZONTAL = Quantity("horizontal position", r"$X$", "m")
 HEIGHT = Quantity("height", r"$Z$", "m")
-LEG_ANGLE = Quantity("leg angle", r"$\theta$", "rad")
-LEG_RATE = Quantity("leg rate", r"$\omega$", "rad/s")
 NORMAL_FORCE = Quantity("normal force", r"$F_N$", "N")
 TANGENTIAL_FORCE = Quantity("tangential force", r"$F_T$", "N")
 PENETRATION = Quantity("penetration", r"$\delta$", "m")
 SLIP_SPEED = Quantity("slip speed", r"$V_T$", "m/s")
 FORCE_RATIO = Quantity("friction over load", r"$F_T/F_N$")
+
+
+def angle_of(noun: str) -> Quantity:
+    """The angle of a "leg" or a "body"."""
+    return Quantity(f"{noun} angle", r"$\theta$", "rad")
+
+
+def rate_of(noun: str) -> Quantity:
+    """The rate of a "leg" or a "body"."""
+    return Quantity(f"{noun} rate", r"$\omega$", "rad/s")
 
 
 def _of_parts() -> dict[str, Quantity]:
@@ -76,7 +84,9 @@ def row_label(name: str | Quantity) -> str:
 
 def _quantity(name: str | Quantity) -> Quantity | None:
     """That of a name of the table, also where it is told from its namesake as `part.name`."""
-    return QUANTITIES.get(name.rpartition(".")[2]) if isinstance(name, str) else name
+    if not isinstance(name, str):
+        return name
+    return QUANTITIES.get(name.rpartition(".")[2]) or state_quantity(name)
 
 
 def law_name(law: object) -> str:

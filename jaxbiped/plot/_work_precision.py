@@ -56,29 +56,18 @@ def work_precision(
     ax.set_yscale("log")
     for k, way in enumerate(ways):
         own = (row for row in rows if row["way"] == way and row["outcome"] == "ok")
-        mine = [row for row in own if _error(row, axis) and row[cost]]
-        ax.plot(
-            np.array([_error(row, axis) for row in mine], dtype=float),
-            np.array([row[cost] for row in mine], dtype=float),
-            marker=_MARKERS[k // len(style.COLOURS) % len(_MARKERS)],
-            color=style.colour_of(k),
-            linestyle="-" if k < len(style.COLOURS) else "--",
-            markersize=4,
-            linewidth=1.0,
-            label=way,
-        )
+        mine = [(_error(row, axis), row[cost]) for row in own if _error(row, axis) and row[cost]]
+        look: dict[str, Any] = {"marker": _MARKERS[k // len(style.COLOURS) % len(_MARKERS)]}
+        look |= {"linestyle": "-" if k < len(style.COLOURS) else "--", "color": style.colour_of(k)}
+        points = np.array(mine, dtype=float).reshape(-1, 2)
+        ax.plot(*points.T, markersize=4, linewidth=1.0, label=way, **look)
     if floor is not None and floor > 0.0:
         ax.set_xlim(left=min(ax.get_xlim()[0], 0.3 * floor))
         ax.axvspan(ax.get_xlim()[0], floor, color="#F3F3F3", zorder=0)
-        ax.axvline(
-            floor, color=style.GROUND_COLOUR, linestyle=":", label="the references' disagreement"
-        )
-    failed = [
-        row
-        for row in rows
-        if row["outcome"] != "ok" and (axis in row["errors"] or not row["errors"])
-    ]
-    if failed:
+        look = {"color": style.GROUND_COLOUR, "linestyle": ":"}
+        ax.axvline(floor, label="the references' disagreement", **look)
+    concerned = (row for row in rows if axis in row["errors"] or not row["errors"])
+    if failed := [row for row in concerned if row["outcome"] != "ok"]:
         _draw_failures(ax, failed, cost, ways)
     style.dress(ax, "", f"error of {axis.replace('_', ' ')}, relative", COSTS[cost])
     return style.figure_of(ax)
@@ -96,17 +85,11 @@ def _draw_failures(
     bottom = ax.get_ylim()[0]
     places = np.geomspace(edge, right, len(failed) + 2)[1:-1]
     for place, row in zip(places, failed, strict=True):
-        known = row["way"] in ways
-        ax.plot(
-            [place],
-            [row[cost] if row[cost] else bottom],
-            "x",
-            color=style.colour_of(ways.index(row["way"])) if known else style.GROUND_COLOUR,
-            markersize=5,
-        )
-    ax.text(
-        1.0 - 0.5 * _BAND, 1.01, "failed", transform=ax.transAxes, ha="center", fontsize="small"
-    )
+        known, height = row["way"] in ways, row[cost] or bottom
+        colour = style.colour_of(ways.index(row["way"])) if known else style.GROUND_COLOUR
+        ax.plot([place], [height], "x", color=colour, markersize=5)
+    words: dict[str, Any] = {"ha": "center", "fontsize": "small"}
+    ax.text(1.0 - 0.5 * _BAND, 1.01, "failed", transform=ax.transAxes, **words)
 
 
 def _error(row: Mapping[str, Any], axis: str) -> float | None:
@@ -167,27 +150,16 @@ def constraint_runs(runs: Sequence[Mapping[str, Any]]) -> Figure:
 
 
 def _draw_way(
-    ax: Axes,
-    runs: list[Mapping[str, Any]],
-    rows: np.ndarray,
-    measure: str,
-    k: int,
-    way: str,
+    ax: Axes, runs: list[Mapping[str, Any]], rows: np.ndarray, measure: str, k: int, way: str
 ) -> None:
     """One integrator's marks in one panel."""
     values = np.array([run[measure] for run in runs], dtype=float)
     failed = np.array([_has_failed(run) for run in runs])
     # A run that failed took its time all the same.
     lost = failed & (measure != "wall_s_run") | ~np.isfinite(values)
-    colour = style.colour_of(k)
-    ax.plot(
-        np.maximum(values[~lost], _FLOOR),
-        rows[~lost],
-        _MARKERS[k % len(_MARKERS)],
-        color=colour,
-        markersize=6,
-        label=way,
-    )
+    found, colour = np.maximum(values[~lost], _FLOOR), style.colour_of(k)
+    marker = _MARKERS[k % len(_MARKERS)]
+    ax.plot(found, rows[~lost], marker, color=colour, markersize=6, label=way)
     edge = ax.get_yaxis_transform()
     ax.plot(np.full(lost.sum(), 0.985), rows[lost], "x", color=colour, transform=edge)
 

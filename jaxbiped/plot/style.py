@@ -1,21 +1,40 @@
 """Style that all figures share: colours, sizes, new figures, and where legends go."""
 
+import math
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.transforms import ScaledTranslation
 
 from jaxbiped.basins._labels import Label
 
-LEG_COLOURS = ("#0072B2", "#D55E00")
-"""Leg 1 blue, leg 2 vermilion: two of Okabe and Ito's colours, distinct to colour-blind readers."""
-LEG_COLOURS_ON_DARK = ("#56B4E9", "#E69F00")
-"""Sky blue and orange, of the same colours, which stand out from a dark page."""
-LEG_STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)))
+_GROUPS = (
+    ("#0072B2", "#56B4E9"),
+    ("#D55E00", "#E69F00"),
+    ("#00795A", "#2CC79B"),
+    ("#A8578A", "#CC79A7"),
+    ("#7A5C00", "#F0E442"),
+    ("#4B3FA0", "#B5A9FF"),
+)
+"""Of each leg and of each body that is in none, on a light page and on a dark one; they repeat.
+
+Leg 1 is blue, leg 2 vermilion: Okabe and Ito's colours, distinct to colour-blind readers.
+"""
+LEG_COLOURS = tuple(light for light, _ in _GROUPS)
+LEG_STYLES: tuple[Any, ...] = (
+    "-",
+    (0, (5, 1.5)),
+    (0, (6, 1.5, 1.5, 1.5)),
+    (0, (1.5, 1.2)),
+    (0, (9, 2)),
+    (0, (3, 1, 1, 1, 1, 1)),
+)
 """Leg 1 solid, leg 2 dashed, for print without colour."""
-LEG_NAMES = ("leg 1", "leg 2")
+_FADES = 0.62
+"""What is left of a colour's depth from a body to the next one of its leg."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito's, in the order in which lines of many kinds take them."""
 GROUND_COLOUR = "#595959"
@@ -31,16 +50,10 @@ _ENERGY_COLOURS = {
 
 def view_colours() -> dict[str, str]:
     """The viewer's colours, `light-…` and `dark-…`, by what they stand for."""
-    pairs = {
-        f"leg-{leg}": pair
-        for leg, pair in enumerate(zip(LEG_COLOURS, LEG_COLOURS_ON_DARK, strict=True), 1)
-    }
+    pairs = {f"leg-{leg}": pair for leg, pair in enumerate(_GROUPS, 1)}
     pairs |= _ENERGY_COLOURS | {"ground": (GROUND_COLOUR, "#B9B9B9")}
-    return {
-        f"{page}-{name}": pair[k]
-        for k, page in enumerate(("light", "dark"))
-        for name, pair in pairs.items()
-    }
+    pages = ("light", "dark")
+    return {f"{pages[k]}-{name}": pair[k] for k in (0, 1) for name, pair in pairs.items()}
 
 
 def colour_of(k: int) -> str:
@@ -48,9 +61,41 @@ def colour_of(k: int) -> str:
     return COLOURS[k % len(COLOURS)]
 
 
-def leg_line(k: int) -> dict[str, Any]:
-    """Colour and style of a leg's line, legs counted from 0, for `Axes.plot`."""
-    return {"color": LEG_COLOURS[k], "linestyle": LEG_STYLES[k]}
+class Look(NamedTuple):
+    """How a body, a foot or a leg is drawn.
+
+    Attributes:
+        group: number of its leg, or behind these of a body that is in none.
+        depth: how many bodies of its leg it hangs on.
+    """
+
+    group: int
+    depth: int = 0
+
+    @property
+    def colour(self) -> str:
+        """Its leg's, the paler the farther from the root point."""
+        share = _FADES**self.depth
+        base = LEG_COLOURS[self.group % len(LEG_COLOURS)]
+        parts = (int(base[k : k + 2], 16) for k in (1, 3, 5))
+        return "#" + "".join(f"{round(255 - share * (255 - part)):02X}" for part in parts)
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """Colour and style for `Axes.plot`."""
+        style = LEG_STYLES[self.group % len(LEG_STYLES)]
+        return {"color": self.colour, "linestyle": style}
+
+    @property
+    def words(self) -> str:
+        """Its classes in the viewer's style sheet."""
+        leg = f"leg-{1 + self.group % len(LEG_COLOURS)}"
+        return leg + (f" deep-{min(self.depth, 3)}" if self.depth else "")
+
+
+def label_of(name: str, noun: str) -> str:
+    """What legends call what has this name: a bare number, say, is "leg 1"."""
+    return name if name[0].isalpha() else f"{noun} {name}"
 
 
 def new_figure(width: float = 6.4, height: float = 4.0) -> Figure:
@@ -95,16 +140,35 @@ def legend(ax: Axes, **options: Any) -> None:
 
 
 def legend_below(ax: Axes, *, columns: int, **options: Any) -> None:
-    """A legend under the axes, for more than fits beside the title."""
-    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.14)}
-    legend(ax, **place, ncols=columns, borderaxespad=0.2, **options)
+    """A legend under the axes and half an inch of labels, for more than fits beside the title."""
+    under = ax.transAxes + ScaledTranslation(0.0, -0.5, figure_of(ax).dpi_scale_trans)
+    place: dict[str, Any] = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": under}
+    legend(ax, loc="upper center", ncols=columns, borderaxespad=0.0, **place, **options)
 
 
-def legend_above(ax: Axes, **options: Any) -> None:
-    """A legend in one row above the axes, right of the title, where it covers no data."""
-    entries = options.get("handles") or ax.get_legend_handles_labels()[0]
-    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
-    legend(ax, **place | {"ncols": max(len(entries), 1), "borderaxespad": 0.2} | options)
+_TITLE_LETTER, _ENTRY_LETTER, _ENTRY_SAMPLE = 0.066, 0.06, 0.5
+"""Widths of a letter of titles, of one of legends, and of the sample before an entry [inches]."""
+
+
+def legend_above(
+    ax: Axes, lowest: Axes | None = None, *, width: float | None = None, **options: Any
+) -> None:
+    """A legend in one row above the axes, right of the title, where it covers no data.
+
+    Where the axes, whose width [inches] may be told, have no room for that, in rows below them or
+    below the lowest of several axes.
+    """
+    entries = options.pop("handles", None) or ax.get_legend_handles_labels()[0]
+    figure = figure_of(ax)
+    if width is None:
+        width = 1.1 * ax.get_window_extent().width / figure.dpi
+    widths = [_ENTRY_SAMPLE + _ENTRY_LETTER * len(str(each.get_label())) for each in entries]
+    if sum(widths) + _TITLE_LETTER * len(ax.get_title(loc="left")) > width:
+        columns = max(1, min(len(entries), int(0.8 * figure.get_figwidth() / max(widths))))
+        legend_below(lowest or ax, columns=columns, handles=entries, **options)
+    else:
+        row = {"handles": entries, "ncols": max(len(entries), 1), "bbox_to_anchor": (1.0, 1.0)}
+        legend(ax, **{"loc": "lower right", "borderaxespad": 0.2} | row | options)
 
 
 def legend_right(ax: Axes, **options: Any) -> None:
@@ -136,31 +200,26 @@ GAIT_SUFFIX = ", gait {gait}"
 
 def label_colour(name: str) -> str:
     """The colour of a label's name (`label_name`); grey for a name that is not known."""
-    if not _walks(name):
-        return _LABEL_COLOURS.get(name, "#BBBBBB")
-    return _BLUES[_shade(name) % len(_BLUES)]
+    ends, place = _kind(name)
+    return _LABEL_COLOURS.get(name, "#BBBBBB") if ends else _BLUES[place % len(_BLUES)]
 
 
 def in_order(names: set[str]) -> list[str]:
     """Names in one order for all legends: walking, then the endings, pending last."""
-    return sorted(names, key=lambda name: (not _walks(name), _place(name), name))
+    kinds = {name: _kind(name) for name in names}
+    return sorted(names, key=lambda name: (kinds[name][0], math.prod(kinds[name]), name))
 
 
 def label_marker(name: str) -> str:
     """The marker of a label's name on a line, by which it is known without colour."""
-    markers = _WALKING_MARKERS if _walks(name) else _MARKERS
-    return markers[(_shade(name) if _walks(name) else _place(name)) % len(markers)]
+    ends, place = _kind(name)
+    markers = _MARKERS if ends else _WALKING_MARKERS
+    return markers[place % len(markers)]
 
 
-def _place(name: str) -> int:
-    return _ORDER.index(name) if name in _ORDER else len(_ORDER)
-
-
-def _shade(name: str) -> int:
-    """Of what walks, by its gait, or else by the length of its cycle."""
-    numbers = [int(number) for number in re.findall(r"\d+", name)]
-    return numbers[-1] if len(numbers) > 1 else (numbers or [1])[0] - 1
-
-
-def _walks(name: str) -> bool:
-    return name.startswith(str(Label.WALKING))
+def _kind(name: str) -> tuple[bool, int]:
+    """Whether it is an ending, and its place among these; or that of its gait or cycle's length."""
+    if not name.startswith(str(Label.WALKING)):
+        return True, _ORDER.index(name) if name in _ORDER else len(_ORDER)
+    numbers = [int(number) for number in re.findall(r"\d+", name)] or [1]
+    return False, numbers[-1] - (len(numbers) == 1)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 
@@ -33,9 +33,16 @@ class Point(eqx.Module):
         check_parameters(self)
 
 
+class OwnHinge(eqx.Module):
+    """The point of a body at its own hinge, which is no parameter."""
+
+    along: ClassVar[float] = 0.0
+    ahead: ClassVar[None] = None
+
+
 def point_of(place: Any) -> Any:
     """A point from one number, down the body, or from a pair (along, ahead)."""
-    if place is None or isinstance(place, Point):
+    if place is None or isinstance(place, Point | OwnHinge):
         return place
     if isinstance(place, tuple | list):
         if len(place) != 2:
@@ -45,6 +52,15 @@ def point_of(place: Any) -> Any:
             )
         return Point(*place)
     return Point(place)
+
+
+def check_centre(centre: object, words: str) -> None:
+    """Raises `ArgumentError` where a piece has no centre."""
+    if centre is None:
+        raise ArgumentError(
+            f"centre = None is not allowed for {words}: give one number, down the body, or a pair "
+            "(along, ahead)."
+        )
 
 
 def check_name(argument: str, name: object) -> None:
@@ -92,6 +108,7 @@ class Body(eqx.Module):
 
     def __check_init__(self) -> None:
         check_name("name", self.name)
+        check_centre(self.centre, f"Body({self.name!r})")
         check_parameters(self)
         if self.at is not None and self.parent is None:
             raise ArgumentError(
@@ -127,4 +144,5 @@ class Foot(eqx.Module):
         for argument in ("name", "leg"):
             if getattr(self, argument) is not None:
                 check_name(argument, getattr(self, argument))
+        check_centre(self.centre, f"Foot({self.body!r})")
         check_parameters(self)

@@ -1,14 +1,53 @@
-"""Couplings of a mechanism, solved for the angles that they fix."""
+"""Couplings of a mechanism, solved for the angles that they fix, and what these are."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.scene._structure import Angle, Fixed
+from jaxbiped.scene._structure import Angle, Fixed, Structure, weighted
 
 _SINGULAR = 1e-9
 """Couplings whose weights are so nearly dependent repeat or contradict each other."""
+
+
+def with_fixed(
+    structure: Structure, values: Sequence[Any], vertical: Any = None, joints: Sequence[Any] = ()
+) -> list[Any]:
+    """Values of all bodies' angles, those that couplings fix set from the others.
+
+    Args:
+        structure: of the mechanism.
+        values: of all bodies; what stands for fixed ones is not read.
+        vertical: angle of the vertical [rad]; None for rates and accelerations.
+        joints: the joint parts, whose rest angles count; none for rates and accelerations.
+    """
+    found = list(values)
+    for each in structure.fixed:
+        own = each.angle.of(values, vertical)
+        own = 0.0 * values[0] if own is None else own
+        for k, weight in each.rests if joints else ():
+            rest = joints[k].rest
+            own = own if rest is None else own + weighted(rest, weight)
+        found[each.body] = own
+    return found
+
+
+def angles_and_rates_named(
+    mechanism: Any, slope: Any, values: Mapping[str, Any], nothing: Any = 0.0
+) -> tuple[list[Any], list[Any]]:
+    """Angles and rates of all bodies, from a state's scalars by name; `nothing` where not named.
+
+    `slope`: the angle of the vertical [rad].
+    """
+    structure = mechanism.structure
+    angles, rates = (
+        [values.get(f"{kind}_{name}", nothing) for name in structure.bodies]
+        for kind in ("theta", "omega")
+    )
+    fixed = with_fixed(structure, angles, slope, mechanism.joints)
+    return fixed, with_fixed(structure, rates)
 
 
 def fixed_angles(couplings: Sequence[tuple[int, Angle]], names: Sequence[str]) -> tuple[Fixed, ...]:

@@ -2,13 +2,14 @@
 
 import abc
 import math
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_choice
 from jaxbiped._parameter_declaration import AbstractPart, parameter
 from jaxbiped._types import Parameter, Scalar
+from jaxbiped.scene._bodies import check_name
 
 
 class Ground(AbstractPart):
@@ -26,34 +27,45 @@ class Ground(AbstractPart):
     g: Parameter = parameter("gravity", "$g$", "m/s^2", minimum=0.0, default=9.8)
 
 
+def gravity_on(ground: Any) -> tuple[Scalar, Scalar]:
+    """Gravity along the slope, downhill, and onto it [m/s²]."""
+    return ground.g * jnp.sin(ground.slope), ground.g * jnp.cos(ground.slope)
+
+
 class SteppedGround(eqx.Module):
-    """A slope on which leg 1's foot comes down behind a step, where the ground lies lower.
+    """A slope on which one leg comes down behind a step, where the ground lies lower.
 
     Attributes (scalar leaves):
         slope: angle of the slope, downhill positive [rad].
         g: gravitational acceleration [m/s²].
         drop: depth of the step along the slope's normal [m].
+        leg: number of that leg, from 0 on.
     """
 
     slope: Parameter
     g: Parameter
     drop: Scalar
+    leg: int = eqx.field(static=True)
 
 
 def drop_under(ground: object, leg: int) -> Scalar | None:
-    """How much lower the ground under a leg's foot lies than the slope [m]; None for even."""
-    return ground.drop if isinstance(ground, SteppedGround) and leg == 1 else None
+    """How much lower the ground under a leg's feet lies than the slope [m]; None for even.
+
+    Legs count from 0.
+    """
+    return ground.drop if isinstance(ground, SteppedGround) and leg == ground.leg else None
 
 
 class AbstractClearance(eqx.Module):
-    """Decides from a leg and its rotation whether its foot may touch."""
+    """Decides from a leg and its rotation whether its feet may touch, all of them together."""
 
     @abc.abstractmethod
-    def admits(self, leg: int, leg_rate: Scalar) -> Scalar | bool | None:
-        """Whether the foot of `leg` (1 or 2), which turns at `leg_rate` [rad/s], may touch.
+    def admits(self, leg: str, leg_rate: Scalar) -> Scalar | bool | None:
+        """Whether the feet of a leg, by its name, may touch.
 
-        None stands for "always" and False for "never", known before anything runs: nothing of the
-        rule, or of the contact, is then left in the compiled program.
+        `leg_rate` is that of the line from the root point to the mean of its feet [rad/s]. None
+        stands for "always" and False for "never", known before anything runs: nothing of the rule,
+        or of the contact, is then left in the compiled program.
         """
 
 
@@ -65,31 +77,35 @@ class StanceRotation(AbstractClearance):
     such a walk as stopped.
     """
 
-    def admits(self, leg: int, leg_rate: Scalar) -> Scalar:
+    def admits(self, leg: str, leg_rate: Scalar) -> Scalar:
         return jnp.asarray(leg_rate < 0.0)
 
 
 class AlwaysTouching(AbstractClearance):
     """Every foot that reaches the ground touches it; a swinging foot scuffs."""
 
-    def admits(self, leg: int, leg_rate: Scalar) -> None:
+    def admits(self, leg: str, leg_rate: Scalar) -> None:
         return None
 
 
+def _leg_name(leg: Any) -> Any:
+    return str(leg) if leg in (1, 2) else leg
+
+
 class OneFoot(AbstractClearance):
-    """Only one leg's foot ever touches: a walker in single support, or a leg that is dropped.
+    """Only one leg ever touches: a walker in single support, or a leg that is dropped.
 
     Attributes:
-        leg: the leg, 1 or 2.
+        leg: the leg's name; of `Walker` also the number 1 or 2, which is kept as its name.
 
     Raises:
-        ArgumentError: another leg.
+        ArgumentError: what is no name. A scene refuses a leg that it does not have.
     """
 
-    leg: int = eqx.field(static=True)
+    leg: str = eqx.field(static=True, converter=_leg_name)
 
     def __check_init__(self) -> None:
-        check_choice("leg", self.leg, (1, 2))
+        check_name("leg", self.leg)
 
-    def admits(self, leg: int, leg_rate: Scalar) -> bool | None:
+    def admits(self, leg: str, leg_rate: Scalar) -> bool | None:
         return None if leg == self.leg else False

@@ -1,10 +1,12 @@
-"""What acts at the joints of a mechanism: springs, stops, latches and couplings."""
+"""What acts at the joints of a mechanism: springs, stops, latches, couplings and motors."""
 
 import dataclasses
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeAlias
 
 import equinox as eqx
+import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type, holds_somewhere, is_number
 from jaxbiped._parameter_declaration import check_parameters, parameter
@@ -16,6 +18,7 @@ Weights: TypeAlias = tuple[tuple[str, float], ...]
 """Weights of bodies' absolute angles, in the order written."""
 
 HOLDS = ("while pressed", "until heel strike", "through heel strike")
+SIDES = ("role", "side")
 
 
 def angle_of(angle: Any) -> Any:
@@ -26,9 +29,15 @@ def angle_of(angle: Any) -> Any:
 
 
 def _weight(name: object, weight: object) -> float:
-    if not is_number(weight) or isinstance(weight, list | tuple):
-        raise ArgumentError(f"the weight of {name!r} in angle = {weight!r} is not a number.")
-    return float(weight)  # type: ignore[arg-type]
+    try:
+        if not is_number(weight) or isinstance(weight, list | tuple):
+            raise TypeError
+        found = float(weight)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        found = math.nan
+    if not math.isfinite(found):
+        raise ArgumentError(f"the weight of {name!r} in angle = {weight!r} is not a finite number.")
+    return found
 
 
 class AbstractJointPart(eqx.Module):
@@ -60,7 +69,8 @@ def check_angle(angle: object) -> None:
     """Raises `ArgumentError` unless an angle is a name, or weights that sum to 0."""
     if isinstance(angle, str):
         return
-    if not isinstance(angle, tuple) or not angle:
+    pairs = isinstance(angle, tuple) and all(isinstance(each, tuple) for each in angle)
+    if not isinstance(angle, tuple) or not pairs or not angle:
         raise ArgumentError(
             f"angle = {angle!r} is not allowed: give a body's name, or weights of absolute angles "
             "by name."
@@ -73,7 +83,7 @@ def check_angle(angle: object) -> None:
     total = sum(weight for _, weight in angle)
     if abs(total) > 1e-12 * max(abs(weight) for _, weight in angle):
         raise ArgumentError(
-            f"angle = {dict(angle)} is not allowed, for its weights sum to {total:g}: a torque "
+            f"angle = {dict(angle)} is not allowed, because its weights sum to {total:g}: a torque "
             'from nowhere; name its other side, or "normal" or "vertical".'
         )
 
@@ -89,14 +99,19 @@ class Spring(AbstractJointPart):
         name: see `AbstractJointPart`.
 
     Raises:
-        ArgumentError: neither stiffness nor damping, or a rest angle without stiffness.
+        ArgumentError: neither stiffness nor damping, one of them below 0, or a rest angle without
+            stiffness.
     """
 
     kind: ClassVar[str] = "spring"
     angle: str | Weights = eqx.field(static=True, converter=angle_of)
     _: dataclasses.KW_ONLY
-    stiffness: Parameter | None = parameter("joint stiffness", "$k$", "N m/rad", default=None)
-    damping: Parameter | None = parameter("joint damping", "$b$", "N m s/rad", default=None)
+    stiffness: Parameter | None = parameter(
+        "joint stiffness", "$k$", "N m/rad", minimum=0.0, default=None
+    )
+    damping: Parameter | None = parameter(
+        "joint damping", "$b$", "N m s/rad", minimum=0.0, default=None
+    )
     rest: Parameter | None = parameter("rest angle", r"$\varphi_0$", "rad", default=None)
     name: str | None = eqx.field(static=True, default=None)
 
@@ -166,7 +181,7 @@ class Latch(AbstractJointPart):
 
     Attributes:
         angle: see `AbstractJointPart`.
-        at: the angle that it holds [rad].
+        at: the angle that it holds [rad]; None for 0.
         width: where its torque is largest, from there [rad].
         torque: T [N·m].
         damping: b, where it holds [N·m·s/rad]; None for none.
@@ -179,9 +194,9 @@ class Latch(AbstractJointPart):
     kind: ClassVar[str] = "latch"
     angle: str | Weights = eqx.field(static=True, converter=angle_of)
     _: dataclasses.KW_ONLY
-    at: Parameter = parameter("latched angle", r"$\varphi_0$", "rad")
     width: Parameter = parameter("width of the latch", "$w$", "rad", positive=True)
     torque: Parameter = parameter("torque of the latch", "$T$", "N m", minimum=0.0)
+    at: Parameter | None = parameter("latched angle", r"$\varphi_0$", "rad", default=None)
     damping: Parameter | None = parameter(
         "damping of the latch", "$b$", "N m s/rad", minimum=0.0, default=None
     )
@@ -205,3 +220,56 @@ class Coupling(AbstractJointPart):
     _: dataclasses.KW_ONLY
     rest: Parameter | None = parameter("coupled angle", r"$\varphi_0$", "rad", default=None)
     name: str | None = eqx.field(static=True, default=None)
+
+
+class FunctionLaw(eqx.Module):
+    """A motor's law that is a plain function, without parameters.
+
+    Attributes:
+        function: of the motion [N·m].
+    """
+
+    function: Callable[[Any], Any] = eqx.field(static=True)
+
+    def __call__(self, motion: Any) -> Any:
+        """The function's torque [N·m]."""
+        return self.function(motion)
+
+
+def law_of(law: Any) -> Any:
+    """A motor's law as it is kept: a pytree, whose leaves are parameters."""
+    is_leaf = jtu.all_leaves([law])
+    return FunctionLaw(law) if callable(law) and is_leaf else law
+
+
+class Motor(AbstractJointPart):
+    """A motor, whose torque is a law of the motion and of nothing else.
+
+    Attributes:
+        angle: see `AbstractJointPart`; the torque turns it forward.
+        law: a function of the motion, `law(motion)` [N·m]: a part of `jaxbiped.actuation`, a
+            module of one's own whose leaves are parameters, or a plain function without any.
+        by: "role" where the law is written for the second leg of each pair standing, and is
+            exchanged where the first one stands; "side" where it is told as it stands.
+        share: what the law's torque is multiplied by; None for all of it.
+        name: see `AbstractJointPart`.
+
+    Raises:
+        ArgumentError: a law that cannot be called, a share below 0, or another word.
+    """
+
+    kind: ClassVar[str] = "motor"
+    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    law: Callable[[Any], Any] = eqx.field(converter=law_of)
+    _: dataclasses.KW_ONLY
+    by: str = eqx.field(static=True, default="role")
+    share: Parameter | None = parameter("share of the motor's torque", minimum=0.0, default=None)
+    name: str | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self) -> None:
+        if not callable(self.law):
+            raise ArgumentError(
+                f"law = {self.law!r} is not allowed for Motor({self.angle!r}): give a function of "
+                "the motion."
+            )
+        check_choice("by", self.by, SIDES)

@@ -1,30 +1,51 @@
 """Mechanisms: any planar tree of rigid bodies on round feet, given as data."""
 
-import copy
+import contextlib
+import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
+import jax
 import jax.tree_util as jtu
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._jax_versions import current_trace
 from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
+from jaxbiped.caching._caches import OfObjects
 from jaxbiped.scene._bodies import Body, Foot, check_name
 from jaxbiped.scene._couplings import fixed_angles
-from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling
+from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Motor, Stop
+from jaxbiped.scene._mechanism_names import check_parameter_names, mechanism_parameter_names
 from jaxbiped.scene._mechanism_pieces import (
     angle_of_part,
     check_pieces,
+    check_state_names,
     foot_names_of,
+    named_angle,
     number_of,
     parents_of,
-    turn_of,
 )
-from jaxbiped.scene._mirror import body_twins, foot_twins, joint_twins
-from jaxbiped.scene._structure import Indices, Structure, pair_name
-from jaxbiped.scene._zero_pose import check_inertia
+from jaxbiped.scene._mirror import (
+    body_twins,
+    check_same_both_ways,
+    foot_twins,
+    joint_twins,
+    symmetric_part,
+    whole_part,
+    with_fields,
+)
+from jaxbiped.scene._structure import Indices, Structure
+from jaxbiped.scene._turn import (
+    check_nothing_turns_along,
+    check_turn,
+    turn_of,
+    turned_foot,
+    turning_body,
+)
+from jaxbiped.scene._zero_pose import check_zero_pose
 
 
 class Mechanism(eqx.Module):
@@ -39,10 +60,11 @@ class Mechanism(eqx.Module):
         root_mass: point mass there [kg]; None for none.
         bodies: the bodies, parents before children.
         feet: their feet, at least one.
-        joints: what acts at joints: `Spring`, `Stop`, `Latch`, `Coupling`.
+        joints: what acts at joints: `Spring`, `Stop`, `Latch`, `Coupling`, `Motor`.
         mirror: pairs of bodies, first the one that swings where a cycle begins, then the one that
             stands.
-        turn: `{body: N}` of a body that looks the same, its feet too, after an N-th of a turn.
+        turn: `{body: N}` of a body that looks the same, its feet too, after an N-th of a turn;
+            its feet share their parameters.
 
     Attributes:
         root_mass: see above.
@@ -83,11 +105,19 @@ class Mechanism(eqx.Module):
         if mirror:
             twin = body_twins(names, parents, bodies, mirror)
             twins = [twin, foot_twins(at_feet, legs, twin, feet), joint_twins(angles, twin, joints)]
+            own = zip(twins[2] or (), angles, strict=True)
+            mirrored = [
+                k == m and a.mirrored(twin).is_like(a.reversed()) for k, (m, a) in enumerate(own)
+            ]
+            joints = [symmetric_part(p) if m else p for p, m in zip(joints, mirrored, strict=True)]
+        turns, shared = turn_of(turn, names, at_feet), [*twins]
+        if turns is not None:
+            check_turn(turns, bodies, feet, legs)
+            bodies = [turning_body(b) if j == turns.body else b for j, b in enumerate(bodies)]
+            shared[1] = turns.firsts
         pieces: list[Body | Foot | AbstractJointPart] = []
-        places = [
-            _share(group, pair, pieces)
-            for group, pair in zip((bodies, feet, joints), twins, strict=True)
-        ]
+        groups = zip((bodies, feet, joints), shared, strict=True)
+        places = [_share(group, pair, pieces) for group, pair in groups]
         couplings = [(k, angles[k]) for k, part in enumerate(joints) if isinstance(part, Coupling)]
         unique_legs = tuple(dict.fromkeys(legs))
         self.root_mass = root_mass
@@ -101,6 +131,7 @@ class Mechanism(eqx.Module):
             legs=unique_legs,
             leg_of_foot=tuple(unique_legs.index(leg) for leg in legs),
             joints=angles,
+            joint_names=tuple(part.name for part in joints),
             fixed=fixed_angles(couplings, names),
             body_twins=twins[0],
             foot_twins=twins[1],
@@ -108,13 +139,21 @@ class Mechanism(eqx.Module):
             body_pieces=places[0],
             foot_pieces=places[1],
             joint_pieces=places[2],
-            turn=turn_of(turn, names),
+            turn=turns,
+            pairs=tuple((names.index(swings), names.index(stands)) for swings, stands in mirror),
         )
+        check_state_names(self.structure)
 
     def __check_init__(self) -> None:
         check_parameters(self)
-        _check_parameter_names(self)
-        check_inertia(self)
+        check_parameter_names(self)
+        for k, part in enumerate(self.joints):
+            if self.structure.changes_sign(k):
+                check_same_both_ways(part)
+                if isinstance(part, Stop):
+                    part.__check_init__()  # its lower limit follows from the upper one
+        check_nothing_turns_along(self.structure, self.joints)
+        check_zero_pose(self)
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -122,25 +161,59 @@ class Mechanism(eqx.Module):
         s = self.structure
         parents = (None if p < 0 else s.bodies[p] for p in s.parents)
         return tuple(
-            _placed(self.pieces[k], name=name, parent=parent)
+            with_fields(self.pieces[k], name=name, parent=parent)
             for k, name, parent in zip(s.body_pieces, s.bodies, parents, strict=True)
         )
 
     @property
     def feet(self) -> tuple[Foot, ...]:
-        """All feet, mirror images with the same leaves."""
+        """All feet, mirror images with the same leaves, and what a turn takes to each other."""
         s = self.structure
+        feet: list[Any] = [self.pieces[k] for k in s.foot_pieces]
+        named = zip(feet, s.feet, s.foot_names, s.leg_of_foot, strict=True)
         return tuple(
-            _placed(self.pieces[k], body=s.bodies[j], name=name, leg=s.legs[leg])
-            for k, j, name, leg in zip(
-                s.foot_pieces, s.feet, s.foot_names, s.leg_of_foot, strict=True
-            )
+            turned_foot(s.turn, with_fields(foot, body=s.bodies[j], name=name, leg=s.legs[leg]), k)
+            for k, (foot, j, name, leg) in enumerate(named)
         )
 
     @property
     def joints(self) -> tuple[AbstractJointPart, ...]:
         """What acts at joints; the angle of each is in `structure.joints`."""
-        return tuple(self.pieces[k] for k in self.structure.joint_pieces)  # type: ignore[misc]
+        s, found = self.structure, []
+        for k, (own, name) in enumerate(zip(s.joint_pieces, s.joint_names, strict=True)):
+            part = with_fields(self.pieces[own], name=name)
+            found.append(whole_part(part) if s.changes_sign(k) else part)
+        return tuple(found)
+
+    def arguments(self) -> dict[str, Any]:
+        """What the mechanism would be made from again, by the names of its arguments."""
+        s = self.structure
+        joints = [
+            with_fields(part, angle=named_angle(angle, s.bodies))
+            for part, angle in zip(self.joints, s.joints, strict=True)
+        ]
+        mirrored = s.pairs if s.body_twins is not None else ()
+        return {
+            "root": s.root,
+            "root_mass": self.root_mass,
+            "bodies": self.bodies,
+            "feet": self.feet,
+            "joints": tuple(joints),
+            "mirror": tuple((s.bodies[i], s.bodies[j]) for i, j in mirrored),
+            "turn": None if s.turn is None else {s.bodies[s.turn.body]: s.turn.order},
+        }
+
+    def untied(self) -> "Mechanism":
+        """The mechanism without its mirror: each side has parameters of its own, equal at first."""
+        alone = Mechanism(**self.arguments() | {"mirror": ()})
+        structure = dataclasses.replace(alone.structure, pairs=self.structure.pairs)
+        changed: Mechanism = with_fields(alone, structure=structure)
+        return changed
+
+    @property
+    def has_motors(self) -> bool:
+        """Whether motors act at joints."""
+        return any(isinstance(part, Motor) for part in self.joints)
 
     @property
     def total_mass(self) -> Scalar:
@@ -154,71 +227,62 @@ class Mechanism(eqx.Module):
     @property
     def height(self) -> Scalar:
         """Height of the root point with all angles 0 and the lowest foot on the ground [m]."""
-        bodies, heights = self.bodies, []
-        for j, foot in zip(self.structure.feet, self.feet, strict=True):
-            below = foot.centre.along if foot.radius is None else foot.centre.along + foot.radius
-            for k in self.structure.chains[j]:
-                at = bodies[k].at
-                below = below if at is None else below + at.along
-            heights.append(below)
-        highest = heights[0]
-        for each in heights[1:]:
-            highest = jnp.where(each > highest, each, highest)
-        return highest
+        return self.height_over_feet(1.0)
+
+    def height_over_feet(self, share: float) -> Scalar:
+        """Height of the root point with all angles 0 over the lowest foot [m].
+
+        What lies between the root point and the centre of the foot's circle counts by a share.
+        """
+        bodies, twins, heights = self.bodies, self.structure.foot_twins, []
+        for k, (j, foot) in enumerate(zip(self.structure.feet, self.feet, strict=True)):
+            if twins is not None and twins[k] < k:
+                continue  # as high as its mirror image
+            chain = (bodies[i].at for i in self.structure.chains[j])
+            parts = [foot.centre.along, *(at.along for at in chain if at is not None)]
+            radius = () if foot.radius is None else (foot.radius,)
+            heights.append(by_numpy(functools.partial(_height, share, len(parts)), *parts, *radius))
+        return by_numpy(lambda numpy, *each: functools.reduce(numpy.maximum, each), *heights)
 
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the leaves, in their order: "thigh.mass", "shank.foot.radius", "hip.mass"."""
-        paths = [path for path, _ in jtu.tree_flatten_with_path(self)[0]]
-        prefixes = self._prefixes()
-        return tuple(
-            f"{self.structure.root}.mass"
-            if path[0].name == "root_mass"
-            else ".".join([prefixes[path[1].idx], _leaf_name(path[2:])])
-            for path in paths
+        return mechanism_parameter_names(self)
+
+
+def _height(share: float, count: int, _: Any, *lengths: Any) -> Any:
+    below = sum(lengths[1:count], lengths[0]) * share
+    return below + lengths[count] if len(lengths) > count else below
+
+
+def mechanism_of(walker: Any) -> Mechanism:
+    """The mechanism that a walker is, or makes by its method `mechanism()`.
+
+    Raises:
+        ArgumentError: what is neither, or makes something else.
+    """
+    if isinstance(walker, Mechanism):
+        return walker
+    makes = getattr(walker, "mechanism", None)
+    if not isinstance(walker, eqx.Module) or not callable(makes):
+        raise ArgumentError(
+            f"walker = {walker!r} is not allowed: give a Mechanism, or a module with a method "
+            "mechanism() that makes one."
         )
-
-    def _prefixes(self) -> dict[int, str]:
-        """What names of each piece's parameters begin with."""
-        s, found = self.structure, {}
-        names = [
-            name
-            if s.body_twins is None or s.body_twins[j] == j
-            else pair_name(*(s.bodies[i] for i in sorted((j, s.body_twins[j]))))
-            for j, name in enumerate(s.bodies)
-        ]
-        for k, name in zip(s.body_pieces, names, strict=True):
-            found[k] = name
-        for k, j, name in zip(s.foot_pieces, s.feet, s.foot_names, strict=True):
-            found[k] = f"{names[j]}.{name}"
-        for k, angle, part in zip(s.joint_pieces, s.joints, self.joints, strict=True):
-            found[k] = f"{names[angle.weights[0][0]]}.{part.name or part.kind}"
-        return found
+    # What is made within one trace means nothing in another.
+    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(walker))
+    made, trace = _MADE(walker, dict), current_trace() if traced else None
+    if trace not in made:
+        # The walker's own rules first: they name its fields, and its leaves may be new to them.
+        getattr(walker, "__check_init__", lambda: None)()
+        with contextlib.nullcontext() if traced else jax.ensure_compile_time_eval():
+            mechanism = makes()
+        check_type(f"{type(walker).__name__}.mechanism()", mechanism, Mechanism)
+        made[trace] = mechanism
+    found: Mechanism = made[trace]
+    return found
 
 
-def _leaf_name(path: tuple[Any, ...]) -> str:
-    """The name of a leaf of a piece: "centre" and "centre_ahead" of a point, "K" of a law."""
-    names = [str(getattr(key, "name", getattr(key, "idx", key))) for key in path]
-    if len(names) > 1 and names[1] in ("along", "ahead"):
-        return names[0] if names[1] == "along" else f"{names[0]}_ahead"
-    return names[-1]
-
-
-def _check_parameter_names(mechanism: "Mechanism") -> None:
-    """Raises `ArgumentError` where two parameters would have one name."""
-    structure, prefixes = mechanism.structure, mechanism._prefixes()
-    for k, own in zip(structure.body_pieces, structure.bodies, strict=True):
-        called = prefixes[k]
-        if called != own and called in structure.bodies:
-            raise ArgumentError(
-                f"a body is called {called!r}, which is not allowed: in names of parameters "
-                f"{called!r} stands for the pair."
-            )
-    for k, part in zip(structure.joint_pieces, mechanism.joints, strict=True):
-        if list(prefixes.values()).count(prefixes[k]) > 1:
-            raise ArgumentError(
-                f"two {part.kind}s at one body, {prefixes[k]!r}, are not allowed without a name "
-                "each: give name=."
-            )
+_MADE = OfObjects[dict[Any, Mechanism]]()
 
 
 def _share(group: Sequence[Any], twins: Indices | None, pieces: list[Any]) -> Indices:
@@ -231,11 +295,3 @@ def _share(group: Sequence[Any], twins: Indices | None, pieces: list[Any]) -> In
         found.append(len(pieces))
         pieces.append(piece)
     return tuple(found)
-
-
-def _placed(piece: Any, **names: object) -> Any:
-    """A piece with other names and the same leaves, unchecked."""
-    placed = copy.copy(piece)
-    for name, value in names.items():
-        object.__setattr__(placed, name, value)
-    return placed

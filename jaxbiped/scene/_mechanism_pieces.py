@@ -1,6 +1,7 @@
 """Pieces of a mechanism, checked and numbered: what hangs on what, and which angle a part is on."""
 
-from collections.abc import Mapping, Sequence
+import string
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
@@ -8,7 +9,7 @@ import equinox as eqx
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped.scene._bodies import RESERVED, Body, Foot
 from jaxbiped.scene._joint_parts import AbstractJointPart
-from jaxbiped.scene._structure import Angle, Indices
+from jaxbiped.scene._structure import Angle, Indices, Structure
 
 
 def check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
@@ -21,7 +22,14 @@ def check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
         for each in group:
             check_type(argument, each, kind)
     if not feet:
-        raise ArgumentError("feet is empty, which is not allowed: a mechanism needs one foot.")
+        raise ArgumentError(
+            "feet is empty, which is not allowed: a mechanism needs at least one foot."
+        )
+    if root[0] not in string.ascii_letters:
+        raise ArgumentError(
+            f"root = {root!r} is not allowed: it must begin with a letter, because names of "
+            "states do."
+        )
     names = [each.name for each in bodies]
     for name in names:
         if names.count(name) > 1 or name == root:
@@ -30,11 +38,22 @@ def check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
             )
 
 
+def check_state_names(structure: Structure) -> None:
+    """Raises `ArgumentError` where two scalars of a state would have one name."""
+    names = (*structure.coordinates, *structure.rates, *structure.bristles)
+    for name in names:
+        if names.count(name) > 1:
+            raise ArgumentError(
+                f"two scalars of the state would be called {name!r}, which is not allowed: give "
+                "the root, a body or a foot another name."
+            )
+
+
 def number_of(part: str, name: Any, names: Sequence[str]) -> int:
     """The number of a body by its name; `part` says in a refusal who names it."""
     if name not in names:
         raise ArgumentError(
-            f"{part} names {name!r}, which is no body: there are {', '.join(names)}."
+            f"{part} names {name!r}, which is not a body: there are {', '.join(names)}."
         )
     return names.index(name)
 
@@ -71,33 +90,30 @@ def foot_names_of(feet: Sequence[Foot]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def angle_of_part(part: AbstractJointPart, parents: Indices, names: list[str]) -> Angle:
-    """The angle that a joint part acts on, as a sum of bodies' absolute angles."""
-    words = f"{type(part).__name__} on {part.angle!r}"
-    if isinstance(part.angle, str):
-        j = number_of(words, part.angle, names)
+def angle_of_part(part: AbstractJointPart, parents: Indices, names: Sequence[str]) -> Angle:
+    return named_sum(f"{type(part).__name__} on {part.angle!r}", part.angle, parents, names)
+
+
+def named_sum(words: str, angle: Any, parents: Indices, names: Sequence[str]) -> Angle:
+    """An angle as a sum of bodies' angles: of a name, or of weights by name."""
+    if isinstance(angle, str):
+        j = number_of(words, angle, names)
         reaction = () if parents[j] < 0 else ((parents[j], -1.0),)
         return Angle(((j, 1.0), *reaction))
     weights, vertical = [], 0.0
-    for name, weight in part.angle:
+    for name, weight in dict(angle).items():
         if name == "vertical":
-            vertical = weight
+            vertical = float(weight)
         elif name not in RESERVED:
-            weights.append((number_of(words, name, names), weight))
+            weights.append((number_of(words, name, names), float(weight)))
     if not weights:
-        raise ArgumentError(f"{words} names no body, so that nothing would move.")
+        raise ArgumentError(f"{words} names no body, so nothing would move.")
     return Angle(tuple(weights), vertical)
 
 
-def turn_of(turn: Mapping[str, int] | None, names: list[str]) -> tuple[int, int] | None:
-    """The body and the count of a rotational symmetry."""
-    if turn is None:
-        return None
-    if not isinstance(turn, Mapping) or len(turn) != 1:
-        raise ArgumentError(f"turn = {turn!r} is not allowed: give one body and its count.")
-    ((name, count),) = turn.items()
-    if not isinstance(count, int) or count < 3:
-        raise ArgumentError(
-            f"turn = {dict(turn)} is not allowed: the count must be a whole number of at least 3."
-        )
-    return number_of("turn", name, names), count
+def named_angle(angle: Angle, names: Sequence[str]) -> tuple[tuple[str, float], ...]:
+    """An angle as weights by name, the slope's normal as the other side where they need one."""
+    weights = [(names[i], weight) for i, weight in angle.weights]
+    weights += [("vertical", angle.vertical)] * bool(angle.vertical)
+    total = sum(weight for _, weight in weights)
+    return (*weights, *([("normal", -total)] if abs(total) > 1e-12 else []))

@@ -9,7 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Latch, Spring, Stop
+from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Latch, Motor, Spring, Stop
 from jaxbiped.scene._structure import Angle, Indices
 
 _NAMING = {"name", "body", "parent", "leg", "angle"}
@@ -25,6 +25,8 @@ def body_twins(
         ArgumentError: what is no pair of bodies, or no symmetry of the tree.
     """
     twin = list(range(len(names)))
+    if isinstance(pairs, str) or not isinstance(pairs, Iterable):
+        raise ArgumentError(f"mirror = {pairs!r} is not allowed: give pairs of bodies.")
     for pair in pairs:
         if not isinstance(pair, tuple | list) or len(pair) != 2 or pair[0] == pair[1]:
             raise ArgumentError(
@@ -34,7 +36,7 @@ def body_twins(
         for name in pair:
             if name not in names:
                 raise ArgumentError(
-                    f"mirror names {name!r}, which is no body: there are {', '.join(names)}."
+                    f"mirror names {name!r}, which is not a body: there are {', '.join(names)}."
                 )
         one, other = (names.index(name) for name in pair)
         if twin[one] != one or twin[other] != other:
@@ -88,7 +90,7 @@ def foot_twins(feet: Indices, legs: Sequence[str], twin: Indices, pieces: Sequen
 def joint_twins(
     joints: Sequence[Angle], twin: Indices, parts: Sequence[AbstractJointPart]
 ) -> Indices:
-    """Number of each joint part's mirror image.
+    """Number of each joint part's mirror image; a motor by role has none but itself.
 
     Raises:
         ArgumentError: a part without an equal one on the other side, or one on an angle that
@@ -97,24 +99,37 @@ def joint_twins(
     found = list(range(len(parts)))
     for k, (angle, part) in enumerate(zip(joints, parts, strict=True)):
         image = angle.mirrored(twin)
-        if image.is_like(angle):
+        if image.is_like(angle) or _is_by_role(part):
             continue
         same = [
             i
             for i, other in enumerate(parts)
-            if type(other) is type(part) and joints[i].is_like(image) and found[i] in (i, k)
+            if type(other) is type(part)
+            and not _is_by_role(other)
+            and _given(other) == _given(part)
+            and joints[i].is_like(image)
+            and found[i] in (i, k)
         ]
         if same:
             found[k] = same[0]
             check_alike(part, parts[same[0]])
         elif image.is_like(angle.reversed()):
-            _check_same_both_ways(part)
+            check_same_both_ways(part)
         else:
             raise ArgumentError(
-                f"{type(part).__name__}({_words(part)}) has no equal on the other side of the "
-                "mirror: give one there, or leave the mirror out."
+                f"{type(part).__name__}({_words(part)}) has no counterpart on the other side of "
+                "the mirror: give one there, or leave the mirror out."
             )
     return tuple(found)
+
+
+def _given(part: AbstractJointPart) -> list[str]:
+    """What of a part's parameters is given."""
+    return [name for name in part.__dataclass_fields__ if getattr(part, name) is not None]
+
+
+def _is_by_role(part: AbstractJointPart) -> bool:
+    return isinstance(part, Motor) and part.by == "role"
 
 
 def check_alike(one: Any, other: Any) -> None:
@@ -149,7 +164,36 @@ def _equal(one: Any, other: Any) -> bool:
     return True
 
 
-def _check_same_both_ways(part: AbstractJointPart) -> None:
+def symmetric_part(part: Any) -> Any:
+    """A part on an angle that changes its sign, with the parameters that the mirror leaves free.
+
+    Of a stop's limits one, for the other is its negative; no rest angle, which is 0.
+    """
+    if isinstance(part, Stop):
+        return with_fields(part, lower=None)
+    if isinstance(part, Latch):
+        return with_fields(part, at=None)
+    return with_fields(part, rest=None) if isinstance(part, Spring | Coupling) else part
+
+
+def whole_part(part: Any) -> Any:
+    """A part on an angle that changes its sign, with both limits of a stop."""
+    if not isinstance(part, Stop):
+        return part
+    assert part.upper is not None  # both limits were given
+    return with_fields(part, lower=-part.upper)
+
+
+def with_fields(piece: Any, **fields: object) -> Any:
+    """A piece with other fields, unchecked."""
+    # Not by `copy.copy`: equinox would hold the new one for ever, as one that is being made.
+    changed = object.__new__(type(piece))
+    for name, value in (vars(piece) | fields).items():
+        object.__setattr__(changed, name, value)
+    return changed
+
+
+def check_same_both_ways(part: AbstractJointPart) -> None:
     """Raises `ArgumentError` where a part on an angle that changes sign is not its own image."""
     name = None
     if isinstance(part, Spring | Coupling) and _is_not_zero(part.rest):
@@ -165,6 +209,11 @@ def _check_same_both_ways(part: AbstractJointPart) -> None:
         raise ArgumentError(
             f"Stop({_words(part)}) has an angle that changes its sign in the mirror: lower must be "
             "minus upper."
+        )
+    if isinstance(part, Motor) and not _is_by_role(part):
+        raise ArgumentError(
+            f"Motor({_words(part)}, by='side') has an angle that changes its sign in the mirror: "
+            "give it by role, or leave the mirror out."
         )
 
 

@@ -1,9 +1,11 @@
 """Parameters of a scene by name, and the identity of a scene that is made of them."""
 
 import dataclasses
+import warnings
 from collections.abc import Mapping
 from typing import Any, TypeAlias, TypeVar
 
+import equinox as eqx
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
@@ -13,9 +15,14 @@ from jaxbiped._identity import identity
 from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import JsonObject, Parameter, Scalar
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
+from jaxbiped.scene._bodies import Point
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._mechanism_names import path_texts
+from jaxbiped.scene._mirror import with_fields
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
-SomeScene = TypeVar("SomeScene", bound=AbstractScene)
+SomeScene = TypeVar("SomeScene", bound=eqx.Module)
 _Path: TypeAlias = tuple[Any, ...]
 """Keys of a leaf, as JAX gives them."""
 
@@ -27,10 +34,13 @@ def parameter_names(scene: AbstractScene) -> tuple[str, ...]:
     """Names of a scene's parameters: K, c and xi first, the others in the scene's order.
 
     A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`; one of
-    several has its number, `torque_1`. Those of a redundant scene are those of what it models.
+    several has its number, `torque_1`. A mechanism's parameters are called after its bodies,
+    `thigh.mass`, `shank.foot.radius`, `shank.stop.K`; those of a walker with fields of its own by
+    their paths, `m_thigh`, `stop.K`, after `walker.` where the scene has that name. A redundant
+    scene's parameters are those of the scene that it models.
 
     Args:
-        scene: of any kind.
+        scene: of any kind; or a mechanism, or any other module of parameters.
 
     Returns:
         The names, one for each numeric leaf of the scene.
@@ -72,10 +82,12 @@ def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
         A `Quantity` (words, symbol and SI unit) by each name.
     """
     known = _parameters(scene).items()
-    return {name: _quantity(scene.minimal, name, path) for name, (path, _) in known}
+    return {name: _quantity(_modelled(scene), name, path) for name, (path, _) in known}
 
 
 def _quantity(part: object, name: str, path: _Path) -> Quantity:
+    angular = _is_walker(part)  # a normal law in a walker is one of an angle
+    of_mechanism = False
     for position, key in enumerate(path):
         if isinstance(key, jtu.SequenceKey):
             part = part[key.idx]  # type: ignore[index]
@@ -84,7 +96,14 @@ def _quantity(part: object, name: str, path: _Path) -> Quantity:
             break  # an entry of a user's own dictionary
         infos = parameter_infos(part)
         if key.name in infos:
-            return _entry(infos[key.name].quantity, path[position + 1 :])
+            found = _entry(infos[key.name].quantity, path[position + 1 :])
+            if isinstance(part, Point):
+                found = found._replace(words=f"{path[position - 1].name} {found.words}")
+            if of_mechanism:
+                found = found._replace(words=f"{found.words}, {name.rpartition('.')[0]}")
+            return found.angular if angular and isinstance(part, AbstractNormalLaw) else found
+        angular = angular or key.name == "walker"
+        of_mechanism = of_mechanism or isinstance(part, Mechanism)
         part = getattr(part, key.name)
     return Quantity(name)
 
@@ -140,22 +159,64 @@ def with_parameters(scene: SomeScene, values: Mapping[str, Parameter]) -> SomeSc
         >>> float(scene.ground.slope), float(scene.normal.K)
         (0.01, 2000000.0)
     """
-    leaves, changed = _leaves_by_name(scene), scene.minimal
-    for name, value in values.items():
-        check_choice("parameter", name, leaves)
-        changed = _replace(changed, leaves[name][0], value)
-    return scene.with_minimal(changed)
-
-
-def _replace(part: Any, path: _Path, value: Parameter) -> Any:
-    if not path:
-        return value
-    key, rest = path[0], path[1:]
-    if isinstance(key, jtu.SequenceKey):
-        return tuple(
-            _replace(each, rest, value) if i == key.idx else each for i, each in enumerate(part)
+    changed = _modelled(scene)
+    leaves = _leaves_by_name(changed)
+    if not all(name in leaves for name in values):
+        untied = _untied(changed)
+        apart = {} if untied is None else _leaves_by_name(untied)
+        for name in values:
+            check_choice("parameter", name, leaves if name not in apart else apart)
+        paired = {name: value for name, value in values.items() if name in leaves}
+        changed = _untied(with_parameters(changed, paired))
+        values = {name: value for name, value in values.items() if name not in leaves}
+        leaves = apart
+        warnings.warn(
+            f"{', '.join(values)}: the sides differ, so the mirror is dropped, and a cycle of the "
+            "walk is a stride instead of a step.",
+            UserWarning,
+            stacklevel=2,
         )
-    return dataclasses.replace(part, **{key.name: _replace(getattr(part, key.name), rest, value)})
+    changed = _replace(changed, {leaves[name][0]: value for name, value in values.items()})
+    return scene.with_minimal(changed) if isinstance(scene, AbstractScene) else changed
+
+
+def _untied(model: Any) -> Any:
+    """A mechanism, or a scene with one, without its mirror; None where there is none to drop."""
+    if isinstance(model, Mechanism):
+        return model.untied() if model.structure.body_twins is not None else None
+    if not isinstance(model, AbstractWalkerScene):
+        return None
+    walker = _untied(model.walker)
+    return None if walker is None else _rebuilt(model, {"walker": walker})
+
+
+def _replace(part: Any, values: dict[_Path, Parameter]) -> Any:
+    """A part with other leaves, every part on the way to them checked anew."""
+    if () in values:
+        return values[()]
+    inner: dict[Any, dict[_Path, Parameter]] = {}
+    for path, value in values.items():
+        inner.setdefault(path[0], {})[path[1:]] = value
+    if not inner:
+        return part
+    if isinstance(part, tuple):
+        changed = {key.idx: _replace(part[key.idx], rest) for key, rest in inner.items()}
+        return tuple(changed.get(i, each) for i, each in enumerate(part))
+    return _rebuilt(
+        part, {key.name: _replace(getattr(part, key.name), rest) for key, rest in inner.items()}
+    )
+
+
+def _rebuilt(part: Any, fields: dict[str, Any]) -> Any:
+    """A module with other fields, converted and checked as at first, whatever its `__init__` is."""
+    for field in dataclasses.fields(part):
+        if field.name in fields and "converter" in field.metadata:
+            fields[field.name] = field.metadata["converter"](fields[field.name])
+    changed = with_fields(part, **fields)
+    for kind in type(changed).__mro__:
+        if "__check_init__" in vars(kind):
+            vars(kind)["__check_init__"](changed)
+    return changed
 
 
 def _parameters(scene: PyTree) -> dict[str, tuple[_Path, Scalar]]:
@@ -164,25 +225,52 @@ def _parameters(scene: PyTree) -> dict[str, tuple[_Path, Scalar]]:
     return {name: leaves[name] for name in _FIRST if name in leaves} | leaves
 
 
+def _is_walker(model: Any) -> bool:
+    """Whether a model is a mechanism or has one of its own, and is no scene of it."""
+    own = isinstance(model, Mechanism) or hasattr(model, "mechanism")
+    return own and not isinstance(model, AbstractScene)
+
+
+def _modelled(scene: Any) -> Any:
+    return scene.minimal if isinstance(scene, AbstractScene) else scene
+
+
 def _leaves_by_name(scene: PyTree) -> dict[str, tuple[_Path, Scalar]]:
     """Paths and leaves of what is modelled, by name, in the order of the leaves."""
-    modelled = scene.minimal if isinstance(scene, AbstractScene) else scene
+    modelled = _modelled(scene)
     leaves = jtu.tree_flatten_with_path(modelled)[0]
-    whole = [_texts(path) for path, _ in leaves]
-    own = [texts[-1] for texts in whole]
-    names = [texts[-1] if own.count(texts[-1]) == 1 else ".".join(texts) for texts in whole]
+    if _is_walker(modelled):
+        names = _walker_names(modelled)
+    elif isinstance(modelled, AbstractWalkerScene):
+        names = _scene_names(modelled, [path for path, _ in leaves])
+    else:
+        names = _shortest_names([path for path, _ in leaves])
     return dict(zip(names, leaves, strict=True))
 
 
-def _texts(path: _Path) -> list[str]:
-    """Names along a path; an entry of several is told by its number, from 1 on."""
-    texts: list[str] = []
-    for key in path:
-        if isinstance(key, jtu.SequenceKey) and texts:
-            texts[-1] += f"_{key.idx + 1}"
-        else:
-            texts.append(str(getattr(key, "name", key)))
-    return texts
+def _scene_names(scene: AbstractWalkerScene, paths: list[_Path]) -> list[str]:
+    """Names of a scene's leaves, of which the walker's lengthen none."""
+    of_walker = [path[0].name == "walker" for path in paths]
+    others = _shortest_names([p for p, inner in zip(paths, of_walker, strict=True) if not inner])
+    rest, own = iter(others), iter(_walker_names(scene.walker))
+    return [_longer(next(own), others) if inner else next(rest) for inner in of_walker]
+
+
+def _longer(name: str, taken: list[str]) -> str:
+    return f"walker.{name}" if name in taken else name
+
+
+def _walker_names(walker: Any) -> list[str]:
+    """Names of a walker's leaves: those of its bodies, or the paths of its own fields."""
+    if isinstance(walker, Mechanism):
+        return list(walker.parameter_names())
+    return [".".join(path_texts(path)) for path, _ in jtu.tree_flatten_with_path(walker)[0]]
+
+
+def _shortest_names(paths: list[_Path]) -> list[str]:
+    whole = [path_texts(path) for path in paths]
+    own = [texts[-1] for texts in whole]
+    return [texts[-1] if own.count(texts[-1]) == 1 else ".".join(texts) for texts in whole]
 
 
 def scene_identity(scene: AbstractScene) -> JsonObject:

@@ -72,10 +72,9 @@ def _in_64_bits(leaf: Any) -> Any:
 
 
 def _parts(tree: Any) -> Iterator[eqx.Module]:
-    """The modules that a scene is made of, itself and theirs among them."""
+    """The modules that a scene is made of, each after its own parts, itself last."""
     inside: Any = ()
     if isinstance(tree, eqx.Module):
-        yield tree
         inside = vars(tree).values()
     elif isinstance(tree, list | tuple):
         inside = tree
@@ -83,3 +82,5 @@ def _parts(tree: Any) -> Iterator[eqx.Module]:
         inside = tree.values()
     for each in inside:
         yield from _parts(each)
+    if isinstance(tree, eqx.Module):
+        yield tree

@@ -1,16 +1,14 @@
-"""The walker: two equal rigid legs on round feet, joined at the hip, also as a linkage."""
+"""The walker: two equal rigid legs on round feet, joined at the hip."""
 
-from typing import Any
+from typing import ClassVar
 
 import equinox as eqx
 
-from jaxbiped._checks import ArgumentError, are_zero_together, check_pair, check_type
+from jaxbiped._checks import ArgumentError, are_zero_together, check_pair
 from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
-from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
-from jaxbiped.constraints._linkage import Body, Joint, Linkage
-from jaxbiped.scene._bodies import Body as RigidBody
-from jaxbiped.scene._bodies import Foot, Point
+from jaxbiped.scene._bodies import Body, Foot, Point
+from jaxbiped.scene._ground import AbstractClearance, StanceRotation
 from jaxbiped.scene._mechanism import Mechanism
 
 
@@ -32,6 +30,7 @@ class Walker(eqx.Module):
             that are mass points) without d and hip_mass above 0.
     """
 
+    clearance: ClassVar[AbstractClearance] = StanceRotation()
     m: Parameter = parameter("leg mass", "$m$", "kg", positive=True)
     J: Parameter = parameter("leg inertia", "$J$", "kg m^2", minimum=0.0)
     l: Parameter = parameter("leg length", "$l$", "m", positive=True)
@@ -59,9 +58,7 @@ class Walker(eqx.Module):
         """Two legs on the hip as data: bodies "1" and "2", of which the second stands."""
         return Mechanism(
             root_mass=self.hip_mass,
-            bodies=tuple(
-                RigidBody(n, mass=self.m, inertia=self.J, centre=Point(self.d)) for n in "12"
-            ),
+            bodies=tuple(Body(n, mass=self.m, inertia=self.J, centre=Point(self.d)) for n in "12"),
             feet=tuple(Foot(n, centre=Point(self.hip_to_foot), radius=self.r) for n in "12"),
             mirror=(("1", "2"),),
         )
@@ -71,62 +68,3 @@ class Walker(eqx.Module):
         """Mass of both legs and the hip [kg]."""
         found: Scalar = by_numpy(lambda _, m, hip: 2.0 * m + hip, self.m, self.hip_mass)
         return found
-
-
-class LinkageScene(eqx.Module):
-    """A linkage in gravity, and how its joints are held.
-
-    Attributes:
-        linkage: bodies and joints.
-        method: how the constraints are held.
-        gravity: acceleration (x, z) [m/s²].
-
-    Raises:
-        ArgumentError: a part of the wrong type, or gravity that is not finite.
-    """
-
-    linkage: Linkage
-    method: AbstractConstraintMethod
-    gravity: tuple[Parameter, Parameter] = parameter(
-        "gravity", "$g$", "m/s^2", several=True, default=(0.0, -9.8)
-    )
-
-    def __check_init__(self) -> None:
-        check_type("linkage", self.linkage, Linkage)
-        check_type("method", self.method, AbstractConstraintMethod)
-        check_parameters(self)
-
-
-def leg_of(walker: Walker) -> tuple[Body, Scalar]:
-    """One leg with half of the hip's mass, and the distance of its centre of mass from the hip [m].
-
-    Both halves move with the hip, so that together they are the walker's hip mass.
-    """
-
-    def of(_: Any, m: Any, d: Any, J: Any, hip_mass: Any) -> tuple[Any, Any, Any]:
-        mass = m + 0.5 * hip_mass
-        distance = m * d / mass
-        return mass, J + m * d * (d - distance), distance
-
-    mass, inertia, distance = by_numpy(of, walker.m, walker.d, walker.J, walker.hip_mass)
-    return Body(mass, inertia), distance
-
-
-def walker_linkage(walker: Walker, orientation: str = "angle") -> Linkage:
-    """The walker's two legs, pinned to each other at the hip.
-
-    The first joint's constraint is Φ = hip of leg 1 − hip of leg 2.
-
-    Args:
-        walker: masses and lengths.
-        orientation: one of `ORIENTATIONS`.
-
-    Returns:
-        Two bodies and one joint, SI units.
-
-    Raises:
-        ArgumentError: an unknown orientation.
-    """
-    leg, distance = leg_of(walker)
-    hip = (by_numpy(lambda numpy, distance: numpy.zeros_like(distance), distance), distance)
-    return Linkage((leg, leg), (Joint(hip, hip, 0, 1),), orientation)

@@ -1,4 +1,4 @@
-"""Inertia of a mechanism with all angles 0: every motion must have some."""
+"""A mechanism with all angles 0: it stands above the ground, and every motion has inertia."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -15,14 +15,22 @@ _SINGULAR = 1e-12
 """Least eigenvalue of a mass matrix scaled to a diagonal of ones that still is an inertia."""
 
 
-def check_inertia(mechanism: "Mechanism") -> None:
-    """Raises `ArgumentError` where the mass matrix is known to be singular with all angles 0.
+def check_zero_pose(mechanism: "Mechanism") -> None:
+    """Raises `ArgumentError` where the root point is not above the ground with all angles 0.
+
+    Nor may the mass matrix be known to be singular there.
 
     Hanging straight down, what has no inertia of its own has none at all: a mass at its hinge, a
     massless thigh over a shank that is a mass point, legs without inertia under a massless root.
     """
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(mechanism)):
         return
+    height = np.min(np.asarray(mechanism.height))
+    if height <= 0.0:
+        raise ArgumentError(
+            f"feet are not allowed where all angles are 0: the root point is at {height:g} m, not "
+            "above the ground; put one foot's sole below it."
+        )
     structure = mechanism.structure
     matrix = _mass_matrix(mechanism)
     diagonal = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))

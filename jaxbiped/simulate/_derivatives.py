@@ -134,6 +134,11 @@ def _tangent_of(found: Trajectory, t_dot: Scalar, leaf_dots: list[Scalar]) -> Tr
     if arrivals is not None:
         arrivals = arrivals._replace(t=part(slice(first))[0], state=part(slice(first))[1])
     moving = dataclasses.replace(still, t=t, state=state, arrivals=arrivals)
+    if still.mode_history is not None:
+        unknown = dataclasses.replace(
+            still.mode_history, t=jnp.full_like(still.mode_history.t, jnp.nan)
+        )
+        moving = dataclasses.replace(moving, mode_history=unknown)
     return jtu.tree_map(
         lambda dot, leaf: dot.astype(leaf.dtype) if _is_real(leaf) else dot, moving, found
     )

@@ -14,7 +14,7 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import LaneEngine, Request
-from jaxbiped.dynamics._state import State
+from jaxbiped.scene._state_types import State
 from jaxbiped.simulate._start import Options
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adaptive_program
 from jaxbiped.solve._engine_names import ENGINES, engine_for, engine_named
@@ -51,7 +51,8 @@ def choose_engine(
         return engine_for(engine, obstacle=obstacle, prefers_xla=redundant, by_device=True)
     check_choice("engine", engine, ENGINES)
     if engine == "xla" or obstacle is not None:
-        why = f"here {obstacle}" if obstacle is not None else 'engine = "xla" was chosen'
+        chosen = 'engine = "xla" was chosen; choose "lanes" or "auto"'
+        why = f"here {obstacle}" if obstacle is not None else chosen
         raise ArgumentError(
             f"save = {type(section).__name__}() is not allowed here: only lanes do that, and {why}."
         )
@@ -66,7 +67,10 @@ def _hindrance(
     if not isinstance(solver, AbstractRosenbrock):
         return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
     if asked.save_steps and any(isinstance(leaf, jax.core.Tracer) for leaf in each):
-        return 'under jit, vmap or derivatives it does not save every step (save="steps")'
+        return (
+            'under jit, vmap or derivatives it does not save every step (save="steps"); ask for '
+            'save="end", an array of times or a section'
+        )
     if asked.adjoint is not None:
         return "an adjoint is diffrax's"
     if isinstance(asked.times, jax.core.Tracer):

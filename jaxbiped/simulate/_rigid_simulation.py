@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -22,7 +22,8 @@ from jaxbiped._types import Scalar, as_float, by_numpy
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import Program, Request
 from jaxbiped.dynamics._section import HeelStrike
-from jaxbiped.dynamics._state import RigidState, check_state
+from jaxbiped.dynamics._state import check_state, state_type, without_whole_turns
+from jaxbiped.scene._rigid_feet import rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._derivatives import with_derivatives
@@ -36,19 +37,21 @@ from jaxbiped.simulate._start import (
 )
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._engine_names import engine_for, engine_named
-from jaxbiped.solve._rigid_steps import (
+from jaxbiped.solve._mode_history import history_of
+from jaxbiped.solve._rigid_progress import (
     RigidProgress,
     RigidWalk,
-    attempt_step,
-    ending_of,
     initial_progress,
     state_with_hip,
 )
+from jaxbiped.solve._rigid_steps import attempt_step, ending_of
 from jaxbiped.solve._scene_key import scene_key
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""
+_ROWS = 64
+"""Changes of mode that there is room for beside heel strikes."""
 _FIRST = 1e-1
 """First tolerance as a share of the relative error wanted."""
 _EMBEDDED = 0.3
@@ -81,7 +84,7 @@ class RigidSimulation(eqx.Module):
     engine: str = eqx.field(static=True)
 
     @staticmethod
-    def of(scene: RigidScene, state: RigidState, asked: Options) -> "RigidSimulation":
+    def of(scene: RigidScene, state: Any, asked: Options) -> "RigidSimulation":
         """Checks what is asked, and forms it."""
         asked.refuse(scene, "solver", "atol", "dt", "extremes", "watch", "adjoint")
         section, duration, footsteps = asked.section, asked.duration, asked.footsteps
@@ -94,7 +97,8 @@ class RigidSimulation(eqx.Module):
         check_limits(duration, footsteps, asked.max_solver_steps)
         with traced_rules() as rules:
             scene = check_scene(scene, RigidScene)
-            state = in_one_precision(check_state(in_own_precision(state), RigidState))
+            state = check_state(in_own_precision(state), state_type(scene))
+            state = in_one_precision(without_whole_turns(scene, state))
             check_single_scene(scene)
             check_unbatched("state", state, "one start")
             if duration is not None:
@@ -105,13 +109,13 @@ class RigidSimulation(eqx.Module):
         # Of a lane that is not allowed nothing is known from the start.
         state, duration = where_allowed(rules, state), where_allowed(rules, duration, 1.0)
         check_room("max_arrivals", asked.max_arrivals)
-        dtype = state.theta_1.dtype
+        dtype = state[0].dtype
         narrow = "it computes in 64 bits" if dtype != jnp.float64 else None
         count, longest = 1 if footsteps is None else footsteps, duration
         if duration is None:
             longest = by_numpy(
                 lambda numpy, l, g: count * (_PATIENCE * numpy.sqrt(l / g)),
-                scene.walker.l,
+                scene.mechanism.height,
                 scene.ground.g,
             )
         walk = RigidWalk(
@@ -154,19 +158,25 @@ class RigidSimulation(eqx.Module):
         """The relative tolerance to begin with where this relative error is wanted."""
         return min(_FIRST * wanted, _LOOSEST)
 
-    def __call__(self) -> Trajectory[RigidState]:
+    def __call__(self) -> Trajectory[Any]:
         """Solves it, differentiably."""
         walk = with_derivatives(self, RigidSimulation.solved, moving=_moving, slopes=_slopes)
         return dataclasses.replace(walk, scene_key=scene_key(self.walk.scene))
 
-    def solved(self) -> Trajectory[RigidState]:
+    def solved(self) -> Trajectory[Any]:
         """Solves it."""
         state = self.walk.state
-        program = rigid_program(self.max_arrivals > 0, self.waits, self.embedded)
-        request = Request(program, self.walk, room=self.max_arrivals, quick=True)
+        moded = rigid_modes(self.scene.mechanism).any
+        program = rigid_program(moded or self.max_arrivals > 0, self.waits, self.embedded)
+        room = _ROWS + 8 * self.max_arrivals if moded else self.max_arrivals
+        request = Request(program, self.walk, room=room, quick=True)
         found, recorded, _ = engine_named(self.engine).run(request)
-        no_rows = np.zeros((0, 1 + len(state)), state.theta_1.dtype)
-        rows = no_rows if recorded is None else recorded.values
+        no_rows = np.zeros((0, 1 + len(state)), state[0].dtype)
+        rows: Any = no_rows if recorded is None else recorded.values
+        history = None
+        if moded and recorded is not None:
+            history = history_of(self.scene, found.begin, rows, recorded.counts)
+            rows = by_numpy(_strikes_first, rows)[: self.max_arrivals]
         t, end = single_time(found.t, found.state)
         return Trajectory(
             t=t,
@@ -176,20 +186,28 @@ class RigidSimulation(eqx.Module):
             rejected=found.rejected,
             arrivals=arrivals_among(rows, found.footsteps, state),
             grazes=found.grazes,
+            mode_history=history,
             engine=self.engine,
         )
+
+
+def _strikes_first(numpy: Any, rows: Any) -> Any:
+    """Rows of heel strikes in their order, then those of other changes, without the flag."""
+    order = numpy.argsort(rows[:, 1] == 0.0, stable=True)
+    return numpy.concatenate([rows[:, :1], rows[:, 2:]], axis=1)[order]
 
 
 class RigidSolved(NamedTuple):
     """One walk's outputs: see `RigidProgress`."""
 
     t: Scalar
-    state: RigidState
+    state: Any
     ending: Scalar
     footsteps: Scalar
     accepted: Scalar
     rejected: Scalar
     grazes: Scalar
+    begin: Scalar | None
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
@@ -205,14 +223,21 @@ def rigid_program(records: bool, waits: bool, embedded: bool = False) -> Program
     def finish(walk: RigidWalk, now: RigidProgress) -> RigidSolved:
         code = ending_of(walk, now, jnp.asarray(waits))
         counts = (now.footsteps, now.accepted, now.rejected, now.grazes)
-        return RigidSolved(now.t, state_with_hip(walk, now), code, *counts)
+        begin = getattr(walk.state, "mode", None)
+        begin = begin if now.modes is None else now.modes.begin
+        return RigidSolved(now.t, state_with_hip(walk, now), code, *counts, begin)
 
     attempt = functools.partial(attempt_step, embedded=embedded)
     return Program(initial_progress, attempt, finish, record=_record if records else None)
 
 
 def _record(walk: RigidWalk, now: RigidProgress, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-    return now.struck, [now.t, *state_with_hip(walk, now)]
+    row = [now.t, *state_with_hip(walk, now)]
+    if not hasattr(walk.state, "mode"):
+        return now.struck, row
+    struck = jnp.where(now.struck, 1.0, 0.0)
+    happens = now.struck if now.modes is None else now.struck | now.modes.changed
+    return happens, [now.t, struck, *row[1:]]
 
 
 def _moving(run: RigidSimulation) -> tuple[PyTree, PyTree, PyTree]:
@@ -221,7 +246,7 @@ def _moving(run: RigidSimulation) -> tuple[PyTree, PyTree, PyTree]:
 
 def _slopes(
     run: RigidSimulation,
-    found: Trajectory[RigidState],
+    found: Trajectory[Any],
     places: tuple[int, ...],
     active: tuple[int, ...],
 ) -> Slopes:

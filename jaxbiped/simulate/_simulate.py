@@ -11,9 +11,9 @@ from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Parameter
 from jaxbiped.dynamics._linkage_motion import LinkageState
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike
-from jaxbiped.dynamics._state import RigidState
+from jaxbiped.scene._linkages import LinkageScene
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.scene._walker import LinkageScene
+from jaxbiped.scene._state_types import RigidState
 from jaxbiped.simulate._error_witnesses import (
     accurate_walk,
     check_accurate_walk,
@@ -41,7 +41,7 @@ def simulate(
     rtol: float | None = None,
     atol: float | None = None,
     dt: float | None = None,
-    save: Literal["steps", "end"] | Array | AbstractSection = "steps",
+    save: Literal["steps", "end"] | Array | AbstractSection | None = None,
     max_arrivals: int = 64,
     extremes: Callable[..., PyTree] | None = None,
     watch: tuple[str, ...] = WATCHES,
@@ -91,7 +91,7 @@ def simulate(
             array of increasing times [s], shape (n,), at which to save, or a section (by lanes
             only), whose `arrivals` to save beside the final state: `HeelStrike()` saves the
             footsteps. The legs take turns there as in `return_map`, but the states saved keep
-            their own names.
+            their own names. None for "steps", or of a `RigidScene` for "end".
         max_arrivals: how many arrivals at a section there is room for.
         extremes: a function of (scene, state) whose least and largest values, number by number,
             over the ends of all steps are wanted.
@@ -118,6 +118,7 @@ def simulate(
         >>> str(walk.outcome), float(walk.t[-1])
         ('walking', 0.1)
     """
+    usual = "end" if isinstance(scene, RigidScene) else "steps"
     asked = Options(
         duration=duration,
         footsteps=footsteps,
@@ -126,7 +127,7 @@ def simulate(
         rtol=rtol,
         atol=atol,
         dt=dt,
-        save=save,
+        save=usual if save is None else save,
         max_arrivals=max_arrivals,
         extremes=extremes,
         watch=watch,

@@ -22,11 +22,10 @@ from jaxbiped._checks import (
     check_unbatched,
     traced_rules,
 )
-from jaxbiped._types import Numbers, Scalar, as_array
+from jaxbiped._types import Numbers, Scalar, as_array, as_float
 from jaxbiped.compiler import Request
 from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import BristleState, State
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._derivatives import with_derivatives
@@ -147,8 +146,7 @@ class Simulation(eqx.Module):
             check_times(times, time)
         dtype = jnp.result_type(jtu.tree_leaves(state)[0])
         check_precision(scene, dtype)
-        if isinstance(given, State | BristleState):
-            check_start_height(scene, given)
+        check_start_height(scene, jtu.tree_map(as_float, given))
         if isinstance(scene, RedundantScene):
             check_adjoint(scene.method, asked.adjoint)
 

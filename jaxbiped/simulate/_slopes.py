@@ -1,7 +1,7 @@
 """Slopes of a simulation: how the moments that it saved depend on its start and its scene."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,12 +13,13 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import CUDA, host_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
+from jaxbiped.dynamics._mode_changes import change_mode, mode_switches
 from jaxbiped.dynamics._rolling import rolling_field
-from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import RigidState, exchange_legs
+from jaxbiped.dynamics._section import AbstractSection, in_nearest_names
+from jaxbiped.dynamics._strike_surfaces import opening, uprightness
 from jaxbiped.dynamics._switches import switches
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.solve._failure_events import FALL_ANGLE, ending_surface
+from jaxbiped.solve._ending_surfaces import ending_surface
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rodas import Rodas5P
@@ -36,7 +37,8 @@ from jaxbiped.variational._variational_solve import (
 
 _WATCH = Watch(field=vector_field, switches=switches)
 """Derivatives are taken up to the times at which the plain solve saved."""
-_ROLLING = Watch(field=rolling_field, switches=lambda args, y: ())
+_ROLLING = Watch(field=rolling_field, switches=mode_switches)
+_IN_MODES = Watch(field=rolling_field, switches=mode_switches, reset=change_mode)
 
 
 class Slopes(NamedTuple):
@@ -138,11 +140,9 @@ def _at_events(
 
     def arrive(here: TangentsAtTimes) -> EventMotion:
         assert section is not None
-        own, other = (section.value(scene, y) for y in (here.state, exchange_legs(here.state)))
-        exchanged = jnp.abs(other) < jnp.abs(own)
 
         def surface(a: PyTree, y: PyTree) -> Scalar:
-            return section.value(a, select(exchanged, exchange_legs(y), y))
+            return section.value(a, in_nearest_names(section, a, here.state, y))
 
         return follow(surface, here)
 
@@ -174,7 +174,7 @@ class _Strike(NamedTuple):
 @host_jit()
 def rigid_slopes_of(
     scene: RigidScene,
-    state: RigidState,
+    state: Any,
     strikes: Scalar,
     count: Scalar,
     end: Scalar,
@@ -199,8 +199,9 @@ def rigid_slopes_of(
     """
     scene, state = jtu.tree_map(lambda leaf: jnp.asarray(leaf, jnp.float64), (scene, state))
     start, seeded = seeded_directions(scene, state, places, active)
-    how = motion_solve(_ROLLING, Rodas5P(), rtol)
-    unit = jnp.sqrt(scene.walker.l / scene.ground.g)
+    watch = _IN_MODES if hasattr(state, "mode") else _ROLLING
+    how = motion_solve(watch, Rodas5P(), rtol)
+    unit = jnp.sqrt(scene.mechanism.height / scene.ground.g)
     n = len(places) + len(active)
 
     def follow(since: _Strike, t: Scalar) -> Tangents:
@@ -217,7 +218,7 @@ def rigid_slopes_of(
     def strike(before: _Strike, given: tuple[Scalar, Scalar]) -> tuple[_Strike, _Strike]:
         t, comes = given
         at = follow(before, jnp.where(comes, t, before.t))
-        moves = event(lambda a, y: -(y.theta_1 + y.theta_2), at)
+        moves = event(lambda a, y: -opening(a, y), at)
         # This solve's own strike, lest its phase drift away from the walk's.
         rates = rolling_field(0.0, at.state, scene)
         on = jtu.tree_map(lambda leaf, rate: leaf + rate * moves.delay, at.state, rates)
@@ -233,9 +234,9 @@ def rigid_slopes_of(
     last, each = jax.lax.scan(strike, first, (strikes, reached))
     at = follow(last, end)
 
-    def fallen(a: RigidScene, y: RigidState) -> Scalar:
-        forward = ending == int(Ending.FELL_FORWARD)
-        return jnp.where(forward, -y.theta_2, y.theta_2) - FALL_ANGLE
+    def fallen(a: RigidScene, y: Any) -> Scalar:
+        side = jnp.where(ending == int(Ending.FELL_FORWARD), -1.0, 1.0)
+        return -uprightness(a, y, side)
 
     moves = event(fallen, at)
     struck = (count > 0) & (end <= strikes[jnp.maximum(count - 1, 0)])

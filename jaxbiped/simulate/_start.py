@@ -1,7 +1,7 @@
 """Start of a simulation, and what else is asked of it, checked."""
 
-import math
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import diffrax
@@ -22,12 +22,13 @@ from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._projection import check_independent
 from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
+from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._footfalls import touches
+from jaxbiped.dynamics._gaps import limits_of
 from jaxbiped.dynamics._redundant_motion import coordinates_of
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import BristleState, State, state_for
-from jaxbiped.scene._ground import AbstractClearance
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
+from jaxbiped.dynamics._state import state_for
+from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
 from jaxbiped.solve._failure_events import WATCHES
 
 _PRECISIONS = (np.float16, np.float32, np.float64)
@@ -36,6 +37,12 @@ _DEEPEST = 0.25
 """Penetration of a foot that touches, in units of l, from which it starts below the ground."""
 _HIGHEST = 100.0
 """Energy stored in a foot's contact, in units of m g l, from which it does."""
+
+
+_TOLD_DEPTH = 0.01
+"""Penetration of a foot that touches, in units of the walker's height, that is told."""
+_TOLD_ANGLE = 0.1
+"""Angle by which a stop is passed [rad] that is told."""
 
 
 class Options(NamedTuple):
@@ -136,7 +143,7 @@ def check_limits(
 ) -> None:
     """Raises `ArgumentError` for what cannot end a simulation."""
     if duration is None and footsteps is None:
-        raise ArgumentError("duration = None and footsteps = None: say how long to simulate.")
+        raise ArgumentError("duration = None and footsteps = None: give one of them.")
     if footsteps is not None:
         check_count("footsteps", footsteps)
     check_unbatched("duration", duration)
@@ -154,8 +161,8 @@ def check_steps(
     if dt is None:
         if isinstance(solver, diffrax.Euler):
             raise ArgumentError(
-                "dt = None is not allowed for solver = euler, whose steps have one size: give it "
-                "in seconds, such as dt = 1e-6."
+                "dt = None is not allowed for solver = euler, whose steps have a fixed size: give "
+                "it in seconds, such as dt = 1e-6."
             )
         return
     check_unbatched("dt", dt)
@@ -167,8 +174,8 @@ def check_steps(
         )
 
 
-def check_start_height(scene: Scene | RedundantScene, state: State | BristleState) -> None:
-    """Refuses a start below the ground, where all values are known.
+def check_start_height(scene: Scene | RedundantScene, state: Any) -> None:
+    """Refuses a start in minimal coordinates below the ground, where all values are known.
 
     The deepest that is allowed is l/4, and so deep that the contact stores what would throw the
     walker a hundred legs high, 100 m g l: contact so stiff is to be started near its surface.
@@ -176,47 +183,66 @@ def check_start_height(scene: Scene | RedundantScene, state: State | BristleStat
     Raises:
         ArgumentError: a deeper start.
     """
+    root = f"{scene.mechanism.structure.root}_z"
     leaves = jtu.tree_leaves((scene, state))
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+    if not hasattr(state, root) or any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
         return
     # Plain numbers: operations of JAX by themselves would be compiled one by one.
-    walker, g = jtu.tree_map(float, scene.walker), float(scene.ground.g)
-    lift, hip_z = walker.total_mass * g * walker.l, float(state.hip_z)
-    if hip_z <= 0.0:
+    mechanism = scene.mechanism
+    structure, length = mechanism.structure, float(mechanism.height)
+    lift = float(mechanism.total_mass) * float(scene.ground.g) * length
+    height = float(getattr(state, root))
+    if height <= 0.0:
         raise ArgumentError(
-            f"state.hip_z = {hip_z:g} is not allowed: the walker starts below the ground, its hip "
-            "under the surface; start higher."
+            f"state.{root} = {height:g} is not allowed: the walker starts below the ground, its "
+            f"{structure.root} under the surface; start higher."
         )
-    angles, rates = (state.theta_1, state.theta_2), (state.omega_1, state.omega_2)
-    depths = [walker.r - hip_z + walker.hip_to_foot * math.cos(float(angle)) for angle in angles]
-    if max(depths) <= 0.0:
-        return
-    given = scene.clearance, scene.normal, depths, rates
-    energies = _contact_energies(*jtu.tree_map(np.asarray, given))
-    stored, depth, leg = max(zip(map(float, energies), depths, (1, 2), strict=True))
-    if stored > 0.0 and (depth > _DEEPEST * walker.l or stored > _HIGHEST * lift > 0.0):
+    begun = _contacts_at(scene, state)
+    depths, energies, passed = (list(map(float, each)) for each in begun)
+    names = structure.feet_told
+    stored, depth, foot = max(zip(energies, depths, names, strict=True))
+    if stored > 0.0 and (depth > _DEEPEST * length or stored > _HIGHEST * lift > 0.0):
         raise ArgumentError(
-            f"state.hip_z = {hip_z:g} is not allowed: foot {leg} starts {depth:.3g} m below the "
+            f"state.{root} = {height:g} is not allowed: foot {foot} starts {depth:.3g} m below the "
             f"ground, where its contact stores {stored:.3g} J (m g l is {lift:.3g} J); it just "
-            f"touches at hip_z = {hip_z + depth:.9g}."
+            f"touches at {root} = {height + depth:.9g}."
         )
+    if stored > 0.0 and depth > _TOLD_DEPTH * length:
+        warnings.warn(
+            f"foot {foot} starts {depth:.3g} m below the ground; it just touches at "
+            f"{root} = {height + depth:.9g}.",
+            stacklevel=2,
+        )
+    if passed and max(passed) > _TOLD_ANGLE:
+        warnings.warn(
+            f"a stop is passed by {max(passed):.3g} rad at the start: begin within its limits.",
+            stacklevel=2,
+        )
+
+
+class _Begun(NamedTuple):
+    """Contacts at a start, in lists.
+
+    Attributes:
+        depths: of each foot [m].
+        energies: in its contact, 0 where it does not touch [J].
+        passed: how far each limit of a stop is passed [rad].
+    """
+
+    depths: list[Scalar]
+    energies: list[Scalar]
+    passed: list[Scalar]
 
 
 @cached_jit
-def _contact_energies(
-    clearance: AbstractClearance,
-    law: AbstractNormalLaw,
-    depths: Sequence[Scalar],
-    rates: Sequence[Scalar],
-) -> list[Scalar]:
-    """The energy in the contact of each foot, 0 where it does not touch [J]."""
-
-    def stored(leg: int, depth: Scalar, rate: Scalar) -> Scalar:
-        admitted = clearance.admits(leg, rate)
-        touches = (depth > 0.0) & (True if admitted is None else admitted)
-        return jnp.where(touches, law.elastic_energy(depth), 0.0)
-
-    return [stored(1, depths[0], rates[0]), stored(2, depths[1], rates[1])]
+def _contacts_at(scene: CompliantScene, state: PyTree) -> _Begun:
+    found = feet(scene, state)
+    energies = [
+        jnp.where(touches(foot), scene.normal.elastic_energy(foot.penetration), 0.0)
+        for foot in found
+    ]
+    passed = [limit.penetration for _, limit in limits_of(scene, state)]
+    return _Begun([foot.penetration for foot in found], energies, passed)
 
 
 def check_times(times: ArrayLike, duration: Scalar | float) -> None:

@@ -11,7 +11,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive
 from jaxbiped._types import RealScalarLike, Scalar
-from jaxbiped.scene._scene import CompliantScene, is_rigid
+from jaxbiped.scene._abstract_scene import is_rigid
+from jaxbiped.scene._scene import CompliantScene
 
 
 class Tolerances(NamedTuple):
@@ -105,7 +106,7 @@ def resolve_slip_speed(rtol: float, scene: PyTree) -> RealScalarLike:
     name = getattr(law, "builds_up_over", None)
     if name is None:
         return rtol
-    leaves = (getattr(law, name), scene.ground.g, scene.walker.l)
+    leaves = (getattr(law, name), scene.ground.g, scene.mechanism.height)
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
     xp: Any = jnp if traced else np  # where numbers are known nothing is compiled for them
     slow, g, l = (jax.lax.stop_gradient(leaf) if traced else np.asarray(leaf) for leaf in leaves)
@@ -163,10 +164,10 @@ def check_precision(scene: CompliantScene, dtype: np.dtype) -> None:
     leaves = jtu.tree_leaves(scene)
     if dtype == np.float64 or any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
         return
-    walker = scene.walker
-    stiffness = scene.normal.elastic_force(jnp.ones_like(walker.l))
-    rounding = stiffness * float(jnp.finfo(dtype).eps) * walker.l
-    worst = float(jnp.max(rounding / (walker.total_mass * scene.ground.g)))
+    mechanism = scene.mechanism
+    stiffness = scene.normal.elastic_force(jnp.ones_like(mechanism.height))
+    rounding = stiffness * float(jnp.finfo(dtype).eps) * mechanism.height
+    worst = float(jnp.max(rounding / (mechanism.total_mass * scene.ground.g)))
     if worst > 1.0:
         raise ArgumentError(
             f"dtype = {np.dtype(dtype).name} is too coarse for this contact: rounding a position "

@@ -1,8 +1,12 @@
-"""Failure events, which end a simulation, and the surfaces of the state on which endings lie."""
+"""Failure events, which end a simulation."""
 
-from collections.abc import Callable, Mapping
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
@@ -10,40 +14,98 @@ from jaxtyping import PyTree
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._contacts import Foot, feet, touches
+from jaxbiped.dynamics._contacts import feet, legs_at
 from jaxbiped.dynamics._energy import energies
-from jaxbiped.dynamics._minimal_motion import accelerations
+from jaxbiped.dynamics._footfalls import (
+    FootMotion,
+    any_of,
+    leg_places,
+    touches,
+    touching_legs,
+)
+from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.dynamics._state import RigidState, State
-from jaxbiped.scene._ground import StanceRotation
-from jaxbiped.scene._scene import Scene
+from jaxbiped.dynamics._strike_surfaces import FALL_ANGLE, lean, uprightness
+from jaxbiped.scene._ground import AbstractClearance, StanceRotation
+from jaxbiped.scene._mirror import with_fields
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._state_types import State
+from jaxbiped.scene._structure import Structure
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 
-FALL_ANGLE = 1.0
-"""A hip lower than a leg at this angle [rad] could carry it has fallen."""
 REST_RATE = 1e-4
 """Rate of a leg at rest, in units of √(g/l)."""
 _LOST_RATE = 0.1
 """Rate, in the same units, up to which a leg that turned back has just lost its ground."""
+_HAIR = 1e-3
+"""Height, in units of the walker's, under which a foot is about to touch."""
 REST_ENERGY = 1e-10
 """Kinetic energy of a walker at rest, in units of its weight times l."""
 STUMBLE_SPEED = 1e-3
 """Speed at which a rear foot comes down, in units of √(g l), from which it counts as a stumble."""
 
 
+def root_height(scene: Scene, state: State) -> Scalar:
+    """Height of the root point in a state [m]."""
+    found: Scalar = getattr(state, f"{scene.mechanism.structure.root}_z")
+    return found
+
+
 def fall_height(scene: Scene) -> Scalar:
-    """How high a leg at 1 rad could carry the hip [m]."""
-    return scene.walker.r + scene.walker.hip_to_foot * jnp.cos(FALL_ANGLE)
+    """How high a straight leg at 1 rad could carry the root point [m]."""
+    return scene.mechanism.height_over_feet(math.cos(FALL_ANGLE))
 
 
 def has_fallen(scene: Scene, state: State) -> Scalar:
-    """Whether the hip is lower than a leg at 1 rad could carry it (boolean)."""
-    return state.hip_z < fall_height(scene)
+    """Whether the root point is lower than a leg at 1 rad could carry it (boolean)."""
+    return root_height(scene, state) < fall_height(scene)
 
 
-def _energy_unit(scene: Scene) -> Scalar:
-    """The walker's weight times its leg's length [J]."""
-    return scene.walker.total_mass * scene.ground.g * scene.walker.l
+def rate_unit(scene: Scene) -> Scalar:
+    """√(g/l), by the root point's height l with all angles 0 [1/s]."""
+    return jnp.sqrt(scene.ground.g / scene.mechanism.height)
+
+
+def speed_unit(scene: Scene) -> Scalar:
+    """√(g l) [m/s]."""
+    return jnp.sqrt(scene.ground.g * scene.mechanism.height)
+
+
+def energy_unit(scene: Scene) -> Scalar:
+    """The walker's weight times that height [J]."""
+    mechanism = scene.mechanism
+    return mechanism.total_mass * scene.ground.g * mechanism.height
+
+
+class _Admitted(AbstractClearance):
+    """A rule by which one leg always touches, the others by another rule."""
+
+    rule: AbstractClearance
+    leg: str = eqx.field(static=True)
+
+    def admits(self, leg: str, leg_rate: Scalar) -> Scalar | bool | None:
+        return None if leg == self.leg else self.rule.admits(leg, leg_rate)
+
+
+def _turning_rate(scene: Scene, state: State, leg: int) -> Scalar:
+    """Rate of a leg's rate [rad/s²]."""
+    rates = vector_field(0.0, state, scene)
+    found: Scalar = jax.jvp(lambda y: legs_at(scene, y)[leg].rate, (state,), (rates,))[1]
+    return found
+
+
+def _at_turn(scene: Scene, state: State, leg: int) -> State:
+    """A state but for the rate of a leg, which is 0: its uppermost body turns otherwise."""
+    structure = scene.mechanism.structure
+    chain = structure.chains[structure.feet[structure.feet_of_leg[leg][0]]]
+    free = [body for body in chain if body in structure.free]
+    if not free:
+        return state
+    name = f"omega_{structure.bodies[free[0]]}"
+    zero = jnp.zeros_like(state[0])
+    along = type(state)(*[zero] * len(state))._replace(**{name: jnp.ones_like(zero)})
+    rate, share = jax.jvp(lambda y: legs_at(scene, y)[leg].rate, (state,), (along,))
+    return state._replace(**{name: getattr(state, name) - rate / share})
 
 
 @cached_jit  # for its trace cache
@@ -53,82 +115,105 @@ def is_barred(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
     Under the paper's clearance rule contact comes on when a swing leg turns back (θ̇ falls to
     zero). Where its foot is under the ground by then, the reaction is there at once, and may push
     the leg forward again, into the side where there is none: neither side lets it go on. The
-    first boolean: the foot is ahead of the other; the second: behind.
+    first boolean: the leg is ahead of all others; the second: it is not.
     """
-    never = jnp.zeros_like(state.hip_z, dtype=bool)
+    never = jnp.zeros_like(state[0], dtype=bool)
+    modelled = scene.minimal
     if not isinstance(scene.clearance, StanceRotation):
         return never, never
-    foot_1, foot_2 = feet(scene, state)
-    unit = jnp.sqrt(scene.ground.g / scene.walker.l)
+    structure, found = scene.mechanism.structure, feet(scene, state)
+    slow, legs = REST_RATE * rate_unit(scene), legs_at(scene, state)
+    turning = [
+        _is_under(structure, found, i) & (leg.rate >= 0.0) & (leg.rate < slow)
+        for i, leg in enumerate(legs)
+    ]
 
-    def turning(foot: Foot, rate: Scalar) -> Scalar:
-        return (foot.penetration > 0.0) & (rate >= 0.0) & (rate < REST_RATE * unit)
+    def attracted() -> tuple[Scalar, ...]:
+        barred = []
+        for i, name in enumerate(structure.legs):
+            rule = _Admitted(modelled.clearance, name)
+            touching = with_fields(modelled, clearance=rule)  # its ground may have a step
+            barred.append(
+                (_turning_rate(modelled, state, i) < 0.0)
+                & (_turning_rate(touching, _at_turn(scene, state, i), i) > 0.0)
+            )
+        return tuple(barred)
 
-    turning_1 = turning(foot_1, state.omega_1)
-    turning_2 = turning(foot_2, state.omega_2)
+    pushed = fusion_barrier(any_of(turning), attracted)
+    barred = [a & b for a, b in zip(turning, pushed, strict=True)]
+    places = leg_places(structure, found)
+    ahead = any_of([each & _is_first(places, i) for i, each in enumerate(barred)])
+    return ahead, any_of(barred) & ~ahead
 
-    def attracted() -> tuple[Scalar, Scalar]:
-        # Small enough for no force to feel it. Processors take very long over still smaller
-        # numbers' products, which have no leading digits.
-        barely_back = jnp.full_like(state.hip_z, -(jnp.finfo(state.hip_z.dtype).tiny ** 0.25))
-        off = accelerations(scene, state)
-        on_1 = accelerations(scene, state._replace(omega_1=barely_back))
-        on_2 = accelerations(scene, state._replace(omega_2=barely_back))
-        barred_1 = (off.alpha_1 < 0.0) & (on_1.alpha_1 > 0.0)
-        barred_2 = (off.alpha_2 < 0.0) & (on_2.alpha_2 > 0.0)
-        return barred_1, barred_2
 
-    attracted_1, attracted_2 = fusion_barrier(turning_1 | turning_2, attracted)
-    barred_1, barred_2 = turning_1 & attracted_1, turning_2 & attracted_2
-    first_ahead = foot_1.x > foot_2.x
-    ahead = (barred_1 & first_ahead) | (barred_2 & ~first_ahead)
-    return ahead, (barred_1 | barred_2) & ~ahead
+def _is_first(places: Sequence[Scalar], leg: int) -> Scalar:
+    """Whether a leg is ahead of all others (boolean)."""
+    first = jnp.ones_like(places[leg], dtype=bool)
+    for i, place in enumerate(places):
+        if i != leg:
+            # Of two that stand in one place the later one counts as ahead.
+            first = first & (places[leg] > place if i > leg else places[leg] >= place)
+    return first
+
+
+def _is_under(structure: Structure, found: Sequence[FootMotion], leg: int) -> Scalar:
+    """Whether a foot of a leg is under the ground (boolean)."""
+    return any_of([found[k].penetration > 0.0 for k in structure.feet_of_leg[leg]])
 
 
 @cached_jit  # for its trace cache
 def has_stopped(scene: Scene, state: State) -> Scalar:
-    """Whether the stance leg is at rest in single support, or all the walker is (boolean)."""
-    foot_1, foot_2 = feet(scene, state)
-    touch_1, touch_2 = touches(foot_1), touches(foot_2)
+    """Whether the leg that stands alone is at rest, or all the walker is (boolean)."""
+    structure, found = scene.mechanism.structure, feet(scene, state)
+    touching = touching_legs(structure, found)
     if not isinstance(scene.clearance, StanceRotation):
-        unit = _energy_unit(scene)
-        at_rest = energies(scene, state).kinetic < REST_ENERGY * unit
-        return (touch_1 | touch_2) & at_rest
-    unit = jnp.sqrt(scene.ground.g / scene.walker.l)
+        at_rest = energies(scene, state).kinetic < REST_ENERGY * energy_unit(scene)
+        return any_of(touching) & at_rest
+    # A foot that is put on the ground does not touch yet, but is about to.
+    hair = _HAIR * scene.mechanism.height
+    nearer = [foot._replace(penetration=foot.penetration + hair) for foot in found]
+    near = touching_legs(structure, nearer)
+    unit, stopped = rate_unit(scene), []
+    for i, leg in enumerate(legs_at(scene, state)):
+        alone = touching[i]
+        for k, other in enumerate(near):
+            alone = alone if k == i else alone & ~other
+        lost = _is_under(structure, found, i) & (leg.rate >= 0.0) & (leg.rate < _LOST_RATE * unit)
+        stopped += [alone & (leg.rate > -REST_RATE * unit), ~any_of(near) & lost]
+    return any_of(stopped)
 
-    def at_rest_on(carries: Scalar, other: Scalar, rate: Scalar) -> Scalar:
-        return carries & ~other & (rate > -REST_RATE * unit)
 
-    def lost(foot: Foot, rate: Scalar) -> Scalar:
-        return (foot.penetration > 0.0) & (rate >= 0.0) & (rate < _LOST_RATE * unit)
-
-    slow = at_rest_on(touch_1, touch_2, state.omega_1) | at_rest_on(touch_2, touch_1, state.omega_2)
-    sinking = lost(foot_1, state.omega_1) | lost(foot_2, state.omega_2)
-    return slow | (~touch_1 & ~touch_2 & sinking)
+def foot_pairs(structure: Structure) -> Iterator[tuple[int, int]]:
+    """Numbers of two feet of different legs."""
+    for i, j in itertools.permutations(range(len(structure.feet)), 2):
+        if structure.leg_of_foot[i] != structure.leg_of_foot[j]:
+            yield i, j
 
 
 @cached_jit  # for its trace cache
 def has_stumbled(scene: Scene, state: State) -> Scalar:
-    """Whether the rear foot comes down, moving forward, while the other carries (boolean)."""
-    foot_1, foot_2 = feet(scene, state)
-    unit = jnp.sqrt(scene.ground.g * scene.walker.l)
+    """Whether a rear foot comes down, moving forward, while another leg carries (boolean)."""
+    structure, found = scene.mechanism.structure, feet(scene, state)
+    least = STUMBLE_SPEED * speed_unit(scene)
 
-    def trips(rear: Foot, front: Foot) -> Scalar:
+    def trips(rear: FootMotion, front: FootMotion) -> Scalar:
         entering = rear.penetration_rate > jnp.maximum(front.penetration_rate, 0.0)
-        fast = rear.penetration_rate > STUMBLE_SPEED * unit
-        return (rear.x < front.x) & entering & fast & (rear.slip_speed > STUMBLE_SPEED * unit)
+        fast = (rear.penetration_rate > least) & (rear.slip_speed > least)
+        both = touches(rear) & touches(front)
+        return both & (rear.x < front.x) & entering & fast
 
-    both = touches(foot_1) & touches(foot_2)
-    return both & (trips(foot_1, foot_2) | trips(foot_2, foot_1))
+    tripped = [trips(found[i], found[j]) for i, j in foot_pairs(structure)]
+    return any_of([jnp.zeros_like(state[0], dtype=bool), *tripped])
 
 
-def rigid_ending(state: RigidState) -> Scalar:
+def rigid_ending(scene: RigidScene, state: Any) -> Scalar:
     """Code of the `Ending` that has come to a rigid walker, 0 where it goes on.
 
-    Its hip comes down as a compliant one's does: when the stance leg is 1 rad from upright.
+    Its root point comes down as a compliant one's does.
     """
-    code = jnp.where(state.theta_2 < -FALL_ANGLE, int(Ending.FELL_FORWARD), 0)
-    code = jnp.where(state.theta_2 > FALL_ANGLE, int(Ending.FELL_BACK), code)
+    side = jnp.sign(lean(scene, state))
+    falls = jnp.where(side < 0.0, int(Ending.FELL_FORWARD), int(Ending.FELL_BACK))
+    code = jnp.where(uprightness(scene, state, side) < 0.0, falls, 0)
     return jnp.where(jnp.isfinite(sum(state)), code, int(Ending.SOLVER_FAILED))
 
 
@@ -145,13 +230,19 @@ def _event(condition: Callable[[Scene, Any], Scalar]) -> Callable[..., Scalar]:
     return happens
 
 
+def _speed(scene: Scene, state: State) -> Scalar:
+    """Speed of the root point along the slope [m/s]."""
+    found: Scalar = getattr(state, f"{scene.mechanism.structure.root}_vx")
+    return found
+
+
 def _fell_forward(scene: Scene, y: State) -> Scalar:
     too_late, _ = is_barred(scene, y)
-    return too_late | (has_fallen(scene, y) & (y.hip_vx >= 0.0))
+    return too_late | (has_fallen(scene, y) & (_speed(scene, y) >= 0.0))
 
 
 def _fell_back(scene: Scene, y: State) -> Scalar:
-    return has_fallen(scene, y) & (y.hip_vx < 0.0)
+    return has_fallen(scene, y) & (_speed(scene, y) < 0.0)
 
 
 def _stumbled(scene: Scene, y: State) -> Scalar:
@@ -197,93 +288,3 @@ def ending_code(
     for name, happened in events.items():
         code = jnp.where(happened, int(name), code)
     return code
-
-
-def ending_surface(code: Scalar, scene: PyTree, end: PyTree, y: PyTree) -> Scalar:
-    """Rises through zero where a compliant walk comes to the ending of a `code`.
-
-    Of "walking" it is the last heel strike. Where several conditions make an ending, it is the one
-    that is met last. NaN for endings that no state decides.
-
-    Args:
-        code: of an `Ending`.
-        scene: what walks, in minimal or redundant coordinates.
-        end: a state just past the ending, which decides between causes of the same code.
-        y: the state of which the value is wanted.
-    """
-    minimal: PyTree = minimal_state(scene, y)
-    past: PyTree = minimal_state(scene, end)
-    both = feet(scene, y)
-    held = [_contact(scene, foot, rate) for foot, rate in zip(both, _rates(minimal), strict=True)]
-    feet_then = feet(scene, end)
-    fallen = fall_height(scene) - minimal.hip_z
-    barred = _turning(scene, both, minimal)
-    stumbled = _stumble(scene, both, held)
-    values = {
-        Ending.WALKING: jnp.where(feet_then.foot_1.x > feet_then.foot_2.x, held[0], held[1]),
-        Ending.FELL_FORWARD: jnp.where(has_fallen(scene, past), fallen, barred),
-        Ending.FELL_BACK: fallen,
-        Ending.STOPPED: _rest(scene, both, minimal, held),
-        Ending.STUMBLED: jnp.where(has_stumbled(scene, past), stumbled, barred),
-    }
-    found = jnp.full_like(fallen, jnp.nan)
-    for name, value in values.items():
-        found = jnp.where(code == int(name), value, found)
-    return found
-
-
-def _rates(state: PyTree) -> tuple[Scalar, Scalar]:
-    return state.omega_1, state.omega_2
-
-
-def _least(*values: Scalar) -> Scalar:
-    least = values[0]
-    for value in values[1:]:
-        least = jnp.minimum(least, value)
-    return least
-
-
-def _contact(scene: Scene, foot: Foot, rate: Scalar) -> Scalar:
-    """Above zero where a foot touches."""
-    if not isinstance(scene.clearance, StanceRotation):
-        return foot.penetration
-    return jnp.minimum(foot.penetration, -rate)
-
-
-def _turning(scene: Scene, both: tuple[Foot, Foot], state: PyTree) -> Scalar:
-    """Above zero where a leg whose foot is under the ground turns back; see `is_barred`."""
-    if not isinstance(scene.clearance, StanceRotation):
-        return jnp.full_like(state.hip_z, -jnp.inf)
-    slow = REST_RATE * jnp.sqrt(scene.ground.g / scene.walker.l)
-    legs = zip(both, _rates(state), strict=True)
-    first, second = (
-        jnp.where(rate < 0.0, -jnp.inf, _least(foot.penetration, slow - rate))
-        for foot, rate in legs
-    )
-    return jnp.maximum(first, second)
-
-
-def _rest(scene: Scene, both: tuple[Foot, Foot], state: PyTree, held: list[Scalar]) -> Scalar:
-    """Above zero where the leg that stands alone is at rest, or all the walker is."""
-    if not isinstance(scene.clearance, StanceRotation):
-        unit = _energy_unit(scene)
-        still = REST_ENERGY * unit - energies(scene, state).kinetic
-        return jnp.minimum(jnp.maximum(*held), still)
-    slow = REST_RATE * jnp.sqrt(scene.ground.g / scene.walker.l)
-    first, second = (
-        _least(foot.penetration, rate + slow, -held[1 - i])
-        for i, (foot, rate) in enumerate(zip(both, _rates(state), strict=True))
-    )
-    return jnp.maximum(first, second)
-
-
-def _stumble(scene: Scene, both: tuple[Foot, Foot], held: list[Scalar]) -> Scalar:
-    """Above zero where the rear foot comes down, moving forward, while the other carries."""
-    least = STUMBLE_SPEED * jnp.sqrt(scene.ground.g * scene.walker.l)
-
-    def trips(rear: Foot, front: Foot) -> Scalar:
-        entering = rear.penetration_rate - jnp.maximum(front.penetration_rate, 0.0)
-        fast = _least(rear.penetration_rate - least, rear.slip_speed - least)
-        return _least(*held, front.x - rear.x, entering, fast)
-
-    return jnp.maximum(trips(*both), trips(both[1], both[0]))

@@ -1,136 +1,50 @@
 """Steps of the rigid walker: explicit Runge–Kutta in single support, ended by impacts."""
 
-from typing import NamedTuple
+from typing import Any
 
+import jax
 import jax.numpy as jnp
 
-from jaxbiped._circular import sine_cosine
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._state import RigidState
-from jaxbiped.scene._scene import RigidScene
+from jaxbiped.dynamics._mode_changes import SLACK, change_mode
+from jaxbiped.dynamics._rolling import rolling_rates
+from jaxbiped.dynamics._strike_surfaces import lean
 from jaxbiped.solve._failure_events import rigid_ending
+from jaxbiped.solve._mode_steps import (
+    ModeEvents,
+    course_of,
+    mode_events,
+    onto_surface,
+)
+from jaxbiped.solve._rigid_progress import (
+    ModeProgress,
+    RigidProgress,
+    RigidWalk,
+    root_place,
+    shifted,
+)
 from jaxbiped.solve._rolling_step import (
     NEAR,
     Rates,
     StepOnto,
-    accelerations,
+    advance,
     euler_step_onto,
     events_within,
     rolling_step,
+    with_changes,
 )
 
 _SAFETY, _MOST_SHRINK, _MOST_GROWTH = 0.8, 0.2, 5.0
-_FIRST_STEP = 0.03
-"""First step, in units of √(l/g)."""
 _ROUNDING = 1e-14
 """Shortest step, as a share of the time."""
 _STRETCH = 1.15
 """By how much a step may be longer than chosen to end where a strike is due."""
+_LANDED = 1e-3
+"""How near a landing comes to where a load is zero, in units of the tolerance."""
 _MOST_LANDINGS = 12
 """Newton steps onto a heel strike or a fall, after which it counts as missed."""
-
-
-class RigidWalk(NamedTuple):
-    """One walk's inputs; every leaf a floating-point number.
-
-    Attributes:
-        scene, state: what walks, and from where.
-        duration: simulated time [s].
-        footsteps: heel strikes after which to end, 0 for no limit.
-        rtol: relative tolerance; the absolute one (SI) is a hundredth of it.
-        max_attempts: cap on the attempted steps.
-    """
-
-    scene: RigidScene
-    state: RigidState
-    duration: Scalar
-    footsteps: Scalar
-    rtol: Scalar
-    max_attempts: Scalar
-
-
-class RigidProgress(NamedTuple):
-    """What is carried from one attempted step to the next.
-
-    Attributes:
-        t, state: so far; hip_x is where the hip is, was or would be with the stance leg upright,
-            which changes at strikes alone. `state_with_hip` gives the hip's own.
-        rates: angular accelerations of both legs there [rad/s²].
-        step: to attempt next [s]; negative while a heel strike or a fall is landed on from beyond.
-        pace: the last free step, with which the next footstep begins.
-        strike, period: time of the last heel strike, and since the one before it [s].
-        due: when the next one is expected [s]; infinite while footsteps differ in their periods.
-        landing: number of Newton steps onto a heel strike or a fall, 0 in free motion.
-        falling: whether that is a fall.
-        struck: whether the last attempt ended by a heel strike.
-        footsteps: how many so far.
-        grazes: steps so far of which the tolerance does not tell whether the foot came down.
-        accepted, rejected: attempted steps so far, by what became of them.
-        code: of the `Ending` that came, 0 for none.
-    """
-
-    t: Scalar
-    state: RigidState
-    rates: tuple[Scalar, Scalar]
-    step: Scalar
-    pace: Scalar
-    strike: Scalar
-    period: Scalar
-    due: Scalar
-    landing: Scalar
-    falling: Scalar
-    struck: Scalar
-    footsteps: Scalar
-    grazes: Scalar
-    accepted: Scalar
-    rejected: Scalar
-    code: Scalar
-
-
-def initial_progress(walk: RigidWalk) -> RigidProgress:
-    """Before the first step."""
-    zero = jnp.zeros_like(walk.duration)
-    none = jnp.zeros((), dtype=jnp.int64)
-    step = _FIRST_STEP * jnp.sqrt(walk.scene.walker.l / walk.scene.ground.g)
-    step = jnp.minimum(step, walk.duration)
-    no = jnp.asarray(False)
-    rates = accelerations(walk.scene, walk.state)
-    upright = walk.state._replace(
-        hip_x=walk.state.hip_x + _rolled_distance(walk, walk.state.theta_2)
-    )
-    never = jnp.full_like(zero, jnp.inf)
-    return RigidProgress(
-        t=zero,
-        state=upright,
-        rates=rates,
-        step=step,
-        pace=step,
-        strike=zero,
-        period=never,
-        due=never,
-        landing=none,
-        falling=no,
-        struck=no,
-        footsteps=none,
-        grazes=none,
-        accepted=none,
-        rejected=none,
-        code=none,
-    )
-
-
-def state_with_hip(walk: RigidWalk, now: RigidProgress) -> RigidState:
-    """The state with the hip where it is."""
-    state = now.state
-    return state._replace(hip_x=state.hip_x - _rolled_distance(walk, state.theta_2))
-
-
-def _rolled_distance(walk: RigidWalk, angle: Scalar) -> Scalar:
-    """How far the hip goes from a stance leg at this angle to one that is upright [m]."""
-    walker = walk.scene.walker
-    return walker.hip_to_foot * sine_cosine(angle)[0] + walker.r * angle
 
 
 def attempt_step(
@@ -144,15 +58,31 @@ def attempt_step(
     trial, error, roughly = rolling_step(
         walk.scene, now.state, now.rates, now.step, walk.rtol, embedded=embedded
     )
-    onto = euler_step_onto(now.falling, trial, roughly, walk.rtol)
-    free, kept = _after_free_step(walk, now, trial, error, roughly, onto, lands_on_falls)
+    onto = euler_step_onto(walk.scene, now.falling, trial, roughly, walk.rtol)
+    course = changes = None
+    if now.modes is not None:
+        course = course_of(walk.scene, trial)
+        length = _length(error)
+        changes = mode_events(now.step, now.modes.course, course, walk.rtol, length)
+        surface = onto_surface(course, now.modes.changing - 1, walk.rtol)
+        there = advance(trial, surface.rest, [1.0], [roughly])
+        own = onto._replace(near=surface.near, rest=surface.rest, state=there)
+        onto = select(now.modes.changing > 0, own, onto)
+    free, kept = _after_free_step(walk, now, trial, error, roughly, onto, lands_on_falls, changes)
     landing = now.landing > 0
-    after = select(landing, _landing(now, trial, onto), free)
-    strike = _strike(walk, onto)
+    after = select(landing, _landing(walk, now, trial, onto), free)
+    if now.modes is None:
+        strike = _strike(walk, onto)
+    else:  # with stops an impact is much work
+        strike = jax.lax.cond(after.struck, lambda: _strike(walk, onto), lambda: onto.state)
     after = select(after.struck, _after_strike(walk, after, onto, strike), after)
-    # The last stage is the first one of the next step, after an impact from the new state.
-    rates = accelerations(walk.scene, select(after.struck, strike, trial))
     accepted = landing | kept
+    there = select(after.struck, strike, trial)
+    if now.modes is not None:
+        after = _after_change(walk, after, onto, select(accepted, course, now.modes.course))
+        there = after.state
+    # The last stage is the first one of the next step, after an impact from the new state.
+    rates = rolling_rates(walk.scene, there)
     rates = select(accepted, rates, now.rates)
     one = jnp.where(accepted, 1, 0)
     after = after._replace(
@@ -173,21 +103,54 @@ def ending_of(walk: RigidWalk, now: RigidProgress, waits: Scalar) -> Scalar:
     return jnp.where(late, int(Ending.TIMED_OUT), now.code)
 
 
-def _strike(walk: RigidWalk, onto: StepOnto) -> RigidState:
-    """The state after a heel strike: the hip stays where it is, over another leg."""
+def _strike(walk: RigidWalk, onto: StepOnto) -> Any:
+    """The state after a heel strike: the root point stays where it is, over another leg."""
     at = onto.state
-    rolled = _rolled_distance(walk, at.theta_1) - _rolled_distance(walk, at.theta_2)
-    return impact(walk.scene, at).state._replace(hip_x=at.hip_x + rolled)
+    after = impact(walk.scene, at).state
+    return shifted(after, root_place(walk, at) - root_place(walk, after))
+
+
+def _after_change(
+    walk: RigidWalk, trial: RigidProgress, onto: StepOnto, course: Any
+) -> RigidProgress:
+    """After the change of mode beside a trial; with its surfaces, wherever the walk is now."""
+    assert trial.modes is not None
+    changed = trial.modes.changed
+    slack = jnp.maximum(SLACK, walk.rtol)
+    state = jax.lax.cond(
+        changed,
+        lambda: change_mode(walk.scene, onto.state, slack, _LANDED * slack),
+        lambda: trial.state,
+    )
+    # Where another foot of its leg stands the place is told from that one.
+    moved = root_place(walk, onto.state) - root_place(walk, state)
+    state = shifted(state, jnp.where(changed, moved, 0.0))
+    t = jnp.where(changed, trial.t + onto.rest, trial.t)
+    step = _step(walk, t, trial.pace, trial.due, trial.period)
+    modes = ModeProgress(
+        course=jax.lax.cond(
+            trial.struck | changed, lambda: course_of(walk.scene, state), lambda: course
+        ),
+        changing=jnp.where(changed, 0, trial.modes.changing),
+        changed=changed,
+        begin=trial.modes.begin,
+    )
+    return trial._replace(
+        t=t,
+        state=state,
+        step=jnp.where(changed, step, trial.step),
+        landing=jnp.where(changed, 0, trial.landing),
+        modes=modes,
+    )
 
 
 def _after_strike(
-    walk: RigidWalk, trial: RigidProgress, onto: StepOnto, state: RigidState
+    walk: RigidWalk, trial: RigidProgress, onto: StepOnto, state: Any
 ) -> RigidProgress:
     """After the strike beside a trial. Where footsteps last alike, the next one is known."""
     t = trial.t + onto.rest
     period = t - trial.strike
-    rate = trial.state.omega_1 + trial.state.omega_2
-    change_of_rest = jnp.abs(period - trial.period) * jnp.abs(rate)
+    change_of_rest = jnp.abs(period - trial.period) * jnp.abs(onto.closing)
     steady = change_of_rest <= 2.0 * NEAR * jnp.sqrt(walk.rtol)
     due = jnp.where(steady, t + period, jnp.inf)
     return trial._replace(
@@ -209,22 +172,29 @@ def _step(walk: RigidWalk, t: Scalar, pace: Scalar, due: Scalar, period: Scalar)
     return jnp.minimum(jnp.where(hits, left, pace), walk.duration - t)
 
 
+def _length(error: Scalar) -> Scalar:
+    """Of a step in units of the one whose error is the tolerance: the eighth root of the error."""
+    return jnp.sqrt(jnp.sqrt(jnp.sqrt(jnp.maximum(error, 1e-10))))
+
+
 def _after_free_step(
     walk: RigidWalk,
     now: RigidProgress,
-    trial: RigidState,
+    trial: Any,
     error: Scalar,
     rates: Rates,
     onto: StepOnto,
     lands_on_falls: bool,
+    changes: ModeEvents | None,
 ) -> tuple[RigidProgress, Scalar]:
     """After a step in single support: whether a heel strike or a fall lies in it or beside it.
 
-    Also whether the step is kept. `rates` are those of the trial, roughly.
+    Or a change of mode; what comes first is landed on. Also whether the step is kept. `rates` are
+    those of the trial, roughly.
     """
-    # As the step to which the error is a unit: its eighth root, for the order is 8.
-    length = jnp.sqrt(jnp.sqrt(jnp.sqrt(jnp.maximum(error, 1e-10))))
+    length = _length(error)
     happens = events_within(
+        walk.scene,
         now.step,
         (now.state, now.rates),
         (trial, rates),
@@ -232,19 +202,32 @@ def _after_free_step(
         length=length,
         begins_on_section=(now.footsteps > 0) & (now.t <= now.strike),
     )
-    fallen = rigid_ending(now.state)
+    grazes = happens.grazes
+    if changes is not None:
+        happens = with_changes(happens, changes)
+        grazes = happens.grazes | changes.grazes
+    fallen = rigid_ending(walk.scene, now.state)
     keep = (error <= 1.0) & ~happens.unclear & (fallen == 0)
     t = jnp.where(keep, now.t + now.step, now.t)
-    beside = onto.near & (trial.theta_1 > trial.theta_2) & (t + onto.rest <= walk.duration)
+    beside = onto.near & onto.ahead & (t + onto.rest <= walk.duration)
     struck = keep & beside & happens.above & ~happens.grazes & ~happens.falls
-    lands = keep & (happens.strikes | (happens.falls & lands_on_falls)) & ~struck
+    lands = happens.strikes | (happens.falls & lands_on_falls)
+    modes = now.modes
+    if changes is not None and modes is not None:
+        struck, lands = struck & ~happens.changes, lands | happens.changes
+        modes = modes._replace(
+            changing=jnp.where(keep & happens.changes, 1 + changes.which, 0),
+            changed=jnp.zeros_like(struck),
+        )
+    lands = keep & lands & ~struck
     pace = now.step * jnp.clip(_SAFETY / length, _MOST_SHRINK, _MOST_GROWTH)
     # A step that is too long to tell what happens within it is tried again at half the length.
     pace = jnp.where(happens.unclear & (error <= 1.0), 0.5 * now.step, pace)
     back = now.step * (happens.place - 1.0)
     lost = ~jnp.isfinite(pace) | (pace <= _ROUNDING * t)
     if not lands_on_falls:
-        fallen = jnp.where(keep, rigid_ending(trial), fallen)
+        ends = keep if changes is None else keep & ~happens.changes
+        fallen = jnp.where(ends, rigid_ending(walk.scene, trial), fallen)
         t = jnp.where(keep & happens.falls, t + back, t)
     after = now._replace(
         t=t,
@@ -254,23 +237,33 @@ def _after_free_step(
         landing=jnp.where(lands, 1, 0),
         falling=lands & happens.falls,
         struck=struck,
-        grazes=now.grazes + jnp.where(keep & happens.grazes, 1, 0),
+        grazes=now.grazes + jnp.where(keep & grazes, 1, 0),
         code=jnp.where(lost, int(Ending.SOLVER_FAILED), fallen).astype(now.code.dtype),
+        modes=modes,
     )
     return after, keep
 
 
-def _landing(now: RigidProgress, trial: RigidState, onto: StepOnto) -> RigidProgress:
+def _landing(walk: RigidWalk, now: RigidProgress, trial: Any, onto: StepOnto) -> RigidProgress:
     """After a step back towards an event: Newton's method goes on, or it has come."""
     missed = ~onto.near & (now.landing >= _MOST_LANDINGS)
-    falls = now.falling & onto.near
-    code = jnp.where(trial.theta_2 < 0.0, int(Ending.FELL_FORWARD), int(Ending.FELL_BACK))
+    falls, lands, modes = now.falling & onto.near, onto.near & ~now.falling, now.modes
+    if modes is not None:
+        changing = modes.changing > 0
+        lands = lands & ~changing
+        modes = modes._replace(changed=onto.near & changing)
+    # What looked like a strike from afar may be two legs that pass each other.
+    struck = lands & onto.ahead
+    passes = lands & ~onto.ahead
+    t = now.t + now.step
+    code = jnp.where(lean(walk.scene, trial) < 0.0, int(Ending.FELL_FORWARD), int(Ending.FELL_BACK))
     code = jnp.where(falls, code, jnp.where(missed, int(Ending.SOLVER_FAILED), now.code))
     return now._replace(
-        t=now.t + now.step + jnp.where(falls, onto.rest, 0.0),
+        t=t + jnp.where(falls, onto.rest, 0.0),
         state=select(falls, onto.state, trial),
-        step=onto.rest,
-        landing=now.landing + 1,
-        struck=onto.near & ~now.falling,
+        step=jnp.where(passes, _step(walk, t, now.pace, now.due, now.period), onto.rest),
+        landing=jnp.where(passes, 0, now.landing + 1),
+        struck=struck,
         code=code,
+        modes=modes,
     )

@@ -1,29 +1,39 @@
 """Rolling step: single support of the rigid walker by Dormand and Prince's method of order 8.
 
-Heel strikes and falls within it are located on its interpolant. A heel strike is where the opening,
-the sum of the leg angles, falls through zero while the swing leg is ahead. Both are asked at the
-root: a leg that swings back fast has struck and is behind again by the end of a step.
+Heel strikes and falls within it are located on its interpolant. A heel strike is where the opening
+falls through zero while the swing foot is ahead. Both are asked at the root: a leg that swings back
+fast has struck and is behind again by the end of a step.
 """
 
 import functools
 import operator
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import diffrax
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._rolling import rolling_rates
-from jaxbiped.dynamics._state import RigidState
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._strike_surfaces import (
+    Surface,
+    lead,
+    lean,
+    opening,
+    surface_along,
+    uprightness,
+)
 from jaxbiped.scene._scene import RigidScene
-from jaxbiped.solve._failure_events import FALL_ANGLE
+from jaxbiped.solve._mode_steps import ModeEvents
 from jaxbiped.solve._step_polynomials import Quintic
 
 _TABLEAU = diffrax.Dopri8.tableau
-Rates = tuple[Scalar, Scalar, Scalar, Scalar]
+_STAGES = np.zeros((len(_TABLEAU.a_lower) - 1, len(_TABLEAU.a_lower)))
+for _row, _weights in zip(_STAGES, _TABLEAU.a_lower[:-1], strict=True):
+    _row[: len(_weights)] = _weights
+Rates = tuple[Scalar, ...]
 """Rates of the angles and of their rates."""
 _INTERPOLATED = 2.0
 """Largest error of the interpolated opening [rad], as measured, over a step whose own error is the
@@ -39,13 +49,13 @@ _ON_SECTION = 1e-12
 
 def rolling_step(
     scene: RigidScene,
-    state: RigidState,
-    at_start: tuple[Scalar, Scalar],
+    state: Any,
+    at_start: tuple[Scalar, ...],
     step: Scalar,
     rtol: Scalar,
     *,
     embedded: bool = False,
-) -> tuple[RigidState, Scalar, Rates]:
+) -> tuple[Any, Scalar, Rates]:
     """The state a step further, its error in units of the tolerance, and its rates, roughly.
 
     `at_start` are the angular accelerations at the start. The place along the slope stays. Of the
@@ -53,68 +63,50 @@ def rolling_step(
     whether to go on with the embedded solution of order 7, by which the error is estimated: another
     method of steps, which a witness of errors takes.
     """
-    stages: list[Rates] = [(state.omega_1, state.omega_2, *at_start)]
-    for row in _TABLEAU.a_lower[:-1]:
-        at = advance(state, step, row, stages)
-        stages.append((at.omega_1, at.omega_2, *accelerations(scene, at)))
+    count = len(at_start)
+    turning = slice(1 + count, 1 + 2 * count)
+    found = jnp.stack([*state[turning], *at_start])
+    found = jnp.pad(found[None], ((0, len(_STAGES)), (0, 0)))
+
+    def stage(found: Scalar, each: Any) -> tuple[Scalar, None]:
+        row, here = each
+        at = advance(state, step, list(row), [tuple(rates) for rates in found])
+        rates = jnp.stack([*at[turning], *rolling_rates(scene, at)])
+        return jnp.where(here[:, None], rates, found), None
+
+    # A loop, which XLA compiles once; lanes write it out, without what is multiplied by zero.
+    here = np.eye(len(_STAGES) + 1, dtype=bool)[1:]
+    found, _ = jax.lax.scan(stage, found, (_STAGES.astype(step.dtype), here))
+    stages: list[Rates] = [tuple(row) for row in found]
     weights = _TABLEAU.b_sol - _TABLEAU.b_error if embedded else _TABLEAU.b_sol
     end = advance(state, step, weights[:-1], stages)
     share = jnp.zeros_like(step)
-    for i, (a, b) in enumerate(zip(recurring_leaves(state), recurring_leaves(end), strict=True)):
+    ends = list(zip(state[1 : 1 + 2 * count], end[1 : 1 + 2 * count], strict=True))
+    for i, (a, b) in enumerate(ends):
         error = step * _weighted(_TABLEAU.b_error[:-1], stages, i)
         size = rtol * (0.01 + jnp.maximum(jnp.abs(a), jnp.abs(b)))
         share = share + (error / size) ** 2
-    error = jnp.sqrt(0.25 * share)
+    error = jnp.sqrt(share / len(ends))
     return end, jnp.where(jnp.isnan(error), jnp.inf, error), stages[-1]
 
 
-def accelerations(scene: RigidScene, state: RigidState) -> tuple[Scalar, Scalar]:
-    """Angular accelerations of swing leg and stance leg [rad/s²]."""
-    motion = rolling_rates(scene, state)
-    return motion.alpha_1, motion.alpha_2
-
-
 def advance(
-    state: RigidState, step: Scalar, weights: Sequence[float] | np.ndarray, stages: list[Rates]
-) -> RigidState:
+    state: Any, step: Scalar, weights: Sequence[Any] | np.ndarray, stages: list[Rates]
+) -> Any:
     """The state a step further, at weighted rates of its angles and of their rates."""
-    old = recurring_leaves(state)
-    new = (leaf + step * _weighted(weights, stages, i) for i, leaf in enumerate(old))
-    return RigidState(state.hip_x, *new)
+    count = len(stages[0])
+    new = (state[1 + i] + step * _weighted(weights, stages, i) for i in range(count))
+    return type(state)(state[0], *new, *state[1 + count :])
 
 
-def _weighted(weights: Sequence[float] | np.ndarray, stages: list[Rates], i: int) -> Scalar:
+def _weighted(weights: Sequence[Any] | np.ndarray, stages: list[Rates], i: int) -> Scalar:
     pairs = zip(weights, stages, strict=True)
-    terms = [float(weight) * stage[i] for weight, stage in pairs if weight != 0.0]
+    terms = [
+        (weight if isinstance(weight, jax.Array) else float(weight)) * stage[i]
+        for weight, stage in pairs
+        if isinstance(weight, jax.Array) or weight != 0.0
+    ]
     return functools.reduce(operator.add, terms)
-
-
-class Surface(NamedTuple):
-    """How far a state is from where something happens, and how fast that changes.
-
-    Attributes:
-        value: above zero before it [rad].
-        rate, curvature: its first two derivatives with respect to time.
-    """
-
-    value: Scalar
-    rate: Scalar
-    curvature: Scalar
-
-
-def opening(state: RigidState, rates: tuple[Scalar, ...]) -> Surface:
-    """Sum of the leg angles: above zero while the swing foot ahead is off the ground.
-
-    `rates` end with the accelerations of both legs.
-    """
-    return Surface(
-        state.theta_1 + state.theta_2, state.omega_1 + state.omega_2, rates[-2] + rates[-1]
-    )
-
-
-def uprightness(state: RigidState, rates: tuple[Scalar, ...], side: Scalar) -> Surface:
-    """What is left of the stance leg's angle before the walker has fallen, to this side (±1)."""
-    return Surface(FALL_ANGLE - side * state.theta_2, -side * state.omega_2, -side * rates[-1])
 
 
 class StepEvents(NamedTuple):
@@ -126,6 +118,7 @@ class StepEvents(NamedTuple):
         unclear: whether the step is too long to tell.
         above: whether it begins before a strike, not under the ground.
         grazes: whether it depends on less than the opening is known to.
+        changes: whether the mode changes, before anything else does.
     """
 
     strikes: Scalar
@@ -134,12 +127,29 @@ class StepEvents(NamedTuple):
     unclear: Scalar
     above: Scalar
     grazes: Scalar
+    changes: Scalar | bool = False
+
+
+def with_changes(happens: StepEvents, changes: ModeEvents) -> StepEvents:
+    """With changes of the mode; what comes behind the first of them does not happen."""
+    happens_at_all = happens.strikes | happens.falls
+    first = changes.crosses & (~happens_at_all | (changes.place <= happens.place))
+    return StepEvents(
+        strikes=happens.strikes & ~first,
+        falls=happens.falls & ~first,
+        place=jnp.where(first, changes.place, happens.place),
+        unclear=happens.unclear | changes.unclear,
+        above=happens.above,
+        grazes=happens.grazes & ~first,
+        changes=first,
+    )
 
 
 def events_within(
+    scene: RigidScene,
     step: Scalar,
-    before: tuple[RigidState, tuple[Scalar, Scalar]],
-    after: tuple[RigidState, Rates],
+    before: tuple[Any, tuple[Scalar, ...]],
+    after: tuple[Any, Rates],
     *,
     rtol: Scalar,
     length: Scalar,
@@ -148,16 +158,20 @@ def events_within(
     """What happens within a step.
 
     Args:
+        scene: what walks.
         step: its length [s].
-        before, after: states at both ends, and the legs' accelerations there.
+        before, after: states at both ends, and rates there that end with the accelerations.
         rtol: relative tolerance.
         length: its length in units of the one whose error is the tolerance.
         begins_on_section: whether it begins with a heel strike (boolean).
     """
-    foot = Quintic.of(step, opening(*before), opening(*after))
-    lead = Quintic.of(step, _lead(*before), _lead(*after))
-    side = jnp.sign(after[0].theta_2)
-    upright = Quintic.of(step, uprightness(*before, side), uprightness(*after, side))
+
+    def course(function: Callable[[RigidScene, Any], Scalar]) -> Quintic:
+        return Quintic.of(step, _along(scene, function, *before), _along(scene, function, *after))
+
+    foot, front = course(opening), course(lead)
+    side = jnp.sign(lean(scene, after[0]))
+    upright = course(functools.partial(uprightness, side=side))
     outside = upright.control[-1] <= 0.0
     begins_on_section = begins_on_section | (jnp.abs(foot.control[0]) <= _ON_SECTION)
     root = jnp.sqrt(rtol)
@@ -169,11 +183,12 @@ def events_within(
     comes_down = above & (foot.control[-1] <= 0.0)
     place = select(outside, upright, foot).root()
     _, slope, curvature = foot.derivatives(place)
-    ahead, _, _ = lead.derivatives(place)
+    ahead, drift, _ = front.derivatives(place)
     # So near to where it turns, or to both legs in line, that it may not come down at all.
     barely = slope * slope <= 2.0 * width * jnp.abs(curvature)
-    barely = barely | (jnp.abs(ahead) <= 2.0 * width)
-    leads = functools.reduce(jnp.maximum, lead.control) > -width
+    slope, drift = jnp.abs(slope), jnp.abs(drift)
+    barely = barely | (slope * jnp.abs(ahead) <= width * (slope + drift))
+    leads = functools.reduce(jnp.maximum, front.control) > -width
     open_ = leads & ((perhaps & ~several) | (comes_down & barely & ~outside))
     open_ = open_ | (tilts & ~falls_and_rises)
     unclear = leads & (several | (comes_down & (begins_on_section | outside)))
@@ -196,22 +211,39 @@ class StepOnto(NamedTuple):
         near: whether one Euler step leads there.
         rest: its length [s], which may lie behind.
         state: there.
+        closing: how fast what is landed on changes at the trial [rad/s].
+        ahead: whether the swing foot is ahead there.
     """
 
     near: Scalar
     rest: Scalar
-    state: RigidState
+    state: Any
+    closing: Scalar
+    ahead: Scalar
 
 
-def euler_step_onto(falling: Scalar, trial: RigidState, rates: Rates, rtol: Scalar) -> StepOnto:
+def euler_step_onto(
+    scene: RigidScene, falling: Scalar, trial: Any, rates: Rates, rtol: Scalar
+) -> StepOnto:
     """From a trial with these rates, roughly, onto a fall where it is `falling`, else a strike."""
-    fall = uprightness(trial, rates, jnp.sign(trial.theta_2))
-    surface = select(falling, fall, opening(trial, rates))
+    fall = functools.partial(uprightness, side=jnp.sign(lean(scene, trial)))
+    surface = select(
+        falling, _along(scene, fall, trial, rates), _along(scene, opening, trial, rates)
+    )
     rest = -surface.value / jnp.where(surface.rate == 0.0, 1.0, surface.rate)
     near = jnp.abs(surface.value) <= NEAR * jnp.sqrt(rtol)
     near = near & (surface.rate < 0.0)
     near = near & (jnp.abs(surface.curvature) * rest * rest <= 0.4 * NEAR * rtol)
-    return StepOnto(near, rest, advance(trial, rest, [1.0], [rates]))
+    there = advance(trial, rest, [1.0], [rates])
+    return StepOnto(near, rest, there, surface.rate, lead(scene, there) > 0.0)
+
+
+def _along(
+    scene: RigidScene, function: Callable[..., Scalar], state: Any, rates: Sequence[Scalar]
+) -> Surface:
+    """A function of scene and state in a motion whose rates end with the accelerations."""
+    count = len(scene.mechanism.structure.free)
+    return surface_along(functools.partial(function, scene), state, tuple(rates[-count:]))
 
 
 def _turns(course: Quintic, width: Scalar, from_second: Scalar) -> tuple[Scalar, Scalar]:
@@ -219,10 +251,3 @@ def _turns(course: Quintic, width: Scalar, from_second: Scalar) -> tuple[Scalar,
     high = course.sign_changes(width, from_second=from_second)
     low = course.sign_changes(-width, from_second=from_second)
     return jnp.minimum(high, low) > 1, jnp.maximum(high, low) > 1
-
-
-def _lead(state: RigidState, rates: tuple[Scalar, ...]) -> Surface:
-    """How far the swing leg is ahead."""
-    return Surface(
-        state.theta_1 - state.theta_2, state.omega_1 - state.omega_2, rates[-2] - rates[-1]
-    )

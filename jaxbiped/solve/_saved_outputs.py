@@ -9,10 +9,12 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._contacts import feet, standing_foot
+from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._footfalls import standing_leg
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import State, exchange_legs
+from jaxbiped.dynamics._symmetry import exchange_legs, images
 from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._state_types import State
 from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, RosenbrockInterpolation
 
@@ -38,8 +40,8 @@ class LastStep(NamedTuple):
     It is where it was accepted, or where there is a section, where there is an arrival within it.
 
     Attributes:
-        foot: that of the last arrival, in the names of the arrival foot 2; at the start the one
-            that stands alone, 0 for none. None without a section, as is `rise`.
+        leg: number of the last arrival's, from 1 on; at the start that which stands alone, 0 for
+            none. None without a section, as is `rise`.
         rise: where the arrival lies.
     """
 
@@ -47,7 +49,7 @@ class LastStep(NamedTuple):
     t: Scalar
     state: State
     coefficients: tuple[State, ...]
-    foot: Scalar | None = None
+    leg: Scalar | None = None
     rise: Rise | None = None
 
     def course(
@@ -86,7 +88,7 @@ class Saved(NamedTuple):
         rows = tuple([nothing] * len(solver.tableau.dense))
         if self.section is None:
             return LastStep(none, zero, nothing, rows)
-        stands = jnp.asarray(standing_foot(feet(scene, state)))
+        stands = jnp.asarray(standing_leg(scene.mechanism.structure, feet(scene, state)))
         return LastStep(none, zero, nothing, rows, stands, Rise(none, zero, zero))
 
     def following(
@@ -108,23 +110,26 @@ class Saved(NamedTuple):
         t, start = began
         if self.section is None:
             return LastStep(keep, t, start, dense)
-        assert last.foot is not None
+        assert last.leg is not None
         course = solver.interpolation_cls(
             t0=t, t1=ended[0], y0=start, y1=ended[1], coefficients=dense
         )
         # The first step of a solve never counts, so it may start on its section.
         counts = keep & moving
+        legs = [1 + leg for leg in scene.mechanism.structure.namings]
+        alternates = self.section.alternates and len(legs) > 1
         rises = []
-        for number in (1, 2):
-            rise = _rise(self.section, scene, course, exchanged=number == 1)
-            other = (last.foot != number) | (not self.section.alternates)
+        for times, number in reversed(list(enumerate(legs))):
+            rise = _rise(self.section, scene, course, times)
+            other = (last.leg != number) | (not alternates)
             rises.append(rise._replace(happens=rise.happens & counts & other))
-        first, second = rises
-        by_first = first.happens & ~(second.happens & (second.until < first.until))
-        rise = select(by_first, first, second)
-        arrived = jnp.where(by_first, 1, 2).astype(last.foot.dtype)
-        foot = jnp.where(rise.happens, arrived, last.foot)
-        return LastStep(rise.happens, t, start, dense, foot, rise)
+        rise, arrived = rises[-1], jnp.full_like(last.leg, legs[0])
+        for number, own in zip(legs[1:], rises[-2::-1], strict=True):
+            earlier = own.happens & ~(rise.happens & (rise.until < own.until))
+            rise = select(earlier, own, rise)
+            arrived = select(earlier, jnp.full_like(arrived, number), arrived)
+        leg = jnp.where(rise.happens, arrived, last.leg)
+        return LastStep(rise.happens, t, start, dense, leg, rise)
 
     def record(
         self,
@@ -154,12 +159,13 @@ class Saved(NamedTuple):
         section = self.section
         assert section is not None
         assert last.rise is not None
-        exchanged = jnp.asarray(last.foot == 1)
 
         def halve(_: Scalar, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
             middle = 0.5 * (ends[0] + ends[1])
-            state = dense.evaluate(middle)
-            before = section.value(scene, select(exchanged, exchange_legs(state), state)) < 0.0
+            *others, (_leg, own) = images(scene, dense.evaluate(middle))
+            for number, image in others:
+                own = select(jnp.asarray(last.leg == 1 + number), image, own)
+            before = section.value(scene, own) < 0.0
             return jnp.where(before, middle, ends[0]), jnp.where(before, ends[1], middle)
 
         time = jax.lax.fori_loop(0, _BISECTIONS, halve, last.rise[1:])[1]
@@ -167,13 +173,15 @@ class Saved(NamedTuple):
 
 
 def _rise(
-    section: AbstractSection, scene: Scene, course: RosenbrockInterpolation, *, exchanged: bool
+    section: AbstractSection, scene: Scene, course: RosenbrockInterpolation, times: int
 ) -> Rise:
-    """Where a section's value rises within a step, also if it falls again or fell before."""
+    """Where a section's value rises within a step, also if it falls again or fell before.
+
+    The names are exchanged so many times.
+    """
 
     def at(time: Scalar) -> State:
-        state = course.evaluate(time)
-        return exchange_legs(state) if exchanged else state
+        return exchange_legs(scene, course.evaluate(time), times)
 
     def value(time: Scalar) -> Scalar:
         return section.value(scene, at(time))

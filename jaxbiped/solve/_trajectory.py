@@ -18,8 +18,9 @@ from jaxbiped._ending import Ending
 from jaxbiped._summary import summary
 from jaxbiped._types import Numbers, Scalar, by_numpy
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._state import State
+from jaxbiped.scene._state_types import State
 from jaxbiped.solve._error_estimate import ErrorEstimate
+from jaxbiped.solve._mode_history import ModeHistory
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -71,6 +72,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
             stepped over them; None where no `dt` was given.
         grazes: how many times the swing foot of a rigid walker met the ground, or missed it, by
             less than the tolerance tells: it did not count as a heel strike. None of other models.
+        mode_history: modes of a rigid walker of which more than one can occur, a `ModeHistory`.
         scene_key: a number that its scene alone has, by which measures and figures refuse another.
         engine: what computed it, "xla", "lanes" or "cuda".
     """
@@ -89,6 +91,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     error: ErrorEstimate | None = None
     missed_contacts: Int[Array, "..."] | None = None
     grazes: Int[Array, "..."] | None = None
+    mode_history: ModeHistory | None = None
     scene_key: Float[Array, "..."] | None = None
     engine: str = eqx.field(static=True, default="xla")
 
@@ -110,6 +113,21 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     def outcome(self) -> Ending:
         """How it ended, by name; for one simulation, not a batch."""
         return Ending(int(self.ending))
+
+    @property
+    def modes(self) -> tuple[tuple[str, ...], ...]:
+        """What stood and what was held, mode by mode: feet, and stops as "NAME held".
+
+        Of one walk on rigid feet; empty where only one mode can occur.
+        """
+        return () if self.mode_history is None else self.mode_history.names
+
+    @property
+    def mode_durations(self) -> np.ndarray:
+        """How long each of `modes` lasted [s], shape (n,)."""
+        if self.mode_history is None:
+            return np.zeros(0)
+        return self.mode_history.durations(self.t[-1])
 
     def at(self, t: npt.ArrayLike) -> SomeState:
         """States at times `t` [s] of any shape, to the order of the solver's dense output.
@@ -142,7 +160,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
         """
         if self.dense is None:
             raise ValueError(
-                "Nothing is known between the saved times: only `simulate` keeps that, with "
+                "There is no solution between the saved times: only `simulate` keeps it, with "
                 'save="steps".'
             )
         if jnp.ndim(self.t) != 1:

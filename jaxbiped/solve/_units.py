@@ -15,7 +15,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.dynamics._state_quantities import dimensions_of, recurring_leaves
-from jaxbiped.scene._scene import AbstractWalkerScene, is_compliant
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene, is_compliant
 
 _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""
@@ -39,7 +39,7 @@ class Units(NamedTuple):
 
 
 def units_of(args: PyTree, state: PyTree) -> Units:
-    """Units of a state's leaves, from a scene's leg length l and √(l/g).
+    """Units of a state's leaves, from the root point's height l with all angles 0 and √(l/g).
 
     Ones where `args` is no scene of a compliant walker. They have no derivatives.
 
@@ -69,10 +69,10 @@ def recurring_inverse_units(args: PyTree, count: int) -> Scalar:
 
 
 def _length_and_time(args: AbstractWalkerScene) -> tuple[Scalar, Scalar]:
-    walker, ground = args.walker, args.ground
-    known = not any(isinstance(leaf, jax.core.Tracer) for leaf in (walker.l, ground.g))
+    height, ground = args.mechanism.height, args.ground
+    known = not any(isinstance(leaf, jax.core.Tracer) for leaf in (height, ground.g))
     xp: Any = np if known else jnp  # where numbers are known nothing is compiled for them
-    length = xp.asarray(walker.l) / _LENGTH
+    length = xp.asarray(height) / _LENGTH
     gravity = xp.asarray(ground.g) / _GRAVITY
     found = length, xp.sqrt(length / xp.where(gravity > 0.0, gravity, 1.0))
     return found if known else jax.lax.stop_gradient(found)
@@ -82,13 +82,18 @@ def sizes_of(args: PyTree, states: PyTree) -> tuple[float, PyTree]:
     """What counts as 1 in times, √(l/g) [s], and in each leaf of a state, SI units.
 
     Args:
-        args: a scene with a walker's leg length and gravity, numbers.
+        args: a scene of a walker, its numbers known.
         states: whose leaves they are for; where it has None there is none.
     """
-    length, gravity = float(args.walker.l), float(args.ground.g)
+    length, gravity = float(args.mechanism.height), float(args.ground.g)
     time = float(np.sqrt(length / gravity)) if gravity > 0.0 else 1.0
     sizes: _Sizes = {(1, 0): length, (1, -1): length / time, (0, -1): 1.0 / time, (0, 0): 1.0}
     return time, _by_dimension(states, sizes)
+
+
+def recurring_sizes(args: PyTree, state: PyTree) -> np.ndarray:
+    """`sizes_of` the components of a state without hip_x, shape (m,), SI units."""
+    return np.array(recurring_leaves(sizes_of(args, state)[1]))
 
 
 def _by_dimension(state: PyTree, values: _Sizes) -> PyTree:
@@ -105,7 +110,7 @@ def relative_to_scene(args: PyTree, times: Numbers, states: PyTree) -> float:
     An error that is no number is infinite.
 
     Args:
-        args: a scene with a walker's leg length and gravity, numbers.
+        args: a scene of a walker, its numbers known.
         times: errors of times [s], of any shape.
         states: errors of states, SI units, leaves of any shape.
     """

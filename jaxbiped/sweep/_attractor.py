@@ -17,12 +17,14 @@ from jaxbiped.basins._label_oracle import spread_directions
 from jaxbiped.basins._labels import Label
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._footfalls import leg_depth
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._units import sizes_of
+from jaxbiped.sweep._admissible import passes_a_stop, projection_of
 from jaxbiped.sweep._convergence_test import Goals
 from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
 from jaxbiped.variational._hybrid_system import section_of
@@ -36,12 +38,14 @@ _HALVED, _MOST_CYCLES = 0.5, 16
 _NOISE = 100.0
 """Distance that the solver may make of none in a cycle, in units of its tolerance."""
 _DIRECTIONS = 128
+_SHALLOW = 1e-9
+"""Depth of a foot in units of length up to which it just touches."""
 _SHARE = 0.7
 """Of the largest distance from which every sample came nearer."""
 
 
 class Attractor(NamedTuple):
-    """A stable gait of a scene, its state without hip_x having m components.
+    """A stable gait of a scene, its state without `ROOT_x` having m components.
 
     Attributes:
         cycle_footsteps: footsteps in its cycle.
@@ -75,7 +79,7 @@ class Attractor(NamedTuple):
 
     @property
     def point(self) -> np.ndarray:
-        """Its state on the section without hip_x, shape (m,)."""
+        """Its state on the section without `ROOT_x`, shape (m,)."""
         return np.stack(recurring_leaves(self.state))
 
     @property
@@ -84,7 +88,7 @@ class Attractor(NamedTuple):
         return (self.point, self.metric, self.model, self.slowest, self.contraction, self.radius)
 
     def distance(self, states: np.ndarray) -> np.ndarray:
-        """Of states on the section without hip_x, shape (n, m), in the metric; shape (n,)."""
+        """Of states on the section without `ROOT_x`, shape (n, m), in the metric; shape (n,)."""
         return np.linalg.norm((states - self.point) @ self.metric.T, axis=1)
 
 
@@ -146,14 +150,19 @@ def _section_slope(section: AbstractSection, scene: Scene | RigidScene, state: P
 
 
 def component_scales(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
-    """Size of each component of a state without hip_x, shape (m,), SI units.
+    """Size of each component of a state without `ROOT_x`, shape (m,), SI units.
 
-    Angles 1, velocities √(g l), rates √(g/l), the hip's height the stance foot's penetration.
+    Angles 1, velocities √(g l), rates √(g/l), the root point's height the penetration of the
+    deepest foot of the stance leg.
     """
     _, sizes = sizes_of(scene, state)
     if scene.compliant:
-        depth = feet(cast(Scene, scene), state).foot_2.penetration
-        sizes = sizes._replace(hip_z=abs(float(depth)))
+        structure = scene.mechanism.structure
+        found = leg_depth(structure, feet(cast(Scene, scene), state), structure.stance_leg)
+        depth, length = abs(float(found)), float(scene.mechanism.height)
+        # A start whose foot just touches tells no depth.
+        height = depth if depth > _SHALLOW * length else length
+        sizes = sizes._replace(**{structure.coordinates[1]: height})
     return np.array(recurring_leaves(sizes))
 
 
@@ -186,14 +195,24 @@ def _draws_in(
     cycles: int,
     effort: Effort,
 ) -> np.ndarray:
-    """Whether all samples at each of these distances are nearer after so many cycles."""
+    """Whether all samples at each of these distances are nearer after so many cycles.
+
+    What is held stays so in all of them, and those that pass a stop do not count.
+    """
+    import scipy.linalg
+
     size = len(attractor.state) - 1
     directions = spread_directions(_DIRECTIONS, size - 1)
     # The metric maps the section one to one: offsets whose images lie on shells.
     tangents = section_tangents(scene, attractor.state)
     back = tangents @ np.linalg.inv(attractor.metric @ tangents)
+    held = np.eye(size) - projection_of(scene, attractor.state)
+    if held.any():
+        own = tangents @ scipy.linalg.null_space(held @ tangents)
+        reached = scipy.linalg.orth(attractor.metric @ own)
+        directions = spread_directions(_DIRECTIONS, reached.shape[1]) @ reached.T
     offsets = (shells[:, None, None] * directions).reshape(-1, size - 1) @ back.T
-    count = len(offsets)
+    count, starts = len(offsets), _displace(attractor.state, offsets)
     # Followed wherever they go: the linear model decides nothing.
     nothing = np.full_like(attractor.model, np.inf)
     aim = attractor._replace(model=nothing, contraction=1.0, radius=-1.0)
@@ -202,7 +221,7 @@ def _draws_in(
     strikes = cycles * attractor.cycle_footsteps + (1 if scene.compliant else 0)
     found = follow_starts(
         broadcast_leaves(scene, count),
-        _displace(attractor.state, offsets),
+        starts,
         broadcast_leaves(goals, count),
         (attractor.cycle_footsteps,),
         effort._replace(footsteps=strikes, gap_share=0.0),
@@ -211,9 +230,10 @@ def _draws_in(
     after = attractor.distance(np.where(returned[:, None], found.final, attractor.point))
     left = attractor.contraction**cycles
     noise = _NOISE * effort.rtol * (1.0 - left) / (1.0 - attractor.contraction)
-    allowed = np.maximum(0.5 * (1.0 + left) * np.repeat(shells, _DIRECTIONS), noise)
-    nearer: np.ndarray = (returned & (after <= allowed)).reshape(len(shells), -1).all(axis=1)
-    return nearer
+    allowed = np.maximum(0.5 * (1.0 + left) * np.repeat(shells, len(directions)), noise)
+    impossible = passes_a_stop(scene, starts._asdict())
+    nearer: np.ndarray = np.asarray(returned & (after <= allowed) | impossible)
+    return np.asarray(nearer.reshape(len(shells), -1).all(axis=1))
 
 
 def _displace(state: PyTree, offsets: np.ndarray) -> PyTree:

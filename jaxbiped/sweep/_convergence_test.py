@@ -27,7 +27,7 @@ UNDECIDED = int(Label.PENDING)
 
 
 class Goals(NamedTuple):
-    """G gaits of a scene, their states without hip_x having m components.
+    """G gaits of a scene, their states without `ROOT_x` having m components.
 
     Attributes:
         points, metrics, models, slowest, contractions, radii: of each `Attractor`, with a first
@@ -48,7 +48,7 @@ class ArrivalHistory(NamedTuple):
     """What is remembered; scalars, but for tuples of them.
 
     Attributes:
-        recent: states at the last `DEPTH` of them, the latest first, without hip_x.
+        recent: states at the last `DEPTH` of them, the latest first, without `ROOT_x`.
         distances: of each gait's point, at as many of the last ones as its cycle has.
         slow: offsets from it in its slowest direction, at as many as two of its cycles have.
         steady: for each gait, at as many of the last ones as its cycle has, how many arrivals a

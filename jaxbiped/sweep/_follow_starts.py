@@ -13,7 +13,7 @@ from jaxbiped.compiler import DEVICES, Program, Request
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._engine_names import engine_named
-from jaxbiped.solve._rigid_steps import RigidWalk
+from jaxbiped.solve._rigid_progress import RigidWalk
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._first_and_last_step import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -85,8 +85,12 @@ def follow_starts(
     cycles: tuple[int, ...],
     effort: Effort,
 ) -> Labelled:
-    """Follows n starts; leaves of scene, states and goals are NumPy's arrays (n, …)."""
-    count = len(states.hip_x)
+    """Follows n starts; leaves of scene, states and goals are NumPy's arrays (n, …).
+
+    `cycles` are footsteps in the cycles of the goals.
+    """
+    count, each = len(states[0]), scene.arrival_footsteps
+    arrivals = tuple(max(length // each, 1) for length in cycles)
     # Labels by a number may doubt what grazes.
     counted = effort.wanted is not None
     if not count:
@@ -114,14 +118,18 @@ def follow_starts(
         atol = same(1e-2 * effort.rtol)
         units = jtu.tree_map(same, units_of(scene, states))
         solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))
-    waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
+    waits = _PATIENCE * np.sqrt(np.asarray(scene.mechanism.height) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
     embedded = effort.embedded and not scene.compliant
     fenced = effort.engine == "xla"
-    program = _program(scene.compliant, effort.solver, cycles, fenced, embedded, counted)
+    program = _program(scene.compliant, effort.solver, arrivals, fenced, embedded, counted)
     engine = engine_named(effort.engine_of(count))
     given = jtu.tree_map(np.asarray, starts)
-    return _as_arrays(engine.run(Request(program, given, batch=True)).outputs)
+    found = _as_arrays(engine.run(Request(program, given, batch=True)).outputs)
+    if each == 1:
+        return found
+    footsteps = (each * found.cycle_footsteps).astype(found.cycle_footsteps.dtype)
+    return found._replace(cycle_footsteps=footsteps, rate=found.rate ** (1.0 / each))
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again

@@ -28,7 +28,7 @@ _SAME = 1e-5
 its convergence is quick."""
 
 Guesses = Mapping[int, Sequence[tuple[int, Sequence[float]]]]
-"""By row of a family: footsteps in a cycle and states, without hip_x, from which to search."""
+"""By row of a family: footsteps in a cycle and states, without `ROOT_x`, from which to search."""
 
 
 class Family(NamedTuple):
@@ -151,7 +151,7 @@ def find_family(
     parameters: Mapping[str, Sequence[float] | np.ndarray],
     guess: PyTree,
 ) -> Family:
-    """The gait of one footstep for every combination of the parameters' values.
+    """The gait of one cycle, a step or a stride, for every combination of the parameters' values.
 
     Each search begins from the nearest gait found so far, the first from the guess, and one that
     fails goes on without a guess.
@@ -168,7 +168,8 @@ def find_family(
             known = [j for j, row in enumerate(rows) if row]
             off = [np.linalg.norm((table[j] - table[k]) / spans) for j in known]
             near = rows[known[int(np.argmin(off))]][0].state if known else guess
-            found = _stable_gaits(scenes[k], [near, None], 1)
+            least = scene.mechanism.structure.cycle_footsteps
+            found = _stable_gaits(scenes[k], [near, None], least)
             rows[k] = tuple(with_radius(scenes[k], gait, effort) for gait in found)
     known = [k for k, row in enumerate(rows) if row]
     states = []

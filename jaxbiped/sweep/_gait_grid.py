@@ -15,10 +15,7 @@ import numpy.typing as npt
 from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._state_quantities import (
-    STATE_QUANTITIES,
-    recurring_names,
-)
+from jaxbiped.dynamics._state_quantities import recurring_names, unit_of
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._homotopy import BranchEnd
@@ -63,7 +60,7 @@ class GaitGrid:
         return bool(self._dataset["spectral_radius"].data[place] < 1.0)
 
     def states(self) -> np.ndarray:
-        """States without hip_x at all points, shape (*grid, m); NaN where there is no gait."""
+        """States without `ROOT_x` at all points, shape (*grid, m); NaN where there is no gait."""
         names = recurring_names(self._state)
         return np.stack([self._dataset[f"state_{name}"].data for name in names], axis=-1)
 
@@ -94,7 +91,7 @@ class GaitGrid:
             warnings.warn(
                 f"{count} of the gaits graze a switch (`grazes`), as a foot that barely touches "
                 "the ground or misses it: their multipliers are those of one side, their "
-                "sensitivities not known.",
+                "sensitivities are not known.",
                 RuntimeWarning,
                 stacklevel=3,
             )
@@ -176,7 +173,7 @@ def _load(path: Path, empty: "xarray.Dataset") -> "xarray.Dataset":
         whole = whole or not bool(stored[_DONE].any())
     if not whole:
         warnings.warn(
-            f"store = {str(path)!r} was damaged: its gaits are searched anew.",
+            f"store = {str(path)!r} was damaged: its gaits are searched again.",
             RuntimeWarning,
             stacklevel=4,
         )
@@ -238,7 +235,7 @@ def _variables(gait: Gait) -> dict[str, tuple[tuple[str, ...], np.ndarray, JsonO
         add(f"sensitivity_error_{name}", error, per, "parameter")
         add(f"elasticity_{name}", getattr(gait.elasticities, name), "", "parameter")
     for name in recurring_names(gait.measures.state):
-        add(f"state_{name}", getattr(gait.measures.state, name), STATE_QUANTITIES[name].unit)
+        add(f"state_{name}", getattr(gait.measures.state, name), unit_of(name))
     add("multiplier_real", np.real(gait.multipliers), "", "multiplier")
     add("multiplier_imag", np.imag(gait.multipliers), "", "multiplier")
     add("unit_multiplier_error", gait.unit_multiplier_error, "")

@@ -28,8 +28,7 @@ from jaxbiped.scene._parameter_access import (
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._gait_grid import open_gait_grid
-from jaxbiped.sweep._gait_waves import GaitWaves
-from jaxbiped.sweep._grid_waves import LARGE, Place
+from jaxbiped.sweep._gait_waves import LARGE, GaitWaves, Place
 from jaxbiped.sweep._store_files import store_path
 from jaxbiped.sweep.starts._coordinates import parameter_axes
 
@@ -47,7 +46,7 @@ def gait_sweep(
     over: Mapping[str, Sequence[float] | np.ndarray],
     *,
     parameters: tuple[str, ...] | None = None,
-    footsteps: int = 1,
+    footsteps: int | None = None,
     accuracy: str = "balanced",
     radius_sensitivities: bool = True,
     engine: str = "auto",
@@ -151,7 +150,7 @@ def find_each(
     Args:
         scene: the walker.
         values: of the parameters that differ, shape (n,) each.
-        starts: states without hip_x, shape (n, m), of the type `state`.
+        starts: states without `ROOT_x`, shape (n, m), of the type `state`.
         options: those of `find_gait`. Gaits have no orbits.
     """
     count, first = len(starts), 0

@@ -14,18 +14,20 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Parameter, Scalar, select
 from jaxbiped.basins._labels import Label, label_names
+from jaxbiped.dynamics._footfalls import any_of
 from jaxbiped.dynamics._section import MidStance
-from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._symmetry import images
+from jaxbiped.scene._state_types import State
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
 from jaxbiped.solve._failure_events import WATCHES
-from jaxbiped.solve._rigid_steps import (
+from jaxbiped.solve._rigid_progress import (
     RigidProgress,
     RigidWalk,
-    attempt_step,
     initial_progress,
     state_with_hip,
 )
+from jaxbiped.solve._rigid_steps import attempt_step
 from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import (
@@ -70,7 +72,7 @@ class Labelled(NamedTuple):
             cycle; NaN without a cycle, and where nothing but rounding is left of the distance.
         closest: smallest distance from any of the gaits, in its metric; infinite without arrival.
         attempted: how many steps the solver attempted; of all its solves, where there were more.
-        final: last states on the section without hip_x, shape (n, m); infinite without arrival.
+        final: last states on the section without `ROOT_x`, shape (n, m); infinite without arrival.
         doubt, disagreed, changed: where the accuracy was asked for by a number, codes of `Doubt`,
             sums of codes of `Witness`, and whether finer tolerances gave another label than the
             first; else None.
@@ -113,7 +115,7 @@ class Progress(NamedTuple):
     solve: PyTree
     trace: ArrivalHistory
     strike: Scalar
-    landed: tuple[Scalar, Scalar] | None
+    landed: tuple[Scalar, ...] | None
     grazes: Scalar | None = None
 
 
@@ -123,7 +125,7 @@ class CompliantLabelling:
     A walk begins, attempts steps until its label is certain, and finishes.
 
     Attributes:
-        cycles: footsteps in a cycle of each known gait.
+        cycles: arrivals in a cycle of each known gait.
         steps: the solver's steps and endings.
         grazes: whether steps that graze are counted.
     """
@@ -161,7 +163,7 @@ class CompliantLabelling:
         landed, slid = slip_distances(solve.scene, after.state, now.landed)
         late = after.t - strike > start.patience
         verdict = jnp.where(late, int(Label.TIMED_OUT), trace.verdict)
-        verdict = jnp.where(slid > solve.scene.walker.l, int(Label.SLID), verdict)
+        verdict = jnp.where(slid > solve.scene.mechanism.height, int(Label.SLID), verdict)
         trace = trace._replace(verdict=verdict)
         count = now.grazes
         if count is not None:
@@ -178,7 +180,7 @@ class CompliantLabelling:
             code=solved.ending,
             footsteps=count,
             time=solved.t,
-            distance=solved.state.hip_x - start.solve.state.hip_x,
+            distance=_advance(start, solved.state),
             attempted=solved.accepted + solved.rejected,
             grazes=now.grazes,
         )
@@ -187,19 +189,21 @@ class CompliantLabelling:
         """After the last step, within which it may have arrived at mid-stance."""
         scene, last, section = start.solve.scene, after.last, MidStance()
 
-        def rises(change: bool) -> Scalar:
-            old, new = _with_leg_names(change, last.state), _with_leg_names(change, after.state)
+        came = []
+        for (_, old), (_, new) in zip(
+            images(scene, last.state), images(scene, after.state), strict=True
+        ):
             crosses = (section.value(scene, old) < 0.0) & (section.value(scene, new) >= 0.0)
-            return crosses & section.counts(scene, new)
-
-        first = rises(True)
-        arrives = last.noted & (first | rises(False))
+            came.append(crosses & section.counts(scene, new))
+        arrives = last.noted & any_of(came)
         dense = last.course(self.steps.solver, after.t, after.state)
 
         def at(time: Scalar) -> State:
-            state = dense.evaluate(time)
-            pairs = zip(_with_leg_names(True, state), _with_leg_names(False, state), strict=True)
-            return type(state)(*[jnp.where(first, a, b) for a, b in pairs])
+            *others, (_, state) = images(scene, dense.evaluate(time))
+            for here, (_, image) in zip(came, others, strict=False):
+                pairs = zip(image, state, strict=True)
+                state = type(state)(*[jnp.where(here, a, b) for a, b in pairs])
+            return state
 
         def on_section() -> State:
             return at(arrival_time(lambda time: section.value(scene, at(time)), last.t, after.t))
@@ -211,7 +215,7 @@ class RigidLabelling:
     """Of the rigid walker, which arrives just after its impacts; as `CompliantLabelling`.
 
     Attributes:
-        cycles: footsteps in a cycle of each known gait.
+        cycles: arrivals in a cycle of each known gait.
         embedded: see `rolling_step`.
         grazes: whether heel strikes that graze are told.
     """
@@ -243,10 +247,15 @@ class RigidLabelling:
             code=walked.code,
             footsteps=walked.footsteps,
             time=walked.t,
-            distance=state_with_hip(start.solve, walked).hip_x - start.solve.state.hip_x,
+            distance=_advance(start, state_with_hip(start.solve, walked)),
             attempted=walked.accepted + walked.rejected,
             grazes=walked.grazes if self.grazes else None,
         )
+
+
+def _advance(start: Start, state: PyTree) -> Scalar:
+    """Along the slope since the start [m]: states begin with the root point's place."""
+    return state[0] - start.solve.state[0]
 
 
 def _outcome(trace: ArrivalHistory, *, code: Scalar, **walked: Any) -> Labelled:
@@ -285,7 +294,3 @@ def _after_arrival(
 
     trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(arrives), made, lambda: old)
     return trace
-
-
-def _with_leg_names(exchanged: bool, state: PyTree) -> PyTree:
-    return exchange_legs(state) if exchanged else state

@@ -1,4 +1,7 @@
-"""Preparation of a labelling: its settings checked, its gaits found, from a start or the starts."""
+"""Preparation of a labelling: its settings checked, its gaits found, from a start or the starts.
+
+And the labelling as a function of coordinates, as the analyses of basins ask for it.
+"""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -7,9 +10,9 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_positive
-from jaxbiped.basins._arguments import check_whole
-from jaxbiped.basins._labels import Label
+from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type
+from jaxbiped.basins._label_oracle import LabelOf
+from jaxbiped.basins._labels import Doubt, Label
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
@@ -21,8 +24,8 @@ from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._follow_starts import Effort
 from jaxbiped.sweep._gait_family import Guesses, find_family, with_gaits
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep.starts._coordinates import parameter_axes
-from jaxbiped.sweep.starts._starts import AbstractStarts
+from jaxbiped.sweep.starts._coordinates import check_coordinates, parameter_axes
+from jaxbiped.sweep.starts._starts import AbstractStarts, Completion, batch_at, rest_of
 
 _ALIKE = 0.05
 """Distance of two starts' last states, in the components' scales, that count as one guess."""
@@ -91,7 +94,7 @@ def labelling(
     if missing:
         of = f" for {missing} of {len(family.rows)} combinations of the parameters"
         warnings.warn(
-            f"no stable gait was found{of if values else ''}: what walks there is labelled "
+            f"no stable gait was found{of if values else ''}: starts that walk there are labelled "
             "unresolved until one is met (see `with_gaits_met`).",
             RuntimeWarning,
             stacklevel=2,
@@ -111,8 +114,8 @@ def effort_of(
 ) -> Effort:
     """How to follow starts, from the arguments of `labelling`; raises `ArgumentError`."""
     scene = check_scene(scene, Scene, RigidScene)
-    check_whole("footsteps", footsteps, 1)
-    check_whole("max_solver_steps", max_solver_steps, 1)
+    check_count("footsteps", footsteps)
+    check_count("max_solver_steps", max_solver_steps)
     if any(np.ndim(leaf) for leaf in jtu.tree_leaves(scene)):
         raise ArgumentError(
             "scene has parameters that are arrays: give one scene, and name what differs from "
@@ -150,7 +153,7 @@ def _share_wanted(accuracy: str | float, rtol: float | None) -> float | None:
     check_wanted(accuracy, rtol=rtol)
     if not accuracy < 1.0:
         raise ArgumentError(
-            f"accuracy = {accuracy:g} is not allowed: it is the share of the labels that may be "
+            f"accuracy = {accuracy:g} is not allowed: it is the fraction of the labels that may be "
             "wrong, and must be below 1."
         )
     return float(accuracy)
@@ -173,7 +176,7 @@ def with_gaits_met(labelling: Labelling, starts: AbstractStarts, *, count: int =
     Raises:
         ArgumentError: count below 1.
     """
-    check_whole("count", count, 1)
+    check_count("count", count)
     chosen = np.unique(np.linspace(0, starts.size - 1, min(count, starts.size)).astype(int))
     return with_guesses(labelling, guesses_among(labelling, starts, chosen))
 
@@ -213,3 +216,54 @@ def _distinct_points(points: np.ndarray) -> list[int]:
         if far and len(chosen) < _MOST_GUESSES:
             chosen.append(i)
     return chosen
+
+
+def label_at(
+    labelling: Labelling,
+    names: Sequence[str],
+    *,
+    failing: bool = False,
+    place: bool | None = None,
+    follow: Completion | None = None,
+    base: PyTree = None,
+) -> LabelOf:
+    """The labelling as a function of points, for the analyses in `jaxbiped.basins`.
+
+    Args:
+        labelling: see there.
+        names: of the points' coordinates (see `coordinate_names`), d of them.
+        failing: whether to tell only walking (0) from all else (1).
+        place, follow, base: as in `grid`.
+
+    Returns:
+        A function of points, shape (n, d), to codes of `Label`, shape (n,). Where the labelling's
+        accuracy is a number, labels that remain in doubt are told by a `RuntimeWarning`.
+
+    Raises:
+        ArgumentError: an unknown coordinate; points of another number of coordinates.
+    """
+    check_type("labelling", labelling, Labelling)
+    check_coordinates(labelling.scene, names)
+    rest = rest_of(labelling.scene, names, place, follow, base)
+
+    def label_of(points: np.ndarray) -> np.ndarray:
+        points = np.asarray(points, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != len(names):
+            raise ArgumentError(
+                f"points has shape {points.shape}: it must be (n, {len(names)}), one column for "
+                f"each of {', '.join(names)}."
+            )
+        columns = {name: points[:, i] for i, name in enumerate(names)}
+        batch = batch_at(labelling, columns, rest)
+        labelled = labelling(batch.states, parameters=batch.parameters)
+        remain = np.sum(labelled.doubt == int(Doubt.REMAINS)) if labelled.doubt is not None else 0
+        if remain:
+            warnings.warn(
+                f"{remain} of {len(points)} labels remain in doubt at the finest tolerance.",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+        found = labelled.label.astype(int)
+        return (found != int(Label.WALKING)).astype(int) if failing else found
+
+    return label_of

@@ -11,11 +11,12 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import as_float
 from jaxbiped.basins._labels import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock, minimal_fatal_shock
-from jaxbiped.basins._ray_descent import Normal
+from jaxbiped.basins._rays import Normal
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.sweep._admissible import admissible_directions, passes_a_stop
 from jaxbiped.sweep._attractor import Attractor
 from jaxbiped.sweep._gait_family import scene_with
 from jaxbiped.sweep._labelling import Labelling
@@ -36,9 +37,12 @@ def nearest_failure(
 ) -> FatalShock:
     """The smallest push off the first gait, on its section, after which a start fails.
 
-    Coordinates are all of the state's but hip_x, in the order of its leaves, m of them; distances
-    are measured in their scales (`Family.scales`: angles 1 rad, velocities √(g l), rates √(g/l),
-    the hip's height the stance foot's penetration). Any label but walking is a failure.
+    On rigid feet a push keeps what is held, and passes no stop.
+
+    Coordinates are all of the state's but `ROOT_x`, in the order of its leaves, m of them;
+    distances are measured in their scales (`Family.scales`: angles 1 rad, velocities √(g l), rates
+    √(g/l), the root point's height the stance foot's penetration). Any label but walking is a
+    failure.
 
     Args:
         labelling: one that knows a gait.
@@ -57,28 +61,40 @@ def nearest_failure(
     check_type("labelling", labelling, Labelling)
     family = labelling.family
     if not family.rows[0]:
-        raise ArgumentError("labelling knows no stable gait: there is nothing to push off.")
+        raise ArgumentError("labelling has no stable gait, so there is no gait to push.")
     attractor = family.rows[0][0]
     scene = scene_with(labelling.scene, family.names, family.table[0])
+    scales = np.asarray(family.scales[0])
+    ways = admissible_directions(scene, attractor.state, scales)
 
-    def fails(points: np.ndarray) -> np.ndarray:
-        count = len(points)
-        states = type(attractor.state)(np.zeros(count), *points.T)
+    def point_of(pushes: np.ndarray) -> np.ndarray:
+        return attractor.point + scales * (pushes @ ways.T)
+
+    def fails(pushes: np.ndarray) -> np.ndarray:
+        count = len(pushes)
+        states = type(attractor.state)(np.zeros(count), *point_of(pushes).T)
         parameters = {
             name: np.full(count, value)
             for name, value in zip(family.names, family.table[0], strict=True)
         }
         found = labelling(states, parameters=parameters)
-        return (found.label != int(Label.WALKING)).astype(int)
+        failed = found.label != int(Label.WALKING)
+        return (failed & ~passes_a_stop(scene, states._asdict())).astype(int)
 
-    return minimal_fatal_shock(
+    normal = boundary_normal(scene, attractor) if gradients else None
+    shock = minimal_fatal_shock(
         fails,
-        attractor.point,
-        scales=family.scales[0],
+        np.zeros(ways.shape[1]),
+        scales=np.ones(ways.shape[1]),
         max_distance=max_distance,
         tolerance=tolerance,
-        normal=boundary_normal(scene, attractor) if gradients else None,
+        normal=None if normal is None else lambda u: (normal(point_of(u)) * scales) @ ways,
         **options,
+    )
+    return shock._replace(
+        push=scales * (ways @ shock.push),
+        boundary_point=point_of(shock.boundary_point),
+        direction=ways @ shock.direction,
     )
 
 

@@ -99,7 +99,7 @@ class Store:
         if lost:
             warnings.warn(
                 f"store = {str(self.path)!r}: {lost} of its chunks were lost or damaged; their "
-                "starts are labelled anew.",
+                "starts are labelled again.",
                 RuntimeWarning,
                 stacklevel=4,
             )

@@ -103,7 +103,7 @@ def check_continued(
     if version is not None and not any_version:
         raise ArgumentError(
             f"store = {str(path)!r} was written by another version: {version}; give it another "
-            "store, or any_version=True (--any-version) to let the labels of both stand in it."
+            "store, or any_version=True (--any-version) to mix the labels of both."
         )
     return {} if own in known else {_ALSO: json.dumps([*others, dict(writer)])}
 

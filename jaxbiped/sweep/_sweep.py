@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._checks import ArgumentError, check_count, check_type
 from jaxbiped._identity import provenance
-from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_label_errors
 from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.sweep._gait_family import Guesses
@@ -67,7 +66,7 @@ def sweep(
         labelling: see there.
         starts: a `grid`, a `sample`, or `GivenStarts`.
         store: directory of a Zarr store, for `xarray.open_zarr`; in memory unless given.
-        chunk: how many starts are labelled and written at once, at most.
+        chunk: maximum number of starts that are labelled and written at once.
         executor: what runs the chunks, any of `concurrent.futures`' kind, such as
             `distributed.Client(...).get_executor()`; this process unless given.
         workers: how many chunks the executor runs at once.
@@ -91,8 +90,8 @@ def sweep(
     """
     check_type("labelling", labelling, Labelling)
     check_type("starts", starts, AbstractStarts)
-    check_whole("chunk", chunk, 1)
-    check_whole("workers", workers, 1)
+    check_count("chunk", chunk)
+    check_count("workers", workers)
     if not starts.size:
         raise ArgumentError("starts is empty: give at least one.")
     path = store_path(store)

@@ -1,18 +1,22 @@
 """Events within a step of a walk that is labelled: arrival at the section, sliding and grazes.
 
-A foot that grazes touches the ground, or misses it, by a hair. Whether there was a contact is then
-open at the tolerance; near a boundary the label may be, too.
+A foot that grazes touches the ground, or misses it, by a hair, and so may a stop. Whether there was
+a contact is then open at the tolerance; near a boundary the label may be, too.
 """
 
+import functools
 from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.dynamics._contacts import Foot, feet, touches
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._footfalls import any_of, touches
+from jaxbiped.dynamics._gaps import Gap, gaps
+from jaxbiped.dynamics._redundant_state import motion_in
 from jaxbiped.scene._scene import CompliantScene, Scene
+from jaxbiped.scene._state_types import State
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
 
@@ -45,57 +49,60 @@ def arrival_time(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -
     return jax.lax.fori_loop(0, _SECANTS, secant, start)[-1]
 
 
-def contact_places(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
+def contact_places(scene: Scene, state: State) -> tuple[Scalar, ...]:
     """For each foot, the place [m] that changes by what it slips: its rate is the slip speed."""
-    both = feet(scene, state)
-    return (
-        both.foot_1.x + scene.walker.r * state.theta_1,
-        both.foot_2.x + scene.walker.r * state.theta_2,
+    mechanism, angles = scene.mechanism, motion_in(scene, state).angles
+    parts = zip(feet(scene, state), mechanism.feet, mechanism.structure.feet, strict=True)
+    return tuple(
+        found.x if foot.radius is None else found.x + foot.radius * angles[body]
+        for found, foot, body in parts
     )
 
 
 def slip_distances(
-    scene: Scene, state: State, landed: tuple[Scalar, Scalar]
-) -> tuple[tuple[Scalar, Scalar], Scalar]:
-    """The places at which the feet last came down, and how far the worse one has slid since [m].
+    scene: Scene, state: State, landed: tuple[Scalar, ...]
+) -> tuple[tuple[Scalar, ...], Scalar]:
+    """The places at which the feet last came down, and how far the worst one has slid since [m].
 
     `landed` are these places a step ago; see `contact_places`.
     """
-    both, places = feet(scene, state), contact_places(scene, state)
-    kept = [
+    found, places = feet(scene, state), contact_places(scene, state)
+    kept = tuple(
         jnp.where(touches(foot), old, new)
-        for foot, old, new in zip(both, landed, places, strict=True)
-    ]
+        for foot, old, new in zip(found, landed, places, strict=True)
+    )
     slid = [jnp.abs(new - old) for old, new in zip(kept, places, strict=True)]
-    return (kept[0], kept[1]), jnp.maximum(slid[0], slid[1])
+    return kept, functools.reduce(jnp.maximum, slid)
 
 
 def grazes(
     scene: CompliantScene, span: Scalar, before: State, after: State, rtol: Numbers
 ) -> Scalar:
-    """Whether a foot's depth turns nearer to zero within a step than it is known to (boolean).
+    """Whether a gap's depth turns nearer to zero within a step than it is known to (boolean).
 
-    Within the `span` [s] from the state before to that after. The depth counts as known to the
-    share `rtol` of the leg's length.
+    Within the `span` [s] from the state before to that after. The depth of a foot counts as known
+    to the share `rtol` of the unit of length, that of a stop to as many radians.
     """
-    pairs = list(zip(feet(scene, before), feet(scene, after), strict=True))
-    known = rtol * scene.walker.l
-    turns = [_turns(span, known, *pair) for pair in pairs]
+    pairs = list(zip(gaps(scene, before), gaps(scene, after), strict=True))
+    feet_of, length = len(scene.mechanism.feet), rtol * scene.mechanism.height
+    known = [length if k < feet_of else rtol for k in range(len(pairs))]
+    turns = [_turns(span, *each) for each in zip(known, *zip(*pairs, strict=True), strict=True)]
 
     def near() -> Scalar:
-        found = jnp.zeros_like(span, dtype=bool)
-        for (old, new), turning in zip(pairs, turns, strict=True):
-            found = found | (turning & (jnp.abs(_extreme(span, old, new)) <= known))
-        return found
+        close = [
+            turning & (jnp.abs(_extreme(span, old, new)) <= depth)
+            for (old, new), depth, turning in zip(pairs, known, turns, strict=True)
+        ]
+        return any_of(close)
 
-    either = turns[0] | turns[1]
-    return either & fusion_barrier(either, near)
+    turning = any_of(turns)
+    return turning & fusion_barrier(turning, near)
 
 
-def _turns(span: Scalar, known: Numbers, old: Foot, new: Foot) -> Scalar:
-    """Whether a foot that may touch turns within a step, or comes down and may soon (boolean).
+def _turns(span: Scalar, known: Numbers, old: Gap, new: Gap) -> Scalar:
+    """Whether a gap that may close turns within a step, or closes and may soon (boolean).
 
-    Not one that stands too deep to come near the surface.
+    Not one that is too deep to come near its surface.
     """
     turning = jnp.asarray(old.penetration_rate * new.penetration_rate < 0.0)
     lands = (old.penetration <= 0.0) & (new.penetration > 0.0)
@@ -109,8 +116,8 @@ def _turns(span: Scalar, known: Numbers, old: Foot, new: Foot) -> Scalar:
     return turning & old.admitted & new.admitted
 
 
-def _extreme(span: Scalar, old: Foot, new: Foot) -> Scalar:
-    """Depth at which a foot turns [m]; of one that came down, had there been no ground.
+def _extreme(span: Scalar, old: Gap, new: Gap) -> Scalar:
+    """Depth at which a gap turns; of one that closed, had there been nothing to press on.
 
     A walk may end as a foot comes down, before it turns.
     """

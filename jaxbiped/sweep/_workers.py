@@ -21,9 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, ResourceError, check_positive
+from jaxbiped._checks import ArgumentError, ResourceError, check_count, check_positive
 from jaxbiped._environment import THREADS_VARIABLE
-from jaxbiped.basins._arguments import check_whole
 from jaxbiped.compiler import default_threads
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._stored_fields import Layout, fields_of
@@ -85,7 +84,7 @@ def local_executor(workers: int) -> ProcessPoolExecutor:
     Raises:
         ArgumentError: `workers` is not a whole number of at least 1.
     """
-    check_whole("workers", workers, 1)
+    check_count("workers", workers)
     return ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
@@ -172,7 +171,7 @@ def _told_if_lost(executor: Executor, *signs: type[Exception]) -> Iterator[None]
         what = " ".join(str(error).split()) or type(error).__name__
         raise ResourceError(
             f"executor = {type(executor).__name__} lost its workers ({what[:200].rstrip('.')}): "
-            "start it anew and run again; the chunks that are complete stay in the store."
+            "restart it and run again; complete chunks remain in the store."
         ) from None
 
 

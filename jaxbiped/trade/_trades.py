@@ -8,7 +8,6 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
-from jaxbiped.dynamics._state import MinimalState, State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -16,12 +15,22 @@ from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.scene._parameter_access import parameter_names
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._state_types import MinimalState, WalkerState
 from jaxbiped.simulate._simulation import CompiledSimulation, Simulation
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import sizes_of
-from jaxbiped.trade._reference_solution import Truth, Values, truth_of
-from jaxbiped.trade._study_row import OK, Row, Way, failed_row, row_of, work_of
+from jaxbiped.trade._study_row import (
+    OK,
+    Row,
+    Truth,
+    Values,
+    Way,
+    failed_row,
+    row_of,
+    truth_of,
+    work_of,
+)
 
 _FINEST = 1e-12
 _REFERENCES = ("rodas5p", "rodas4p")
@@ -39,7 +48,7 @@ class WalkTrade(NamedTuple):
     """
 
     scene: Scene
-    start: State
+    start: MinimalState
     duration: float
     repeats: int = 3
 
@@ -137,15 +146,17 @@ _MOST_EVALUATIONS = 40
 
 
 class GaitTrade(NamedTuple):
-    """A gait to be found in many ways, from the seed's start fitted to the scene.
+    """A gait to be found in many ways, from one start.
 
     Attributes:
         scene: the walker.
         repeats: warm runs of which the median counts.
+        guess: that start; the seed's, fitted to the scene, unless given.
     """
 
     scene: Scene | RigidScene | RedundantScene
     repeats: int = 3
+    guess: WalkerState | None = None
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -187,6 +198,7 @@ class GaitTrade(NamedTuple):
         rtol, tangent_rtol = np.asarray(way.rtol), np.asarray(TANGENT_SHARE * way.rtol)
         return find_gait(
             self.scene,
+            self.guess,
             parameters=self.parameters,
             accuracy=Precision(rtol, tangent_rtol),
             max_evaluations=_MOST_EVALUATIONS,  # and no stages beyond the first

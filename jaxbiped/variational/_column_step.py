@@ -14,7 +14,9 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, VectorField
 from jaxbiped.compiler import LANES
 from jaxbiped.solve._fusion_barrier import without_barriers
-from jaxbiped.solve.rosenbrock._linearisation import Components, split
+from jaxbiped.solve.rosenbrock._abstract_linearisation import Components
+from jaxbiped.solve.rosenbrock._implicit_linearisation import implicit_form
+from jaxbiped.solve.rosenbrock._linearisation import split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import Stages, stages_of
 from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau, end_weights, error_weights
 from jaxbiped.variational._rosenbrock_tangents import kept_in_order, stage_matrices
@@ -60,15 +62,18 @@ def differentiate_step(
     Derivatives with respect to the p active leaves of the arguments are zero unless
     `carries_parameters`.
     """
-    start, join = split(y0)
+    start, join = split(y0, field)
     parameters = active_leaves(args)
 
     def rates(t: Scalar, y: Components, q: Sequence[Scalar]) -> Components:
-        return split(field(t, join(y), with_active(args, list(q))))[0]
+        return split(field(t, join(y), with_active(args, list(q))), field)[0]
 
     span = jnp.asarray(t1 - t0)
     with without_barriers():
-        stages = stages_of(tableau, lambda t, y: rates(t, y, parameters), t0, start, span, span)
+        form = implicit_form(field, join, args.args)
+        stages = stages_of(
+            tableau, lambda t, y: rates(t, y, parameters), t0, start, span, span, form
+        )
         order = [*stages.direct, *kept_in_order(stages)]
 
         def kept_rates(y: Components, q: Sequence[Scalar]) -> Components:
@@ -154,7 +159,7 @@ def column_step(
     g, led = stages.step, len(stages.direct)
     start = jnp.stack([column[i] for i in order])
     zero_state = jnp.zeros_like(start)
-    inverse, entries = stage_matrices(stages)
+    by_kept, by_direct = stage_matrices(stages)
     increments: list[Scalar] = []
     for i in range(len(tableau.alpha)):
         argument = _weighted_sum(tableau.a[i - 1] if i else (), increments, start)
@@ -168,7 +173,7 @@ def column_step(
         if forcing is not None:
             right = right + forcing[i]
         through = g * argument[led : 2 * led] + memory[:led]
-        solved = inverse @ (g * (right + entries @ through) + memory[led:])
+        solved = by_kept @ (g * right + memory[led:]) + by_direct @ through
         followers = through + g * solved[:led]
         increments.append(jnp.concatenate([followers, solved]))
     back = [order.index(i) for i in range(len(column))]

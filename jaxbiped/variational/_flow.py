@@ -20,6 +20,9 @@ from jaxbiped.variational._tangents import Seeded, with_active
 
 Arrival = Callable[[PyTree, PyTree], tuple[Scalar, Scalar]]
 """Of (args, state): a section's value, and whether a crossing counts."""
+_STEEPER, _LARGE = 1.2, 1e-4
+"""From which ratio of its changes near a switch and farther off an entry of a Jacobian is without
+bound, and from which size, in units of the largest entry, such a change is no rounding."""
 SIDES = tuple(1e-10 * side for side in (1.0, 4.0, 16.0, -1.0, -4.0, -16.0))
 """When the two sides of a switch are looked at [s]: first the new one. Nearer, penetrations are all
 rounding; a thousand times the margin away, Jacobians have changed by more than their jump's error.
@@ -162,10 +165,15 @@ def _pick(which: Scalar, each: Sequence[Scalar], value: Scalar | float) -> Scala
 def jump_of(at_sides: Scalar) -> Scalar:
     """J₊ − J₋ from its values on the `SIDES` of a switch, shape (c, n).
 
-    Extrapolated to the switch itself, in the root of time: that is how Hertz's law leaves it.
+    Extrapolated to the switch itself, in the root of time: that is how Hertz's law leaves it. NaN
+    where an entry grows without bound towards it, as behind Tsuji's touchdown.
     """
     new, old = (8.0 * at_sides[k] - 6.0 * at_sides[k + 1] + at_sides[k + 2] for k in (0, 3))
-    return (new - old) / 3.0
+    # Times are 1 to 4 to 16: what goes as t^q there has a ratio of 4^-q, above 1 if q < 0.
+    changes = jnp.abs(at_sides[:-1] - at_sides[1:])
+    near, far = changes[0::3], changes[1::3]
+    steep = (near > _STEEPER * far) & (near > _LARGE * jnp.max(jnp.abs(at_sides)))
+    return jnp.where(jnp.any(steep), jnp.nan, (new - old) / 3.0)
 
 
 def on_section(

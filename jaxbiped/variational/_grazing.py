@@ -18,6 +18,9 @@ from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
 
+ROUNDING = 1e-15
+"""Value of a switch [SI units] that it may have by rounding alone."""
+
 
 class Turns(NamedTuple):
     """Where switches turn between the ends of a step.
@@ -32,6 +35,11 @@ class Turns(NamedTuple):
     touches: Scalar
     places: Scalar
     graze: Scalar
+
+
+def _may_turn(old: Switch, new: Switch) -> Scalar:
+    """Whether it matters how a switch turns; one that resets the state may have begun on it."""
+    return jnp.asarray(old.live & (old.value > ROUNDING if old.resets else new.live))
 
 
 def turns_of(
@@ -61,7 +69,7 @@ def turns_of(
         ends += [value, span * slope]
     cubic = StepCubic(ends[0], ends[2], ends[1], ends[3])
     both = list(zip(switches(before), switches(after), strict=True))
-    live = jnp.stack([jnp.asarray(old.live & new.live) for old, new in both])
+    live = jnp.stack([_may_turn(old, new) for old, new in both])
     corner = np.array([switch.corner for switch, _ in both])
     places, turning = cubic.turning_point(), cubic.turns() & live & ~corner
     leaves, structure = jtu.tree_flatten(after)

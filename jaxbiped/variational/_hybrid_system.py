@@ -4,32 +4,34 @@ The walker is only one of them: solves and searches ask this interface, so a use
 """
 
 import abc
-from typing import ClassVar, cast
+from typing import Any, ClassVar, cast
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import Scalar, Time
-from jaxbiped.dynamics._contacts import foot_forces, with_leg_2_standing
+from jaxbiped.dynamics._contacts import foot_forces, with_stance_leg_standing
 from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._redundant_motion import redundant_field
-from jaxbiped.dynamics._redundant_state import LegsState
+from jaxbiped.dynamics._minimal_motion import WalkerField
+from jaxbiped.dynamics._mode_changes import change_mode, mode_switches, on_held
+from jaxbiped.dynamics._redundant_motion import BodiesField
+from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
-from jaxbiped.dynamics._state import RigidState, State, exchange_legs
-from jaxbiped.dynamics._state_quantities import CYCLIC
+from jaxbiped.dynamics._state_quantities import cyclic_names
+from jaxbiped.dynamics._strike_surfaces import lead, opening
 from jaxbiped.dynamics._switches import Switch, switches
-from jaxbiped.scene._scene import (
+from jaxbiped.dynamics._symmetry import exchange_legs
+from jaxbiped.scene._abstract_scene import (
     AbstractScene,
-    CompliantScene,
-    RedundantScene,
-    RigidScene,
-    Scene,
+    AbstractWalkerScene,
+    is_compliant,
     is_rigid,
 )
+from jaxbiped.scene._scene import CompliantScene, RigidScene
+from jaxbiped.scene._state_types import State
 from jaxbiped.solve._failure_events import WATCHES, ending_events, rigid_ending
 
 
@@ -55,6 +57,17 @@ class AbstractSystem(eqx.Module):
     def switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
         """Surfaces across which the vector field is not smooth."""
 
+    def reset_at_switch(self, args: PyTree, y: PyTree) -> PyTree:
+        """What becomes of the state at a switch that resets it; nothing unless overridden."""
+        return y
+
+    def on_held(self, args: PyTree, y: PyTree) -> PyTree:
+        """The state with what is held there where it belongs; as it is unless overridden.
+
+        A cycle begins with it, so that its multipliers are those of what is free to change.
+        """
+        return y
+
     @abc.abstractmethod
     def ending(self, args: PyTree, y: PyTree) -> Scalar:
         """Code of the `Ending` that has come, 0 where the motion goes on."""
@@ -62,6 +75,11 @@ class AbstractSystem(eqx.Module):
     @abc.abstractmethod
     def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
         """What is done to the state at each arrival: a symmetry, an impact, or nothing."""
+
+    def arrival(self, section: AbstractSection, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
+        """A section's value at a state just before it, and whether a crossing there counts."""
+        after_reset = minimal_state(args, self.reset_map(args, y))
+        return section.value(args, after_reset), section.counts(args, after_reset)
 
     @abc.abstractmethod
     def load(self, args: PyTree, y: PyTree) -> Scalar | None:
@@ -86,23 +104,25 @@ class AbstractWalking(AbstractSystem):
         return code
 
     def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
-        return exchange_legs(y)
+        return exchange_legs(args, y)
 
     def load(self, args: PyTree, y: PyTree) -> Scalar:
         """Normal force on the foot that carries more [N]."""
-        forces = foot_forces(args, y)
-        one, two = forces.foot_1.normal, forces.foot_2.normal
-        # Versions of JAX differentiate a maximum by other operations.
-        return jnp.where(one > two, one, two)
+        first, *others = (force.normal for force in foot_forces(args, y))
+        for each in others:
+            # Versions of JAX differentiate a maximum by other operations.
+            first = jnp.where(first > each, first, each)
+        return first
 
 
 class Walking(AbstractWalking):
     """The walker in minimal coordinates, of which the place along the slope need not return."""
 
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(map(State._fields.index, CYCLIC))
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(
+        map(State._fields.index, cyclic_names(State))
+    )
 
-    def vector_field(self, t: Time, y: State, args: Scene) -> State:
-        return vector_field(t, y, args)
+    vector_field: ClassVar[WalkerField] = WalkerField()
 
 
 class RedundantWalking(AbstractWalking):
@@ -111,22 +131,25 @@ class RedundantWalking(AbstractWalking):
     `find_gait` tells its returns in minimal coordinates; by itself it is for `return_map`.
     """
 
-    def vector_field(self, t: Time, y: LegsState, args: RedundantScene) -> LegsState:
-        return redundant_field(t, y, args)
+    vector_field: ClassVar[BodiesField] = BodiesField()
 
 
-def section_of(scene: object, section: AbstractSection | None) -> AbstractSection:
+def section_of(scene: Any, section: AbstractSection | None) -> AbstractSection:
     """The section asked for, or the one that a scene's cycles begin at unless told otherwise.
 
     Raises:
-        ArgumentError: what is no section, or one other than heel strike for a rigid walker.
+        ArgumentError: what is no section, one of a body that the state does not have, or one other
+            than heel strike for a rigid walker.
     """
     if section is not None and not isinstance(section, AbstractSection):
         raise ArgumentError(
             f"section = {section!r} is not allowed: give MidStance(), HeelStrike() or a Section."
         )
+    if isinstance(section, MidStance) and section.body is not None and is_compliant(scene):
+        structure = scene.mechanism.structure
+        check_choice("section.body", section.body, [structure.bodies[j] for j in structure.free])
     if not is_rigid(scene):
-        return MidStance() if section is None else section
+        return _default_section(scene) if section is None else section
     if section is not None and not isinstance(section, HeelStrike):
         raise ArgumentError(
             f"section = {section!r} is not allowed for a RigidScene: its cycles begin just after "
@@ -135,30 +158,48 @@ def section_of(scene: object, section: AbstractSection | None) -> AbstractSectio
     return HeelStrike()
 
 
+def _default_section(scene: Any) -> AbstractSection:
+    """Mid-stance; of a single leg, which may hop, its landing."""
+    is_walker = isinstance(scene, AbstractWalkerScene)
+    return HeelStrike() if is_walker and len(scene.mechanism.structure.legs) == 1 else MidStance()
+
+
 def with_leg_names_of(section: AbstractSection, scene: AbstractScene, state: PyTree) -> PyTree:
-    """The same motion with the legs' names as the section has them; see `with_leg_2_standing`."""
-    if is_rigid(scene) or not section.leg_2_stands:
+    """The same motion with the legs' names as the section has them; on rigid feet in its mode."""
+    if is_rigid(scene) and hasattr(state, "mode"):
+        return change_mode(cast("RigidScene", scene), state)
+    if is_rigid(scene) or not section.names_legs:
         return state
-    return with_leg_2_standing(cast("CompliantScene", scene), state)
+    return with_stance_leg_standing(cast("CompliantScene", scene), state)
 
 
 class Rolling(AbstractSystem):
-    """The rigid walker: it rolls on leg 2, and exchanges support at each heel strike."""
+    """The rigid walker: it rolls on one foot, and exchanges support at each heel strike."""
 
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(map(RigidState._fields.index, CYCLIC))
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = (0,)
 
-    def vector_field(self, t: Time, y: RigidState, args: RigidScene) -> RigidState:
+    def vector_field(self, t: Time, y: Any, args: RigidScene) -> Any:
         return rolling_field(t, y, args)
 
-    def switches(self, args: RigidScene, y: RigidState) -> tuple[Switch, ...]:
-        return ()
+    def switches(self, args: RigidScene, y: Any) -> tuple[Switch, ...]:
+        return mode_switches(args, y)
 
-    def ending(self, args: RigidScene, y: RigidState) -> Scalar:
-        return rigid_ending(y)
+    def reset_at_switch(self, args: RigidScene, y: Any) -> Any:
+        return change_mode(args, y)
 
-    def reset_map(self, args: RigidScene, y: RigidState) -> RigidState:
+    def on_held(self, args: RigidScene, y: Any) -> Any:
+        return on_held(args, y)
+
+    def ending(self, args: RigidScene, y: Any) -> Scalar:
+        return rigid_ending(args, y)
+
+    def reset_map(self, args: RigidScene, y: Any) -> Any:
         return impact(args, y).state
 
-    def load(self, args: RigidScene, y: RigidState) -> Scalar:
+    def arrival(self, section: AbstractSection, args: RigidScene, y: Any) -> tuple[Scalar, Scalar]:
+        # The angles before the impact tell, without it.
+        return -opening(args, y), lead(args, y) > 0.0
+
+    def load(self, args: RigidScene, y: Any) -> Scalar:
         """Normal force on the foot that rolls [N]; an impact has an impulse instead."""
         return rolling(args, y).force.normal

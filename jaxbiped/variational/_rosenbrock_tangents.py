@@ -12,7 +12,9 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.solve.rosenbrock._linearisation import Components, split
+from jaxbiped.solve.rosenbrock._abstract_linearisation import Components
+from jaxbiped.solve.rosenbrock._implicit_linearisation import implicit_form
+from jaxbiped.solve.rosenbrock._linearisation import split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import Stages, stages_of
 from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau, end_weights, error_weights
 from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with_active
@@ -36,18 +38,19 @@ def rosenbrock_tangents(
 
     None where this does not apply: arrays in the state, many scalars, or explicit time.
     """
-    start, join = split(y0.state)
+    start, join = split(y0.state, field)
     parameters = active_leaves(args)
     # `split` glues many scalars into one array, too.
     if any(jnp.ndim(leaf) for leaf in (*start, *jax.tree.leaves(y0.state))):
         return None
 
     def rates(t: Scalar, y: Components, q: Sequence[Scalar]) -> Components:
-        return split(field(t, join(y), with_active(args, q)))[0]
+        return split(field(t, join(y), with_active(args, q)), field)[0]
 
     t = jnp.asarray(t0)
     span = jnp.asarray(t1 - t0, dtype=jnp.result_type(*start))
-    stages = stages_of(tableau, lambda t, y: rates(t, y, parameters), t, start, span, span)
+    form = implicit_form(field, join, args.args)
+    stages = stages_of(tableau, lambda t, y: rates(t, y, parameters), t, start, span, span, form)
     if any(rate is not None for rate in stages.lin.time_derivative()):
         return None
 
@@ -136,7 +139,7 @@ def _column_stages(
 ) -> list[Scalar]:
     """dU_i of every stage, each of shape (components, n)."""
     step, led = stages.step, len(stages.direct)
-    inverse, entries = stage_matrices(stages)
+    by_kept, by_direct = stage_matrices(stages)
     increments: list[Scalar] = []
     for i in range(len(tableau.alpha)):
         argument = columns
@@ -149,7 +152,7 @@ def _column_stages(
         through = step * argument[led : 2 * led]
         if i:
             through = through + memory[:led]
-        solved = inverse @ (right + step * (entries @ through))
+        solved = by_kept @ right + by_direct @ through
         increments.append(jnp.concatenate([through + step * solved[:led], solved]))
     return increments
 
@@ -168,18 +171,11 @@ def _rows(matrix: Scalar, order: Sequence[int]) -> Scalar:
 
 
 def stage_matrices(stages: Stages) -> tuple[Scalar, Scalar]:
-    """(I − g J)⁻¹ for the kept components alone, and their J by the direct ones."""
-    kept = kept_in_order(stages)
-    places = [stages.kept.index(i) for i in kept]
-    inverse = jnp.stack([jnp.stack([stages.factors[i][j] for j in places]) for i in places])
-    if not stages.direct:
-        return inverse, jnp.zeros((len(kept), 0))
-    zero = jnp.zeros_like(stages.step)
-    rows = [
-        [zero if stages.jacobian[i][p] is None else stages.jacobian[i][p] for p in stages.direct]
-        for i in kept
-    ]
-    return inverse, jnp.stack([jnp.stack(row) for row in rows])
+    """What a stage's solution is of right sides: of the kept components in order, of the direct."""
+    places = [stages.kept.index(i) for i in kept_in_order(stages)]
+    found = stages.lin.solution_matrices(stages.factors, stages.jacobian, stages.step)
+    by_kept, by_direct = (_rows(each, places) for each in found)
+    return _rows(by_kept.T, places).T, by_direct
 
 
 def _weighted_sum(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:

@@ -1,4 +1,4 @@
-"""Tangents at a switch: where displaced motions meet it; saltation where the field jumps."""
+"""Tangents at a switch: where displaced motions meet it; saltation, by which they jump there."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -32,9 +32,9 @@ class SwitchMeeting(NamedTuple):
     rates: Scalar
 
 
-def has_field_switches(watch: Watch, state: PyTree, args: PyTree) -> bool:
-    """Whether the field is not smooth anywhere; known before anything runs."""
-    return any(not switch.corner for switch in watch.switches(args, state))
+def field_switch_values(watch: Watch, state: PyTree, args: PyTree) -> list[Scalar]:
+    """Values of the switches where the field itself is not smooth; how many is known before."""
+    return [each.value for each in watch.switches(args, state) if not each.corner]
 
 
 def meeting_at(watch: Watch, state: PyTree, args: Seeded, which: Scalar) -> SwitchMeeting:
@@ -98,7 +98,7 @@ class Saltation(NamedTuple):
         change: (f⁺ − f⁻)/ġ⁻, shape (c,).
         by_state, by_parameter: derivatives of g with respect to the state, shape (c,), and to the
             active parameters, shape (p,).
-        which: which of the surfaces where the field jumps it is (booleans).
+        which: which of the field's switches it is (booleans).
     """
 
     change: Scalar
@@ -107,28 +107,17 @@ class Saltation(NamedTuple):
     which: Scalar
 
 
-def has_saltation(watch: Watch, state: PyTree, args: PyTree) -> bool:
-    """Whether the field jumps anywhere at all; known before anything runs."""
-    return any(switch.force_jumps for switch in watch.switches(args, state))
-
-
-def jump_surface_values(watch: Watch, state: PyTree, args: PyTree) -> Scalar:
-    """Values of the functions that are zero where the field jumps."""
-    return jnp.stack([s.value for s in watch.switches(args, state) if s.force_jumps])
-
-
 def saltation_at(watch: Watch, state: PyTree, args: Seeded, happens: Scalar) -> Saltation:
-    """The saltation at a state that lies just past a surface where the field jumps.
+    """The saltation at a state that lies just past a switch where the field is not smooth.
 
-    Of several surfaces it is the one that was passed last. Zero where it does not `happen`.
+    A field that is infinitely steep behind it has changed by then as if it had jumped. Of several
+    switches it is the one that was passed last. Zero where it does not `happen`.
     """
     leaves, structure = jtu.tree_flatten(state)
     q = active_leaves(args)
 
     def values(y: list[Scalar], p: list[Scalar]) -> list[Scalar]:
-        return list(
-            jump_surface_values(watch, jtu.tree_unflatten(structure, y), with_active(args, p))
-        )
+        return field_switch_values(watch, jtu.tree_unflatten(structure, y), with_active(args, p))
 
     def field(y: list[Scalar]) -> Scalar:
         rates = watch.field(jnp.zeros_like(leaves[0]), jtu.tree_unflatten(structure, y), args.args)

@@ -21,6 +21,7 @@ from jaxbiped.variational._tangent_solver import (
     TangentControl,
     TangentSolver,
     VariationalField,
+    with_saltation,
     worst_norm,
 )
 from jaxbiped.variational._tangents import (
@@ -30,6 +31,7 @@ from jaxbiped.variational._tangents import (
     Watch,
     along_columns,
     as_columns,
+    is_cut_short,
     plain_args,
     plain_state,
 )
@@ -69,7 +71,6 @@ class SectionArrival(NamedTuple):
         peak: largest value of the watched quantity, 0 where there is none; `peak_columns` its
             derivatives, shape (n,), where the solve carried columns.
         jumps: steps that ended past a switch where the vector field itself jumps.
-        missed: whether the last of them was the last step at all: columns did not jump there.
         grazes: steps in which a switch was grazed: derivatives are not determined.
         attempted: number of steps attempted.
         nodes: the ends of the accepted steps, where saved.
@@ -82,7 +83,6 @@ class SectionArrival(NamedTuple):
     peak: Scalar
     peak_columns: PyTree
     jumps: Scalar
-    missed: Scalar
     grazes: Scalar
     attempted: Scalar
     nodes: Nodes | None
@@ -90,7 +90,7 @@ class SectionArrival(NamedTuple):
     @property
     def undetermined(self) -> Scalar:
         """Whether derivatives of the arrival are not to be had (boolean)."""
-        return self.missed | (self.grazes > 0)
+        return (self.grazes > 0) | is_cut_short(self.code)
 
 
 def solve_to_section(
@@ -142,12 +142,14 @@ def solve_to_section(
     states: PyTree = solution.ys
     landed: PyTree = solution.controller_state
     last = jtu.tree_map(lambda leaf: leaf[-1], states[0])
+    if carries:
+        last = with_saltation(watch, last, args, landed.saltation_pending)
     y, time, time_columns = onto_section(watch, last, times[0][-1], args)
     peak, peak_columns = jnp.zeros(()), None
     if carries:
         peak, rows = peak_of(watch, landed.at_peak, args)
-        # Columns whose saltation is pending do not tell how a load right behind a jump changes.
-        peak_columns = jnp.where(landed.peak_saltation_pending, jnp.nan, rows)
+        # Columns do not tell how a load right behind a jump changes.
+        peak_columns = jnp.where(landed.jumps_at_peak, jnp.nan, rows)
     return SectionArrival(
         y=y,
         time=time,
@@ -156,7 +158,6 @@ def solve_to_section(
         peak=peak,
         peak_columns=peak_columns,
         jumps=landed.jumps,
-        missed=landed.saltation_pending,
         grazes=landed.grazes,
         attempted=solution.stats["num_steps"],
         nodes=_nodes(times[1], states[1], time, y) if save_nodes else None,

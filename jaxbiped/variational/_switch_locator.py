@@ -13,6 +13,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
+from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import (
@@ -21,7 +22,7 @@ from jaxbiped.solve.controllers._wrapped_control import (
     Attempt,
     try_again,
 )
-from jaxbiped.variational._grazing import turns_of
+from jaxbiped.variational._grazing import ROUNDING, turns_of
 from jaxbiped.variational._tangents import Watch, plain_args, plain_state, surfaces_of
 
 _OVERSHOOT = 1e-4
@@ -46,8 +47,9 @@ class SwitchLocatorState(NamedTuple):
         sizes: the largest absolute values of the state's leaves so far: what its error is
             relative to. None where there are no switches.
         grazes: number of steps in which a switch was grazed: no derivatives are determined then.
-        saltation_pending: whether the last accepted step did: columns have yet to jump there.
-        peak_saltation_pending: whether the step with the largest value did.
+        saltation_pending: whether the last accepted step passed a switch where the field is not
+            smooth: columns of `TangentSolver` have yet to jump there.
+        jumps_at_peak: whether the field jumped in the step with the largest value.
         crossed_field: number of the switch where the field is not smooth that the last step passed,
             counted from one; 0 where it passed none.
         arrived: whether the section was reached.
@@ -63,7 +65,7 @@ class SwitchLocatorState(NamedTuple):
     jumps: Scalar
     grazes: Scalar
     saltation_pending: Scalar
-    peak_saltation_pending: Scalar
+    jumps_at_peak: Scalar
     crossed_field: Scalar
     arrived: Scalar
     code: Scalar
@@ -140,10 +142,10 @@ class SwitchLocator(AbstractWrappedControl):
         watch = self.watch
         surfaces = functools.partial(surfaces_of, watch, landed.peak, scene)
         at_start, at_end = surfaces(before), surfaces(after)
-        crossed = [
-            ((a.value > 0.0) != (b.value > 0.0)) & (a.live | b.live)
-            for a, b in zip(at_start, at_end, strict=True)
-        ]
+        crossed = [_crosses(a, b) for a, b in zip(at_start, at_end, strict=True)]
+        # A foot that is put on the ground starts on its switch: rounding alone tells the side.
+        begins = [(landed.accepted == 0) & (jnp.abs(each.value) <= ROUNDING) for each in at_start]
+        crossed = [c & ~on for c, on in zip(crossed, begins, strict=True)]
         arrives = jnp.asarray(False)
         if watch.section is not None:
             arrives = crossed[-1] & (at_end[-1].value > 0.0) & (landed.accepted > 0)
@@ -164,6 +166,7 @@ class SwitchLocator(AbstractWrappedControl):
                 after,
                 errors=jtu.tree_map(lambda size: self.rtol * size, landed.sizes),
             )
+            turns = turns._replace(touches=turns.touches & ~jnp.stack(begins[:count]))
         none = jnp.asarray(False)
         any_crossed = functools.reduce(jnp.logical_or, crossed, none)
         if turns is not None:
@@ -219,12 +222,12 @@ class SwitchLocator(AbstractWrappedControl):
         if self.watch.ending is not None:
             ending = functools.partial(self.watch.ending, scene, after)
             code = jnp.where(keep, fusion_barrier(keep, ending), 0)
-        peak, at_peak, peak_saltation_pending = old.peak, old.at_peak, old.peak_saltation_pending
+        peak, at_peak, jumps_at_peak = old.peak, old.at_peak, old.jumps_at_peak
         if self.watch.peak is not None:
             value = fusion_barrier(keep, functools.partial(self.watch.peak, scene, after))
             record = keep & (value > peak)
             peak = jnp.where(record, value, peak)
-            peak_saltation_pending = jnp.where(record, crossed.jump, peak_saltation_pending)
+            jumps_at_peak = jnp.where(record, crossed.jump, jumps_at_peak)
             at_peak = select(record, y1, at_peak)
         return SwitchLocatorState(
             inner=inner,
@@ -233,8 +236,8 @@ class SwitchLocator(AbstractWrappedControl):
             landings=old.landings + jnp.where(keep & crossed.switch, 1, 0),
             jumps=old.jumps + jnp.where(keep & crossed.jump, 1, 0),
             grazes=old.grazes + jnp.where(keep & crossed.graze, 1, 0),
-            saltation_pending=jnp.where(keep, crossed.jump, old.saltation_pending),
-            peak_saltation_pending=peak_saltation_pending,
+            saltation_pending=jnp.where(keep, crossed.field, old.saltation_pending),
+            jumps_at_peak=jumps_at_peak,
             crossed_field=jnp.where(keep, crossed.which, 0),
             # What has fallen by then has not arrived.
             arrived=keep & crossed.section & (code == 0),
@@ -242,6 +245,13 @@ class SwitchLocator(AbstractWrappedControl):
             peak=peak,
             at_peak=at_peak,
         )
+
+
+def _crosses(before: Switch, after: Switch) -> Scalar:
+    """Whether a step crosses a surface that matters; one that resets the state only downwards."""
+    if before.resets:
+        return (before.value > 0.0) & (after.value <= 0.0) & before.live
+    return ((before.value > 0.0) != (after.value > 0.0)) & (before.live | after.live)
 
 
 class _Crossed(NamedTuple):

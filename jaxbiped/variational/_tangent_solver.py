@@ -28,7 +28,8 @@ from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
     AbstractRosenbrock,
 )
 from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
-from jaxbiped.variational._saltation import has_saltation, jump_surface_values, saltation_at
+from jaxbiped.variational._saltation import field_switch_values, saltation_at
+from jaxbiped.variational._switch_locator import NEAR
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
 
 SHARE = 0.1
@@ -52,7 +53,7 @@ class TangentSolver(AbstractMemorylessSolver):
     the state's; `TangentControl` reads it. Steps forwards in time.
 
     Attributes:
-        watch: with the state's own vector field, and the surfaces where it jumps.
+        watch: with the state's own vector field, and its switches.
         solver: any one-step solver that carries nothing from step to step.
         columns_only_choose_steps: whether the columns only choose the steps and are not themselves
             differentiated: for reverse mode, whose derivatives then are these columns' transpose.
@@ -83,30 +84,57 @@ class TangentSolver(AbstractMemorylessSolver):
     ) -> tuple[Tangents, Tangents, dict[str, Tangents], None, Any]:
         """One step, as `diffrax.AbstractSolver.step` describes it."""
         del terms, solver_state
-        y0 = _apply_saltation(self.watch, y0, args, made_jump)
+        y0 = with_saltation(self.watch, y0, args, made_jump)
         if self.columns_only_choose_steps:
             y1, error = _plain_step(self, t0, t1, y0.state, args.args)
             choosing, errors = jax.lax.stop_gradient(_tangent_step(self, t0, t1, y0, args))
             new, error = Tangents(y1, choosing.columns), Tangents(error, errors.columns)
         else:
             new, error = _tangent_step(self, t0, t1, y0, args)
+        crosses = _crosses(self.watch, t1 - t0, y0.state, new.state, args.args)
+        new, error = _columns_held(crosses, y0, new, error)
         return new, error, dict(y0=y0, y1=new), None, diffrax.RESULTS.successful
 
 
-def _apply_saltation(
-    watch: Watch, y: Tangents, args: Seeded, made_jump: BoolScalarLike
-) -> Tangents:
-    """The columns behind a jump of the field, where one has just been passed.
+def _crosses(watch: Watch, span: Time, before: PyTree, after: PyTree, args: PyTree) -> Scalar:
+    """Whether a step is the short one that crosses a switch where the field is not smooth.
+
+    Its last stage lies behind, where the Jacobian may be any size: saltation is all that its
+    columns change by.
+    """
+    ends = jax.lax.stop_gradient((before, after, args))
+    old, new = (field_switch_values(watch, state, ends[2]) for state in ends[:2])
+    changed = [(a > 0.0) != (b > 0.0) for a, b in zip(old, new, strict=True)]
+    crossed = functools.reduce(jnp.logical_or, changed, jnp.asarray(False))
+    return crossed & jax.lax.stop_gradient(jnp.asarray(span) <= 2.0 * NEAR)
+
+
+def _columns_held(
+    crosses: Scalar, before: Tangents, after: Tangents, error: Tangents
+) -> tuple[Tangents, Tangents]:
+    """A step and its error, but where it `crosses` derivatives are those of before, without any."""
+
+    def held(old: Scalar, new: Scalar) -> Scalar:
+        return jnp.where(crosses, old + jax.lax.stop_gradient(new - old), new)
+
+    state = jtu.tree_map(held, before.state, after.state)
+    columns = jnp.where(crosses, before.columns, after.columns)
+    errors = jnp.where(crosses, 0.0, error.columns)
+    return Tangents(state, columns), error._replace(columns=errors)
+
+
+def with_saltation(watch: Watch, y: Tangents, args: Seeded, made_jump: BoolScalarLike) -> Tangents:
+    """The columns behind a switch where the field is not smooth, if one has just been passed.
 
     The state stays what it is, but JAX's own derivatives of it jump as well.
     """
-    if not has_saltation(watch, y.state, args.args):
+    if not field_switch_values(watch, y.state, args.args):
         return y
     still, held = jax.lax.stop_gradient((y.state, args))
     saltation = saltation_at(watch, still, held, jax.lax.stop_gradient(jnp.asarray(made_jump)))
     rows = saltation.by_state @ y.columns + saltation.by_parameter @ args.seeds
     leaves, structure = jtu.tree_flatten(y.state)
-    zero_values = jump_surface_values(watch, y.state, args.args)
+    zero_values = jnp.stack(field_switch_values(watch, y.state, args.args))
     zero_values = zero_values - jax.lax.stop_gradient(zero_values)
     shift = jnp.sum(jnp.where(saltation.which, zero_values, 0.0))
     jumped = [leaf + change * shift for leaf, change in zip(leaves, saltation.change, strict=True)]

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._accuracy import Precision
@@ -45,6 +46,11 @@ class Seeded(eqx.Module):
     seeds: Scalar
     floors: Scalar
     active: tuple[int, ...] = eqx.field(static=True)
+
+
+def is_cut_short(code: Scalar) -> Scalar:
+    """Whether a solve that ended so came neither to its section nor to its time."""
+    return (code == int(Ending.OUT_OF_STEPS)) | (code == int(Ending.SOLVER_FAILED))
 
 
 def active_leaves(args: Seeded) -> list[Scalar]:
@@ -124,6 +130,7 @@ class Watch(eqx.Module):
             zero and it does. None: nothing to arrive at.
         ending: code of the failure that ends the solve, 0 for none.
         peak: a quantity whose largest value is to be known.
+        reset: what becomes of the state at a switch that `resets`.
     """
 
     field: VectorField = eqx.field(static=True)
@@ -133,6 +140,7 @@ class Watch(eqx.Module):
     )
     ending: Callable[[PyTree, PyTree], Scalar] | None = eqx.field(static=True, default=None)
     peak: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
+    reset: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
 
 
 class SectionSolve(NamedTuple):
@@ -223,4 +231,4 @@ class VariationalSolution(NamedTuple):
     @property
     def undetermined(self) -> Scalar:
         """Whether the columns are not the derivatives of the motion (boolean)."""
-        return self.grazes > 0
+        return (self.grazes > 0) | is_cut_short(self.code)

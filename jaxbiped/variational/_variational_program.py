@@ -1,7 +1,4 @@
-"""Variational solve as a program for lanes: a state with its derivatives, to a section.
-
-The twin for lanes of what `_solve_to_section` does through diffrax.
-"""
+"""Variational solve for lanes: the twin of what `_solve_to_section` does through diffrax."""
 
 import dataclasses
 from typing import NamedTuple
@@ -15,12 +12,14 @@ from jaxtyping import PyTree
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import Program
+from jaxbiped.dynamics._implicit_field import traced_once
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._first_and_last_step import clip_step, first_step
 from jaxbiped.solve.controllers._tangent_step_size import step_control
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._column_step import Differentiated, column_step, differentiate_step
-from jaxbiped.variational._saltation import at_fixed_time, has_field_switches, meet, meeting_at
+from jaxbiped.variational._reset import behind_reset
+from jaxbiped.variational._saltation import at_fixed_time, field_switch_values, meet, meeting_at
 from jaxbiped.variational._solve_to_section import onto_section, peak_of
 from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
 from jaxbiped.variational._tangent_solver import SHARE
@@ -79,9 +78,9 @@ class AdaptiveColumns:
     ) -> None:
         self.solver, self.active = solver, active
         # Compiled by themselves, these are traced once, not at each of their many uses.
-        whole = ((name, getattr(watch, name)) for name in ("field", "section", "ending", "peak"))
+        whole = ((name, getattr(watch, name)) for name in ("section", "ending", "peak", "reset"))
         once = {name: jax.jit(function) for name, function in whole if function is not None}
-        self.watch = dataclasses.replace(watch, **once)
+        self.watch = dataclasses.replace(watch, field=traced_once(watch.field), **once)
         self.save_nodes = save_nodes
         self.term: diffrax.ODETerm[PyTree] = diffrax.ODETerm(watch.field)
 
@@ -136,6 +135,11 @@ class AdaptiveColumns:
         state = select(keep, step.end, now.state)
         columns, peaks, peak_shifts = now.columns, now.peak_columns, now.peak_shifts
         new_columns, shifts = self._met(given, now, landed.crossed_field, new_columns)
+        if self.watch.reset is not None:
+            met, seeded = keep & (landed.crossed_field > 0), self._seeded(given)
+            state, new_columns = behind_reset(
+                self.watch.reset, met, state, new_columns, seeded, given.sizes
+            )
         if self.watch.peak is None:
             columns = tuple(_select(keep, a, b) for a, b in zip(new_columns, columns, strict=True))
             peaks, peak_shifts = columns, shifts
@@ -174,7 +178,7 @@ class AdaptiveColumns:
             peaks = self._at_fixed_time(given, at_peak, now.peak_columns, now.peak_shifts)
             highest = Tangents(at_peak, jnp.concatenate(peaks).T)
             peak, peak_columns = peak_of(self.watch, highest, seeded, along_columns_in_turn)
-            peak_columns = jnp.where(now.landed.peak_saltation_pending, jnp.nan, peak_columns)
+            peak_columns = jnp.where(now.landed.jumps_at_peak, jnp.nan, peak_columns)
         return VariationalSolution(
             t=t,
             state=y.state,
@@ -193,7 +197,7 @@ class AdaptiveColumns:
         self, given: VariationalProblem, now: _Now, which: Scalar, stepped: list[Scalar]
     ) -> tuple[list[Scalar], tuple[Scalar, ...]]:
         """Columns and shifts after a step, which may have met the switch of a number."""
-        if not has_field_switches(self.watch, now.state, given.args):
+        if not field_switch_values(self.watch, now.state, given.args):
             return stepped, now.shifts
 
         def met() -> tuple[list[Scalar], tuple[Scalar, ...]]:

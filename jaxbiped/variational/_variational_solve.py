@@ -116,7 +116,6 @@ def solve_to_section_by_lanes(
         peak=found.peak,
         peak_columns=found.peak_columns,
         jumps=found.jumps,
-        missed=jnp.asarray(False),  # its columns meet at every switch
         grazes=found.grazes,
         attempted=found.attempted,
         nodes=None if recording is None else _nodes(y0.state, found, recording),

@@ -15,14 +15,13 @@ from jaxbiped.caching import _caches
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import Once, bounded_cache
 from jaxbiped.compiler.runtime import _compiled_program, _lane_call
-from jaxbiped.compiler.runtime._engine_interface import Request
-from jaxbiped.compiler.runtime._lane_engine import LaneEngine
+from jaxbiped.compiler.runtime._engines import LaneEngine, Request
 from jaxbiped.compiler.runtime._machine_code import _LOADED
 from jaxbiped.compiler.runtime._primitive import call
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.simulate._rigid_simulation import rigid_program
 from jaxbiped.solve._failure_events import WATCHES, ending_events
-from jaxbiped.solve._rigid_steps import RigidWalk
+from jaxbiped.solve._rigid_progress import RigidWalk
 from tests.compiler.one_shot import compiled, stepped
 from tests.sweep.walkers import same
 

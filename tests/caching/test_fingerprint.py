@@ -14,7 +14,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.caching import _fingerprint
 from jaxbiped.caching._fingerprint import Leaf, as_leaves, fingerprint, settings
-from jaxbiped.optimise._augmented_cycles import augment
+from jaxbiped.optimise._augmented_system import augment
 from jaxbiped.solve._failure_events import WATCHES, ending_events
 
 SCENE = as_leaves(jb.seed_scene())
@@ -47,7 +47,7 @@ def test_another_process_knows_the_same():
 
 
 def test_things_that_differ_are_told_apart():
-    stiffer = dataclasses.replace(SCENE, friction=jb.laws.Frictionless())
+    stiffer = as_leaves(dataclasses.replace(jb.seed_scene(), friction=jb.laws.Frictionless()))
     things = [
         *KNOWN.values(), (stiffer,), (1,), (1.0,), (True,), ("1",), (None,), (0,), ((),), ((1,),),
         ([1],), ((1, 2),), ((2, 1),), ((1, (2,)),), (((1, 2),),), ({"a": 1},), ({"b": 1},),
@@ -118,7 +118,7 @@ def _scaled(x, y=1.0, *, factor=2.0):
     return x * y * factor
 
 
-HOME = "jaxbiped._circular"
+HOME = "jaxbiped._trigonometry"
 
 
 def of_the_package(*, code=_scaled.__code__, defaults=(1.0,), kwdefaults=None, name="scaled"):

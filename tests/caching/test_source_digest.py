@@ -21,7 +21,7 @@ LATER = time.time_ns() + 10**15
 
 COULOMB = "scene/laws/friction/_coulomb.py"
 WORDS = {
-    "comment in a figure": ("plot/style.py", "import Any\n", "import Any  # of any kind\n"),
+    "comment in a figure": ("plot/style.py", "import re\n", "import re  # of any kind\n"),
     "line above functions": ("gait/_find_gait.py", "import jax\n", "import jax\n\n# A word.\n"),
     "docstring": ("dynamics/_rolling.py", "rolls without slip", "rolls and does not slip"),
     "new docstring": (COULOMB, "switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:",
@@ -35,7 +35,7 @@ CODE = {
     "constant": ("solve/_failure_events.py", "_LOST_RATE = 0.1", "_LOST_RATE = 0.2"),
     "string": ("gait/_find_gait.py", '"newton"', '"newtons"'),
     "registered for a class": ("dynamics/_rolling.py", "return rolling_field", "return None"),
-    "compiler": ("compiler/passes/_liveness.py", "value.op in", "value.op not in"),
+    "compiler": ("compiler/ir/_liveness.py", "value.op in", "value.op not in"),
     "how programs are kept": ("caching/_compiled_store.py", '_KIND = "xla"', '_KIND = "lax"'),
     "what laws there are": ("scene/laws/__init__.py", "Tsuji as Tsuji", "Tsuji as Fuji"),
 }
@@ -108,7 +108,7 @@ def test_code_of_other_layers_changes_no_key(keys):
 
 
 def test_it_reaches_all_that_python_imports():
-    module = "jaxbiped.optimise._ensemble"
+    module = "jaxbiped.optimise._design_gaits"
     code = f"import {module}, sys; print(*sys.modules)"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     imported = {name for name in told.stdout.split() if name.startswith("jaxbiped")}

@@ -12,9 +12,11 @@ from matplotlib.colors import to_hex
 
 import jaxbiped as jb
 from jaxbiped import plot
+from jaxbiped.cli._basin_starts import StartsOptions
 from jaxbiped.plot.style import label_colour
 from tests.cli.commands import numbers_of, outputs_of, run
 from tests.drawn import assert_is_drawn
+from tests.mechanisms import scene_of
 
 pytestmark = pytest.mark.slow
 
@@ -125,3 +127,11 @@ def test_a_full_disk_is_no_argument_of_ours(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(plot, "basin", full)
     assert run("basin", *AXES, "--out", tmp_path / "out") == 1
     assert "No space left on device" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_axes_that_nobody_chose():
+    """Of legs of any name: a body that swings and one that stands where a cycle begins."""
+    chosen = {"unequal": "leg", "kneed": "thigh"}
+    for name, body in chosen.items():
+        starts = StartsOptions(seed=0).chosen(scene_of(name))
+        assert list(starts.axes) == [f"omega_{body}_1", f"theta_{body}_1"]

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli import _constraint_comparison
 from jaxbiped.cli import _constraints as command
-from jaxbiped.cli._constraint_comparison import ConstraintRun, time_run
+from jaxbiped.cli._constraints import ConstraintRun, time_run
 from tests.cli.commands import outputs_of, run
 from tests.drawn import assert_is_drawn, points_of
 
@@ -50,11 +49,10 @@ def _done(method, integrator, seconds):
 def test_rows_come_as_they_are_done_and_ctrl_c_keeps_them(monkeypatch, capsys, tmp_path):
     shown = []
 
-    def compared(scene, start, *, integrators, methods, advance, **options):
+    def compared(scene, start, *, integrators, methods, **options):
         assert len(integrators) == 3
         for method, seconds in zip(methods[:2], (0.5, 0.75), strict=True):
             yield _done(method, integrators[0], seconds)
-            advance(1)
             shown.append(capsys.readouterr())
         raise KeyboardInterrupt
 
@@ -74,7 +72,7 @@ def test_rows_come_as_they_are_done_and_ctrl_c_keeps_them(monkeypatch, capsys, t
 
 def test_runs_that_take_long_are_not_repeated(monkeypatch):
     now = iter(range(0, 1000, 3))
-    monkeypatch.setattr(_constraint_comparison.time, "perf_counter", lambda: 0.1 * next(now))
+    monkeypatch.setattr(command.time, "perf_counter", lambda: 0.1 * next(now))
     asked = []
     assert time_run(lambda: asked.append(1), repeats=3)[1] == pytest.approx(0.3)
     assert len(asked) == 3

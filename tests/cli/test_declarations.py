@@ -88,7 +88,7 @@ def test_the_seed_s_parameters_are_those_of_its_scene():
 
 
 def test_help_tells_the_seed_s_start():
-    said = documentation("jaxbiped.cli._scene_options", "StartOptions")
+    said = documentation("jaxbiped.cli._start_options", "StartOptions")
     for name, value in jb.seed_state()._asdict().items():
         assert f"the seed's is {float(value):g}" in said[name]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._default_start import default_start
+from jaxbiped.cli._start_options import default_start
 
 
 @pytest.mark.parametrize("slope", [0.02, 0.04])
@@ -21,7 +21,7 @@ def test_the_seed_s_scene_starts_as_the_seed_to_the_last_bit(slope):
 
 def _load(scene, start):
     """The elastic force under the standing foot, in units of the weight."""
-    foot = jb.dynamics.feet(scene, start).foot_2
+    foot = jb.dynamics.feet(scene, start)[1]
     force = scene.normal.elastic_force(foot.penetration)
     return float(force / (scene.walker.total_mass * scene.ground.g))
 
@@ -47,7 +47,7 @@ def test_another_scene_is_loaded_as_the_seed_s(name):
 
 def test_a_ground_too_soft_to_stand_on_is_started_near_its_surface():
     scene = jb.seed_scene(K=2.0)
-    foot = jb.dynamics.feet(scene, default_start(scene)).foot_2
+    foot = jb.dynamics.feet(scene, default_start(scene))[1]
     assert float(foot.penetration) == pytest.approx(0.04, rel=1e-6)
 
 

@@ -36,7 +36,8 @@ def test_rigid_walk_and_gait(tmp_path, capsys):
     assert (numbers["ending"], numbers["model"]) == ("walking", "rigid")
     assert numbers["steps"][-1]["period_s"] == pytest.approx(0.4438, abs=2e-4)
     assert numbers["steps"][-1]["length_m"] == pytest.approx(0.1904, abs=2e-4)
-    assert (folder / "leg_angles.png").exists()
+    pictures = ("leg_angles.png", "phase_portrait.png", "strobe.png", "walk.html")
+    assert all((folder / name).exists() for name in pictures)
     assert numbers["solver"]["rtol"] == 1e-6
     capsys.readouterr()
     assert numbers_of(capsys, "walk", *flags, "--accuracy", "tight")["solver"]["rtol"] == 1e-11

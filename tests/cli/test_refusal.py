@@ -22,7 +22,7 @@ def _rows(table):
 MORE = ("", " --quick --json -", " --help")
 EARLY = _rows("""
 walk --slop 3 | --slop | perhaps you meant --slope
-walk --slope abc | --slope | 'abc' | float
+walk --slope abc | --slope | 'abc' | FLOAT
 walk --hip-z abc | --hip-z | 'abc' | FLOAT
 basin --samples 1.5 | --samples | '1.5' | INT
 walk --out | --out | missing value
@@ -50,6 +50,11 @@ walk --json /no/such/folder/x.json | --json | /no/such/folder/x.json | folder
 walk --theta-1 nan | theta_1 | nan | finite
 walk --K -1 | K | -1 | above 0
 walk --model soft | model = 'soft'
+walk --walker three-legs | walker = 'three-legs' | with-torso, garcia, | or FILE.py:NAME
+walk --walker nowhere.py:w | nowhere.py:w' cannot be read
+gait --walker kneed --l 0.5 | l = 0.5 is not allowed with walker = 'kneed'
+walk --state theta_1 | write name=value
+walk --standing 2 | standing = '2' is not allowed without state
 walk --normal hertzz | normal = 'hertzz'
 walk --model rigid --K 5 | K = 5.0 is not allowed with model
 walk --formulation maximal | formulation = 'maximal'
@@ -71,7 +76,7 @@ basin --x theta_swing=0.1:0.1:4 | axis 'theta_swing=0.1:0.1:4' is empty
 basin --x theta_swing=0:1:0 | = 0 is not allowed
 basin --x theta_swing | write name=first:last:count
 basin --x theta_swing=0:nan:3 | is empty
-basin --starts nowhere.csv --x g=1:2:3 | name either
+basin --starts nowhere.csv --x g=1:2:3 | give one or the other
 basin --formulation redundant | formulation = "redundant" is not allowed for a basin
 basin --footsteps 0 | footsteps = 0
 basin --accuracy high | accuracy = 'high' is not known
@@ -133,7 +138,7 @@ basin --x K=-1:1:3 | K = -1
 basin --x g=1:2:3 --y g=1:2:3 | g is named by two axes
 basin --model rigid --x hip_z=0:1:3 | coordinate = 'hip_z' is not known
 basin --starts nowhere.csv | starts = 'nowhere.csv' cannot be read
-basin --accuracy 2 | accuracy = 2 is not allowed: it is the share of the labels
+basin --accuracy 2 | accuracy = 2 is not allowed: it is the fraction of the labels
 basin --store /dev/null | store = '/dev/null' is a file
 constraints --out /proc/nowhere | --out
 trade --out /proc/nowhere | --out

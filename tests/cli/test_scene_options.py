@@ -6,7 +6,8 @@ import jax
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._scene_options import SEED, ActuationOptions, SceneOptions, StartOptions
+from jaxbiped.cli._scene_options import SEED, ActuationOptions, SceneOptions
+from jaxbiped.cli._start_options import StartOptions
 from tests.cli.commands import numbers_of
 
 
@@ -64,7 +65,7 @@ def test_flags_make_the_actuators():
 def test_what_is_said_stays_as_it_was_said():
     options = StartOptions(hip_z=0.4, omega_2=-1.0)
     assert options.given == {"hip_z": 0.4, "omega_2": -1.0}
-    start = options.state(jb.seed_scene(K=1e8))
+    start = options.start(jb.seed_scene(K=1e8))
     assert (float(start.hip_z), float(start.omega_2)) == (0.4, -1.0)
     assert float(start.theta_2) == float(jb.seed_state().theta_2)
     assert StartOptions().given == {}

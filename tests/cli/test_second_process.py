@@ -41,6 +41,7 @@ COMMANDS = {
     "walk": "walk --duration 0.5 --out OUT",
     "rigid walk": "walk --duration 1 --model rigid --out OUT",
     "gait": "gait --out OUT",
+    "published walk": "walk --walker garcia --slope 0.01 --duration 10",
     "continue": "continue --model rigid --max-points 2 --out OUT",
     "optimise": "optimise --model rigid --vary d --maximise speed --iterations 1 --basin 16 "
     "--footsteps 4",
@@ -52,8 +53,17 @@ COMMANDS = {
     "trade": "trade --duration 0.1 --repeats 1 --out OUT",
     "doctor": "doctor",
 }
-NIGHTLY = ("optimise", "basin", "constraints", "trade")
-"""Those that take longest."""
+NIGHTLY = (
+    "rigid walk",
+    "continue",
+    "optimise",
+    "fit",
+    "basin",
+    "rigid basin",
+    "constraints",
+    "trade",
+)
+"""Those that take longest, and what runs by programs of the others' kind."""
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ import jaxbiped as jb
 from jaxbiped.cli import main
 
 WALK = "walk --duration 0.05"
-COMPARISON = "_constraint_comparison"
 
 
 class _ReachedError(Exception):
@@ -28,7 +27,7 @@ class _ReachedError(Exception):
         (f"{WALK} --model rigid", "_walk", "rigid_walk", "compiling"),
         ("basin", "_basin", "labelling", "gaits"),
         ("models", "_models", "measure.operation_counts", "counting"),
-        ("constraints", COMPARISON, f"cli.{COMPARISON}.final_truth", "minimal formulation"),
+        ("constraints", "_constraints", "cli._constraints.final_truth", "minimal formulation"),
     ],
 )
 def test_the_slow_part_is_named(arguments, module, slow, word, monkeypatch, tmp_path):

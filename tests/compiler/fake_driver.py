@@ -18,8 +18,7 @@ import numpy as np
 
 from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
 from jaxbiped.compiler.runtime import _cuda_device, _device_processor, _kernel
-from jaxbiped.compiler.runtime._host_cpu import host
-from jaxbiped.compiler.runtime._machine_code import machine_code
+from jaxbiped.compiler.runtime._machine_code import host, machine_code
 
 OUT_OF_MEMORY, NOT_READY, LAUNCH_FAILED = 2, 600, 719
 _WARP = 32

@@ -7,8 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._host_cpu import host
-from jaxbiped.compiler.runtime._machine_code import machine_code
+from jaxbiped.compiler.runtime._machine_code import host, machine_code
 from jaxbiped.compiler.runtime._program import Program
 
 NUMBER = jax.ShapeDtypeStruct((), jnp.float64)

@@ -107,11 +107,11 @@ def test_usual_constants_by_the_papers_name(name):
         (lambda: jb.RedundantScene(jb.seed_scene(), "glue"), "method = 'glue' is not known"),
         (lambda: jb.RedundantScene(jb.seed_scene(), orientation="up"), "orientation = 'up'"),
         (lambda: jb.RedundantScene(jb.seed_state()), "scene = "),
-        (lambda: jb.constraints.Body(0.0, 1.0), "mass = 0 is not allowed"),
-        (lambda: jb.constraints.Joint((0.0, 0.0), (0.0, 0.0), 1, 1), "body_2 = 1 is not allowed"),
+        (lambda: jb.constraints.LinkBody(0.0, 1.0), "mass = 0 is not allowed"),
+        (lambda: jb.constraints.Pin((0.0, 0.0), (0.0, 0.0), 1, 1), "body_2 = 1 is not allowed"),
         (
             lambda: jb.constraints.Linkage(
-                (jb.constraints.Body(1.0, 1.0),), (jb.constraints.Joint((0, 0), (0, 0), 3),)
+                (jb.constraints.LinkBody(1.0, 1.0),), (jb.constraints.Pin((0, 0), (0, 0), 3),)
             ),
             "joint = 3",
         ),

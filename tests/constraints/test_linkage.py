@@ -1,12 +1,14 @@
 """Φ, J and J̇q̇ of linkages against derivatives taken by JAX."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.constraints._linkage import constraints_of, masses_of
+from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of
 from jaxbiped.constraints._projection import correct_step
 from tests.linkages import (
     four_bar,
@@ -16,7 +18,14 @@ from tests.linkages import (
     with_euler_parameters,
 )
 
-LINKAGES = {"pendulum": pinned_pendulum, "four-bar": four_bar}
+
+def held_pendulum(orientation):
+    """The pendulum with a sum of both angles that is held."""
+    held = jb.constraints.LinkAngle(0.3, ((0, 1.0), (1, -0.5)))
+    return dataclasses.replace(pinned_pendulum(orientation), angles=(held,))
+
+
+LINKAGES = {"pendulum": pinned_pendulum, "four-bar": four_bar, "held": held_pendulum}
 
 
 @pytest.mark.parametrize("orientation", ["angle", "euler"])
@@ -68,10 +77,16 @@ def test_euler_parameters_have_the_same_energy():
 
 def test_a_projected_step_is_on_its_constraints_with_its_rates():
     linkage = jb.constraints.Linkage(
-        (jb.constraints.Body(1.0, 0.1),),
-        (jb.constraints.Joint((0.0, 0.5), (0.0, 0.0), 0, None),),
+        (jb.constraints.LinkBody(1.0, 0.1),),
+        (jb.constraints.Pin((0.0, 0.5), (0.0, 0.0), 0, None),),
     )
     off = [np.float64(value) for value in (0.01, -0.48, 0.05)], [np.float64(1.0)] * 3
     q, v = correct_step(linkage, jb.constraints.Index1(iterations=4), *off)
     at = constraints_of(linkage, q, v)
     np.testing.assert_allclose([*at.violation, *at.rate], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("old", "new"), [("Body", "LinkBody"), ("Joint", "Pin")])
+def test_the_names_of_the_last_release_stay_for_this_one(old, new):
+    with pytest.warns(DeprecationWarning, match=rf"jaxbiped\.constraints\.{new}"):
+        assert getattr(jb.constraints, old) is getattr(jb.constraints, new)

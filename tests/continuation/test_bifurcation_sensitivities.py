@@ -31,7 +31,7 @@ def _followed(scene, kind, bounds):
             jb.with_parameters(RIGID, {"slope": 0.098}),
             BranchEvent.PERIOD_DOUBLING,
             (0.095, 0.105),
-            ("r", "J", "d"),
+            ("J",),
         ),
     ],
     ids=["fold", "doubling"],

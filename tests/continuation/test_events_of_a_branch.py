@@ -118,9 +118,9 @@ def test_deflated_newton_finds_the_roots_one_after_the_other():
         def __init__(self):
             self._sizes, self._crossings = np.ones(2), []
             curve = SimpleNamespace(converged=1e-9)
-            self._setup = SimpleNamespace(curve=curve, footsteps=1)
+            self._setup = SimpleNamespace(curve=curve, arrivals=1)
 
-        def _walk(self, point, footsteps):
+        def _walk(self, point, arrivals):
             return np.asarray(point), 0
 
         def _change(self, point):

@@ -26,14 +26,19 @@ def test_it_is_that_of_the_whole_branch(gait):
 
 
 def test_level_ground_is_left_to_both_sides():
-    """A driven gait's slope has no factor to go by: the first of both ways by its distance."""
+    """A driven gait's slope has no factor to go by: the first of both ways by its distance.
+
+    Downhill its branch folds, and ends on the sheet beyond, next to level ground.
+    """
     push = jb.actuation.PushOff(0.1)
     level = jb.with_parameters(jb.RigidScene(RIGID.walker, RIGID.ground, push), {"slope": 0.0})
     gait = jb.find_gait(level, parameters=(), radius_sensitivities=False)
     found = jb.continuation.nearest_bifurcation(level, gait)
     seen = jb.continue_gait(level, "slope", bounds=(-0.1, 0.1), guess=gait).bifurcations
-    assert len(seen) > 1
-    assert found.value == pytest.approx(min((each.value for each in seen), key=abs), rel=1e-7)
+    limit, fold, doubling = seen
+    assert abs(limit.value) < 1e-6 < abs(fold.value) < doubling.value
+    assert found.kind is jb.continuation.BranchEvent.FOLD
+    assert found.value == pytest.approx(fold.value, rel=1e-7)
     assert found.ratio != found.ratio
 
 

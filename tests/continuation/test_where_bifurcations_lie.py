@@ -27,7 +27,7 @@ def test_a_fold_moves_so_that_its_forcing_stays_zero():
     forced = np.array([[2.0, -1.0], [0.5, 3.0]])
     seen = SimpleNamespace(code=[0], jacobian=[np.hstack([by_point, forced])] * 2)
     setup = SimpleNamespace(
-        scene=SCENE, footsteps=1, axis=SimpleNamespace(name="slope"),
+        scene=SCENE, arrivals=1, axis=SimpleNamespace(name="slope"),
         curve=SimpleNamespace(sizes=sizes),
         problem=SimpleNamespace(cycle=lambda *_: seen),
     )  # fmt: skip
@@ -38,30 +38,38 @@ def test_a_fold_moves_so_that_its_forcing_stays_zero():
         np.testing.assert_allclose(row / row[0], expected / expected[0])
 
 
-def branch(*values, kinds=None):
-    kinds = [BranchEvent.FOLD] * len(values) if kinds is None else kinds
-    points = [
-        SimpleNamespace(value=v, kind=k, multiplier=1.0 + 0j, error=0.01, beyond=np.nan)
-        for v, k in zip(values, kinds, strict=True)
+def event(value, kind=BranchEvent.FOLD):
+    point = SimpleNamespace(value=value, place=np.array([value]), recurring=np.zeros(1))
+    told = dict(multiplier=1.0 + 0j, error=0.01, beyond=np.nan)
+    return SimpleNamespace(value=value, kind=kind, point=point, **told)
+
+
+GAIT = SimpleNamespace(
+    step_lengths=np.zeros(1), measures=SimpleNamespace(state=jb.dynamics.RigidState(0, 1, 1, 1, 1))
+)
+
+
+def follows(monkeypatch, own, before, after, *others):
+    """Branches through the gait at a value, between events in their order along them."""
+    asked = {}
+    middle = SimpleNamespace(value=own, place=np.array([-1.0]), recurring=np.ones(4))
+    again = [
+        SimpleNamespace(value=x, place=np.array([-2.0]), recurring=np.zeros(4)) for x in others
     ]
-    return SimpleNamespace(bifurcations=points)
+    points = (*(e.point for e in before), middle, *(e.point for e in after), *again)
+    found = SimpleNamespace(bifurcations=[*before, *after], points=points)
+    monkeypatch.setattr(nearest, "continue_gait", lambda *_, **how: asked.update(how) or found)
+    return asked
 
 
 @pytest.mark.parametrize(
-    ("slope", "values", "first"),
-    [(0.02, (0.005, 0.05), 0.05), (0.02, (0.01, 0.05), 0.01), (0.0, (-0.01, 0.005), 0.005)],
+    ("slope", "before", "after", "first"),
+    [(0.02, 0.005, 0.05, 0.05), (0.02, 0.01, 0.05, 0.01), (0.0, -0.01, 0.005, 0.005)],
 )
-def test_the_nearest_is_that_of_the_smallest_factor(slope, values, first, monkeypatch):
-    asked = {}
-
-    def follow(scene, along, *, bounds, **options):
-        asked["bounds"] = bounds
-        return branch(*values)
-
-    monkeypatch.setattr(nearest, "continue_gait", follow)
+def test_the_nearest_is_that_of_the_smallest_factor(slope, before, after, first, monkeypatch):
+    asked = follows(monkeypatch, slope, [event(before)], [event(after)])
     scene = jb.with_parameters(SCENE, {"slope": slope})
-    gait = SimpleNamespace(orbit=(np.zeros((1, 3)), None))
-    found = nearest.nearest_bifurcation(scene, gait)
+    found = nearest.nearest_bifurcation(scene, GAIT)
     assert found.value == first
     assert (found.kind, found.error) == (BranchEvent.FOLD, 0.01)
     if slope:
@@ -72,13 +80,20 @@ def test_the_nearest_is_that_of_the_smallest_factor(slope, values, first, monkey
         assert asked["bounds"] == (-0.1, 0.1)
 
 
+def test_what_lies_beyond_a_fold_is_another_gaits(monkeypatch):
+    """The branch turns back at 0.05 and passes the gait's own value again, with another gait."""
+    doubling = event(0.021, BranchEvent.PERIOD_DOUBLING)
+    follows(monkeypatch, 0.02, [event(0.004)], [event(0.05), doubling], 0.02)
+    found = nearest.nearest_bifurcation(jb.with_parameters(SCENE, {"slope": 0.02}), GAIT)
+    assert (found.kind, found.value) == (BranchEvent.FOLD, 0.05)
+
+
 def test_where_one_was_not_located_the_nearer_end_counts(monkeypatch):
-    found = branch(0.04, 0.08, kinds=[BranchEvent.FOLD, BranchEvent.NOT_LOCATED])
-    found.bifurcations[1].beyond = 0.025
-    monkeypatch.setattr(nearest, "continue_gait", lambda *_, **__: found)
-    gait = SimpleNamespace(orbit=(np.zeros((1, 3)), None))
+    later = event(0.08, BranchEvent.NOT_LOCATED)
+    later.beyond = 0.025
+    follows(monkeypatch, 0.02, [event(0.01)], [later])
     scene = jb.with_parameters(SCENE, {"slope": 0.02})
-    assert nearest.nearest_bifurcation(scene, gait).kind is BranchEvent.NOT_LOCATED
+    assert nearest.nearest_bifurcation(scene, GAIT).kind is BranchEvent.NOT_LOCATED
 
 
 @pytest.mark.parametrize("value", [OWN + 0.01, OWN - 0.004])
@@ -87,13 +102,12 @@ def test_a_distance_moves_with_the_bifurcation_and_against_the_gait(value, monke
     slopes[NAMES.index("slope")] = 0.0
     located = distances.Functional(value, 1e-6, slopes, 0.01 * slopes)
     other = OWN + 0.02
-    parts = [SimpleNamespace(bifurcations=branch(other).bifurcations, stop=None),
-             SimpleNamespace(bifurcations=branch(value).bifurcations, stop=None)]  # fmt: skip
+    parts = [SimpleNamespace(bifurcations=[event(x)], stop=None) for x in (other, value)]
     asked = []
     monkeypatch.setattr(distances, "continuation_setup", lambda *_, **__: None)
     monkeypatch.setattr(distances, "_both_ways", lambda *_: parts)
-    monkeypatch.setattr(distances, "_located_fold", lambda _, event: asked.append(event) or located)
-    gait = SimpleNamespace(orbit=(np.zeros((1, 3)), None), engine="lanes")
+    monkeypatch.setattr(distances, "_located_fold", lambda _, at: asked.append(at) or located)
+    gait = SimpleNamespace(step_lengths=np.zeros(1), engine="lanes")
     found = distances.bifurcation_distance(SCENE, gait)
     assert asked[0].value == value
     assert found.outcome is Sought.MET
@@ -113,12 +127,12 @@ def test_a_doubling_is_located_by_the_modulus_that_is_one(monkeypatch):
     told = (moduli, np.full(3, 1e-4), slopes, 0.01 * np.abs(slopes), 0)
     monkeypatch.setattr(distances, "jacobian_functionals", lambda *_, **__: told)
     setup = SimpleNamespace(
-        scene=SCENE, axis=SimpleNamespace(name="slope"), footsteps=2, accuracy="tight",
+        scene=SCENE, axis=SimpleNamespace(name="slope"), arrivals=2, accuracy="tight",
         state_of=lambda point: None,
         problem=SimpleNamespace(spec=SimpleNamespace(engine="lanes")),
     )  # fmt: skip
-    event = SimpleNamespace(value=0.03, point=SimpleNamespace(recurring=None))
-    found = distances._located_doubling(setup, event)
+    at = SimpleNamespace(value=0.03, point=SimpleNamespace(recurring=None))
+    found = distances._located_doubling(setup, at)
     assert found.value == pytest.approx(0.03 + 0.002 / 0.5)
     assert found.slopes[NAMES.index("d")] == pytest.approx(4.0)
     assert found.slopes[NAMES.index("slope")] == 0.0

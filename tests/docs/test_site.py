@@ -1,6 +1,7 @@
 """The documentation site, against every public name and page, and in a browser."""
 
 import functools
+import re
 import subprocess
 import sys
 import threading
@@ -73,6 +74,13 @@ def test_every_picture_of_the_gallery_leads_to_its_script(site):
         assert f"{picture.stem.partition('-')[0]}.py" in page
 
 
+def test_mathematics_is_on_the_page_and_nothing_is_loaded_from_a_network(site):
+    assert (site / "docs" / "model.html").read_text().count("<math ") > 20
+    loaded = r"""<(?:script|link|img|iframe)\b[^>]*\b(?:src|href)=["']?https?://"""
+    pages = [*site.rglob("*.html")]
+    assert [page.name for page in pages if re.search(loaded, page.read_text())] == []
+
+
 def test_a_walk_is_played_on_its_page(served, browser):
     browser.resize()
     browser.driver.get(f"{served}/docs/watch.html")
@@ -135,7 +143,6 @@ def test_pages_open_without_a_message_on_the_console(served, browser):
         browser.resize(width=400)
         browser.driver.get(f"{served}/{name}.html")
         severe = [each["message"] for each in browser.errors() if each["level"] == "SEVERE"]
-        # Mathematics comes from a network, which a test does without.
-        assert [each for each in severe if "mathjax" not in each] == [], name
+        assert severe == [], name
         wider = "return document.documentElement.scrollWidth - window.innerWidth"
         assert browser.run(wider) <= 0, name

@@ -12,6 +12,7 @@ from reference.rigid import rigid_walker
 from scipy.integrate import solve_ivp
 
 import jaxbiped as jb
+from jaxbiped.compiler import host_jit
 
 A = jb.actuation
 SEED = jb.seed_scene(hip_mass=0.3)
@@ -46,7 +47,7 @@ ROLLING = rigid_walker(SEED, torques=lambda y: torques(y[:2], y[2:], np.array([[
 def test_passive_scenes_take_the_operations_that_they_took():
     """As counted: actuators bring none that they do not need."""
     counts = {name: sum(jb.measure.operation_counts(s).values()) for name, s in jb.ladder().items()}
-    assert counts == {"rigid": 138, "creep": 441, "stribeck": 431, "bristles": 439}
+    assert counts == {"rigid": 144, "creep": 441, "stribeck": 431, "bristles": 439}
     for part in (*AT_HIP, PRELOAD):
         driven = dataclasses.replace(jb.seed_scene(), actuation=part)
         assert sum(jb.measure.operation_counts(driven).values()) > counts["stribeck"]
@@ -80,7 +81,7 @@ def test_accelerations_are_those_of_equations_written_again():
         found = np.array(jb.dynamics.accelerations(DRIVEN, state))
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
         forces = jb.dynamics.foot_forces(DRIVEN, state)
-        in_contact += float(forces.foot_2.normal) > 0.0
+        in_contact += float(forces[1].normal) > 0.0
     assert 10 < in_contact < 30
 
 
@@ -187,7 +188,7 @@ def test_both_engines_roll_alike():
     np.testing.assert_allclose(np.array(one.final), np.array(other.final), rtol=1e-11)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_both_engines_walk_alike():
     options = dict(duration=0.42, accuracy="tight", save="end")
     one, other = (
@@ -212,13 +213,14 @@ def test_fields_are_smooth_in_every_number_of_the_actuators(scene):
         return jnp.stack([rates.alpha_1, rates.alpha_2, *jb.dynamics.impact(driven, state).state])
 
     leaves, structure = jax.tree_util.tree_flatten(scene.actuation)
-    slopes = jax.tree_util.tree_leaves(jax.jacfwd(field)(scene.actuation))
+    slopes = jax.tree_util.tree_leaves(host_jit()(jax.jacfwd(field))(scene.actuation))
+    value = host_jit(within=True)(field)
     for i, (leaf, slope) in enumerate(zip(leaves, slopes, strict=True)):
         step = 1e-5 * max(abs(float(leaf)), 1e-2)
         moved = [
-            field(structure.unflatten([*leaves[:i], leaf + s, *leaves[i + 1 :]]))
+            value(structure.unflatten([*leaves[:i], np.float64(leaf) + s, *leaves[i + 1 :]]))
             for s in (step, -step)
         ]
         difference = (moved[0] - moved[1]) / (2.0 * step)
-        size = float(1.0 + jnp.max(jnp.abs(difference)))
+        size = 1.0 + np.abs(difference).max()
         np.testing.assert_allclose(slope, difference, rtol=1e-5, atol=1e-5 * size)

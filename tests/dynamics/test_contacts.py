@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._contacts import Feet, Foot, landings, standing_foot, touches
+from jaxbiped.dynamics._footfalls import FootMotion, landings, standing_leg, touches
+from tests.mechanisms import scene_of
+
+LEGS = jb.seed_scene().mechanism.structure
 
 
 def test_foot_at_the_seed_start():
@@ -35,21 +38,27 @@ def test_a_rolling_foot_does_not_slip():
     state = jb.seed_state()._replace(
         theta_2=jnp.asarray(0.0), omega_2=jnp.asarray(-1.0), hip_vx=jnp.asarray(0.4)
     )
-    assert float(jb.dynamics.feet(jb.seed_scene(), state).foot_2.slip_speed) == pytest.approx(0.0)
+    assert float(jb.dynamics.feet(jb.seed_scene(), state)[1].slip_speed) == pytest.approx(0.0)
 
 
 def test_standing_height():
     scene = jb.seed_scene()
     height = jb.dynamics.standing_height(scene, jnp.asarray(0.3), 1e-3)
     state = jb.seed_state()._replace(theta_2=jnp.asarray(0.3), hip_z=height)
-    assert float(jb.dynamics.feet(scene, state).foot_2.penetration) == pytest.approx(
-        1e-3, abs=1e-12
-    )
+    assert float(jb.dynamics.feet(scene, state)[1].penetration) == pytest.approx(1e-3, abs=1e-12)
+
+
+def test_standing_height_of_knees():
+    """The standing leg turned as a whole: its sole lies on the ground."""
+    scene = scene_of("kneed")
+    height = jb.dynamics.standing_height(scene, 0.3, 1e-3)
+    at = 0.080 + (0.184 + 0.136) * np.cos(0.3) - 1e-3
+    assert float(height) == pytest.approx(at, abs=1e-12)
 
 
 def _foot(x, penetration, admitted):
     rest = dict.fromkeys(("z", "vx", "vz", "penetration_rate", "slip_speed"), np.float64(0.0))
-    return Foot(x=np.float64(x), penetration=np.float64(penetration), admitted=admitted,
+    return FootMotion(x=np.float64(x), penetration=np.float64(penetration), admitted=admitted,
                 bristle=None, **rest)  # fmt: skip
 
 
@@ -72,11 +81,11 @@ def test_a_heel_strike_is_of_the_foot_ahead():
     up, down = -1e-3, 1e-3
     for ahead in (0, 1):
         places = (0.2, 0.1) if ahead == 0 else (0.1, 0.2)
-        before = Feet(*[_foot(x, up, None) for x in places])
-        both = Feet(*[_foot(x, down, None) for x in places])
-        assert list(map(bool, landings(before, both))) == [ahead == 0, ahead == 1]
-        assert not any(map(bool, landings(both, both)))
-        assert not any(map(bool, landings(both, before)))
-        one = Feet(*[_foot(x, down if k == ahead else up, None) for k, x in enumerate(places)])
-        assert int(standing_foot(one)) == ahead + 1
-        assert int(standing_foot(both)) == int(standing_foot(before)) == 0
+        before = tuple(_foot(x, up, None) for x in places)
+        both = tuple(_foot(x, down, None) for x in places)
+        assert list(map(bool, landings(LEGS, before, both))) == [ahead == 0, ahead == 1]
+        assert not any(map(bool, landings(LEGS, both, both)))
+        assert not any(map(bool, landings(LEGS, both, before)))
+        one = tuple(_foot(x, down if k == ahead else up, None) for k, x in enumerate(places))
+        assert int(standing_leg(LEGS, one)) == ahead + 1
+        assert int(standing_leg(LEGS, both)) == int(standing_leg(LEGS, before)) == 0

@@ -6,7 +6,7 @@ import sys
 
 import jaxbiped as jb
 from jaxbiped.caching._fingerprint import fingerprint
-from jaxbiped.dynamics._state_types import state_type_of
+from jaxbiped.scene._state_types import state_type_of
 
 NAMES = ("hip_x", "theta_thigh_1")
 

@@ -1,5 +1,7 @@
 """Equations of motion of a tree against maximal coordinates, and each parameter's effect."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,8 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
+from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._joint_loads import motion_of, with_constraint_torques, with_joint_loads
-from jaxbiped.dynamics._tree import point_motion, pose_of
+from jaxbiped.dynamics._tree import Loads, point_motion, pose_of
+from jaxbiped.dynamics._tree_balance import force_balance, free_mass_entries
 from jaxbiped.dynamics._tree_inertia import centrifugal_loads, composites, eliminate
 from jaxbiped.scene._bodies import Body, Foot, Point
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
@@ -17,13 +21,22 @@ from tests.random_mechanisms import maximal_accelerations, mechanisms, motions
 
 SLOPE, GRAVITY = 0.1, 9.8
 PLACE = Point(0.3, -0.1)
+GROUND = jb.Ground(slope=SLOPE, g=GRAVITY)
+
+
+@host_jit(within=True)
+def moved(mechanism, places, rates, force):
+    motion = motion_of(mechanism, GROUND, places, rates)
+    return motion, tree_accelerations(mechanism, motion, SLOPE, GRAVITY, force)
 
 
 def tree_accelerations(mechanism, motion, slope, g, force):
     """Those of the root point and all angles, with a force on a point of the last body."""
     structure = mechanism.structure
     pose, known = pose_of(mechanism, motion), composites(mechanism)
-    loads = with_joint_loads(centrifugal_loads(structure, known, pose), mechanism, motion, slope)
+    loads = with_joint_loads(
+        centrifugal_loads(structure, known, pose), mechanism, motion, slope, stops=True
+    )
     last = len(structure.bodies) - 1
     loads = loads.with_force(point_motion(structure, pose, last, PLACE), *force)
     factors = eliminate(structure, known, pose)
@@ -39,9 +52,7 @@ def test_accelerations_equal_those_in_maximal_coordinates(data):
     mechanism = data.draw(mechanisms())
     places, rates = data.draw(motions(mechanism))
     force = data.draw(st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)))
-    ground = jb.Ground(slope=SLOPE, g=GRAVITY)
-    motion = motion_of(mechanism, ground, *(list(map(jnp.asarray, x)) for x in (places, rates)))
-    found = tree_accelerations(mechanism, motion, SLOPE, GRAVITY, force)
+    motion, found = moved(mechanism, *(list(map(np.float64, x)) for x in (places, rates, force)))
     forces = [(len(mechanism.structure.bodies) - 1, PLACE, *force)]
     expected = maximal_accelerations(mechanism, motion, SLOPE, GRAVITY, forces)
     size = max(1.0, np.abs(expected).max())
@@ -81,3 +92,39 @@ def test_every_parameter_moves_the_accelerations():
     # A limit that is not passed and a foot in the air are felt where they touch.
     idle = {"a.foot.centre", "b.up.lower", "a.down.upper"}
     assert set(by_name) - felt == idle
+
+
+def _balance(mechanism, places, rates, accelerations):
+    """F − M a of the free coordinates, and its mass matrix."""
+    motion = motion_of(mechanism, GROUND, list(places), list(rates))
+    structure = mechanism.structure
+    pose, known = pose_of(mechanism, motion), composites(mechanism)
+    loads = with_joint_loads(Loads.none(structure), mechanism, motion, SLOPE, stops=True)
+    found = force_balance(structure, known, pose, loads, list(accelerations))
+    n = 2 + len(structure.free)
+    entries = free_mass_entries(structure, known, pose)
+    mass = [[entries.get((i, j), 0.0) for j in range(n)] for i in range(n)]
+    return jnp.stack(found), jnp.array(mass)
+
+
+@host_jit(within=True)
+def _balanced(mechanism, places, rates, accelerations):
+    """The same, and how it changes with the accelerations."""
+    balance = functools.partial(_balance, mechanism, places, rates)
+    return *balance(accelerations), jax.jacfwd(lambda a: balance(a)[0])(accelerations)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.data())
+def test_forces_balance_at_the_accelerations_of_maximal_coordinates(data):
+    mechanism = data.draw(mechanisms(most_bodies=6))
+    places, rates = map(np.array, data.draw(motions(mechanism)))
+    motion, _ = moved(mechanism, list(places), list(rates), [np.float64(0.0)] * 2)
+    expected = maximal_accelerations(mechanism, motion, SLOPE, 0.0)
+    free = np.array([*expected[:2], *(expected[2 + j] for j in mechanism.structure.free)])
+    missing, mass, by_rates = _balanced(mechanism, places, rates, free)
+    assert np.abs(missing).max() < 1e-9 * max(1.0, np.abs(mass).max() * np.abs(free).max())
+    # It is linear in the accelerations, by minus the mass matrix.
+    np.testing.assert_allclose(mass, -by_rates, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(mass, mass.T)
+    assert np.linalg.eigvalsh(mass).min() > 0.0

@@ -47,6 +47,16 @@ def test_the_cascade_and_the_walks_beside_it(tmp_path):
     assert len(numbers["period_three"]["gaits"]) >= 1
 
 
+def test_published_walkers_are_beside_what_was_printed(tmp_path):
+    numbers, _ = drawn_run("published_walkers", tmp_path)
+    rows = {(row["walker"], row["quantity"]): row["difference"] for row in numbers["rows"]}
+    assert rows["garcia", "long gait: θ"] < 1e-12
+    assert rows["bhounsule", "u1"] < 1e-12
+    assert rows["goswami", "θ̇_s"] < 5e-5
+    assert rows["garcia", "slope of doubling 1, rad"] < 5e-5
+    assert set(numbers["periods"]) >= {"garcia, short", "mcgeer-kneed, gait", "wisse, gait"}
+
+
 def test_stability_is_lost_where_bisection_says(tmp_path):
     numbers, _ = drawn_run("slope_branch", tmp_path)
     compliant, rigid = numbers["scenes"]["stribeck"], numbers["scenes"]["rigid"]

@@ -42,6 +42,17 @@ def test_laws_are_measured_and_judged(tmp_path):
     assert steep["angle_grows_every_step"]
 
 
+def test_a_kneed_walker_s_gait_tends_to_the_one_on_rigid_feet(tmp_path):
+    axis = {"factor of the stiffness, $s$", "distance from the rigid gait"}
+    numbers, figures = drawn_run("kneed_ladder", tmp_path, unitless=axis)
+    rows = numbers["distances"]["c with K^(3/2)"]
+    drawn = points_of(figures["kneed_limit.png"].axes[-1], "period")[0]
+    np.testing.assert_array_equal(drawn, [[row["factor"], row["period"]] for row in rows])
+    for name in ("period", "step_length", "pair", "third"):
+        away = np.array([row[name] for row in rows])
+        assert (away[1:] < 0.5 * away[:-1]).all(), name
+
+
 def test_rungs_and_the_way_to_the_rigid_limit(tmp_path):
     numbers, figures = drawn_run("ladder", tmp_path, unitless={"factor of the path, $s$"})
     measures = numbers["measures"]

@@ -70,10 +70,10 @@ def test_errors_costs_and_maps_of_constraint_methods(tmp_path):
         own = [run for run in numbers["runs"] if run["method"] == method]
         shown = [(run["wall_s_run"], run["state_error"]) for run in own]
         np.testing.assert_array_equal(points_of(trade.axes[0], method)[0], shown)
-        coarse, fine = runs[method, 1e-4], runs[method, 1e-5]
+        coarse, fine = runs[method, 1e-5], runs[method, 1e-6]
         assert fine["state_error"] < 0.3 * coarse["state_error"]
         assert fine["steps"] == 10 * coarse["steps"]
-    assert runs["index1", 1e-5]["max_violation_m"] < 1e-15
+    assert runs["index1", 1e-6]["max_violation_m"] < 1e-15
     costs = numbers["costs"]
     assert set(costs) == {"minimal", "standard", "index1"}
     for key in ("single", "batch"):
@@ -86,3 +86,17 @@ def test_errors_costs_and_maps_of_constraint_methods(tmp_path):
     assert off[1, 1] < off[0, 0]
     # One that is pulled back faster than the steps are short, without damping, explodes.
     assert found["failed"][0][-1]
+
+
+def test_the_sketch_has_the_walker_where_the_model_has_it(tmp_path):
+    numbers, figures = quick_run("walker_sketch", tmp_path)
+    words = {text.get_text() for text in figures["walker_sketch.png"].axes[0].texts}
+    named = ("alpha", "theta_1", "theta_2", "delta_2")
+    assert {"$S$", "$l$", "$d$", "$r$", "$x$", "$z$", "$g$"} <= words
+    assert {rf"$\{name}$" for name in named} <= words
+    hip, (swing, stance) = np.array(numbers["hip_m"]), np.array(numbers["foot_centres_m"])
+    for foot, angle in ((swing, -0.62), (stance, 0.30)):
+        down = np.array((np.sin(angle), -np.cos(angle)))
+        np.testing.assert_allclose(foot, hip + (0.40 - 0.08) * down, rtol=0, atol=1e-12)
+    assert swing[1] > 0.08
+    np.testing.assert_allclose(stance[1], 0.08 - 0.022, rtol=0, atol=1e-12)

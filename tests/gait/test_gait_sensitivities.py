@@ -39,6 +39,8 @@ STEPS = {
 }
 
 # Powers of the parameters that scale one unit alone, and how the measures follow.
+HELD_BY_SCALINGS = ("xi", "m", "J", "l", "r", "g", "v0")
+"""Three laws bind these sensitivities; one by one they are compared at night."""
 SCALINGS = {
     "time": (dict(g=-2, K=-2, c=-1, v0=-1, xi=1), (1, 0, -1, -2, 0)),
     "mass": (dict(m=1, J=1, K=1, c=1), (0, 0, 0, 1, 0)),
@@ -150,7 +152,13 @@ def test_multipliers_agree_with_an_independent_solve(accuracy, tolerance, multip
     assert np.max(np.abs(ours[4:])) < 1e-9
 
 
-@pytest.mark.parametrize("name", STEPS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.nightly] if name in HELD_BY_SCALINGS else [])
+        for name in STEPS
+    ],
+)
 def test_sensitivities_agree_with_an_independent_solve(name, found, tight, start):
     expected = sensitivities(start, name, STEPS[name])
     # The state is one vector: its entries are measured against the largest.
@@ -212,3 +220,23 @@ def test_the_section_does_not_matter(found):
         # times as large, each as exact as the columns.
         least = 1e-4 * np.max(np.abs(mine)) if measure == "spectral_radius" else 1e-7
         assert np.asarray(theirs) == pytest.approx(np.asarray(mine), rel=1e-3, abs=least)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [dict(slope=0.06), dict(slope=0.08325, K=2.395e5, c=2.2e6, J=0.00856, d=0.0963, v0=5.6e-5)],
+    ids=["tiny sensitivities", "more steps than a walk may take"],
+)
+def test_bars_hold_what_a_tight_solve_changes(changes):
+    """Friction hardly matters on steep slopes; on soft ground "tight" takes many steps."""
+    scene, shares = jb.seed_scene(**changes), []
+    balanced, tight = (jb.find_gait(scene, accuracy=how) for how in ("balanced", "tight"))
+    for measure in MEASURES:
+        told, right, bars = (
+            getattr(each, measure)
+            for each in (balanced.sensitivities, tight.sensitivities, balanced.sensitivity_errors)
+        )
+        shares.extend(np.abs(told - right) / bars)
+    assert len(shares) == 75
+    assert max(shares) <= 1.0
+    assert np.median(shares) >= 0.01

@@ -40,7 +40,7 @@ def summary():
             recurring=point, jacobian=np.zeros((7, 9)), monodromy=np.ones((7, 9)),
             velocity=np.zeros(7), period=np.asarray(0.5), period_row=np.zeros(9),
             advance=np.array([0.2]), advance_rows=np.zeros((1, 9)), peak=np.asarray(100.0),
-            peak_row=np.zeros(9), code=whole, attempted=np.asarray(321), jumps=whole, missed=whole,
+            peak_row=np.zeros(9), code=whole, attempted=np.asarray(321), jumps=whole,
             grazes=np.asarray(2), nodes=Nodes(begun[None], None, begun[None], zero),
         )  # fmt: skip
         coarse = last._replace(period=np.asarray(0.502), peak=np.asarray(97.0))
@@ -56,7 +56,7 @@ def summary():
         return jax.tree.map(jnp.asarray, orbit)
 
     patch = pytest.MonkeyPatch()
-    patch.setattr(_gait, "_path", lambda *_: (jnp.zeros((1, 1)), start))
+    patch.setattr(_gait, "nodes_of", lambda *_: (jnp.zeros((1, 1)), start))
     origin = single_stage_origin(scene, start, FoundBy.GUESS)
 
     @jax.jit

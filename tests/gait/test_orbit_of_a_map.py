@@ -19,6 +19,7 @@ from jaxbiped.gait._newton import Method, Stage, initial_progress, newton_iterat
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import return_map_spec
+from jaxbiped.gait._second_variation import SecondVariation
 from jaxbiped.variational._solve_to_section import Nodes
 
 P = np.array([0.7, -0.4])
@@ -31,9 +32,9 @@ class Triple(NamedTuple):
     """A state of one cyclic and three recurring components."""
 
     hip_x: Scalar
-    first: Scalar
-    second: Scalar
-    third: Scalar
+    theta_1: Scalar
+    omega_1: Scalar
+    omega_2: Scalar
 
 
 def returned(linear, x, p):
@@ -64,7 +65,7 @@ def linearised(linear, x, p):
     start = jnp.concatenate([jnp.zeros(2), x])[None]
     return LinearisedReturn(
         at, rows[0], rows[0], at, period, rows[1], advance[None], rows[2][None], peak, rows[3],
-        no, no, no, no, no, Nodes(start, None, start, zero),
+        no, no, no, no, Nodes(start, None, start, zero),
     )  # fmt: skip
 
 
@@ -88,16 +89,19 @@ def differences(linear):
 def test_sensitivities_are_differences_of_fixed_points(linear, monkeypatch):
     x = jnp.asarray(fixed_point(linear, P))
 
-    def second_variation(spec, args, like, last, leading, weights, family, sizes):
+    def second_variation(spec, args, like, last, leading, weights, family, sizes, _):
         """What the adjoint solve gives, of this map."""
 
         def jacobian(x, p):
             return jax.jacfwd(returned, argnums=1)(linear, x, p)[0]
 
-        _, along = jax.vmap(lambda dx, dp: jax.jvp(jacobian, (x, P), (dx, dp)), (1, 0))(
-            family, jnp.diag(P)
-        )
-        return jnp.einsum("vi,kij,vj->k", weights, along, leading)
+        def summed(dx, dp):
+            along = jax.jvp(jacobian, (x, P), (dx, dp))[1]
+            return jnp.einsum("vi,ij,vj->", weights, along, leading)
+
+        by_point = jax.vmap(lambda dx: summed(dx, 0.0 * P))(jnp.eye(3))
+        by_parameter = jax.vmap(lambda dp: summed(0.0 * x, dp))(jnp.diag(P))
+        return SecondVariation(by_point @ family + by_parameter, by_point, by_parameter)
 
     monkeypatch.setattr(_orbit_derivatives, "second_variation", second_variation)
     zero = jb.State(*[0.0] * 8)
@@ -106,16 +110,17 @@ def test_sensitivities_are_differences_of_fixed_points(linear, monkeypatch):
     @jax.jit
     def told(last):
         slopes, length = slopes_of(last), last.advance[0]
-        radius = _orbit_derivatives._radius_slopes(problem, last)
+        radius, terms = _orbit_derivatives._radius_slopes(problem, (last, None))
         measured = Measures(last.period, length, length / last.period, last.peak, None, zero)
         seven = slopes._replace(recurring=jnp.concatenate([slopes.recurring, jnp.zeros((4, 2))]))
         found = _by_parameter(SimpleNamespace(), measured, seven, radius)
         values = Measures(2.0, *[4.0] * 4, jnp.asarray(8.0))
         relative = _elasticities((1.0, 0.0), (0, 1), values, found._replace(state=found.period))
-        return slopes.recurring, found, relative
+        return slopes.recurring, found, relative, terms
 
     last = linearised(linear, x, P)
-    recurring, found, relative = told(last)
+    recurring, found, relative, terms = told(last)
+    assert np.all(terms >= np.abs(found.spectral_radius) * (1.0 - 1e-12))
     ours = [*recurring, found.period, found.step_length, found.speed, found.peak_normal]
     expected = differences(linear)
     np.testing.assert_allclose(
@@ -124,6 +129,23 @@ def test_sensitivities_are_differences_of_fixed_points(linear, monkeypatch):
     np.testing.assert_allclose(relative.period, [expected[3, 0] / 2.0, 0.0], rtol=1e-6)
     np.testing.assert_allclose(relative.speed, [expected[5, 0] / 4.0, 0.0], rtol=1e-6)
     assert np.isnan(told(last._replace(grazes=jnp.asarray(1)))[1].period).all()
+
+
+def test_bars_of_slopes_hold_two_witnesses_and_a_floor():
+    """A derivative that no other solve changes, even one that is zero, has that of its column."""
+    last = linearised(TURN, jnp.asarray(fixed_point(TURN, P)), P)
+    moved = {"jacobian": last.jacobian.at[:, 3].multiply(1.0 + 1e-6)}
+    found = SimpleNamespace(last=last, coarse=last, recurring=last.recurring, again=None)
+    slopes, least = slopes_of(last), 1e-9 * jnp.array([1.0, 2.0, 4.0])
+    floor = _orbit_derivatives._slope_errors(found, slopes, least)
+    inverse = np.abs(np.linalg.inv(np.eye(3) - np.asarray(last.jacobian)[:, :3]))
+    expected = 0.3 * inverse @ np.asarray(least)
+    np.testing.assert_allclose(floor.recurring, np.stack([expected] * 2, axis=1), rtol=1e-9)
+    for witness in ("coarse", "again"):
+        other = SimpleNamespace(**(vars(found) | {witness: last._replace(**moved)}))
+        bars = _orbit_derivatives._slope_errors(other, slopes, least)
+        change = np.abs(slopes_of(last._replace(**moved)).period - slopes.period)
+        assert np.all(bars.period >= change + floor.period - 1e-18)
 
 
 def test_errors_of_measures_hold_what_the_looser_solve_and_the_last_correction_change():
@@ -233,7 +255,7 @@ def test_bars_are_what_a_looser_tolerance_and_another_method_change():
     loose.sensitivity_errors = gait.sensitivity_errors._replace(period=np.array([0.0, 4e7]))
     _, relative, _ = judge_gait(scene, loose, loose, True)
     # An elasticity's error to the largest one: that of the slope, 0.02 rad, to that of K.
-    assert relative == pytest.approx(0.65 * 4e7 * 0.02 / (2.0 * 1e6))
+    assert relative == pytest.approx(0.5 * 0.65 * 4e7 * 0.02 / (2.0 * 1e6))
     lost = gait_of((1.0, 2.0, 2.0, 50.0), found=jb.gait.Search.NOT_CONVERGED)
     assert judge_gait(scene, gait, lost, True)[1] == np.inf
 
@@ -280,8 +302,8 @@ class Point(NamedTuple):
     """One of two."""
 
     hip_x: Scalar
-    first: Scalar
-    second: Scalar
+    theta_1: Scalar
+    omega_1: Scalar
 
 
 def test_a_differentiable_correction_has_the_derivatives_of_the_fixed_point():
@@ -289,14 +311,14 @@ def test_a_differentiable_correction_has_the_derivatives_of_the_fixed_point():
 
     def measured(a):
         state = Point(jnp.zeros(()), jnp.asarray(3.0 / (1.0 - 0.6)), jnp.zeros(()))
-        after = Point(0.5 * state.first, a * state.first + 3.0, 0.5 * state.second)
+        after = Point(0.5 * state.theta_1, a * state.theta_1 + 3.0, 0.5 * state.omega_1)
         jacobian = jnp.array([[0.6, 0.0], [0.0, 0.5], [1.0, 0.0], [0.5, 0.0]])
         gait = SimpleNamespace(
             measures=SimpleNamespace(state=state), return_jacobian=jacobian, ending=jnp.asarray(0)
         )
-        once = SimpleNamespace(time=2.0 + state.first, state=after)
+        once = SimpleNamespace(time=2.0 + state.theta_1, state=after)
         found = _by_correction(gait, lambda _: once)
-        return jnp.stack([found.state.first, found.period, found.step_length])
+        return jnp.stack([found.state.theta_1, found.period, found.step_length])
 
     value, slope = jax.jit(lambda a: jax.jvp(measured, (a,), (jnp.ones(()),)))(0.6)
     np.testing.assert_allclose(value, [7.5, 9.5, 3.75])

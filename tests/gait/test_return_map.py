@@ -384,6 +384,62 @@ def test_derivatives_leap_where_the_force_jumps(mode, engine):
     assert np.asarray(ours) == pytest.approx(np.asarray(expected), rel=1e-6, abs=1e-8)
 
 
+@pytest.mark.parametrize(("mode", "said"), [("forward", "Forward"), ("reverse", "across switches")])
+def test_second_derivatives_that_steps_do_not_see_are_refused(mode, said):
+    """Steps end where the switches were: what these add to second derivatives would be missing."""
+
+    def turned(y):
+        given = (jnp.asarray(0.9), jnp.asarray(3.0), jnp.asarray(0.2)), (y, jnp.zeros_like(y))
+        how = dict(section=TURNING_POINT, system=Step(), gradient=MODES[mode], engine="xla")
+        return jb.return_map(*given, **how).time
+
+    with pytest.raises(jb.ArgumentError, match=f"Second derivatives of a return map .*{said}"):
+        jax.jacfwd(derivative(turned, mode))(jnp.asarray(1.3))
+
+
+class Pad(Flowing):
+    """Nothing acts above y = s; below, w' = −b (s − y)^¼ w brakes what comes down; given (b, s)."""
+
+    def vector_field(self, t, y, args):
+        brake, level = args
+        depth = jnp.where(y[0] < level, level - y[0], 1.0)
+        return y[1], jnp.where(y[0] < level, -brake * depth**0.25 * y[1], 0.0)
+
+    def switches(self, args, y):
+        return (Switch(args[1] - y[0], True),)
+
+
+@pytest.mark.parametrize("engine", ["xla", "lanes"])
+@pytest.mark.parametrize("mode", MODES)
+def test_derivatives_where_the_force_is_infinitely_steep(mode, engine):
+    """Tsuji's kind: at depth δ the speed is u − 0.8 b δ^(5/4), from whatever height."""
+
+    def arrived(numbers):
+        y, speed, brake, level = numbers
+        r = jb.return_map(
+            (brake, level),
+            (y, -speed),
+            section=jb.Section(lambda args, y: -y[0]),
+            system=Pad(),
+            gradient=MODES[mode],
+            engine=engine,
+        )
+        return jnp.stack([-r.state[1], r.time])
+
+    def truth(numbers):
+        y, speed, brake, level = numbers
+        at, weights = np.polynomial.legendre.leggauss(40)
+        root = 0.5 * level**0.25 * (1.0 + at)
+        falls = jnp.sum(4.0 * root**3 / (speed - 0.8 * brake * root**5) * weights)
+        below = 0.5 * level**0.25 * falls
+        return jnp.stack([speed - 0.8 * brake * level**1.25, (y - level) / speed + below])
+
+    at = jnp.array([0.3, 2.0, 8.0, 0.1])
+    assert np.asarray(arrived(at)) == pytest.approx(np.asarray(truth(at)), rel=1e-6)
+    ours, expected = derivative(arrived, mode)(at), jax.jacfwd(truth)(at)
+    assert np.asarray(ours) == pytest.approx(np.asarray(expected), rel=2e-5, abs=2e-5)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

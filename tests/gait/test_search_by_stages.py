@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait import _search_starts, _staged_search
+from jaxbiped.gait import _settled_walks, _staged_search, _walk_waves
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._search_provenance import FoundBy
-from jaxbiped.gait._search_starts import component_sizes, settle_walks
+from jaxbiped.gait._settled_walks import walks_from
 from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
 from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve._units import recurring_sizes
 
 SCENE = jb.ladder()["rigid"]
 START = jb.dynamics.RigidState(0.0, -0.2, 0.3, -1.0, -2.0)
@@ -26,7 +27,7 @@ def found(radius, period=0.5, *, ending=jb.gait.Search.FOUND, sound=True):
     whole = np.asarray(0)
     last = LinearisedReturn(
         np.full(4, period), jacobian, jacobian, whole, np.asarray(period), whole,
-        np.array([0.2]), *[whole] * 8, None,
+        np.array([0.2]), *[whole] * 7, None,
     )  # fmt: skip
     pair = last._replace(**{
         name: np.stack([np.asarray(leaf)] * 2) for name, leaf in last._asdict().items()
@@ -46,7 +47,8 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
 
     def walks(scene, starts):
         took.append(f"walk {len(starts.hip_x)}")
-        return [np.full(4, 1.0)] * len(queue["walk"])
+        points = [np.full(4, 1.0)] * len(queue["walk"])
+        return SimpleNamespace(settled=lambda: points)
 
     def follow(*_):
         took.append("branch")
@@ -62,8 +64,8 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
             took.append("scatter")
         return queue[kind].pop(0) if queue[kind] else NOTHING
 
-    monkeypatch.setattr(_staged_search, "settle_walks", walks)
-    monkeypatch.setattr(_staged_search, "_follow_from_seed", follow)
+    monkeypatch.setattr(_walk_waves, "walks_from", walks)
+    monkeypatch.setattr(_staged_search, "branch_along", follow)
     scout = SimpleNamespace(engine=engine)
     problem = FixedPointProblem(SimpleNamespace(steps=1), SCENE, (), START, Precision(1e-9, 1e-8))
     return search_in_stages(search, problem, scout, first), took
@@ -113,10 +115,10 @@ def test_a_jacobian_that_is_no_number_has_no_radius():
 
 def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
     """Of five walks the one that repeats every other footstep, and one that still drifts."""
-    sizes = component_sizes(SCENE, START)
+    sizes = recurring_sizes(SCENE, START)
     rate = np.sqrt(9.8 / 0.4)
     np.testing.assert_allclose(sizes, [1.0, 1.0, rate, rate])
-    assert component_sizes(jb.seed_scene(), jb.seed_state()).tolist() == pytest.approx(
+    assert recurring_sizes(jb.seed_scene(), jb.seed_state()).tolist() == pytest.approx(
         [0.4, 1.0, 1.0, np.sqrt(9.8 * 0.4), np.sqrt(9.8 * 0.4), rate, rate]
     )
     last = np.arange(5.0)
@@ -125,19 +127,20 @@ def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
     zero = np.zeros_like(angle)
     states = jb.dynamics.RigidState(zero, angle, zero, zero, zero)
     counts = np.array([40, 40, 40, 39, 40])
-    monkeypatch.setattr(_search_starts, "_rigid_arrivals", lambda *_: (counts, states))
-    chosen = settle_walks(SCENE, START)
+    monkeypatch.setattr(_settled_walks, "_rigid_arrivals", lambda *_: (counts, states))
+    chosen = walks_from(SCENE, START).settled()
     # The third is where the first one is; the fourth fell.
     assert [float(point[0]) for point in chosen] == pytest.approx([0.5, 0.2400001, 0.3])
-    assert len(settle_walks(SCENE, START, most=1)) == 1
+    assert len(walks_from(SCENE, START).settled(most=1)) == 1
 
 
 def gait(outcome, *, end=BranchEnd.NOT_FOLLOWED, stable=True, others=(), grazes=0, walk=0):
     nearest = jb.with_parameters(SCENE, {"slope": 0.015})
     return SimpleNamespace(
+        sensitivities=SimpleNamespace(period=np.zeros(2)),
         outcome=outcome, found_by="walks", others=others, grazes=grazes, stable=stable,
         walk_outcome=jb.Ending.STUMBLED,
-        orbit=(np.zeros((1, 1)),), cycle_footsteps=1,
+        step_lengths=np.zeros(1), cycle_footsteps=1,
         origin=SimpleNamespace(branch_end=int(end), nearest=nearest, branch_walk_ending=walk),
     )  # fmt: skip
 

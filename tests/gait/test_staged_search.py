@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait._search_provenance import warn_of_grazing
+from jaxbiped.gait._search_provenance import warn_of_unknown
 from tests.rigid_walkers import rigid_seed, simplest_walker
 
 pytestmark = pytest.mark.slow
@@ -28,7 +28,10 @@ def test_the_stable_gait_is_found_on_every_slope(slope):
 
 
 @pytest.mark.parametrize(("stiffness", "options"), [
-    (10.0**8.25, [{"parameters": ("K",)}, {"parameters": ("c",), "radius_sensitivities": False}]),
+    pytest.param(
+        10.0**8.25, [{"parameters": ("K",)}, {"parameters": ("c",), "radius_sensitivities": False}],
+        marks=pytest.mark.nightly,
+    ),
     (4e8, []),
 ])  # fmt: skip
 def test_on_stiff_ground_the_gait_is_the_one_that_walks_settle_on(stiffness, options):
@@ -156,8 +159,8 @@ def test_a_gait_that_grazes_a_switch_is_told():
     assert "grazes" not in jb.gait.explain_search(scene, gait)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warn_of_grazing(gait)
+        warn_of_unknown(gait)
     grazing = eqx.tree_at(lambda each: each.grazes, gait, jnp.asarray(2))
     assert "the gait grazes a switch 2 times" in jb.gait.explain_search(scene, grazing)
-    with pytest.warns(RuntimeWarning, match="its sensitivities not known"):
-        warn_of_grazing(grazing)
+    with pytest.warns(RuntimeWarning, match="its sensitivities are not known"):
+        warn_of_unknown(grazing)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._contacts import Contacts, Feet, Foot, FootForce, FootForces
+from jaxbiped.dynamics._contacts import Contacts, FootForce
 from jaxbiped.dynamics._energy import Energies, Powers
+from jaxbiped.dynamics._footfalls import FootMotion
 from jaxbiped.measure import _cost_of_transport, _energy_ledger, _footsteps
 from jaxbiped.measure._footsteps import HeelStrikes
 from jaxbiped.measure._samples import NODES, Samples
@@ -20,7 +21,7 @@ WEIGHT = 2.7 * 9.8
 
 def foot(x, depth):
     blank = np.zeros_like(x)
-    return Foot(x, blank, blank, blank, depth, blank, blank, None, None)
+    return FootMotion(x, blank, blank, blank, depth, blank, blank, None, None)
 
 
 def test_footsteps_are_measured_by_the_foot_that_strikes_and_the_larger_load(monkeypatch):
@@ -32,9 +33,9 @@ def test_footsteps_are_measured_by_the_foot_that_strikes_and_the_larger_load(mon
     loads = {1: flat(10, 0, 40, 30), 2: flat(20, 25, 0, 50)}
     touching = flat(1, 0, 1, 1) > 0, flat(1, 1, 0, 1) > 0
     depths = flat(1e-3, 9e-3, 3e-3, 2e-3), flat(2e-3, 4e-3, 8e-3, 1e-3)
-    forces = FootForces(*[FootForce(loads[k], None) for k in (1, 2)])
-    values = Contacts(Feet(*[foot(depth, depth) for depth in depths]), touching, forces)
-    at_strikes = SimpleNamespace(feet=Feet(foot(places[1], time), foot(places[2], time)))
+    forces = tuple(FootForce(loads[k], None) for k in (1, 2))
+    values = Contacts(tuple(foot(depth, depth) for depth in depths), touching, forces)
+    at_strikes = SimpleNamespace(feet=(foot(places[1], time), foot(places[2], time)))
     books = SimpleNamespace(
         damper_loss=np.array([0.5, 0.7]), friction_loss=np.array([0.1, 0.2]),
         residual=np.array([1e-6, -2e-6]),
@@ -142,24 +143,23 @@ def test_the_cost_of_a_rigid_walk_is_between_the_places_where_it_stands(monkeypa
 
 
 def test_a_rigid_ledger_closes_with_its_push_off(monkeypatch):
-    """Kinetic and potential energy after a strike, before the next and after it; push and hip."""
+    """Energies after a strike, before the next and after it; push, hip and joints."""
     scene = jb.RigidScene(SCENE.walker, SCENE.ground)
     states = jb.dynamics.RigidState(*[np.arange(2.0)] * 5)
-    known = iter([
-        (np.array([1.0]), np.array([9.0])), (np.array([3.0]), np.array([6.5])),
-        (np.array([1.5]), np.array([6.5])),
-    ])  # fmt: skip
+    energies = (1.0, 9.0, 0.25), (3.0, 6.5, 0.5), (1.5, 6.5, 0.5)
+    held = iter([Energies(*[np.array([part]) for part in each]) for each in energies])
+    works = _energy_ledger._Works(*[np.array([part]) for part in (-0.5, 0.125, 0.0625)])
     monkeypatch.setattr(_energy_ledger, "kept_strikes", lambda *_: (np.array([1.0, 2.0]), states))
     monkeypatch.setattr(_energy_ledger, "_before_impact", lambda *_: states)
-    monkeypatch.setattr(_energy_ledger, "_energies", lambda *_: next(known))
+    monkeypatch.setattr(_energy_ledger, "_held", lambda *_: next(held))
     monkeypatch.setattr(_energy_ledger, "push_off_work", lambda *_: np.array([0.25]))
-    monkeypatch.setattr(
-        _energy_ledger, "_hip_works", lambda *_: (np.array([-0.5]), np.array([0.125]))
-    )
+    monkeypatch.setattr(_energy_ledger, "mode_changes", lambda *_: None)
+    monkeypatch.setattr(_energy_ledger, "_works", lambda *_: works)
+    monkeypatch.setattr(_energy_ledger, "_stop_losses", lambda *_: np.array([0.03125]))
     books = jb.measure.rigid_ledger(scene, None)
     assert [float(part[0]) for part in books] == pytest.approx(
-        # gravity; hip and push; lost; stored; left open; motors
-        [2.5, -0.25, 3.0 + 0.25 - 1.5, 0.5, 2.5 - 0.25 - 1.75 - 0.5, 0.375]
+        # gravity; hip and push; lost; stored; left open; motors; joints; stops
+        [2.5, -0.25, 1.75, 0.75, 2.5 - 0.25 - 1.75 - 0.75 - 0.09375, 0.375, 0.0625, 0.03125]
     )
 
 

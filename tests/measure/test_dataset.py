@@ -25,9 +25,10 @@ def test_round_trip_through_a_file(seed_walk, tmp_path):
         feet = {"normal_force": "N", "tangential_force": "N", "penetration": "m",
                 "slip_speed": "m/s", "touches": "1"}  # fmt: skip
         assert told == angles | energies | feet
-        assert read.normal_force.dims == ("leg", "time")
-        expected = jb.dynamics.foot_forces(scene, walk.state).foot_2.normal
-        np.testing.assert_array_equal(read.normal_force.sel(leg=2), expected)
+        assert read.normal_force.dims == ("foot", "time")
+        expected = jb.dynamics.foot_forces(scene, walk.state)[1].normal
+        np.testing.assert_array_equal(read.normal_force.sel(foot="2"), expected)
+        assert read.leg.values.tolist() == ["1", "2"]
         total = read.kinetic_energy + read.gravitational_energy + read.elastic_energy
         assert float(total[-1] - total[0]) < 0.0
 

@@ -8,8 +8,7 @@ import jaxbiped as jb
 from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._design_variables import requirements_of, variables_of
-from jaxbiped.optimise._evaluations import Evaluations
-from jaxbiped.optimise._objective_values import Evaluation
+from jaxbiped.optimise._objective_values import Evaluation, Evaluations
 from jaxbiped.optimise._runs import Runs
 
 SCENE = jb.ladder()["rigid"]

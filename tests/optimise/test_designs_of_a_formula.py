@@ -14,12 +14,12 @@ from jaxbiped.continuation._nearest_bifurcation import farthest_allowed, range_o
 from jaxbiped.dynamics._actuation import actuator_powers, hip_torques
 from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
-from jaxbiped.optimise import _certificate, _ensemble
+from jaxbiped.optimise import _certificate, _design_gaits
 from jaxbiped.optimise._cycle_functionals import Functional, _totals, with_errors
 from jaxbiped.optimise._cycle_integrals import integrals_of
-from jaxbiped.optimise._design_gaits import GaitSettings
-from jaxbiped.optimise._ensemble import (
+from jaxbiped.optimise._design_gaits import (
     Ensemble,
+    GaitSettings,
     _by_nominal,
     _together,
     ensemble_of,
@@ -217,7 +217,7 @@ def test_a_search_in_the_box_finds_what_neither_sample_nor_corners_show(monkeypa
         return [None if f[0] > 1.09 else member(v, 0.0, 0.0) for f, v in
                 zip(ensemble.factors, values, strict=True)]  # fmt: skip
 
-    monkeypatch.setattr(_ensemble, "evaluate_members", members)
+    monkeypatch.setattr(_design_gaits, "evaluate_members", members)
     ensemble = ensemble_of(SCENE, {"d": 0.08, "m": 0.1}, 8, "worst", {"speed": True}, 0)
     found = with_worse_members(ensemble, SCENE, None, ("speed",), GaitSettings(), 0)
     assert found.factors.shape == ensemble.factors.shape
@@ -297,10 +297,10 @@ def test_integrals_of_a_cycle_gain_what_their_powers_say():
         return rates, jb.dynamics.powers(scene, y), jb.dynamics.feet(scene, y)
 
     rates, power, both = fields(state)
-    touching = float(both.foot_2.penetration) > 0.0 and bool(both.foot_2.admitted)
+    touching = float(both[1].penetration) > 0.0 and bool(both[1].admitted)
     assert touching
-    assert float(both.foot_2.slip_speed) < 0.0
-    assert float(rates.slip_distance) == pytest.approx(-float(both.foot_2.slip_speed))
+    assert float(both[1].slip_speed) < 0.0
+    assert float(rates.slip_distance) == pytest.approx(-float(both[1].slip_speed))
     assert float(rates.friction_loss) == pytest.approx(float(power.friction))
     assert float(rates.friction_loss) > 0.0
     assert float(rates.impact_loss) == pytest.approx(float(power.indentation))
@@ -330,8 +330,8 @@ def test_motors_work_where_they_drive_and_not_where_they_brake():
 
     @jax.jit
     def told(state):
-        hip = rolling_hip_motion(state)
-        motors = actuator_powers(scene, hip, (None, None)).motors
+        hip = rolling_hip_motion(scene, state)
+        motors = actuator_powers(scene, hip).motors
         work = system.vector_field(0.0, system.begin(state), scene).motor_work
         return work, motors, hip_torques(scene, hip)
 
@@ -356,7 +356,7 @@ def test_a_pushed_walk_returns_to_the_gait_or_does_not(last, count, returned, mo
         times[:count] = np.append(0.5 * np.arange(count - 1), 0.5 * (count - 2) + last)
         return SimpleNamespace(arrivals=SimpleNamespace(t=times))
 
-    monkeypatch.setattr(_certificate, "rigid_walk", walk)
+    monkeypatch.setattr(_certificate, "simulate", walk)
     state = jb.dynamics.RigidState(1.0, 0.2, 0.3, -1.0, -2.0)
     gait = SimpleNamespace(measures=SimpleNamespace(state=state, period=0.5))
     found = _certificate._walk(SCENE, gait, 20, 0.01)

@@ -10,12 +10,13 @@ from reference.rigid import rigid_walker
 
 import jaxbiped as jb
 from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._rolling import inertia_of, rolling_field, support_of
-from jaxbiped.dynamics._state import RigidState
+from jaxbiped.dynamics._rolling import rolling_field
+from jaxbiped.dynamics._stance import kinetic_energy
 from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
-from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
+from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._objective_values import evaluate
 from jaxbiped.optimise._objectives import check_objective
+from jaxbiped.scene._state_types import RigidState
 
 pytestmark = pytest.mark.slow
 SCENES = jb.ladder() | {"heavy hip": jb.seed_scene(hip_mass=0.5, slope=0.025, r=0.1)}
@@ -94,7 +95,7 @@ def test_gradients_are_those_of_central_differences(which):
         names, noisy = COSTS, dict.fromkeys(COSTS, USUAL)
     told, guess = evaluation(scene, names)
     tight, _ = evaluation(scene, names, guess, "tight")
-    for varied in VARIED:
+    for varied in VARIED[:1] if which == "hip torque" else VARIED:
         own = float(jb.parameter_values(scene)[varied])
         place = jb.parameter_names(scene).index(varied)
         for step in sorted({USUAL[0], *(each[0] for each in noisy.values())}):
@@ -128,25 +129,25 @@ def test_gradients_are_those_of_central_differences(which):
                 assert off["balanced"] <= noisy[name][1] + 5.0 * bar, (name, varied)
 
 
-def test_energy_that_gravity_gives_is_lost():
+@pytest.mark.parametrize("which", ["rigid", pytest.param("stribeck", marks=pytest.mark.nightly)])
+def test_energy_that_gravity_gives_is_lost(which):
     """Weight times the descent equals the losses, to their error bars."""
-    for which in ("rigid", "stribeck"):
-        scene = SCENES[which]
-        losses = {"impact_loss", "friction_loss"} & set(objectives_of(scene))
-        known, _ = evaluation(scene, ("step_length", "cost_of_transport", *sorted(losses)))
-        weight = float(scene.walker.total_mass * scene.ground.g)
-        work = weight * known.values["step_length"] * np.sin(float(scene.ground.slope))
-        lost = sum(known.values[name] for name in losses)
-        assert lost == pytest.approx(work, rel=1e-6)
-        sine = np.sin(float(scene.ground.slope))
-        assert known.values["cost_of_transport"] == pytest.approx(sine, rel=1e-6)
-        # So the gradient of a passive cost of transport is the slope's alone.
-        names = jb.parameter_names(scene)
-        expected = np.zeros(len(names))
-        expected[names.index("slope")] = np.cos(float(scene.ground.slope))
-        values = np.asarray([float(v) for v in jb.parameter_values(scene).values()])
-        off = (known.slopes["cost_of_transport"] - expected) * values / sine
-        assert np.max(np.abs(off)) < 1e-4
+    scene = SCENES[which]
+    losses = {"impact_loss", "friction_loss"} & set(objectives_of(scene))
+    known, _ = evaluation(scene, ("step_length", "cost_of_transport", *sorted(losses)))
+    weight = float(scene.walker.total_mass * scene.ground.g)
+    work = weight * known.values["step_length"] * np.sin(float(scene.ground.slope))
+    lost = sum(known.values[name] for name in losses)
+    assert lost == pytest.approx(work, rel=1e-6)
+    sine = np.sin(float(scene.ground.slope))
+    assert known.values["cost_of_transport"] == pytest.approx(sine, rel=1e-6)
+    # So the gradient of a passive cost of transport is the slope's alone.
+    names = jb.parameter_names(scene)
+    expected = np.zeros(len(names))
+    expected[names.index("slope")] = np.cos(float(scene.ground.slope))
+    values = np.asarray([float(v) for v in jb.parameter_values(scene).values()])
+    off = (known.slopes["cost_of_transport"] - expected) * values / sine
+    assert np.max(np.abs(off)) < 1e-4
 
 
 @pytest.mark.parametrize("which", DRIVEN)
@@ -183,17 +184,18 @@ def test_the_rigid_clearance_is_that_of_the_rigid_checks():
     assert clearance == pytest.approx(lowest, rel=0.2)
 
 
-def test_the_bound_is_above_the_radius_and_the_moduli_are_the_multipliers():
-    for which in ("rigid", "stribeck"):
-        scene = SCENES[which]
-        gait = usual_gait(scene)
-        found = jacobian_functionals(scene, gait.measures.state)
-        values = dict(zip(JACOBIAN_FUNCTIONALS, np.asarray(found.values), strict=True))
-        upper = np.asarray(gait.multipliers)
-        upper = np.sort(np.abs(upper[upper.imag >= 0.0]))[::-1]
-        assert values["spectral_radius"] == pytest.approx(upper[0], rel=1e-4)
-        assert values["modulus_2"] == pytest.approx(upper[1], rel=1e-3)
-        assert upper[0] < values["radius_bound"] < 1.1 * upper[0]
+@pytest.mark.parametrize("which", ["rigid", pytest.param("stribeck", marks=pytest.mark.nightly)])
+def test_the_bound_is_above_the_radius_and_the_moduli_are_the_multipliers(which):
+    scene = SCENES[which]
+    gait = usual_gait(scene)
+    names = ("spectral_radius", "modulus_2", "radius_bound")
+    found = jacobian_functionals(scene, gait.measures.state, names)
+    values = dict(zip(names, np.asarray(found.values), strict=True))
+    upper = np.asarray(gait.multipliers)
+    upper = np.sort(np.abs(upper[upper.imag >= 0.0]))[::-1]
+    assert values["spectral_radius"] == pytest.approx(upper[0], rel=1e-4)
+    assert values["modulus_2"] == pytest.approx(upper[1], rel=1e-3)
+    assert upper[0] < values["radius_bound"] < 1.1 * upper[0]
 
 
 def test_a_push_over_a_cycle_of_two_has_the_gradient_of_differences():
@@ -204,7 +206,7 @@ def test_a_push_over_a_cycle_of_two_has_the_gradient_of_differences():
     def told(d):
         there = jb.with_parameters(scene, {"d": d})
         state = usual_gait(there).measures.state
-        return jacobian_functionals(there, state, names, footsteps=2)
+        return jacobian_functionals(there, state, names, arrivals=2)
 
     place = jb.parameter_names(scene).index("d")
     norms = {k: float(told(own * (1.0 + k * step)).values[0]) for k in PLACES}
@@ -225,9 +227,11 @@ def test_the_divergence_of_the_foot_strike_is_that_of_its_saltation_matrix():
 
     def volume(y):
         """Of momenta for each of rates: the determinant of the mass matrix."""
-        support = support_of(scene.walker, y[1])
-        own = inertia_of(scene.walker, support, jnp.sin(y[0]), jnp.cos(y[0]))
-        return own.stance * own.swing - own.coupling**2
+
+        def kinetic(rates):
+            return kinetic_energy(scene, RigidState(jnp.zeros(()), *y[:2], *rates))
+
+        return jnp.linalg.det(jax.hessian(kinetic)(y[2:]))
 
     after, by_state = struck(before), jax.jacfwd(struck)(before)
     coming, leaving = rates(before), rates(after)
@@ -240,9 +244,17 @@ def test_the_divergence_of_the_foot_strike_is_that_of_its_saltation_matrix():
     assert float(told.values[0]) < 0.0
 
 
-def test_error_bars_of_values_hold_against_a_tight_solve():
-    scene = SCENES["stribeck"]
-    names = tuple(objectives_of(scene))
+@pytest.mark.parametrize(
+    ("which", "names"),
+    [
+        ("rigid", ("spectral_radius", "radius_bound", "impact_loss", "foot_clearance")),
+        pytest.param("stribeck", (), id="stribeck", marks=pytest.mark.nightly),
+    ],
+)
+def test_error_bars_of_values_hold_against_a_tight_solve(which, names):
+    """Of those named, or of all."""
+    scene = SCENES[which]
+    names = names or tuple(objectives_of(scene))
     known, guess = evaluation(scene, names)
     tight, _ = evaluation(scene, names, guess, "tight")
     for name in names:

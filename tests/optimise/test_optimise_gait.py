@@ -11,8 +11,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem
-from jaxbiped.optimise._evaluations import Evaluations
-from jaxbiped.optimise._objective_values import Evaluation
+from jaxbiped.optimise._objective_values import Evaluation, Evaluations
 from jaxbiped.optimise._optimise_gait import _problem_settings
 
 pytestmark = pytest.mark.slow

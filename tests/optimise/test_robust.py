@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.optimise._design_gaits import GaitSettings
-from jaxbiped.optimise._ensemble import ensemble_of, evaluate_ensemble
+from jaxbiped.optimise._design_gaits import GaitSettings, ensemble_of, evaluate_ensemble
 from jaxbiped.optimise._objective_values import evaluate
 
 pytestmark = pytest.mark.slow

@@ -10,7 +10,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._samples import evaluate_along, evaluate_at
-from jaxbiped.plot._samples import sample, sampled_forces, state_at
+from jaxbiped.plot._contact_forces import sampled_forces
+from jaxbiped.plot._samples import sample, state_at
 
 
 def test_samples_hold_every_step_of_the_solver(seed_walk):
@@ -37,8 +38,8 @@ def test_contacts_are_feet_and_forces(seed_walk):
     state = state_at(walk, np.linspace(0.0, 2.0, 11))
     found = evaluate_along(scene, state, contacts)
     forces = jb.dynamics.foot_forces(scene, jb.State(*(jnp.asarray(leaf) for leaf in state)))
-    np.testing.assert_allclose(found.forces.foot_1.normal, np.asarray(forces.foot_1.normal))
-    np.testing.assert_allclose(found.forces.foot_2.tangential, np.asarray(forces.foot_2.tangential))
+    np.testing.assert_allclose(found.forces[0].normal, np.asarray(forces[0].normal))
+    np.testing.assert_allclose(found.forces[1].tangential, np.asarray(forces[1].tangential))
     assert found.touching[0].shape == (11,)
 
 
@@ -53,8 +54,8 @@ def _peaks(scene, walk, t, found):
     """Largest normal and tangential force of each heel strike, of the foot that lands."""
     for time, foot in zip(*jb.measure.heel_strikes(scene, walk), strict=True):
         near = (t > time - 1e-4) & (t < time + 5e-3)
-        force = found.forces[foot - 1]
-        yield foot, t[near], force.normal[near], -force.tangential[near]
+        normal, tangential = found[f"normal_{foot}"], found[f"tangential_{foot}"]
+        yield foot, t[near], normal[near], -tangential[near]
 
 
 def test_peaks_are_those_of_a_much_finer_sampling(walk):
@@ -86,7 +87,7 @@ def test_between_two_times_and_without_friction(walk):
     slippery = eqx.tree_at(lambda s: s.friction, scene, jb.laws.Frictionless())
     t, found = sampled_forces(slippery, trajectory, start=0.3, stop=0.5)
     assert (t[0], t[-1]) == (0.3, 0.5)
-    assert found.forces.foot_1.tangential is None
-    assert found.forces.foot_1.normal.shape == t.shape
+    assert set(found) == {"normal_1", "normal_2"}
+    assert found["normal_1"].shape == t.shape
     with pytest.raises(ValueError, match='save="steps"'):
         sampled_forces(scene, dataclasses.replace(trajectory, dense=None))

@@ -77,7 +77,8 @@ def test_it_fills_its_figure_and_says_which_second_it_shows(seed_walk):
     assert (right - left) / shown > 0.9
     across = ax.get_window_extent().width / figure.bbox.width
     assert across > 0.85
-    assert ax.collections[0].get_linestyle() != ax.collections[2].get_linestyle()
+    first, second = (each for each in ax.collections if isinstance(each, LineCollection))
+    assert first.get_linestyle() != second.get_linestyle()
 
 
 def test_axes_and_spans_given(seed_walk):

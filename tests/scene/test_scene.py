@@ -1,5 +1,6 @@
 """Scenes of any kind, against their leaves and a kind of one's own."""
 
+import dataclasses
 from typing import ClassVar
 
 import equinox as eqx
@@ -10,8 +11,14 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.dynamics._minimal_motion import WalkerField
+from jaxbiped.dynamics._redundant_motion import BodiesField
 from jaxbiped.dynamics._state import field_of, state_type
-from jaxbiped.scene._scene import AbstractScene, is_compliant, is_rigid
+from jaxbiped.scene._abstract_scene import AbstractScene, is_compliant, is_rigid
+from jaxbiped.scene._joint_parts import Stop
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._state_types import state_type_of
+from tests.mechanisms import FEET, LEGS, WALKERS, scene_of
 
 PARAMETERS = "m J l d r hip slope g K c n mu_s mu_k v0 xi".split()  # noqa: SIM905
 
@@ -52,7 +59,7 @@ def _broadcast(tree, n):
 def test_frictionless_forces_have_no_tangential_part():
     seed = jb.seed_scene()
     scene = jb.Scene(seed.walker, seed.ground, seed.normal, jb.laws.Frictionless())
-    assert jb.dynamics.foot_forces(scene, jb.seed_state()).foot_1.tangential is None
+    assert jb.dynamics.foot_forces(scene, jb.seed_state())[0].tangential is None
 
 
 @pytest.mark.parametrize("rule", [jb.laws.StanceRotation(), jb.laws.AlwaysTouching()])
@@ -73,22 +80,22 @@ RIGID = jb.RigidScene(SEED.walker, SEED.ground)
 @pytest.mark.parametrize(
     ("scene", "compliant", "redundant", "state", "field"),
     [
-        (SEED, True, False, jb.State, jb.dynamics.vector_field),
-        (BRISTLES, True, False, jb.dynamics.BristleState, jb.dynamics.vector_field),
+        (SEED, True, False, jb.State, WalkerField()),
+        (BRISTLES, True, False, jb.dynamics.BristleState, WalkerField()),
         (RIGID, False, False, jb.dynamics.RigidState, jb.dynamics.rolling_field),
         (
             jb.RedundantScene(SEED),
             True,
             True,
             jb.dynamics.RedundantState,
-            jb.dynamics.redundant_field,
+            BodiesField(),
         ),
         (
             jb.RedundantScene(BRISTLES, "penalty", "euler"),
             True,
             True,
-            jb.dynamics.EulerState,
-            jb.dynamics.redundant_field,
+            state_type_of((*jb.dynamics.EulerState._fields, "bristle_1", "bristle_2")),
+            BodiesField(),
         ),
     ],
 )
@@ -145,3 +152,21 @@ def test_a_kind_of_ones_own_registers_its_formulation_and_needs_no_walker():
     assert jb.parameter_names(wheel) == ("spokes",)
     assert jb.parameter_quantities(wheel)["spokes"].words == "spokes"
     assert float(jb.with_parameters(wheel, {"spokes": 9.0}).spokes) == 9.0
+
+
+def test_a_scene_takes_any_mechanism_and_knows_its_rules():
+    """By the clearance rule of the walker's own; a stop without law and an unknown leg refused."""
+    seed = jb.seed_scene()
+    assert isinstance(seed.clearance, jb.laws.StanceRotation)
+    assert scene_of("torso").mechanism is WALKERS["torso"]
+    assert isinstance(scene_of("torso").clearance, jb.laws.AlwaysTouching)
+    assert dataclasses.replace(seed, clearance=jb.laws.OneFoot(2)).clearance.leg == "2"
+    with pytest.raises(jb.ArgumentError, match="leg"):
+        scene_of("kneed", clearance=jb.laws.OneFoot("thigh_1"))
+    bare = Mechanism(bodies=LEGS, feet=FEET, joints=(Stop("leg_1", upper=1.0),))
+    with pytest.raises(jb.ArgumentError, match="no law"):
+        scene_of("torso", walker=bare)
+    with pytest.raises(jb.ArgumentError, match="without a mirror"):
+        scene_of("unequal", actuation=jb.actuation.HipSpring(k=1.0))
+    with pytest.raises(jb.ArgumentError, match="walker"):
+        scene_of("torso", walker=3.0)

@@ -7,7 +7,8 @@ from reference.rigid_walks import rigid_walks
 from reference.scipy_solves import final_of
 
 import jaxbiped as jb
-from jaxbiped.solve._rolling_step import accelerations, rolling_step
+from jaxbiped.dynamics._rolling import rolling_rates
+from jaxbiped.solve._rolling_step import rolling_step
 from tests.rigid_walkers import STABLE, rigid_seed, simplest_state, simplest_walker
 
 SCENE, STATE = jb.seed_scene(), jb.seed_state()
@@ -165,7 +166,7 @@ def test_the_embedded_method_is_one_order_lower():
     scene = rigid_seed()
 
     def end(step, state=START, *, embedded=False):
-        rates = accelerations(scene, state)
+        rates = rolling_rates(scene, state)
         return rolling_step(scene, state, rates, step, 1e-6, embedded=embedded)[0]
 
     gaps = []

@@ -74,6 +74,7 @@ def test_extremes_are_those_of_the_steps(seed_walk, engine):
         assert found["speeds"][0] == pytest.approx(float(reduce(whole.state.hip_vx)), abs=1e-4)
 
 
+@pytest.mark.nightly
 def test_extremes_by_both_engines_agree():
     """To the tolerance: rounding decides on the steps, and extremes are taken at their ends."""
     lanes, xla = (
@@ -88,7 +89,7 @@ def test_extremes_by_both_engines_agree():
     "options",
     [
         dict(engine="lanes"),
-        dict(engine="xla"),
+        pytest.param(dict(engine="xla"), marks=pytest.mark.nightly),
         pytest.param(
             dict(solver="kvaerno3", accuracy="draft", duration=0.3), marks=pytest.mark.nightly
         ),

@@ -11,6 +11,7 @@ import pytest
 
 import jaxbiped as jb
 from tests.compliant_walkers import held_walker
+from tests.mechanisms import WALKERS, scene_of, start_of
 
 pytestmark = pytest.mark.slow
 
@@ -166,6 +167,41 @@ def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name, draft):
     for accuracy, error in (("draft", draft), ("balanced", draft / 4.0)):
         told = jax.jacfwd(lambda rate, accuracy=accuracy: end(rate, accuracy))(rate)
         np.testing.assert_allclose(told, right, atol=error * np.max(np.abs(right)))
+
+
+def _kneed_with_everything():
+    """Knees with stops and latches, and a hip whose motor knows who stands."""
+    kneed = WALKERS["kneed"].arguments()
+    latches = (jb.Latch(f"shank_{i}", at=-0.2, width=0.05, torque=0.02) for i in (1, 2))
+    hip = {"thigh_1": 1, "thigh_2": -1}
+    motor = jb.Motor(hip, jb.actuation.PD(kp=0.3, kd=0.02, of=hip))
+    return jb.Mechanism(**kneed | {"joints": (*kneed["joints"], *latches, motor)})
+
+
+MOVED = ("shank.stop.K", "shank.latch.torque", "thigh.motor.kp", "slope")
+
+
+def test_derivatives_of_a_mechanism_follow_what_ends_it():
+    """With respect to a part of each kind and to the ground's slope, at once and in both modes."""
+    scene = scene_of("kneed", walker=_kneed_with_everything())
+    values = jb.parameter_values(scene)
+    at = np.array([float(values[name]) for name in MOVED])
+
+    def walk(values, accuracy="balanced"):
+        moved = jb.with_parameters(scene, dict(zip(MOVED, values, strict=True)))
+        # Its knees are bent: at the stop's limit the start would graze it.
+        start = start_of("kneed", scene)._replace(theta_shank_2=0.06)
+        found = jb.simulate(moved, start, footsteps=1, save="end", accuracy=accuracy)
+        return jnp.concatenate([found.t, *found.state])
+
+    steps = np.diag(1e-5 * np.abs(at))
+    ends = jax.vmap(partial(walk, accuracy="tight"))(jnp.asarray(at + np.vstack([steps, -steps])))
+    right = (ends[: len(at)] - ends[len(at) :]) / (2e-5 * np.abs(at)[:, None])
+    forward, reverse = (each(walk)(jnp.asarray(at)) for each in (jax.jacfwd, jax.jacrev))
+    assert abs(float(right[-1, 0])) > 1e-4
+    for one, other in zip(forward.T, right, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-3 * np.max(np.abs(other)))
+    np.testing.assert_allclose(reverse, forward, rtol=1e-12)
 
 
 def test_derivatives_do_not_depend_on_the_engine():

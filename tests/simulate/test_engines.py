@@ -52,6 +52,7 @@ def test_random_scenes_and_starts_end_alike(noise, slope, factor):
             assert float(a) == pytest.approx(float(b), abs=2e-6)
 
 
+@pytest.mark.nightly
 def test_another_solver_agrees():
     """On the scene that XLA compiles soonest; `test_return_map` holds all to closed forms."""
     options = dict(duration=0.2, solver="rodas3p", rtol=1e-8, watch=())

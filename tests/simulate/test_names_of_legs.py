@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 import jaxbiped as jb
 
 SCENE, STATE = jb.seed_scene(), jb.seed_state()
-TWIN = jb.dynamics.exchange_legs(STATE)
+TWIN = jb.dynamics.exchange_legs(SCENE, STATE)
 DURATION = 1.3
 
 
@@ -29,7 +29,7 @@ def _roots(walk, function):
     """Times at which a function of the state, under either naming, rises through zero."""
     times = np.linspace(0.0, DURATION, 20001)
     found = []
-    for named in (lambda y: y, jb.dynamics.exchange_legs):
+    for named in (lambda y: y, lambda y: jb.dynamics.exchange_legs(SCENE, y)):
         value = lambda t, named=named: float(function(SCENE, named(walk.at(t))))
         values = np.asarray(function(SCENE, named(walk.at(times))))
         rises = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._constraint_comparison import Integrator, compare_constraints
+from jaxbiped.cli._constraints import Integrator, compare_constraints
 
 pytestmark = pytest.mark.slow
 
@@ -30,6 +30,7 @@ def runs():
     return {run.method: run for run in every}
 
 
+@pytest.mark.nightly
 def test_methods_take_the_seeds_footstep(runs):
     for name, run in runs.items():
         assert run.ending == "walking"

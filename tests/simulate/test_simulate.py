@@ -73,7 +73,7 @@ def test_energy_is_kept_without_damper_and_friction():
     scene = frictionless_walker(K=1e5)
     start = jb.seed_state()._replace(hip_z=jnp.asarray(0.45))
     motion = jb.simulate(scene, start, duration=0.6, accuracy="tight", watch=())
-    assert float(jnp.max(jb.dynamics.foot_forces(scene, motion.state).foot_2.normal)) > 50.0
+    assert float(jnp.max(jb.dynamics.foot_forces(scene, motion.state)[1].normal)) > 50.0
     total = jb.dynamics.energies(scene, motion.state).total
     np.testing.assert_allclose(total, total[0], atol=2e-6)
 
@@ -89,7 +89,7 @@ def test_a_drop_on_the_hertz_law():
     drop = jb.simulate(scene, _upright(speed_z=-0.5), duration=0.05, accuracy="tight", watch=())
     times = np.linspace(0.0, 0.05, 20001)
     states = drop.at(times)
-    depth = float(jnp.max(jb.dynamics.feet(scene, states).foot_1.penetration))
+    depth = float(jnp.max(jb.dynamics.feet(scene, states)[0].penetration))
     # ½·2·v² + 2 g δ = 2·K δ^2.5/2.5
     assert depth**2.5 * 1e6 / 2.5 - 9.8 * depth == pytest.approx(0.5 * 0.5**2, rel=1e-6)
     leaving = int(np.flatnonzero(np.asarray(states.hip_z) > 0.4)[0])

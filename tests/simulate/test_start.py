@@ -76,7 +76,7 @@ def test_the_foot_that_would_just_touch_is_named_by_a_height_at_which_it_does():
     with pytest.raises(jb.ArgumentError) as caught:
         check_start_height(SEED, _start(hip_z=0.2))
     height = float(str(caught.value).split("hip_z = ")[-1].rstrip("."))
-    foot = jb.dynamics.feet(SEED, _start(hip_z=height)).foot_2
+    foot = jb.dynamics.feet(SEED, _start(hip_z=height))[1]
     assert float(foot.penetration) == pytest.approx(0.0, abs=1e-9)
 
 

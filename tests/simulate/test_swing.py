@@ -38,11 +38,10 @@ def angles():
 
 @pytest.fixture(scope="module")
 def swings():
-    """The pinned pendulum by every method in explicit Euler steps of 1e-4 s."""
+    """One leg of the pendulum by every method in explicit Euler steps of 1e-4 s."""
+    how = dict(times=TIMES, solver="euler", dt=1e-4)
     return {
-        name: jb.swing(
-            jb.LinkageScene(pinned_pendulum(), kind()), START, times=TIMES, solver="euler", dt=1e-4
-        )
+        name: jb.swing(jb.LinkageScene(one_leg(), kind()), ONE_LEG_START, **how)
         for name, kind in jb.constraints.CONSTRAINT_METHODS.items()
     }
 
@@ -52,8 +51,7 @@ def test_the_pendulum_by_seven_methods(swings, angles):
     for name, each in swings.items():
         assert each.outcome is jb.Ending.FINISHED
         assert (int(each.accepted), int(each.rejected)) == (20000, 0)
-        error = np.abs(np.array([each.state.q[2][-1], each.state.q[5][-1]]) - angles).max()
-        assert error < 0.02, name
+        assert abs(float(each.state.q[2][-1]) - angles[0]) < 0.02, name
     for name in PROJECTING:
         assert worst[name] < 1e-14
     for name in ("baumgarte", "penalty", "augmented"):

@@ -47,7 +47,7 @@ def astride(*, rear, front, speeds, depth=1e-4, **more):
 
 
 def swapped(state):
-    return jb.dynamics.exchange_legs(state)
+    return jb.dynamics.exchange_legs(jb.seed_scene(), state)
 
 
 @pytest.mark.parametrize("exchange", [lambda s: s, swapped], ids=["leg 1", "leg 2"])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.basins import FatalShock
 from jaxbiped.basins._labels import Label
 from jaxbiped.sweep import _nearest_failure
 from jaxbiped.sweep._attractor import attractor_without_radius, component_scales
@@ -64,11 +65,15 @@ def test_recurrences_are_looked_for_above_the_tolerance():
     assert effort.gap == pytest.approx(3e-3)
 
 
+ALONG = np.array([0.0, 0.6, 0.0, 0.8])
+
+
 def test_every_label_but_walking_is_a_failure(monkeypatch):
     asked = {}
 
     def shock(fails, origin, **options):
         asked.update(options, origin=origin, found=fails(np.zeros((5, 4))))
+        return FatalShock(0.5, 0.5 * ALONG, 0.4 * ALONG, 1, ALONG, 0.0, 0.5, 0, 5, 1)
 
     codes = np.array([int(Label.WALKING), 1, int(Label.STUMBLED), int(Label.UNRESOLVED), 9])
     monkeypatch.setattr(_nearest_failure, "minimal_fatal_shock", shock)
@@ -76,10 +81,13 @@ def test_every_label_but_walking_is_a_failure(monkeypatch):
         jb.Labelling, "__call__", lambda *_, **__: SimpleNamespace(label=codes), raising=True
     )
     knows = with_attractor(LABELLING)
-    jb.nearest_failure(knows, gradients=False, max_distance=0.7)
+    found = jb.nearest_failure(knows, gradients=False, max_distance=0.7)
     assert asked["found"].tolist() == [0, 1, 1, 1, 1]
-    np.testing.assert_array_equal(asked["origin"], knows.family.rows[0][0].point)
-    np.testing.assert_array_equal(asked["scales"], knows.family.scales[0])
+    np.testing.assert_array_equal(asked["origin"], np.zeros(4))
+    np.testing.assert_array_equal(asked["scales"], np.ones(4))
+    point, scales = knows.family.rows[0][0].point, knows.family.scales[0]
+    np.testing.assert_array_equal(found.push, 0.5 * ALONG * scales)
+    np.testing.assert_array_equal(found.boundary_point, point + 0.4 * ALONG * scales)
     assert (asked["max_distance"], asked["normal"]) == (0.7, None)
 
 

@@ -32,7 +32,10 @@ def of_parameters(values, count=1):
         (lambda: label(footsteps=2.5), "footsteps = 2.5 .* whole number"),
         (lambda: label(accuracy="best"), "accuracy = 'best' is not known: choose one of draft"),
         (lambda: label(accuracy=0.0), "accuracy = 0 is not allowed"),
-        (lambda: label(accuracy=2.0), "accuracy = 2 is not allowed: it is the share of the labels"),
+        (
+            lambda: label(accuracy=2.0),
+            "accuracy = 2 is not allowed: it is the fraction of the labels",
+        ),
         (
             lambda: jb.labelling(RIGID, accuracy=1e-3, rtol=1e-6),
             "rtol = 1e-06 is not allowed beside accuracy = 0.001",
@@ -66,7 +69,7 @@ def of_parameters(values, count=1):
         (lambda: sample(SCENE, {"hip_vx": (0.5, 0.1)}, 4), "hip_vx = 0.5:0.1 .* be less than"),
         (lambda: sample(SCENE, {"hip_vx": (0.5,)}, 4), "hip_vx = .* two numbers"),
         (lambda: sample(SCENE, {"hip_vx": (0.5, np.inf)}, 4), "hip_vx = inf"),
-        (lambda: sample(SCENE, BOUNDS, 0), "count = 0 .* whole number of at least 1"),
+        (lambda: sample(SCENE, BOUNDS, 0), "count = 0 .* whole number above 0"),
         (lambda: sample(SCENE, BOUNDS, 4, method="best"), "method = 'best' .* sobol"),
         (lambda: sample(SCENE, {"c": (-5.0, 1.0)}, 4), "c = -5"),
         (lambda: given([1.0]), "states = .* must be a State"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxbiped.sweep._grid_waves import extrapolated, interpolated, neighbours, rings, waves
+from jaxbiped.sweep._gait_waves import extrapolated, interpolated, neighbours, rings, waves
 
 SHAPES = [((100, 100), (37, 80)), ((97,), (3,)), ((30, 5, 7), (0, 4, 6)), ((8, 8), (7, 0))]
 

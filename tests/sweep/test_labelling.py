@@ -206,7 +206,7 @@ def beyond_doubling():
     guess = simplest_state(0.235, -0.235)
     scene = simplest_walker(0.0152)
     assert float(scene.ground.slope) > FIRST_DOUBLING
-    with pytest.warns(RuntimeWarning, match="no stable gait was found: what walks there"):
+    with pytest.warns(RuntimeWarning, match="no stable gait was found: starts that walk there"):
         return jb.labelling(scene, guess=guess, accuracy="balanced", footsteps=60)
 
 

@@ -175,7 +175,7 @@ def standing(angle, rate, depth=1e-4, hip_x=0.0):
 
 @pytest.mark.parametrize("leg", [0, 1])
 def test_a_foot_that_rolls_does_not_slide_and_one_that_slides_does(leg):
-    name = (lambda state: state) if leg else jb.dynamics.exchange_legs
+    name = lambda y: y if leg else jb.dynamics.exchange_legs(SCENE, y)
     places = contact_places(SCENE, name(standing(0.2, -1.0)))
     told = lambda **moved: slip_distances(SCENE, name(standing(0.1, -1.0, **moved)), places)
     landed, slid = told()
@@ -245,7 +245,7 @@ def test_arrivals_at_mid_stance_are_those_of_either_leg(attempt):
     for exchanged in (False, True):
         ends = before, after
         if exchanged:
-            ends = tuple(jb.dynamics.exchange_legs(each) for each in ends)
+            ends = tuple(jb.dynamics.exchange_legs(SCENE, each) for each in ends)
             landed = landed[::-1]
         trace, over = attempt(*ends, 1.0, 0.5, landed, 0.0)
         arrived = np.array(trace.recent[0])

@@ -30,9 +30,7 @@ def test_the_last_axis_of_a_grid_runs_fastest():
 def test_placed_feet_are_as_deep_and_slip_as_slowly_as_in_the_gait():
     axes = {"theta_stance": np.linspace(-0.3, 0.4, 5), "omega_stance": np.linspace(-2.0, 0.3, 4)}
     batch = jb.starts.grid(SCENE, axes, place=True).batch(LABELLING, 0, 20)
-    ours, gait = (
-        jb.dynamics.feet(SCENE, state).foot_2 for state in (batch.states, jb.seed_state())
-    )
+    ours, gait = (jb.dynamics.feet(SCENE, state)[1] for state in (batch.states, jb.seed_state()))
     np.testing.assert_allclose(ours.penetration, gait.penetration, atol=1e-15)
     np.testing.assert_allclose(ours.penetration_rate, gait.penetration_rate, atol=1e-13)
     np.testing.assert_allclose(ours.slip_speed, gait.slip_speed, atol=1e-13)

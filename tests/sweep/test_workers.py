@@ -83,7 +83,7 @@ def test_spawned_processes_and_one_that_dies(tmp_path, expected):
             _swept(starts=killing, store=tmp_path / "store", executor=pool, workers=2)
     sentence = str(raised.value)
     assert sentence.startswith("executor = ProcessPoolExecutor lost its workers (")
-    assert sentence.endswith("run again; the chunks that are complete stay in the store.")
+    assert sentence.endswith("run again; complete chunks remain in the store.")
     done = zarr.open_group(str(tmp_path / "store"), mode="r")["done"][:]
     assert 1 <= done.sum() < len(done)
     kept = zarr.open_group(str(tmp_path / "store"), mode="r")["time"][:][done == 1]

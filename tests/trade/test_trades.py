@@ -9,6 +9,7 @@ from reference.walks import reference_states, walk
 
 import jaxbiped as jb
 from jaxbiped.trade import GaitTrade, WalkTrade, Way
+from tests.optimise.test_optima_of_mechanisms import TORSO
 
 DURATION = 2.0
 LEGS = 0.40
@@ -92,3 +93,15 @@ def test_no_gait_no_truth():
     scene = jb.seed_scene(slope=-0.2)
     assert GaitTrade(scene).parameters == ("K", "c", "xi")
     assert GaitTrade(scene).truth() is None
+
+
+@pytest.mark.nightly
+def test_a_mechanisms_gait_is_traded_from_a_guess():
+    start = jb.find_gait(TORSO, parameters=(), radius_sensitivities=False).measures.state
+    trade = GaitTrade(TORSO, 1, start)
+    truth = trade.truth()
+    assert truth.floor["period"] < 1e-10
+    row = trade.row(Way("rodas4", "lanes", "balanced", 2e-8), truth)
+    assert row.outcome == "ok"
+    assert row.errors["period"] < 1e-8
+    assert row.errors["multiplier"] < 1e-6

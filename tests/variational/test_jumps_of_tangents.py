@@ -12,7 +12,14 @@ from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._tangent_step_size import step_control
 from jaxbiped.variational._collocated_step import RADAU, KnownStep
-from jaxbiped.variational._flow import Flow, after_reset, on_section, tangent_on_section
+from jaxbiped.variational._flow import (
+    SIDES,
+    Flow,
+    after_reset,
+    jump_of,
+    on_section,
+    tangent_on_section,
+)
 from jaxbiped.variational._grazing import turns_of
 from jaxbiped.variational._hybrid_system import RedundantWalking, Rolling, Walking
 from jaxbiped.variational._saltation import saltation_at
@@ -66,7 +73,7 @@ def test_saltation_is_the_change_of_the_field_over_the_rate_of_crossing():
     np.testing.assert_array_equal(saltation(WATCH, *at, False).change, [0.0, 0.0])
     np.testing.assert_array_equal(found.by_state, [1.0, 0.0])
     np.testing.assert_array_equal(found.by_parameter, [-1.0])
-    np.testing.assert_array_equal(found.which, [True, False])
+    np.testing.assert_array_equal(found.which, [True, False, False])
 
 
 def test_of_two_switches_it_is_the_one_that_was_passed_last():
@@ -130,6 +137,28 @@ def test_a_step_behind_a_jump_carries_the_columns_of_the_exact_motion():
     slopes = jax.jacfwd(exact, argnums=(0, 1, 2))(start[0], start[1], level, fall + 0.01)
     np.testing.assert_allclose(ours.columns, np.stack(slopes, axis=1), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(ours.state, exact(*start, level, fall + 0.01), rtol=1e-9)
+
+
+def _beside_a_switch(power):
+    """A Jacobian whose first entry goes as this power of the time since a switch, the others not.
+
+    The last one is rounding.
+    """
+    times = np.abs(SIDES)
+    first = np.where(np.asarray(SIDES) > 0.0, 3e4 + 2.0 * (1e10 * times) ** power * 1e4, 0.0)
+    noise = 1e-12 * np.array([1.0, -3.0, 2.0, 2.0, -5.0, 1.0])
+    return np.stack([first, 0.0 * times + 7.0, noise], axis=1)[:, None]
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0])
+def test_a_jump_of_the_jacobian_is_its_value_at_the_switch(power):
+    jump = np.asarray(jump_of(jnp.asarray(_beside_a_switch(power))))[0]
+    np.testing.assert_allclose(jump, [3e4, 0.0, 0.0], rtol=1e-12, atol=1e-10)
+
+
+@pytest.mark.parametrize("power", [-0.75, -0.5, -0.25])
+def test_a_jacobian_without_bound_at_a_switch_has_no_jump(power):
+    assert np.all(np.isnan(jump_of(jnp.asarray(_beside_a_switch(power)))))
 
 
 class Flight(jb.gait.AbstractSystem):
@@ -235,13 +264,13 @@ def test_radau_is_exact_for_polynomials_and_its_clock_runs_in_the_root_of_time()
 
 def test_systems_of_walkers_exchange_legs_and_carry_the_larger_load():
     scene, state = jb.seed_scene(), jb.seed_state()
-    swapped = jb.dynamics.exchange_legs(state)
+    swapped = jb.dynamics.exchange_legs(scene, state)
     for leg in (Walking(), RedundantWalking()):
         assert [float(x) for x in leg.reset_map(scene, state)] == [float(x) for x in swapped]
     low = state._replace(hip_z=jnp.asarray(0.3945))
     load = jax.jit(lambda y: (Walking().load(scene, y), jb.dynamics.foot_forces(scene, y)))
-    for each in (low, jb.dynamics.exchange_legs(low)):
+    for each in (low, jb.dynamics.exchange_legs(scene, low)):
         largest, forces = load(each)
-        both = float(forces.foot_1.normal), float(forces.foot_2.normal)
+        both = float(forces[0].normal), float(forces[1].normal)
         assert float(largest) == max(both) > min(both) == 0.0
     assert Walking.cyclic_coordinates == Rolling.cyclic_coordinates == (0,)

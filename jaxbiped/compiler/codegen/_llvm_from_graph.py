@@ -3,11 +3,10 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from jaxbiped.compiler.codegen._instruction_selection import select_fused, select_instruction
-from jaxbiped.compiler.codegen._kernel_target import KernelTarget
+from jaxbiped.compiler.codegen._kernel_target import KernelTarget, select_fused, select_instruction
 from jaxbiped.compiler.codegen._llvm_function import RARELY, FunctionBuilder, literal, vector
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
-from jaxbiped.compiler.passes._liveness import Liveness
+from jaxbiped.compiler.ir._liveness import Liveness
 
 
 class Place(NamedTuple):

@@ -18,8 +18,8 @@ from jaxbiped.compiler.codegen._llvm_function import literal
 from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
 from jaxbiped.compiler.ir._elementary_functions import HALF_PI, Arithmetic
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
+from jaxbiped.compiler.ir._liveness import Liveness
 from jaxbiped.compiler.ir._powers import any_logarithm, any_power, circular_within
-from jaxbiped.compiler.passes._liveness import Liveness
 from jaxbiped.compiler.runtime._machine_code import foreign_machine, optimised_module
 
 THREADS, BLOCKS = 64, 1
@@ -115,7 +115,7 @@ def library_text() -> tuple[str, frozenset[str]]:
         text, declared = _function_text(name, kinds, make)
         parts.append(text)
         declarations |= declared
-    parts += [_circular_text(name) for name in ("sin", "cos")]
+    parts += [_sine_or_cosine_text(name) for name in ("sin", "cos")]
     return "\n".join(parts), frozenset(declarations)
 
 
@@ -249,7 +249,7 @@ def _reduction_text() -> str:
 }}"""
 
 
-def _circular_text(name: str) -> str:
+def _sine_or_cosine_text(name: str) -> str:
     return f"""define internal double @{OWN_LIBRARY}{name}(double %x) noinline {{
   %angle = call {{double, double, i64}} @reduce_angle(double %x)
   %rest = extractvalue {{double, double, i64}} %angle, 0

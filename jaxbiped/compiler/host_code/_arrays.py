@@ -182,6 +182,21 @@ def eigensystem_of(matrix: np.ndarray, *, left: bool, right: bool) -> list[np.nd
     return [np.full_like(each, np.nan) for each in found] if failed else found
 
 
+def singular_system_of(matrices: np.ndarray, *, full: bool, vectors: bool) -> list[np.ndarray]:
+    """Singular values of matrices (…, n, k), with left and right vectors where asked for."""
+    known = np.isfinite(matrices).all(axis=(-2, -1))
+    # LAPACK's iteration does not end well on what is no number.
+    finite = np.where(known[..., None, None], matrices, 0.0)
+    if vectors:
+        left, values, right = np.linalg.svd(finite, full_matrices=full)
+        found = [values, left, right]
+    else:
+        found = [np.linalg.svd(finite, compute_uv=False)]
+    spare = [each.ndim - known.ndim for each in found]
+    held = [known.reshape(known.shape + (1,) * count) for count in spare]
+    return [np.where(own, each, np.nan) for own, each in zip(held, found, strict=True)]
+
+
 def _complex_vectors(vectors: np.ndarray, imag: np.ndarray) -> np.ndarray:
     """LAPACK tells of a pair the real part and then the imaginary one."""
     found = vectors.astype(np.complex128)

@@ -1,5 +1,6 @@
 """Host operations: how a host program writes operations of JAX, linear algebra among them."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -58,6 +59,8 @@ _REDUCTIONS = {
     "reduce_and": "logical_and",
     "reduce_or": "logical_or",
 }
+_OF_NONE = {"maximum": -np.inf, "minimum": np.inf}
+"""What reductions without an identity in NumPy give of no entries."""
 
 
 def _entrywise(w: HostWriter, op: Operation, form: str, inputs: Sequence[Value]) -> Value:
@@ -137,6 +140,8 @@ def _reduce_rule(name: str) -> Rule:
         axes = tuple(int(axis) for axis in op.params["axes"])
         if all(op.inputs[0].shape[i] == 1 for i in axes):
             return [reshaped(w, op.inputs[0], shape)]
+        if dtype.kind == "f" and name in _OF_NONE and 0 in op.inputs[0].shape:
+            return [w.constant(np.full(shape, _OF_NONE[name], dtype))]
         axis = axes[0] if len(axes) == 1 else axes
         # Of small whole numbers NumPy would make larger ones.
         kept = f", {dtype.name}" if dtype.kind == "i" and name in ("add", "multiply") else ""
@@ -189,19 +194,16 @@ def _product(w: HostWriter, op: Operation) -> list[Value]:
     shape, dtype = op.result()
     (left, right), (left_batch, right_batch) = op.params["dimension_numbers"]
     a, b = (w.full(each) for each in op.inputs)
-    if len(left) != 1:
-        raise UnwrittenError("a product over other than one axis")
     order_a = [*left_batch, *_others(a, [*left_batch, *left]), *left]
     order_b = [*right_batch, *right, *_others(b, [*right_batch, *right])]
     a, b = transposed(w, a, order_a), transposed(w, b, order_b)
-    n = len(left_batch)
-    if not n and len(b.shape) <= 2:
+    n, summed = len(left_batch), len(left)
+    if not n and summed == 1 and len(b.shape) <= 2:
         return [w.emit("({0} @ {1})", [a, b], shape, dtype)]
-    if len(a.shape) > n + 2 or len(b.shape) > n + 2:
-        raise UnwrittenError("a product of many axes")
-    rows = "" if len(a.shape) == n + 2 else "[..., None, :]"
-    columns = "" if len(b.shape) == n + 2 else "[..., None]"
-    form = f"({{0}}{rows} @ {{1}}{columns}).reshape({shape!r})"
+    inner = math.prod(b.shape[n : n + summed])
+    rows = (*a.shape[:n], math.prod(a.shape[n : len(a.shape) - summed]), inner)
+    columns = (*b.shape[:n], inner, math.prod(b.shape[n + summed :]))
+    form = f"({{0}}.reshape({rows!r}) @ {{1}}.reshape({columns!r})).reshape({shape!r})"
     return [w.emit(form, [a, b], shape, dtype)]
 
 
@@ -231,6 +233,16 @@ def _eigensystem(w: HostWriter, op: Operation) -> Sequence[Value]:
     return w.emit_all(form, [matrix], op.results())
 
 
+def _singular_system(w: HostWriter, op: Operation) -> Sequence[Value]:
+    p, value = op.params, op.inputs[0]
+    if value.dtype != np.float64 or p["subset_by_index"] is not None:
+        raise UnwrittenError("singular values of other than 64-bit numbers, or some of them")
+    full, vectors = bool(p["full_matrices"]), bool(p["compute_uv"])
+    only = "" if vectors else "[0]"
+    form = f"singular_system_of({{0}}, full={full}, vectors={vectors}){only}"
+    return w.emit_all(form, [w.full(value)], op.results())
+
+
 def _square_matrix(w: HostWriter, value: Value) -> Value:
     if len(value.shape) != 2 or value.dtype != np.float64:
         raise UnwrittenError("linear algebra of other than one matrix of 64-bit numbers")
@@ -242,4 +254,5 @@ LINEAR_ALGEBRA: dict[str, Rule] = {
     "lu": _factors,
     "triangular_solve": _triangular,
     "eig": _eigensystem,
+    "svd": _singular_system,
 }

@@ -1,1 +1,1 @@
-"""Intermediate representation."""
+"""Intermediate representation: graphs of scalar operations, and passes over them."""

@@ -7,7 +7,7 @@ the errors in units in the last place.
 import math
 from collections.abc import Callable, Sequence
 
-from jaxbiped._circular import COSINE_SERIES, SINE_SERIES
+from jaxbiped._trigonometry import COSINE_SERIES, SINE_SERIES
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 
 
@@ -212,7 +212,7 @@ def turned(m: Arithmetic, number: Value, quarter: int, sine: Value, cosine: Valu
     return m.choose(back, m.neg(value), value)
 
 
-def _circular(name: str, quarter: int) -> Callable[[Arithmetic, Value], Value]:
+def _sine_or_cosine(name: str, quarter: int) -> Callable[[Arithmetic, Value], Value]:
     def function(m: Arithmetic, x: Value) -> Value:
         number, sine, cosine = _quarter_turns(m, x)
         value = turned(m, number, quarter, sine, cosine)
@@ -224,8 +224,8 @@ def _circular(name: str, quarter: int) -> Callable[[Arithmetic, Value], Value]:
     return function
 
 
-sine = _circular("sin", 0)
-cosine = _circular("cos", 1)
+sine = _sine_or_cosine("sin", 0)
+cosine = _sine_or_cosine("cos", 1)
 
 _TANH_ABOVE = (-9.64399179425052238628e-1, -9.92877231001918586564e1, -1.61468768441708447952e3)
 _TANH_BELOW = (1.0, 1.12811678491632931402e2, 2.23548839060100448583e3, 4.84406305325125486048e3)

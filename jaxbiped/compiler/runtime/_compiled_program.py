@@ -11,8 +11,8 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped.compiler.runtime._host_cpu import default_threads, run_in_threads
 from jaxbiped.compiler.runtime._kernel import Kernel
+from jaxbiped.compiler.runtime._machine_code import default_threads, run_in_threads
 from jaxbiped.compiler.runtime._processor import (
     AbstractProcessor,
     HostProcessor,

@@ -27,11 +27,11 @@ from jaxbiped.compiler.codegen._ptx_kernel import (
     device_target,
     ptx_text,
 )
-from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._machine_code import (
     MachineCode,
     assembly,
     code_name,
+    host,
     machine_code,
     stored_code,
 )

@@ -12,7 +12,7 @@ from jaxtyping import Array, PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.compiler.runtime._engine_interface import AbstractEngine, Request, Result
+from jaxbiped.compiler.runtime._engines import AbstractEngine, Request, Result
 from jaxbiped.compiler.runtime._program import Program, Recorded
 
 _ROUND = 128

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped.compiler.codegen._lane_scheduler import FIELDS
-from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._kernel import Kernel
+from jaxbiped.compiler.runtime._machine_code import host
 
 _MANY = 8
 """Vectors for each thread from which on two are computed side by side."""

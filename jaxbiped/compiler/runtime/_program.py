@@ -18,8 +18,8 @@ from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.compiler.ir._elementwise_primitives import KINDS, Array, array_of, convert
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
+from jaxbiped.compiler.ir._liveness import Liveness, sink_code
 from jaxbiped.compiler.ir._lower_jaxpr import lower_jaxpr
-from jaxbiped.compiler.passes._liveness import Liveness, sink_code
 
 _NO_WORK = ("input", "const", "part", "held", "taken")
 

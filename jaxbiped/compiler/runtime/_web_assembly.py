@@ -10,8 +10,7 @@ from collections.abc import Iterator
 
 from jaxbiped.compiler.codegen._kernel_target import host_target
 from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY, kernel_text
-from jaxbiped.compiler.runtime._host_cpu import Host
-from jaxbiped.compiler.runtime._machine_code import foreign_machine, optimised_module
+from jaxbiped.compiler.runtime._machine_code import Host, foreign_machine, optimised_module
 from jaxbiped.compiler.runtime._program import Graph
 
 _PAGE = Host("wasm32-unknown-unknown", "generic", "+bulk-memory", 1, False)

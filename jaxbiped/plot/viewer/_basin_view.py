@@ -11,8 +11,8 @@ from jaxbiped._checks import ArgumentError, check_count, check_type
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import label_names
 from jaxbiped.plot.style import in_order, label_colour, view_colours
-from jaxbiped.plot.viewer._page import AbstractPage, base64_of, frame_of, page_of
-from jaxbiped.plot.viewer._recording import Recording, record_walk
+from jaxbiped.plot.viewer._recording import Recording, base64_of, record_walk
+from jaxbiped.plot.viewer._view import AbstractPage
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._simulate import simulate
@@ -37,14 +37,17 @@ class BasinView(AbstractPage):
     basin: JsonObject
     recordings: tuple[Recording | None, ...]
 
-    def html(self) -> str:
-        """One page of HTML that holds everything and needs no network."""
+    def sent(self) -> JsonObject:
+        """What the page is given, ready for JSON."""
         walks = [each and each.numbers() for each in self.recordings]
-        sent = {"basin": self.basin, "walks": walks, "colours": view_colours()}
-        return page_of(sent, self.basin["title"])
+        return {"basin": self.basin, "walks": walks, "colours": view_colours()}
+
+    def _frame(self) -> tuple[str, int]:
+        """The picture's title, and the height of its frame [px]."""
+        return self.basin["title"], 900
 
     def _repr_html_(self) -> str:
-        return frame_of(self.html(), self.basin["title"], 900)
+        return self._in_frame()
 
 
 def view_basin(
@@ -93,18 +96,25 @@ def view_basin(
     names = in_order(set(words.ravel().tolist()))
     y, x = starts.values
     quantities = coordinate_quantities(labelling.scene)
+    labels = [
+        f"{each.words} ({each.unit})" if each.unit else each.words
+        for each in (quantities[x], quantities[y])
+    ]
+    # One that walks is shown at first, if there is one.
+    walking = np.argwhere(np.char.startswith(words[np.ix_(rows, columns)].astype(str), "walking"))
+    first = walking[len(walking) // 2, ::-1].tolist() if len(walking) else [0, 0]
     picture = {
         "title": title,
         "x": starts.values[x].tolist(),
         "y": starts.values[y].tolist(),
-        "xLabel": _axis_words(quantities[x]),
-        "yLabel": _axis_words(quantities[y]),
+        "xLabel": labels[0],
+        "yLabel": labels[1],
         "names": names,
         "colours": [label_colour(name) for name in names],
         "cells": base64_of(np.vectorize(names.index)(words), "<u1"),
         "columns": columns.tolist(),
         "rows": rows.tolist(),
-        "first": _first_shown(words[np.ix_(rows, columns)]),
+        "first": first,
     }
     return BasinView(picture, tuple(_walks(labelling, starts, numbers, footsteps)))
 
@@ -139,14 +149,3 @@ def _walks(
         except ArgumentError:  # a start that no walk can have
             found.append(None)
     return found
-
-
-def _first_shown(words: np.ndarray) -> list[int]:
-    """Column and row of the start that is shown at first: one that walks, if there is one."""
-    walking = np.argwhere(np.char.startswith(words.astype(str), "walking"))
-    row, column = walking[len(walking) // 2] if len(walking) else (0, 0)
-    return [int(column), int(row)]
-
-
-def _axis_words(quantity: Any) -> str:
-    return f"{quantity.words} ({quantity.unit})" if quantity.unit else quantity.words

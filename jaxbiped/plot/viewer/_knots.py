@@ -91,19 +91,13 @@ def _error(
     worst = np.zeros(len(at))
     for name, (rate, allowed) in tolerances.cubic.items():
         start, end = values[name][left], values[name][right]
-        slopes = width * values[rate][left], width * values[rate][right]
-        error = np.abs(_cubic(start, end, *slopes, share) - there[name])
+        first, last, rise = width * values[rate][left], width * values[rate][right], end - start
+        square, cube = 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise
+        drawn = start + share * (first + share * (square + share * cube))
+        error = np.abs(drawn - there[name])
         worst = np.maximum(worst, error / allowed)
     for name in values.keys() & tolerances.linear.keys():
         start, end = values[name][left], values[name][right]
         error = np.abs(start + share * (end - start) - there[name])
         worst = np.maximum(worst, error / tolerances.linear[name])
     return worst
-
-
-def _cubic(
-    start: np.ndarray, end: np.ndarray, left: np.ndarray, right: np.ndarray, share: np.ndarray
-) -> np.ndarray:
-    rise = end - start
-    square, cube = 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise
-    return start + share * (left + share * (square + share * cube))

@@ -2,7 +2,8 @@
 
 import base64
 import dataclasses
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from typing import Any, ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -16,10 +17,10 @@ from jaxbiped._types import JsonObject, Scalar
 from jaxbiped.compiler import LANES, Program, Request, web_module
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._energy import Energies, energies
-from jaxbiped.dynamics._state import State
-from jaxbiped.plot.style import view_colours
-from jaxbiped.plot.viewer._page import AbstractPage, frame_of, page_of
-from jaxbiped.plot.viewer._recording import FORCES
+from jaxbiped.dynamics._state import state_type
+from jaxbiped.plot import style
+from jaxbiped.plot._skeleton import body_motion, motion_names, names_by_foot, skeleton_of
+from jaxbiped.plot.viewer._view import AbstractPage
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.simulate._simulation import Simulation
@@ -27,57 +28,50 @@ from jaxbiped.solve._adaptive_program import Solve
 
 STEPS = 8192
 """Attempted steps after which a page gives up."""
-RECORDED = (
-    "t",
-    *State._fields,
-    *FORCES,
-    *Energies._fields,
-    "touches_1",
-    "touches_2",
-    "place_1",
-    "place_2",
-)
-"""What is recorded at the end of every accepted step."""
-ENDING = 1 + len(State._fields)
-"""The place among a solve's outputs of how it ended."""
 
 
-def played_request(scene: Scene, state: State, footsteps: int) -> Request:
-    """What is asked of lanes: one walk of so many footsteps, `RECORDED` step by step."""
+def recorded_names(scene: Scene) -> tuple[str, ...]:
+    """What is recorded at the end of every accepted step."""
+    structure = scene.mechanism.structure
+    contact = names_by_foot(structure, "touches", "place")
+    forces = names_by_foot(structure, "normal", "tangential")
+    return ("t", *motion_names(structure), *forces, *Energies._fields, *contact)
+
+
+def played_request(scene: Scene, state: Any, footsteps: int) -> Request:
+    """What is asked of lanes: one walk of so many footsteps, recorded step by step."""
     run = Simulation.prepare(
         scene, state, footsteps=footsteps, max_solver_steps=STEPS, engine="lanes"
     )
     request = run.lane_request()
     assert request is not None
-    return request._replace(program=_recording_program(request.program), room=STEPS)
+    program = _recording_program(request.program, type(state))
+    return request._replace(program=program, room=STEPS)
 
 
-def played_module(request: Request) -> bytes:
-    """Its program as a module of WebAssembly."""
-    return web_module(LANES.compile(request).kernel.graph)
-
-
-def _recording_program(program: Program) -> Program:
+def _recording_program(program: Program, kind: Any) -> Program:
     """The program with records for the viewer in place of the dense output."""
     steps = program.record
     assert steps is not None
 
     def record(solve: Solve, now: PyTree, due: Scalar) -> tuple[Scalar, list[Scalar]]:
         noted, (t, *values) = steps(solve, now, due)
-        state = State(*values[: len(State._fields)])
+        state = kind(*values[: len(kind._fields)])
+        count = len(recorded_names(solve.scene)) - 1
         shown = jax.lax.cond(
             noted,
             lambda: _shown_numbers(solve.scene, state),
-            lambda: [jnp.zeros_like(t)] * (len(RECORDED) - 1 - len(state)),
+            lambda: [jnp.zeros_like(t)] * count,
         )
-        return noted, [t, *state, *shown]
+        return noted, [t, *shown]
 
     return dataclasses.replace(program, record=record)
 
 
-def _shown_numbers(scene: Any, state: State) -> list[Scalar]:
-    found, energy = contacts(scene, state), energies(scene, state)
-    zero = jnp.zeros_like(state.hip_x)
+def _shown_numbers(scene: Any, state: Any) -> list[Scalar]:
+    motion, found = body_motion(scene, state), contacts(scene, state)
+    named = [motion[name] for name in motion_names(scene.mechanism.structure)]
+    zero = jnp.zeros_like(named[0])
     normal = [force.normal for force in found.forces]
     tangential = [
         zero if force.tangential is None else jnp.asarray(force.tangential)
@@ -85,26 +79,43 @@ def _shown_numbers(scene: Any, state: State) -> list[Scalar]:
     ]
     touching = [jnp.where(touches, 1.0, 0.0) for touches in found.touching]
     places = [foot.x for foot in found.feet]
-    return [zero + value for value in (*normal, *tangential, *energy, *touching, *places)]
+    rest = (*normal, *tangential, *energies(scene, state), *touching, *places)
+    return [*named, *(zero + value for value in rest)]
 
 
-class _Slider(NamedTuple):
-    """An input that a page moves: by up to `reach`, a `factor` by 10^`reach` times."""
-
-    leaf: str
-    words: str
-    unit: str
-    reach: float
-    factor: bool = False
-
-
-_SLIDERS = (
-    _Slider(".scene.ground.slope", "Slope", "rad", 0.02),
-    _Slider(".scene.normal.K", "Stiffness K", "N/mⁿ", 1.0, factor=True),
-    _Slider(".scene.normal.c", "Damping c", "N s/m²", 1.0, factor=True),
-    _Slider(".state.theta_1", "Swing leg angle", "rad", 0.15),
-    _Slider(".state.omega_1", "Swing leg rate", "rad/s", 1.5),
+_OF_SCENE = (
+    (".scene.ground.slope", "Slope", "rad", 0.02, False),
+    (".scene.normal.K", "Stiffness K", "N/mⁿ", 1.0, True),
+    (".scene.normal.c", "Damping c", "N s/m²", 1.0, True),
 )
+_OF_START = (("theta", "Angle", "rad", 0.15), ("omega", "Rate", "rad/s", 1.5))
+"""Inputs that a page moves by up to so much, or with True by the tenth or ten times."""
+
+
+def _sliders(scene: Scene, inputs: dict[str, float]) -> Iterator[JsonObject]:
+    """Of the scene, and of the angles and rates of what swings at first: one of each pair."""
+    structure = scene.mechanism.structure
+    swinging = {pair[0] for pair in structure.pairs} or {structure.feet[0]}
+    names = [structure.bodies[j] for j in structure.free if j in swinging]
+    of_start = [
+        (f".state.{word}_{name}", f"{words} of {style.label_of(name, 'leg')}", unit, reach, False)
+        for name in names
+        for word, words, unit, reach in _OF_START
+    ]
+    places = {leaf: place for place, leaf in enumerate(inputs)}
+    for leaf, words, unit, reach, power in (*_OF_SCENE, *of_start):
+        if leaf in inputs:
+            middle = float(np.log10(inputs[leaf])) if power else inputs[leaf]
+            yield {
+                "leaf": leaf,
+                "input": places[leaf],
+                "words": words,
+                "unit": unit,
+                "least": middle - reach,
+                "most": middle + reach,
+                "value": middle,
+                "power": power,
+            }
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,41 +127,43 @@ class Playground(AbstractPage):
         inputs: its numbers as the page begins, shape (n,).
         sliders: which of them the page moves, ready for JSON.
         scene: the walker.
+        ending: the place among a solve's outputs of how it ended.
     """
 
+    _computes: ClassVar[bool] = True
     module: bytes
     inputs: np.ndarray
     sliders: tuple[JsonObject, ...]
     scene: Scene
+    ending: int
 
     def sent(self) -> JsonObject:
         """What the page is given, ready for JSON."""
-        walker = self.scene.walker
+        mechanism = self.scene.mechanism
         return {
             "playground": {
                 "module": base64.b64encode(self.module).decode("ascii"),
                 "inputs": self.inputs.tolist(),
                 "sliders": list(self.sliders),
-                "recorded": RECORDED,
+                "recorded": recorded_names(self.scene),
                 "room": STEPS,
-                "ending": ENDING,
+                "ending": self.ending,
                 "endings": {int(each): str(each) for each in Ending},
-                "l": float(walker.l),
-                "r": float(walker.r),
-                "weight": float(walker.total_mass * self.scene.ground.g),
+                "skeleton": skeleton_of(mechanism).numbers(),
+                "weight": float(mechanism.total_mass) * float(self.scene.ground.g),
             },
-            "colours": view_colours(),
+            "colours": style.view_colours(),
         }
 
-    def html(self) -> str:
-        """One page of HTML that holds everything and needs no network."""
-        return page_of(self.sent(), "A walk that simulates itself", computes=True)
+    def _frame(self) -> tuple[str, int]:
+        """The page's title, and the height of its frame [px]."""
+        return "A walk that simulates itself", 1000
 
     def _repr_html_(self) -> str:
-        return frame_of(self.html(), "a walk that simulates itself", 1000)
+        return self._in_frame()
 
 
-def playground(scene: Scene, state: State, *, footsteps: int = 5) -> Playground:
+def playground(scene: Scene, state: Any, *, footsteps: int = 5) -> Playground:
     """A page with sliders for the slope, stiffness, damping and the start, which simulates itself.
 
     The lanes' program of this scene is compiled to WebAssembly, which takes some seconds. Its steps
@@ -175,26 +188,13 @@ def playground(scene: Scene, state: State, *, footsteps: int = 5) -> Playground:
         b'\\x00asm'
     """
     scene = check_scene(scene, Scene)
-    check_type("state", state, State)
+    kind = state_type(scene)
+    check_type("state", state, kind)
     check_count("footsteps", footsteps)
     request = played_request(scene, state, footsteps)
     paths, _ = jtu.tree_flatten_with_path(request.inputs)
-    leaves = [jtu.keystr(path) for path, _ in paths]
-    inputs = np.array([float(value) for _, value in paths])
-    sliders = [_sent(each, leaves, inputs) for each in _SLIDERS if each.leaf in leaves]
-    return Playground(played_module(request), inputs, tuple(sliders), scene)
-
-
-def _sent(slider: _Slider, leaves: list[str], inputs: np.ndarray) -> JsonObject:
-    place = leaves.index(slider.leaf)
-    middle = float(np.log10(inputs[place])) if slider.factor else float(inputs[place])
-    return {
-        "leaf": slider.leaf,
-        "input": place,
-        "words": slider.words,
-        "unit": slider.unit,
-        "least": middle - slider.reach,
-        "most": middle + slider.reach,
-        "value": middle,
-        "power": slider.factor,
-    }
+    inputs = {jtu.keystr(path): float(value) for path, value in paths}
+    sliders = tuple(_sliders(scene, inputs))
+    ending = 1 + len(kind._fields)
+    module = web_module(LANES.compile(request).kernel.graph)
+    return Playground(module, np.array(list(inputs.values())), sliders, scene, ending)

@@ -1,45 +1,45 @@
 """Recordings: walks as the viewer plays them, a few thousand numbers each."""
 
+import base64
 import dataclasses
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._contacts import Contacts, contacts
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._energy import energies
-from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.dynamics._state import State
 from jaxbiped.measure._footsteps import heel_strikes
-from jaxbiped.measure._samples import at_steps, evaluate_along
+from jaxbiped.measure._samples import evaluate_along
+from jaxbiped.plot._contact_forces import forces_in
 from jaxbiped.plot._samples import end_time, state_at
+from jaxbiped.plot._skeleton import Skeleton, body_motion, motion_names, names_by_foot, skeleton_of
 from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots
-from jaxbiped.plot.viewer._page import base64_of
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
-_COORDINATES = {
-    "hip_x": "hip_vx",
-    "hip_z": "hip_vz",
-    "theta_1": "omega_1",
-    "theta_2": "omega_2",
-}
-FORCES = ("normal_1", "normal_2", "tangential_1", "tangential_2")
+_FORCES = ("normal", "tangential")
 ENERGIES = ("kinetic", "elastic", "supplied", "lost")
 _FORCE, _ENERGY = 0.05, 5e-4
-"""Errors allowed of forces, in weights, and of energies, in weights times leg lengths."""
+"""Errors allowed of forces, in weights, and of energies, in weights times the walker's height."""
+
+
+def base64_of(values: npt.ArrayLike, kind: str) -> str:
+    """Numbers as they are sent, of a kind such as "<f8"."""
+    return base64.b64encode(np.asarray(values, dtype=kind).tobytes()).decode("ascii")
 
 
 class Footprint(NamedTuple):
-    """Where a foot came down: time [s], foot (1 or 2), place along the slope [m].
+    """Where a leg came down: time [s], leg (from 1 on), place along the slope [m].
 
-    `strike` tells a heel strike from a foot that stood there at the start.
+    `strike` tells a heel strike from a leg that stood there at the start.
     """
 
     t: float
-    foot: int
+    leg: int
     x: float
     strike: bool
 
@@ -52,7 +52,7 @@ class Recording:
         name: what it is called.
         ending: how it ended, in words.
         slope: [rad].
-        l, r: hip to sole and foot radius [m].
+        skeleton: what is drawn.
         weight: of the walker [N].
         driven: whether actuators act on it.
         t: knots [s], shape (n,).
@@ -63,8 +63,7 @@ class Recording:
     name: str
     ending: str
     slope: float
-    l: float
-    r: float
+    skeleton: Skeleton
     weight: float
     driven: bool
     t: np.ndarray
@@ -73,8 +72,9 @@ class Recording:
 
     def numbers(self) -> JsonObject:
         """What is sent, ready for JSON: times in 64 bits, channels in 32, by base64."""
-        plain = ("name", "ending", "slope", "l", "r", "weight", "driven")
+        plain = ("name", "ending", "slope", "weight", "driven")
         return {name: getattr(self, name) for name in plain} | {
+            "skeleton": self.skeleton.numbers(),
             "t": base64_of(self.t, "<f8"),
             "channels": {name: base64_of(each, "<f4") for name, each in self.channels.items()},
             "footprints": [each._asdict() for each in self.footprints],
@@ -90,15 +90,14 @@ def recording(
     footprints: list[Footprint],
 ) -> Recording:
     """A recording of a scene's walk, as far as its states are numbers."""
-    bad = ~np.isfinite([channels[each] for each in (*_COORDINATES, *_COORDINATES.values())])
-    broken = np.flatnonzero(bad.any(axis=0))
+    moving = [channels[each] for each in motion_names(scene.mechanism.structure)]
+    broken = np.flatnonzero(~np.isfinite(moving).all(axis=0))
     count = max(int(broken[0]), 2) if broken.size else len(t)
     return Recording(
         name=name,
         ending=str(ending),
         slope=float(scene.ground.slope),
-        l=float(scene.walker.l),
-        r=float(scene.walker.r),
+        skeleton=skeleton_of(scene.mechanism),
         weight=_weight(scene),
         driven=scene.actuation is not None,
         t=t[:count],
@@ -108,33 +107,34 @@ def recording(
 
 
 def _weight(scene: Any) -> float:
-    return float(scene.walker.total_mass) * float(scene.ground.g)
+    return float(scene.mechanism.total_mass) * float(scene.ground.g)
 
 
 def time_unit(scene: Any) -> float:
-    """√(l/g), in which a walker moves [s]."""
-    return math.sqrt(float(scene.walker.l) / float(scene.ground.g))
+    """√(height/g), in which a walker moves [s]."""
+    return math.sqrt(float(scene.mechanism.height) / float(scene.ground.g))
 
 
 def tolerances_for(scene: Any, exact: float) -> Tolerances:
-    """The errors allowed: `exact` of angles [rad], and of lengths in parts of the legs'."""
-    weight = _weight(scene)
-    length = exact * float(scene.walker.l)
-    allowed = {name: length if name.startswith("hip") else exact for name in _COORDINATES}
+    """The errors allowed: `exact` of angles [rad], and of lengths in parts of the height."""
+    weight, structure = _weight(scene), scene.mechanism.structure
+    height = float(scene.mechanism.height)
+    names, half = motion_names(structure), 2 + len(structure.bodies)
+    allowed = [exact * height] * 2 + [exact] * len(structure.bodies)
     return Tolerances(
-        cubic={name: (rate, allowed[name]) for name, rate in _COORDINATES.items()},
-        linear={name: _FORCE * weight for name in FORCES}
-        | {name: _ENERGY * weight * float(scene.walker.l) for name in ENERGIES},
+        cubic=dict(zip(names[:half], zip(names[half:], allowed, strict=True), strict=True)),
+        linear=dict.fromkeys(names_by_foot(structure, *_FORCES), _FORCE * weight)
+        | dict.fromkeys(ENERGIES, _ENERGY * weight * height),
         shortest=1e-4 * time_unit(scene),
     )
 
 
 _EXACT, _LOOKS_RIGHT = 1e-5, 1e-4
-"""Errors allowed of angles [rad], and of lengths in parts of the legs'."""
+"""Errors allowed of angles [rad], and of lengths in parts of the walker's height."""
 _EVEN, _MOST = 0.05, 20_000
-"""Even times to begin with [√(l/g)], and their largest number."""
+"""Even times to begin with [√(height/g)], and their largest number."""
 _STEPS = 5e-3
-"""The solver's steps are begun with, too, as far as they are this far apart [√(l/g)]."""
+"""The solver's steps are begun with, too, as far as they are this far apart [√(height/g)]."""
 
 
 def record_walk(
@@ -152,14 +152,13 @@ def record_walk(
 
     def evaluate(t: np.ndarray) -> Channels:
         states = state_at(trajectory, t)
-        hip = minimal_state(scene, states)
-        motion = {field: np.asarray(getattr(hip, field)) for field in State._fields}
+        motion: Channels = evaluate_along(scene, states, body_motion)
         if motion_only:
             return motion
         now = evaluate_along(scene, states, energies)
         return {
             **motion,
-            **_forces(evaluate_along(scene, states, contacts)),
+            **forces_in(evaluate_along(scene, states, contacts)),
             "kinetic": now.kinetic,
             "elastic": now.elastic,
             "supplied": started.gravitational - now.gravitational,
@@ -184,27 +183,23 @@ def _first_times(scene: Scene, trajectory: Trajectory) -> np.ndarray:
     return times[np.concatenate([[True], apart[:-1] | (times[1:-1] == last), [True]])]
 
 
-def _forces(found: Contacts) -> Channels:
-    forces: Channels = {}
-    for leg, force in enumerate(found.forces, 1):
-        forces[f"normal_{leg}"] = np.asarray(force.normal)
-        if force.tangential is not None:
-            forces[f"tangential_{leg}"] = np.asarray(force.tangential)
-    return forces
-
-
 def _footprints(scene: Scene, trajectory: Trajectory) -> list[Footprint]:
-    """Of feet that stand at the start, and of all heel strikes."""
-    start = at_steps(scene, trajectory, contacts)
-    prints = [
-        Footprint(0.0, leg, float(foot.x[0]), strike=False)
-        for leg, (foot, touching) in enumerate(zip(start.feet, start.touching, strict=True), 1)
-        if touching[0]
+    """Of legs that stand at the start, and of all heel strikes."""
+    structure, strikes = scene.mechanism.structure, heel_strikes(scene, trajectory)
+    times = np.concatenate([np.asarray(trajectory.t)[:1], strikes.time_s])
+    found = evaluate_along(scene, state_at(trajectory, times), contacts)
+
+    def place(leg: int, k: int) -> float:
+        """Of the deepest foot of a leg."""
+        own = structure.feet_of_leg[leg]
+        return float(found.feet[max(own, key=lambda foot: found.feet[foot].penetration[k])].x[k])
+
+    standing = [
+        Footprint(0.0, leg + 1, place(leg, 0), strike=False)
+        for leg, feet in enumerate(structure.feet_of_leg)
+        if any(found.touching[foot][0] for foot in feet)
     ]
-    strikes = heel_strikes(scene, trajectory)
-    if strikes.time_s.size:
-        feet = evaluate_along(scene, state_at(trajectory, strikes.time_s), contacts).feet
-        for k, (time, leg) in enumerate(zip(*strikes, strict=True)):
-            place = float(feet[leg - 1].x[k])
-            prints.append(Footprint(float(time), int(leg), place, strike=True))
-    return prints
+    return standing + [
+        Footprint(float(time), int(leg), place(leg - 1, k), strike=True)
+        for k, (time, leg) in enumerate(zip(*strikes, strict=True), 1)
+    ]

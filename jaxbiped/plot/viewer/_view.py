@@ -1,19 +1,122 @@
-"""Views of walks: what plays them, as a page or in a notebook."""
+"""Views of walks: what plays them, as one page of HTML without a network or in a notebook."""
 
+import abc
 import dataclasses
+import html
+import json
+import re
+from importlib.resources import files
 from importlib.util import find_spec
-from typing import Any
+from pathlib import Path
+from typing import Any, ClassVar
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._files import check_writable_file
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._state import RigidState
+from jaxbiped.measure._samples import from_start
 from jaxbiped.plot.style import view_colours
-from jaxbiped.plot.viewer._page import AbstractPage, frame_of, page_of
 from jaxbiped.plot.viewer._recording import Recording, record_walk
 from jaxbiped.plot.viewer._rigid_recording import record_rigid_walk
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._state_types import RigidState
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
+
+_MODULES = (
+    "dom", "channels", "pose", "stage", "chart", "linked_charts", "player", "step_table", "view",
+    "basin", "simulator", "playground",
+)  # fmt: skip
+"""In the order of their imports."""
+_IMPORT = re.compile(r'^import \{[^}]*\} from "\./\w+\.js";\n', re.MULTILINE)
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'{more}; style-src 'unsafe-inline'; img-src data:"
+)
+_PAGE = """\
+<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<link rel="icon" href="data:,">
+<title>{title}</title>
+<style>
+body {{ margin: 0; }}
+@media (prefers-color-scheme: dark) {{ body {{ background: #16181d; color: #f0f0f0; }} }}
+{style}</style>
+</head>
+<body>
+<main><noscript>This page plays a walk, which takes JavaScript.</noscript></main>
+<script type="application/json" id="walks">{walks}</script>
+<script type="module">
+{script}showPage();
+</script>
+</body>
+</html>
+"""
+
+
+class AbstractPage(abc.ABC):
+    """What is shown as one page of HTML; a notebook shows it in a frame."""
+
+    _computes: ClassVar[bool] = False
+    """Whether the page runs WebAssembly."""
+
+    @abc.abstractmethod
+    def sent(self) -> JsonObject:
+        """What the page is given, ready for JSON."""
+
+    @abc.abstractmethod
+    def _frame(self) -> tuple[str, int]:
+        """Title of the page, and the height of its frame [px]."""
+
+    def html(self) -> str:
+        """One page of HTML that holds everything and needs no network."""
+        return page_of(self.sent(), self._frame()[0], computes=self._computes)
+
+    def save(self, path: str | Path) -> Path:
+        """Writes that page, and returns its path."""
+        where = check_writable_file("path", path)
+        where.write_text(self.html(), encoding="utf-8")
+        return where
+
+    def _in_frame(self) -> str:
+        """The page in a frame, for a notebook."""
+        title, height = self._frame()
+        return (
+            f'<iframe srcdoc="{html.escape(self.html())}" sandbox="allow-scripts" '
+            f'title="{html.escape(title)}" '
+            f'style="width: 100%; height: {height}px; border: 0"></iframe>'
+        )
+
+
+def page_of(sent: JsonObject, title: str, *, computes: bool = False) -> str:
+    """A page of HTML that holds everything: what `showWalks` is sent, its script and its look."""
+    return _PAGE.format(
+        policy=_POLICY.format(more=" 'wasm-unsafe-eval'" if computes else ""),
+        title=html.escape(title),
+        style=asset("view.css"),
+        # No text within ends the script.
+        walks=json.dumps(sent, allow_nan=False).replace("<", "\\u003c"),
+        script=script(*_MODULES, "page"),
+    )
+
+
+def script(*modules: str) -> str:
+    """Modules of the viewer as one, behind each other: their names are known to all."""
+    parts = [_IMPORT.sub("", asset(f"{name}.js")) for name in modules]
+    return re.sub(r"^export ", "", "".join(parts), flags=re.MULTILINE)
+
+
+def widget_script() -> str:
+    """The viewer as a module for `anywidget`."""
+    return script(*_MODULES, "widget") + "\nexport default { render };\n"
+
+
+def asset(name: str) -> str:
+    """The text of one of the viewer's files."""
+    return files("jaxbiped.plot.viewer").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,9 +136,10 @@ class View(AbstractPage):
             "colours": view_colours(),
         }
 
-    def html(self) -> str:
-        """One page of HTML that holds everything and needs no network."""
-        return page_of(self.sent(), ", ".join(each.name for each in self.recordings))
+    def _frame(self) -> tuple[str, int]:
+        """The names of the walks, and the height of their frame [px]."""
+        names = ", ".join(each.name for each in self.recordings)
+        return names, 620 * -(-len(self.recordings) // 2)
 
     def widget(self) -> Any:
         """The view as a widget of `anywidget` (`pip install jaxbiped[view]`).
@@ -46,16 +150,19 @@ class View(AbstractPage):
         Raises:
             ModuleNotFoundError: anywidget is not installed.
         """
-        from jaxbiped.plot.viewer._widget import ViewWidget
+        import anywidget
+        import traitlets
 
-        return ViewWidget(sent=self.sent())
+        looks = {"_esm": widget_script(), "_css": asset("view.css")}
+        shared: dict[str, Any] = {"sent": traitlets.Dict(), "time": traitlets.Float(0.0)}
+        synced = {name: trait.tag(sync=True) for name, trait in shared.items()}
+        return type("ViewWidget", (anywidget.AnyWidget,), looks | synced)(sent=self.sent())
 
     def _repr_mimebundle_(self, **options: Any) -> Any:
         """What a notebook shows: the widget, or the page in a frame where there is no anywidget."""
         if find_spec("anywidget") is not None:
             return self.widget()._repr_mimebundle_(**options)
-        frame = frame_of(self.html(), "walks", 620 * -(-len(self.recordings) // 2))
-        return {"text/html": frame, "text/plain": repr(self)}
+        return {"text/html": self._in_frame(), "text/plain": repr(self)}
 
     def __repr__(self) -> str:
         told = ", ".join(f"{each.name}: {each.ending}" for each in self.recordings)
@@ -99,9 +206,12 @@ def view(
     check_type("scene", scene, Scene, RedundantScene, RigidScene)
     check_scene_of(trajectory, scene)
     if isinstance(scene, RigidScene):
-        return View((record_rigid_walk(scene, trajectory, start, name),))
+        walk = trajectory if start is None else from_start(scene, trajectory, start)
+        return View((record_rigid_walk(scene, walk, name),))
     if start is not None:
-        raise ArgumentError("start is only allowed with a rigid walk: this one knows its own.")
+        raise ArgumentError(
+            "start is allowed only with a rigid walk: this walk contains its start."
+        )
     return View((record_walk(scene, trajectory, name),))
 
 

@@ -19,3 +19,10 @@ from jaxbiped.scene.actuation._actuators import HipSpline as HipSpline
 # At the feet: rigid ones, compliant ones.
 from jaxbiped.scene.actuation._actuators import PushOff as PushOff
 from jaxbiped.scene.actuation._actuators import FootPreload as FootPreload
+
+# Laws of motors at the joints of a mechanism.
+from jaxbiped.scene.actuation._motor_laws import AbstractMotorLaw as AbstractMotorLaw
+from jaxbiped.scene.actuation._motor_laws import Constant as Constant
+from jaxbiped.scene.actuation._motor_laws import PD as PD
+from jaxbiped.scene.actuation._motor_laws import Pulse as Pulse
+from jaxbiped.scene.actuation._motor_laws import Spline as Spline

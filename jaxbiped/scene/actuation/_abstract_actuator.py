@@ -126,3 +126,13 @@ def check_actuation(actuation: Actuation, feet: str) -> None:
                 f"actuation = {type(part).__name__} is not allowed with {feet} feet: it needs "
                 f"{part.feet} ones."
             )
+
+
+def check_no_hip(actuation: Actuation) -> None:
+    """Raises `ArgumentError` for an actuator that turns two legs against each other."""
+    for part in actuation or ():
+        if isinstance(part, AbstractHipActuator):
+            raise ArgumentError(
+                f"actuation = {type(part).__name__} is not allowed for a mechanism without a "
+                "mirror: it acts between the bodies of a pair; give mirror= or use joint parts."
+            )

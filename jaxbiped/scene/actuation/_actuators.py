@@ -4,9 +4,7 @@ import dataclasses
 from typing import ClassVar, Self
 
 import equinox as eqx
-import jax.numpy as jnp
 
-from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar
@@ -17,6 +15,7 @@ from jaxbiped.scene.actuation._abstract_actuator import (
     HipMotion,
     LegTorques,
 )
+from jaxbiped.scene.actuation._profiles import check_spline, cubic_spline, pulse
 
 
 class HipSpring(AbstractHipActuator):
@@ -104,14 +103,10 @@ class HipPulse(AbstractPhaseTorque):
     reaction: str = eqx.field(static=True, default="swing")
 
     def torque_at(self, phase: Scalar) -> Scalar:
-        off = (phase - self.phase) / self.width
-        return self.pulse * jnp.exp(-off * off)
+        return pulse(self.pulse, self.phase, self.width, phase)
 
     def idle(self) -> Self:
         return dataclasses.replace(self, pulse=0.0 * self.pulse)
-
-
-_DIFFERENCE = (1.0 / 6.0, -4.0 / 6.0, 1.0, -4.0 / 6.0, 1.0 / 6.0)
 
 
 class HipSpline(AbstractPhaseTorque):
@@ -140,27 +135,10 @@ class HipSpline(AbstractPhaseTorque):
     reaction: str = eqx.field(static=True, default="swing")
 
     def __check_init__(self) -> None:
-        if len(self.torque) < 2:
-            raise ArgumentError(
-                f"torque has length {len(self.torque)}, which is not allowed: give two or more "
-                "coefficients."
-            )
-        if holds_somewhere(self.last <= self.first):
-            raise ArgumentError(
-                f"last = {self.last} is not allowed with first = {self.first}: it must be above."
-            )
+        check_spline(self.torque, self.first, self.last)
 
     def torque_at(self, phase: Scalar) -> Scalar:
-        count = len(self.torque)
-        place = (phase - self.first) * (count - 1) / (self.last - self.first)
-        cubes = []
-        for j in range(count + 4):
-            beyond = jnp.maximum(place + (2.0 - j), 0.0)
-            cubes.append(beyond * beyond * beyond)
-        splines = (
-            sum(weight * cubes[i + j] for j, weight in enumerate(_DIFFERENCE)) for i in range(count)
-        )
-        return jnp.asarray(sum(a * b for a, b in zip(self.torque, splines, strict=True)))
+        return cubic_spline(self.torque, self.first, self.last, phase)
 
     def idle(self) -> Self:
         return dataclasses.replace(self, torque=tuple(0.0 * each for each in self.torque))

@@ -1,8 +1,9 @@
 """Contacts within a step: what three step-size controllers do about them.
 
-A foot that is off the ground at both ends of a step may touch it in between, and one that is barely
-in it at an end may have been deeper. No error estimate sees that where no stage of the step feels
-its force: `ShallowContact` ends the step just past the contact's beginning instead.
+All of it holds of stops and their limits, too. A foot that is off the ground at both ends of a step
+may touch it in between, and one that is barely in it at an end may have been deeper. No error
+estimate sees that where no stage of the step feels its force: `ShallowContact` ends the step just
+past the contact's beginning instead.
 
 The corner of the force where a foot comes down rejects steps of any size that go far past it. Size
 by size this would cost some ten attempts at every touchdown of the seed's walker: `TouchdownAhead`
@@ -20,7 +21,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._contacts import Foot, feet
+from jaxbiped.dynamics._gaps import Gap, gaps
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
@@ -68,7 +69,7 @@ def _touchdown(
 ) -> tuple[Scalar, Scalar]:
     """Whether a step, which is to be kept or not, is to end at a contact instead, and when [s]."""
     part = jnp.ones_like(span)
-    for k, before in enumerate(feet(scene, y0)):
+    for k, before in enumerate(gaps(scene, y0)):
         if before.admitted is False:
             continue
         near = jnp.abs(before.penetration) < _REACH * span * before.penetration_rate
@@ -80,7 +81,7 @@ def _touchdown(
 
 
 def _part_above(
-    scene: PyTree, span: Scalar, keep: Scalar, k: int, before: Foot, y1: PyTree
+    scene: PyTree, span: Scalar, keep: Scalar, k: int, before: Gap, y1: PyTree
 ) -> Scalar:
     """The part of a step after which a foot comes into the ground, barely; 1 if it does not.
 
@@ -90,7 +91,7 @@ def _part_above(
     part after which a foot is deepest that begins barely in the ground and ends out of it: a smooth
     force is not felt yet where the step begins. Of a step that is not kept the end tells nothing.
     """
-    after = feet(scene, y1)[k]
+    after = gaps(scene, y1)[k]
     rates = span * before.penetration_rate, span * after.penetration_rate
     depth = StepCubic(before.penetration, after.penetration, *rates)
     off, rises = depth.start <= 0.0, keep & (depth.end_slope < 0.0)
@@ -133,13 +134,13 @@ def _to_touchdown(scene: CompliantScene, span: Scalar, state: PyTree) -> Scalar:
     At the speed that it has: where that falls short, once more the next time.
     """
     found = jnp.zeros_like(span)
-    for foot in feet(scene, state):
-        if foot.admitted is False:
+    for gap in gaps(scene, state):
+        if gap.admitted is False:
             continue
-        falls = (foot.penetration < 0.0) & (foot.penetration_rate > 0.0)
-        if foot.admitted is not None:
-            falls = falls & foot.admitted
-        time = -foot.penetration / jnp.where(falls, foot.penetration_rate, 1.0)
+        falls = (gap.penetration < 0.0) & (gap.penetration_rate > 0.0)
+        if gap.admitted is not None:
+            falls = falls & gap.admitted
+        time = -gap.penetration / jnp.where(falls, gap.penetration_rate, 1.0)
         past = jnp.minimum(time + _LESS_PAST * (span - time), _LARGEST * span)
         found = jnp.maximum(found, jnp.where(falls & (time < span), past, 0.0))
     return found
@@ -157,14 +158,14 @@ class MissedContacts(AbstractWrappedControl):
         inner, count = attempt.memory
         adapted = attempt.by(self.controller, memory=inner)
         span = jnp.asarray(attempt.t1 - attempt.t0)
-        before, after = feet(attempt.args, attempt.y0), feet(attempt.args, attempt.y1)
-        for k in range(2):
-            missed = adapted.keep & _misses(span, before[k], after[k])
+        ends = (gaps(attempt.args, y) for y in (attempt.y0, attempt.y1))
+        for before, after in zip(*ends, strict=True):
+            missed = adapted.keep & _misses(span, before, after)
             count = count + jnp.where(missed, 1, 0).astype(count.dtype)
         return adapted._replace(memory=(adapted.memory, count))
 
 
-def _misses(span: Scalar, before: Foot, after: Foot) -> Scalar | bool:
+def _misses(span: Scalar, before: Gap, after: Gap) -> Scalar | bool:
     """Whether a foot that is off the ground at both ends is in it in between (boolean).
 
     By the cubic through depths and rates at both ends.

@@ -6,7 +6,8 @@ import diffrax
 import jax.numpy as jnp
 
 from jaxbiped._types import RealScalarLike, Scalar
-from jaxbiped.dynamics._contacts import feet, landings, standing_foot
+from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._footfalls import any_of, landings, standing_leg
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractWrappedControl,
     Adapted,
@@ -20,7 +21,7 @@ PATIENCE = 100.0
 class FootstepLimit(AbstractWrappedControl):
     """Wraps a controller; ends the solve at the end of the step with the last heel strike.
 
-    Its state carries what no function of the walker's state can tell: which foot struck last, and
+    Its state carries what no function of the walker's state can tell: which leg struck last, and
     how many strikes there were. The solve's `args` must be the scene.
 
     Attributes:
@@ -32,19 +33,24 @@ class FootstepLimit(AbstractWrappedControl):
     def init(self, *request: Any) -> tuple[Scalar, Any]:
         first, inner = self.controller.init(*request)
         _, _, _, y0, _, args, *_ = request
-        last = standing_foot(feet(args, y0))
+        last = standing_leg(args.mechanism.structure, feet(args, y0))
         return first, (inner, last, jnp.zeros_like(last))
 
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, and counts."""
         inner, last, count = attempt.memory
         adapted = attempt.by(self.controller, memory=inner)
+        structure = attempt.args.mechanism.structure
         before, after = feet(attempt.args, attempt.y0), feet(attempt.args, attempt.y1)
-        lands_1, lands_2 = landings(before, after)
-        strike_1 = adapted.keep & lands_1 & (last != 1)
-        strike_2 = adapted.keep & lands_2 & (last != 2)
-        last = jnp.where(strike_1, 1, jnp.where(strike_2, 2, last))
-        count = count + jnp.where(strike_1 | strike_2, 1, 0)
+        lands = landings(structure, before, after)
+        # Of several legs another one made the strike before; a single leg hops.
+        strikes = [
+            adapted.keep & landed & (last != leg if len(lands) > 1 else True)
+            for leg, landed in enumerate(lands, 1)
+        ]
+        for leg, strike in reversed(list(enumerate(strikes, 1))):
+            last = jnp.where(strike, leg, last)
+        count = count + jnp.where(any_of(strikes), 1, 0)
         successful = diffrax.RESULTS.successful
         done = diffrax.RESULTS.where(
             count >= self.limit, diffrax.RESULTS.event_occurred, successful

@@ -8,7 +8,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar
-from jaxbiped.solve._failure_events import ending_events, ending_surface
+from jaxbiped.solve._ending_surfaces import ending_surface
+from jaxbiped.solve._failure_events import ending_events
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractMemorylessControl,

@@ -19,7 +19,9 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, RealScalarLike, Scalar
-from jaxbiped.dynamics._contacts import Foot, feet, foot_force
+from jaxbiped.dynamics._contacts import feet, foot_force
+from jaxbiped.dynamics._footfalls import FootMotion
+from jaxbiped.dynamics._gaps import limits_of
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 from jaxbiped.solve._accuracy import rms_norm
@@ -43,6 +45,8 @@ _RESOLUTION = 8.9e-16
 a step stands still and runs out of attempts, as it should."""
 _ROUNDING = 1.01
 """Times the smallest step that counts as it."""
+_WILD = 1e3
+"""Of each leaf of the state, in its unit: no step of a walk changes one by as much."""
 _SAME_SLIP = 3.0
 """Factor by which the slip speed may change in a step: a Stribeck curve is bent on that scale."""
 
@@ -109,7 +113,8 @@ class ErrorControl(AbstractControl):
         """Of the errors in units of the tolerance."""
 
         def scale(before: Scalar, after: Scalar, off: Scalar, inverse: Numbers) -> Scalar:
-            largest = jnp.maximum(jnp.abs(before), jnp.abs(after))
+            # A state that runs away within a step must not make its own error look small.
+            largest = jnp.maximum(jnp.abs(before), jnp.minimum(jnp.abs(after), _WILD / inverse))
             return jnp.asarray(self.atol / inverse + self.rtol * largest, off.dtype)
 
         scales = jtu.tree_map(scale, y0, y1, error, self.units.inverse)
@@ -191,19 +196,23 @@ def weigh_crossed(
 
 
 def crosses(scene: CompliantScene, y0: PyTree, y1: PyTree) -> Scalar:
-    """Whether a foot's contact is of another kind at a step's end than at its start (boolean).
+    """Whether a contact is of another kind at a step's end than at its start (boolean).
 
-    A foot carries or does not, it slips this way or that, on this side of friction's peak or the
-    other, or much faster.
+    A stop is pressed or is not. A foot carries or does not, it slips this way or that, on this side
+    of friction's peak or the other, or much faster.
     """
     found = jnp.zeros(jnp.shape(y0[0]), dtype=bool)
     for before, after in zip(feet(scene, y0), feet(scene, y1), strict=True):
         if before.admitted is not False:
             found = found | _changes(scene, before, after)
+    stops = zip(limits_of(scene, y0), limits_of(scene, y1), strict=True)
+    for (law, *was), (_, *now) in stops:
+        pressed = (law.force(each.penetration, each.rate) > 0.0 for each in (*was, *now))
+        found = found | functools.reduce(operator.ne, pressed)
     return found
 
 
-def _changes(scene: CompliantScene, before: Foot, after: Foot) -> Scalar:
+def _changes(scene: CompliantScene, before: FootMotion, after: FootMotion) -> Scalar:
     carried, carries = (foot_force(scene, foot).normal > 0.0 for foot in (before, after))
     if isinstance(scene.friction, Frictionless):
         return carried != carries

@@ -3,163 +3,32 @@
 Entries that are zero by structure, read off the field's own program, are left out.
 """
 
-import abc
 import math
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
 
-import equinox as eqx
 import jax
 import jax.extend
 import jax.flatten_util
 import jax.numpy as jnp
 import jax.tree_util as jtu
-from jax.extend.core import Jaxpr, Literal, Var
 from jaxtyping import PyTree
 
-from jaxbiped._jax_versions import ClosedJaxpr, called_program
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._implicit_field import AbstractImplicitField
 from jaxbiped.linalg._elimination import Entry, Matrix, inverse, matmul
+from jaxbiped.solve.rosenbrock._abstract_linearisation import AbstractLinearisation, Components
+from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, ImplicitLinearisation
+from jaxbiped.solve.rosenbrock._program_structure import structure_of
 
 _MOST_SCALARS = 24
 """Up to this size a Jacobian is eliminated scalar by scalar; beyond, as one dense matrix."""
 
 
-class Structure(NamedTuple):
-    """Structure of a function of scalars.
-
-    Attributes:
-        depends: for each output, the positions of the inputs that it can depend on.
-        copies: for each output, the position of the input that it is a plain copy of, or None.
-    """
-
-    depends: tuple[frozenset[int], ...]
-    copies: tuple[int | None, ...]
-
-
-def structure_of(program: ClosedJaxpr) -> Structure:
-    """Structure of a traced program. Conservative: a dependence may be reported in vain."""
-    jaxpr = program.jaxpr
-    inputs: list[frozenset[int]] = [frozenset([i]) for i in range(len(jaxpr.invars))]
-    copies: list[int | None] = list(range(len(jaxpr.invars)))
-    depends, copied = _propagate(jaxpr, inputs, copies)
-    return Structure(tuple(depends), tuple(copied))
-
-
-def _propagate(
-    jaxpr: Jaxpr, inputs: list[frozenset[int]], copies: list[int | None]
-) -> tuple[list[frozenset[int]], list[int | None]]:
-    depends: dict[Var, frozenset[int]] = dict(zip(jaxpr.invars, inputs, strict=True))
-    copied: dict[Var, int | None] = dict(zip(jaxpr.invars, copies, strict=True))
-
-    def read(atom: Var | Literal) -> tuple[frozenset[int], int | None]:
-        if isinstance(atom, Literal):
-            return frozenset(), None
-        return depends.get(atom, frozenset()), copied.get(atom)
-
-    for equation in jaxpr.eqns:
-        arguments = [read(atom) for atom in equation.invars]
-        called = called_program(equation)
-        if called is None:
-            union: frozenset[int] = frozenset().union(*(used for used, _ in arguments))
-            results = [union] * len(equation.outvars)
-            results_copied: list[int | None] = [None] * len(equation.outvars)
-        else:
-            results, results_copied = _propagate(
-                called[0], [used for used, _ in arguments], [source for _, source in arguments]
-            )
-        for variable, used, source in zip(equation.outvars, results, results_copied, strict=True):
-            depends[variable], copied[variable] = used, source
-    outputs = [read(atom) for atom in jaxpr.outvars]
-    return [used for used, _ in outputs], [source for _, source in outputs]
-
-
-Components: TypeAlias = list[Scalar]
-"""A point of the state space: its scalars one by one, or one vector that holds them all."""
-
-
-class AbstractLinearisation(eqx.Module):
-    """A vector field about one point, its state split into components.
-
-    Attributes:
-        run: the field, of the time and the components.
-        structure: of that program.
-        t, y: the point.
-    """
-
-    run: Callable[..., Components]
-    structure: Structure
-    t: Scalar
-    y: tuple[Scalar, ...]
-
-    @abc.abstractmethod
-    def jacobian(self) -> PyTree:
-        """J = ∂f/∂y at the point of linearisation, in a form of its own."""
-
-    @abc.abstractmethod
-    def factorise(self, jacobian: PyTree, step: Scalar) -> PyTree:
-        """What `solve_kept` needs of I − step J."""
-
-    @abc.abstractmethod
-    def solve_kept(
-        self,
-        factors: PyTree,
-        jacobian: PyTree,
-        step: Scalar,
-        right: Components,
-        direct_right: dict[int, Scalar],
-    ) -> Components:
-        """The kept components of (I − step J)⁻¹ r.
-
-        `right` holds r of the kept components, `direct_right` of the direct ones.
-        """
-
-    def evaluate(self, t: Scalar, y: Components) -> Components:
-        """The vector field at any point."""
-        return self.run(t, *y)
-
-    def time_derivative(self) -> list[Entry]:
-        """∂f/∂t at the point of linearisation; None for a component that has none."""
-        return self._column(0)
-
-    def direct(self) -> dict[int, int]:
-        """Components whose rate *is* another, kept component, each with that one."""
-        direct: dict[int, int] = {}
-        for i, copied in enumerate(self.structure.copies):
-            source = None if copied is None else copied - 1
-            if source is None or source < 0 or source == i:
-                continue
-            if source not in direct and i not in direct.values():
-                direct[i] = source
-        return direct
-
-    def kept(self) -> list[int]:
-        """The other components, which remain when the direct ones are eliminated."""
-        direct = self.direct()
-        return [i for i in range(len(self.y)) if i not in direct]
-
-    def _column(self, position: int) -> list[Entry]:
-        """Derivatives of all rates with respect to one input (0: time, 1 on: components)."""
-        inputs = [self.t, *self.y]
-        if not any(position in used for used in self.structure.depends):
-            return [None] * len(self.y)
-
-        def along(value: Scalar) -> list[Scalar]:
-            return self.run(*inputs[:position], value, *inputs[position + 1 :])
-
-        _, tangents = jax.jvp(along, (inputs[position],), (jnp.ones_like(inputs[position]),))
-        return [
-            tangent if position in used else None
-            for tangent, used in zip(tangents, self.structure.depends, strict=True)
-        ]
-
-
-def split(
-    y: PyTree,
-) -> tuple[Components, Callable[[Components], PyTree]]:
-    """The components of `y` and the map back."""
+def split(y: PyTree, field: object = None) -> tuple[Components, Callable[[Components], PyTree]]:
+    """The components of `y` and the map back; scalars if `field` has an implicit form."""
     leaves, structure = jtu.tree_flatten(y)
-    if sum(jnp.size(leaf) for leaf in leaves) > _MOST_SCALARS:
+    few = sum(jnp.size(leaf) for leaf in leaves) <= _MOST_SCALARS
+    if not few and not isinstance(field, AbstractImplicitField):
         vector, unravel = jax.flatten_util.ravel_pytree(y)
         return [vector], lambda components: unravel(components[0])
     shapes = [jnp.shape(leaf) for leaf in leaves]
@@ -182,11 +51,16 @@ def split(
 
 
 def linearise(
-    field: Callable[[Scalar, Components], Components], t: Scalar, y: Components
+    field: Callable[[Scalar, Components], Components],
+    t: Scalar,
+    y: Components,
+    form: ImplicitForm | None = None,
 ) -> AbstractLinearisation:
     """Linearises a vector field of components (as `split` makes them) about (t, y)."""
     program = jax.make_jaxpr(lambda t, *y: field(t, list(y)))(t, *y)
     run = jax.extend.core.jaxpr_as_fun(program)
+    if form is not None:
+        return ImplicitLinearisation(run, structure_of(program), t, tuple(y), form)
     dense = len(y) == 1 and jnp.ndim(y[0]) == 1
     kind = _DenseLinearisation if dense else _ScalarLinearisation
     return kind(run, structure_of(program), t, tuple(y))
@@ -211,6 +85,12 @@ class _DenseLinearisation(AbstractLinearisation):
         direct_right: dict[int, Scalar],
     ) -> Components:
         return [jax.scipy.linalg.lu_solve(factors, right[0])]
+
+    def solution_matrices(
+        self, factors: PyTree, jacobian: PyTree, step: Scalar
+    ) -> tuple[Scalar, Scalar]:
+        size = self.y[0].size
+        return jax.scipy.linalg.lu_solve(factors, jnp.eye(size)), jnp.zeros((size, 0))
 
 
 class _ScalarLinearisation(AbstractLinearisation):
@@ -242,6 +122,17 @@ class _ScalarLinearisation(AbstractLinearisation):
             terms = [entry * value for entry, value in entries if entry is not None]
             reduced.append(own + step * sum(terms[1:], terms[0]) if terms else own)
         return matmul(factors, reduced)
+
+    def solution_matrices(
+        self, factors: list[list[Scalar]], jacobian: Matrix, step: Scalar
+    ) -> tuple[Scalar, Scalar]:
+        inverse = jnp.stack([jnp.stack(row) for row in factors])
+        kept, direct = self.kept(), self.direct()
+        if not direct:
+            return inverse, jnp.zeros((len(kept), 0))
+        zero = jnp.zeros_like(step)
+        rows = [[zero if (own := jacobian[i][p]) is None else own for p in direct] for i in kept]
+        return inverse, step * (inverse @ jnp.stack([jnp.stack(row) for row in rows]))
 
 
 def _reduced_matrix(

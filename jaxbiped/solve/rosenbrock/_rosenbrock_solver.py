@@ -15,12 +15,9 @@ from jaxtyping import PyTree
 from jaxbiped._types import BoolScalarLike, Scalar, SomeTree, Time
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.solve.rosenbrock._linearisation import (
-    AbstractLinearisation,
-    Components,
-    linearise,
-    split,
-)
+from jaxbiped.solve.rosenbrock._abstract_linearisation import AbstractLinearisation, Components
+from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, implicit_form
+from jaxbiped.solve.rosenbrock._linearisation import linearise, split
 from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau, error_weights, last_stage
 
 if TYPE_CHECKING:
@@ -125,20 +122,29 @@ def step_of(
 
     That is where the last stage evaluates the field: as far from the new value as its correction.
     """
-    start, join = split(y0)
+    whole = _vector_field(terms)
+    start, join = split(y0, whole)
     dtype = jnp.result_type(*start)
 
     def field(t: Scalar, y: Components) -> Components:
-        return split(terms.vf(t, join(y), args))[0]
+        return split(terms.vf(t, join(y), args), whole)[0]
 
     span = jnp.asarray(t1 - t0, dtype=dtype)
     control = jnp.asarray(terms.contr(t0, t1), dtype=dtype)
-    stages = stages_of(tableau, field, jnp.asarray(t0), start, span, control)
+    form = implicit_form(whole, join, args)
+    stages = stages_of(tableau, field, jnp.asarray(t0), start, span, control, form)
     last = _plus(start, stages.weighted(tableau.a[-1]))
     end = _plus(last, stages.weighted(last_stage(tableau)))
     error = stages.weighted(error_weights(tableau))
     dense = tuple(join(stages.weighted(row)) for row in tableau.dense)
     return join(end), join(error), dense, join(last)
+
+
+def _vector_field(terms: Any) -> object:
+    """The vector field of a term of diffrax, which integrates backwards by wrapping it."""
+    while isinstance(terms, diffrax._term.WrapTerm):
+        terms = terms.term
+    return getattr(terms, "vector_field", None)
 
 
 _cached_step = cached_jit(step_of)
@@ -207,13 +213,14 @@ def stages_of(
     start: Components,
     span: Scalar,
     control: Scalar,
+    form: ImplicitForm | None = None,
 ) -> Stages:
     """All stages of a step.
 
     `span` is the step in the time that `field` sees and `control` the same step as the state sees
-    it: opposite in sign where diffrax integrates backwards.
+    it: opposite in sign where diffrax integrates backwards. `form` is the field's, if it has one.
     """
-    lin = linearise(field, t, start)
+    lin = linearise(field, t, start, form)
     kept = lin.kept()
     step = tableau.gamma * control
     moves = control != 0.0

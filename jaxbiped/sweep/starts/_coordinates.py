@@ -8,29 +8,40 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped._quantity import Quantity
-from jaxbiped.dynamics._state import BristleState, RigidState, State, state_type
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state import state_type
+from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, with_parameters
-from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
+from jaxbiped.scene._placement import placement
+from jaxbiped.scene._rigid_feet import rigid_modes
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._starting_mode import AT_LIMIT
+from jaxbiped.sweep._admissible import limit_motions, passes_a_stop
 
-COORDINATES = {
-    "theta_stance": "theta_2",
-    "theta_swing": "theta_1",
-    "omega_stance": "omega_2",
-    "omega_swing": "omega_1",
-    "hip_z": "hip_z",
-    "hip_vx": "hip_vx",
-    "hip_vz": "hip_vz",
-}
-"""Names of the state's coordinates, leg 2 standing, and the leaves that they stand for."""
-_QUANTITIES = {
-    "theta_swing": Quantity("swing leg angle", r"$\theta_1$", "rad"),
+START_QUANTITIES = {
     "theta_stance": Quantity("stance leg angle", r"$\theta_2$", "rad"),
-    "omega_swing": Quantity("swing leg rate", r"$\omega_1$", "rad/s"),
+    "theta_swing": Quantity("swing leg angle", r"$\theta_1$", "rad"),
     "omega_stance": Quantity("stance leg rate", r"$\omega_2$", "rad/s"),
+    "omega_swing": Quantity("swing leg rate", r"$\omega_1$", "rad/s"),
 }
-START_QUANTITIES = {name: _QUANTITIES.get(name) or STATE_QUANTITIES[name] for name in COORDINATES}
-"""What the state's coordinates are."""
+"""What angles and rates of two legs "1" and "2" are, by what the leg does where a cycle begins."""
+
+
+def state_coordinates(scene: AbstractWalkerScene) -> dict[str, str]:
+    """The state's coordinates that starts can differ in, and the leaves that they stand for.
+
+    Where the bodies "1" and "2" are legs, `theta_stance`, `theta_swing` and their rates are other
+    names of theirs.
+    """
+    names, structure = recurring_names(state_type(scene)), scene.mechanism.structure
+    found = {}
+    swing, stance = (structure.bodies[j] for j in structure.roles)
+    if {swing, stance} == {"1", "2"}:
+        found = {
+            name: name.replace("stance", stance).replace("swing", swing)
+            for name in START_QUANTITIES
+        }
+    return found | {name: name for name in names}
 
 
 def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
@@ -40,16 +51,16 @@ def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
         scene: the walker, compliant or rigid.
 
     Returns:
-        Names of the state's coordinates, leg 2 standing, and then of the scene's parameters.
+        Names of the state's coordinates but `ROOT_x`, and then of the scene's parameters. Of two
+        legs "1" and "2" come first `theta_stance`, `theta_swing` and their rates, other names of
+        theirs.
 
     Examples:
         >>> import jaxbiped as jb
         >>> jb.starts.coordinate_names(jb.seed_scene())[:2]
         ('theta_stance', 'theta_swing')
     """
-    leaves = state_type(scene)._fields
-    own = [name for name, leaf in COORDINATES.items() if leaf in leaves]
-    return (*own, *parameter_names(scene))
+    return (*state_coordinates(scene), *parameter_names(scene))
 
 
 def coordinate_quantities(scene: Scene | RigidScene) -> dict[str, Quantity]:
@@ -61,14 +72,23 @@ def coordinate_quantities(scene: Scene | RigidScene) -> dict[str, Quantity]:
     Returns:
         A `Quantity` (words, symbol and SI unit) by each name.
     """
-    known = START_QUANTITIES | parameter_quantities(scene)
-    return {name: known[name] for name in coordinate_names(scene)}
+    own = {
+        name: START_QUANTITIES.get(name) or state_quantity(name)
+        for name in state_coordinates(scene)
+    }
+    return {name: each for name, each in own.items() if each} | parameter_quantities(scene)
 
 
 def check_coordinates(scene: Scene | RigidScene, names: Iterable[str]) -> None:
-    """Raises `ArgumentError` for a name that is no coordinate of the scene's starts."""
+    """Raises `ArgumentError` for what is no coordinate of the scene's starts, or named twice."""
+    leaves, told = state_coordinates(scene), dict[str, str]()
     for name in names:
         check_choice("coordinate", name, coordinate_names(scene))
+        other = told.setdefault(leaves.get(name, name), name)
+        if other != name:
+            raise ArgumentError(
+                f"{other} and {name} are not allowed together: they are one coordinate; give one."
+            )
 
 
 def axis_values(name: str, values: npt.ArrayLike) -> np.ndarray:
@@ -97,37 +117,77 @@ def parameter_axes(
     return axes
 
 
-def parameters_among(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def parameters_among(
+    scene: AbstractWalkerScene, columns: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
     """Those of the coordinates that are parameters of the scene."""
-    return {name: column for name, column in columns.items() if name not in COORDINATES}
+    own = state_coordinates(scene)
+    return {name: column for name, column in columns.items() if name not in own}
 
 
-def state_at(base: PyTree, columns: Mapping[str, np.ndarray]) -> PyTree:
+def state_at(scene: AbstractWalkerScene, base: PyTree, columns: Mapping[str, np.ndarray]) -> PyTree:
     """The states (n,) with these coordinates, all else from the base's leaves (n,)."""
-    changed = {COORDINATES[name]: column for name, column in columns.items() if name in COORDINATES}
-    return base._replace(**changed)
+    leaves = state_coordinates(scene)
+    return base._replace(**{leaves[name]: columns[name] for name in columns if name in leaves})
+
+
+def turns_bodies(scene: AbstractWalkerScene, names: Iterable[str]) -> bool:
+    """Whether an angle or a rate is among the names, as the state has it."""
+    structure = scene.mechanism.structure
+    return not {*structure.coordinates[2:], *structure.rates[2:]}.isdisjoint(names)
+
+
+def _held_along(
+    scene: AbstractWalkerScene, base: PyTree, states: PyTree, named: Collection[str]
+) -> PyTree:
+    """States in which the stops that the base holds are held, where they can be.
+
+    Of two bodies that a stop holds, the one that is not `named` follows the other. What is off its
+    limit then is not held; states that pass a stop are no numbers, so that they are told to fail.
+    """
+    modes, structure = rigid_modes(scene.mechanism), scene.mechanism.structure
+    mode, values = modes.decoded(np, base.mode), states._asdict()
+    for limit, stays in zip(modes.limits, mode.held, strict=True):
+        names = [structure.bodies[j] for j, _ in limit.gap.weights]
+        for kind in ("theta", "omega"):
+            lead = [name for name in names if f"{kind}_{name}" in named]
+            follow = [name for name in names if name not in lead]
+            if len(lead) == len(follow) == 1:
+                own, other = f"{kind}_{follow[0]}", f"{kind}_{lead[0]}"
+                moved = getattr(base, own) + values[other] - getattr(base, other)
+                values[own] = np.where(stays, moved, values[own])
+    like, held = values["mode"], []
+    for (_, off, rate), stays in zip(limit_motions(scene, values), mode.held, strict=True):
+        held.append(stays & (np.abs(off) <= AT_LIMIT) & (np.abs(rate) <= AT_LIMIT))
+    passed = passes_a_stop(scene, values, by=AT_LIMIT)
+    values["mode"] = modes.encoded(np, mode._replace(held=tuple(held)), like)
+    return type(states)(**{name: np.where(passed, np.nan, each) for name, each in values.items()})
 
 
 def place_states(
     scene: AbstractWalkerScene, base: PyTree, states: PyTree, named: Collection[str]
 ) -> PyTree:
-    """States whose stance foot is as deep, and rolls and slips, as the base's does.
+    """States whose stance leg is as deep, and rolls and slips, as the base's does.
 
-    The hip's height and velocity follow from the stance leg where they are not `named`. A rigid
-    walker's do anyway.
+    The root point's height and velocity follow from the lowest foot of that leg where they are not
+    `named`. A rigid walker's do anyway; there what the base holds moves along.
     """
-    if isinstance(states, RigidState):
-        return states
-    length, radius = np.asarray(scene.walker.hip_to_foot), np.asarray(scene.walker.r)
+    if not scene.compliant:
+        stops = rigid_modes(scene.mechanism).limits
+        return _held_along(scene, base, states, named) if stops else states
+    mechanism = scene.mechanism
+    structure = mechanism.structure
+    root = (structure.coordinates[1], *structure.rates[:2])
+    turning = (*structure.coordinates[2:], *structure.rates[2:])
 
-    def rolling(state: State | BristleState) -> dict[str, np.ndarray]:
-        sine, cosine = np.sin(state.theta_2), np.cos(state.theta_2)
-        return {
-            "hip_z": length * cosine,
-            "hip_vx": -(length * cosine + radius) * state.omega_2,
-            "hip_vz": -length * sine * state.omega_2,
-        }
+    def rolling(state: PyTree) -> dict[str, np.ndarray]:
+        given = {name: getattr(state, name) for name in turning}
+        leg = structure.legs[structure.stance_leg]
+        placed = placement(mechanism, scene.ground.slope, given, leg)
+        return {name: np.asarray(placed[name]) for name in root}
 
     old, new = rolling(base), rolling(states)
-    moved = {leaf: getattr(base, leaf) + new[leaf] - old[leaf] for leaf in new if leaf not in named}
+    moved = {
+        leaf: getattr(base, leaf) + new[leaf] - old[leaf] for leaf in root if leaf not in named
+    }
     return states._replace(**moved)

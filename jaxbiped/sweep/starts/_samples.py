@@ -4,11 +4,10 @@ import warnings
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite
-from jaxbiped._identity import identity
+from jaxbiped._checks import ArgumentError, check_choice, check_count, check_finite
 from jaxbiped._types import JsonObject
-from jaxbiped.basins._arguments import check_whole
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._labelling import Labelling
@@ -17,8 +16,10 @@ from jaxbiped.sweep.starts._starts import (
     AbstractStarts,
     Batch,
     Completion,
+    Rest,
     batch_at,
     check_parameters,
+    rest_of,
 )
 
 SAMPLINGS = ("uniform", "latin-hypercube", "sobol", "halton")
@@ -89,7 +90,7 @@ class Sample(AbstractStarts):
         count: how many starts.
         method: one of `SAMPLINGS`.
         seed: of the sequence.
-        place, follow: as in `Grid`.
+        rest: as in `Grid`.
     """
 
     lower: dict[str, float]
@@ -97,8 +98,7 @@ class Sample(AbstractStarts):
     count: int
     method: str
     seed: int
-    place: bool
-    follow: Completion | None
+    rest: Rest
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -118,13 +118,12 @@ class Sample(AbstractStarts):
             name: self.lower[name] + drawn[:, i] * (self.upper[name] - self.lower[name])
             for i, name in enumerate(self.lower)
         }
-        return batch_at(labelling, columns, place=self.place, follow=self.follow)
+        return batch_at(labelling, columns, self.rest)
 
     def described(self) -> JsonObject:
         bounds = {name: [self.lower[name], self.upper[name]] for name in self.lower}
-        rest = {"place": self.place, "follow": identity(self.follow)}
         drawn = {"sample": self.method, "count": self.count, "seed": self.seed}
-        return drawn | {"bounds": bounds} | rest
+        return drawn | {"bounds": bounds} | self.rest.described()
 
 
 def sample(
@@ -134,8 +133,9 @@ def sample(
     *,
     method: str = "sobol",
     seed: int = 0,
-    place: bool = False,
+    place: bool | None = None,
     follow: Completion | None = None,
+    base: PyTree = None,
 ) -> Sample:
     """Random or quasi-random starts within bounds of coordinates (see `grid`).
 
@@ -148,7 +148,7 @@ def sample(
         count: how many starts.
         method: one of `SAMPLINGS`.
         seed: of the random numbers.
-        place, follow: as in `grid`.
+        place, follow, base: as in `grid`.
 
     Returns:
         The starts, of shape (count,); none is computed before it is labelled.
@@ -157,8 +157,8 @@ def sample(
         ArgumentError: an unknown coordinate or method, bounds that enclose nothing, no starts.
     """
     check_coordinates(scene, bounds)
-    check_whole("count", count, 1)
-    check_whole("seed", seed, 0)
+    check_count("count", count)
+    check_count("seed", seed, 0)
     check_choice("method", method, SAMPLINGS)
     if method == "sobol" and count > MOST_SOBOL:
         raise ArgumentError(
@@ -178,4 +178,5 @@ def sample(
     lower = {name: float(low) for name, (low, _) in bounds.items()}
     upper = {name: float(high) for name, (_, high) in bounds.items()}
     check_parameters(scene, {name: np.array([lower[name], upper[name]]) for name in lower})
-    return Sample(lower, upper, int(count), method, int(seed), place, follow)
+    rest = rest_of(scene, bounds, place, follow, base)
+    return Sample(lower, upper, int(count), method, int(seed), rest)

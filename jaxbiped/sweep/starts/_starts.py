@@ -3,7 +3,7 @@
 import abc
 import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
@@ -14,9 +14,11 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._state import BristleState, RigidState, State
+from jaxbiped.dynamics._state import state_for
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._state_types import State
+from jaxbiped.sweep._follow_starts import broadcast_leaves
 from jaxbiped.sweep._labelling import Labelling, check_leaves_of_starts
 from jaxbiped.sweep.starts._coordinates import (
     axis_values,
@@ -24,6 +26,7 @@ from jaxbiped.sweep.starts._coordinates import (
     parameters_among,
     place_states,
     state_at,
+    turns_bodies,
 )
 
 Completion: TypeAlias = Callable[[Any, PyTree], PyTree]
@@ -80,18 +83,58 @@ class AbstractStarts(eqx.Module):
         return self.at(labelling, np.arange(first, last))
 
 
+class Rest(eqx.Module):
+    """Where what starts do not name comes from; see `grid`.
+
+    Attributes:
+        place: whether the stance leg is placed on the ground.
+        follow: what completes the starts; None for nothing.
+        base: the state that they are changed from; None for the gait's.
+    """
+
+    place: bool
+    follow: Completion | None
+    base: PyTree
+
+    def described(self) -> JsonObject:
+        """What it is, ready for JSON."""
+        own = {"place": self.place, "follow": identity(self.follow)}
+        if self.base is None:
+            return own
+        return own | {"base": {name: float(x) for name, x in self.base._asdict().items()}}
+
+
+def rest_of(
+    scene: Scene | RigidScene,
+    names: Iterable[str],
+    place: bool | None,
+    follow: Completion | None,
+    base: PyTree,
+) -> Rest:
+    """Where starts that name these coordinates have the rest from; raises `ArgumentError`."""
+    if base is not None:
+        base = state_for(scene, base, "base")
+        if np.ndim(base[0]):
+            raise ArgumentError(
+                f"base has leaves of shape {np.shape(base[0])}, which is not allowed: give one "
+                "state."
+            )
+        base = type(base)(*map(float, base))
+    return Rest(turns_bodies(scene, names) if place is None else bool(place), follow, base)
+
+
 class Grid(AbstractStarts):
     """A regular grid over coordinates; the last axis runs fastest. `grid` makes one.
 
     Attributes:
         values: coordinates' values, shape (k,) each.
-        place: whether the stance foot is placed on the ground.
-        follow: see `grid`.
+        rest: where what they do not name comes from.
+        swept: which of the coordinates are parameters of the scene.
     """
 
     values: dict[str, np.ndarray]
-    place: bool
-    follow: Completion | None
+    rest: Rest
+    swept: tuple[str, ...]
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -103,7 +146,7 @@ class Grid(AbstractStarts):
 
     @property
     def parameters(self) -> dict[str, np.ndarray]:
-        return {name: np.unique(column) for name, column in parameters_among(self.values).items()}
+        return {name: np.unique(self.values[name]) for name in self.swept}
 
     @property
     def own_columns(self) -> tuple[str, ...]:
@@ -113,36 +156,42 @@ class Grid(AbstractStarts):
         places = np.unravel_index(numbers, self.shape)
         pairs = zip(self.values.items(), places, strict=True)
         columns = {name: values[place] for (name, values), place in pairs}
-        return batch_at(labelling, columns, place=self.place, follow=self.follow)
+        return batch_at(labelling, columns, self.rest)
 
     def described(self) -> JsonObject:
         values = {name: [float(x) for x in values] for name, values in self.values.items()}
-        return {"grid": values, "place": self.place, "follow": identity(self.follow)}
+        return {"grid": values} | self.rest.described()
 
 
 def grid(
     scene: Scene | RigidScene,
     values: Mapping[str, Sequence[float] | np.ndarray],
     *,
-    place: bool = False,
+    place: bool | None = None,
     follow: Completion | None = None,
+    base: PyTree = None,
 ) -> Grid:
     """A regular grid of starts over coordinates of the state and parameters of the scene.
 
     Args:
         scene: the walker.
-        values: of each coordinate (see `coordinate_names`), the last one running fastest. What is
-            not named keeps the value that the gait has on its section.
-        place: whether the stance foot is placed on the ground: hip height and velocity, where they
-            are not named, follow from the stance leg as deep and as slowly slipping as in the gait.
+        values: of each coordinate (see `coordinate_names`), the last one running fastest.
+        place: whether the stance leg is placed on the ground: height and velocity of the root
+            point, where they are not named, follow from its lowest foot, as deep and as slowly
+            slipping as in the gait, or in the base. Unless given they do where a body's angle or
+            rate is told by its name in the state; `theta_stance` and its like name a slice through
+            the gait's own root point.
         follow: a function of (scene, states), leaves (n,), that completes the starts in another
             way, after all else. For workers in other processes it must be a module's own.
+        base: a state of the scene, of which starts keep what they do not name; that of the gait on
+            its section unless given.
 
     Returns:
         The starts, of the shape that the axes span; none is computed before it is labelled.
 
     Raises:
-        ArgumentError: an unknown coordinate, an empty axis, a value that is not finite.
+        ArgumentError: an unknown coordinate or one that is named twice, an empty axis, a value that
+            is not finite, or a base of another kind.
 
     Examples:
         >>> import jaxbiped as jb
@@ -158,33 +207,35 @@ def grid(
         check_finite(name, given)
         axes[name] = axis_values(name, np.atleast_1d(given))
     check_parameters(scene, axes)
-    return Grid(axes, place, follow)
+    swept = tuple(parameters_among(scene, axes))
+    return Grid(axes, rest_of(scene, axes, place, follow, base), swept)
 
 
 def batch_at(
     labelling: Labelling,
     columns: dict[str, np.ndarray],
-    *,
-    place: bool = False,
-    follow: Completion | None = None,
+    rest: Rest,
 ) -> Batch:
-    """The starts at these coordinates, each (n,); `place` and `follow` as in `grid`."""
+    """The starts at these coordinates, each (n,)."""
     count = len(next(iter(columns.values())))
-    parameters = parameters_among(columns)
-    base = labelling.base(parameters, count)
+    parameters = parameters_among(labelling.scene, columns)
+    if rest.base is None:
+        base = labelling.base(parameters, count)
+    else:
+        base = broadcast_leaves(rest.base, count)
     scene = with_parameters(labelling.scene, parameters)
-    states = state_at(base, columns)
-    if place:
+    states = state_at(scene, base, columns)
+    if rest.place:
         states = place_states(scene, base, states, columns)
-    if follow is not None:
-        states = follow(scene, states)
+    if rest.follow is not None:
+        states = rest.follow(scene, states)
     leaves = [np.broadcast_to(np.asarray(leaf, dtype=np.float64), (count,)) for leaf in states]
     return Batch(type(states)(*leaves), parameters, columns)
 
 
 def check_parameters(scene: Scene | RigidScene, columns: dict[str, np.ndarray]) -> None:
     """Raises `ArgumentError` for values that the scene's parameters must not have."""
-    for name, column in parameters_among(columns).items():
+    for name, column in parameters_among(scene, columns).items():
         with_parameters(scene, {name: column})
 
 
@@ -192,7 +243,7 @@ class GivenStarts(AbstractStarts):
     """Starts as they are given.
 
     Attributes:
-        states: `State`, `BristleState` or `RigidState` with leaves of shape (n,).
+        states: a state of the scene's kind with leaves of shape (n,).
 
     Raises:
         ArgumentError: a state of another kind, or leaves of different shapes.
@@ -201,12 +252,13 @@ class GivenStarts(AbstractStarts):
     states: PyTree
 
     def __check_init__(self) -> None:
-        check_type("states", self.states, State, BristleState, RigidState)
+        if not hasattr(self.states, "_fields"):  # of which kind, the labelling knows
+            check_type("states", self.states, State)
         check_leaves_of_starts(self.states)
 
     @property
     def shape(self) -> tuple[int, ...]:
-        return (len(self.states.hip_x),)
+        return (len(self.states[0]),)
 
     @property
     def axes(self) -> dict[str, np.ndarray | None]:

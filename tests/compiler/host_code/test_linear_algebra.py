@@ -20,6 +20,22 @@ def test_products():
     check_against_xla(function, A, B, C, rtol=1e-12)
 
 
+def test_products_over_any_number_of_axes():
+    """As a cycle of several arrivals makes them: in a batch, over two axes or over none."""
+
+    def function(a, c):
+        many = jnp.einsum("kij,kjab->kiab", c, jnp.stack([c] * 5, axis=1))
+        batched = many, jnp.einsum("kij,kl->kjil", c, c[..., 0])
+        return (
+            batched,
+            jnp.tensordot(c, c, ((1, 2), (2, 1))),
+            jnp.tensordot(c, a, 0),
+            jnp.tensordot(c, c, (2, 1)),
+        )
+
+    check_against_xla(function, A, C, rtol=1e-12)
+
+
 @pytest.mark.parametrize("rows", [1, 3])
 def test_systems(rows):
     def function(a, b):
@@ -42,6 +58,19 @@ def test_triangles():
         return [solved(a, b, **how, **way) for way in ways], solved(a, b.T, left_side=False)
 
     check_against_xla(function, A + 4.0 * np.eye(5), B, rtol=1e-12)
+
+
+def test_singular_systems():
+    """By products, for signs are free; a matrix that is no number leaves others as they are."""
+
+    def function(b, c):
+        left, values, right = jnp.linalg.svd(b, full_matrices=False)
+        own, several, others = jax.vmap(jnp.linalg.svd)(c)
+        products = left * values @ right, jnp.einsum("kij,kj,kjl->kil", own, several, others)
+        return products, values, several, jnp.linalg.svd(b, compute_uv=False)
+
+    check_against_xla(function, B, C, rtol=1e-11)
+    check_against_xla(function, B, C * np.array([1.0, np.nan, 1.0, 1.0])[:, None, None], rtol=1e-11)
 
 
 def test_eigensystems():

@@ -66,6 +66,12 @@ def test_reductions():
     check_against_xla(lambda k: jnp.sum(k.astype(jnp.int32), dtype=jnp.int32), WHOLE)
 
 
+def test_the_least_of_none_is_infinite():
+    none = np.zeros((2, 0))
+    check_against_xla(lambda x: jnp.min(x, axis=1, initial=jnp.inf), none)
+    check_against_xla(lambda x: jnp.max(x, axis=1, initial=-jnp.inf), none)
+
+
 def test_sorting_keeps_equal_ones_in_their_order():
     def function(x):
         order = jnp.argsort(x)

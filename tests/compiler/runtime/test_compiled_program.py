@@ -19,8 +19,8 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
 from jaxbiped.compiler import LANES, Request
-from jaxbiped.compiler.runtime import _compiled_program, _host_cpu
-from jaxbiped.compiler.runtime._host_cpu import default_threads, host
+from jaxbiped.compiler.runtime import _compiled_program, _machine_code
+from jaxbiped.compiler.runtime._machine_code import default_threads, host
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._first_and_last_step import just_before_end
@@ -155,7 +155,7 @@ def test_an_interrupt_ends_a_run(monkeypatch):
             work()
             at_work.remove(threading.get_ident())
 
-        _host_cpu.run_in_threads(one, workers, stop, quick=quick)
+        _machine_code.run_in_threads(one, workers, stop, quick=quick)
 
     monkeypatch.setattr(_compiled_program, "run_in_threads", counted)
     program.kernel.code(host().width)
@@ -182,7 +182,7 @@ def test_an_interrupt_is_heard_at_the_first_look(monkeypatch):
     """Counted, for how long it takes depends on the machine."""
     monkeypatch.setattr(_Interrupted, "waits", 0)
     names = types.SimpleNamespace(Thread=threading.Thread, Event=_Interrupted)
-    monkeypatch.setattr(_host_cpu, "threading", names)
+    monkeypatch.setattr(_machine_code, "threading", names)
     with pytest.raises(KeyboardInterrupt):
         _endless().run(np.zeros(100), threads=3)
     # One look, and then the end of each of the three is awaited.
@@ -200,7 +200,7 @@ def test_a_run_that_is_stopped_attempts_nothing_more(attempts, monkeypatch):
 
     def stopped(work, workers, stop, *, quick):
         stop[0] = 1
-        _host_cpu.run_in_threads(work, workers, stop, quick=quick)
+        _machine_code.run_in_threads(work, workers, stop, quick=quick)
 
     monkeypatch.setattr(_compiled_program, "run_in_threads", stopped)
     assert np.isnan(program.run(inputs).outputs).all()

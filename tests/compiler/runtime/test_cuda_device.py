@@ -11,8 +11,7 @@ import pytest
 from jaxbiped._checks import ResourceError
 from jaxbiped.compiler import CUDA, LANES, LaneEngine, Program, Request
 from jaxbiped.compiler.runtime import _cuda_device, _device_processor
-from jaxbiped.compiler.runtime._cuda_device import find_devices
-from jaxbiped.compiler.runtime._cuda_driver import CudaDriver, CudaError
+from jaxbiped.compiler.runtime._cuda_device import CudaDriver, CudaError, find_devices
 from tests.compiler.fake_driver import FakeDriver, install
 
 NEVER = 2000.0

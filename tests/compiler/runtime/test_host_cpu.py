@@ -8,12 +8,12 @@ import pytest
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._environment import VECTOR_VARIABLE
-from jaxbiped.compiler.runtime import _host_cpu
-from jaxbiped.compiler.runtime._host_cpu import host
+from jaxbiped.compiler.runtime import _machine_code
+from jaxbiped.compiler.runtime._machine_code import host
 
 _ASKED = """
 import jax, jax.numpy as jnp, jaxbiped as jb, numpy as np
-from jaxbiped.compiler.runtime._host_cpu import host
+from jaxbiped.compiler.runtime._machine_code import host
 rates = jnp.linspace(-1.4, -1.1, 9)
 def walk(rate):
     start = jb.seed_state()._replace(omega_2=rate)
@@ -52,7 +52,7 @@ def test_narrower_vectors_do_without_the_wider_ones_instructions(monkeypatch):
     monkeypatch.setenv(VECTOR_VARIABLE, "128")
     assert _host().width == 2
     assert _host().scales is False
-    assert _host().features.endswith(f"-{_host_cpu._WITHOUT[128]}")
+    assert _host().features.endswith(f"-{_machine_code._WITHOUT[128]}")
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.compiler.runtime._host_cpu import host
+from jaxbiped.compiler.runtime._machine_code import host
 from jaxbiped.compiler.runtime._primitive import call
 from tests.compiler.one_shot import NUMBER, stepped, two_zeros
 

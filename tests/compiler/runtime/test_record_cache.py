@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
+from jaxbiped.compiler.runtime._lane_call import BufferPool, RecordCache
 from jaxbiped.compiler.runtime._primitive import Recording, call
-from jaxbiped.compiler.runtime._record_cache import BufferPool, RecordCache
 from tests.compiler.one_shot import NUMBER, stepped, two_zeros
 
 ROOM = 8

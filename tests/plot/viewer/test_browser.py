@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.plot._animation import poses
+from jaxbiped.plot._samples import DrawnMotion
+from jaxbiped.plot._skeleton import poses
 from tests.browser import require_chromium
 from tests.drawn import leg_pixels
+from tests.mechanisms import scene_of, start_of
 
 pytestmark = pytest.mark.slow
 
@@ -16,8 +18,10 @@ const at = (part, names) => [...document.querySelectorAll(`[data-part=${part}]`)
   (each) => names.map((name) => Number(each.getAttribute(name))));
 return {
   time: Number(document.querySelector(".stage").dataset.time),
-  hip: at("hip", ["cx", "cy"]), foot_1: at("foot-1", ["cx", "cy"]),
-  foot_2: at("foot-2", ["cx", "cy"]), leg_1: at("leg-1", ["x2", "y2"]),
+  root: at("root", ["cx", "cy"]), foot_1: at("foot-1", ["cx", "cy"]),
+  foot_2: at("foot-2", ["cx", "cy"]),
+  leg_1: [...document.querySelectorAll("[data-part=body-1]")].map(
+    (each) => each.getAttribute("d").split("L").at(-1).split(" ").map(Number)),
 };
 """
 SCRUB = """
@@ -57,9 +61,9 @@ def assert_is_there(page, walk):
     shown = page.run(WHERE)
     scene, trajectory = walk
     time = min(shown["time"], float(trajectory.t[-1]))
-    there = poses(scene, trajectory.at(np.array([time])))
+    there = poses(scene, DrawnMotion(scene, trajectory).at(np.array([time])))
     for name, (x, z) in zip(
-        ("hip", "foot_1", "foot_2"), (there.hip[0], *(f[0] for f in there.feet)), strict=True
+        ("root", "foot_1", "foot_2"), (there.root[0], *(f[0] for f in there.feet)), strict=True
     ):
         assert np.allclose(shown[name], [[x, -z]], rtol=0.0, atol=1e-4), (name, time)
     assert shown["leg_1"] == shown["foot_1"]
@@ -183,3 +187,24 @@ def test_screen_readers_are_told(page):
     assert [each.tag_name for each in nameless if not each.accessible_name] == []
     rows = page.run("return document.querySelectorAll('tbody tr').length")
     assert rows == 19
+
+
+def test_knees_feet_and_names_of_a_mechanism_are_shown(browser, tmp_path):
+    require_chromium()
+    scene = scene_of("kneed")
+    trajectory = jb.simulate(scene, start_of("kneed", scene), duration=0.1)
+    path = jb.plot.view(scene, trajectory, name="kneed").save(tmp_path / "kneed.html")
+    page = browser.open(path)
+    page.run(SCRUB, 0.5 * float(trajectory.t[-1]))
+    time = page.run("return Number(document.querySelector('.stage').dataset.time)")
+    there = poses(scene, DrawnMotion(scene, trajectory).at(np.array([time])))
+    shown = page.run(
+        "return [...document.querySelectorAll('[data-part=hinge], [data-part^=foot-]')].map("
+        "(each) => ['cx', 'cy'].map((name) => Number(each.getAttribute(name))))"
+    )
+    expected = [each[0] * [1.0, -1.0] for each in (*there.feet, *there.hinges)]
+    assert np.allclose(sorted(shown), sorted(map(list, expected)), rtol=0.0, atol=1e-4)
+    said = page.run("return document.body.textContent")
+    for name in scene.mechanism.structure.bodies:
+        assert f"{name}: " in said
+    assert browser.errors() == []

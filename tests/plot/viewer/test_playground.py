@@ -10,8 +10,9 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 import jaxbiped as jb
 from jaxbiped.compiler import LANES
-from jaxbiped.plot.viewer._page import page_of, script
-from jaxbiped.plot.viewer._playground import STEPS, played_request
+from jaxbiped.plot.viewer._playground import STEPS, played_request, recorded_names
+from jaxbiped.plot.viewer._view import page_of, script
+from tests.mechanisms import scene_of, start_of
 
 pytestmark = pytest.mark.slow
 
@@ -114,3 +115,20 @@ def test_the_page_asks_for_nothing_and_is_small(playground):
     assert "'wasm-unsafe-eval'" not in page_of({}, "walk")
     assert re.findall(r"(?:src|href)=\"(?!data:)", page) == []
     assert len(page) < 250_000
+
+
+def test_a_mechanism_s_page_records_the_walk_that_lanes_make():
+    scene = scene_of("coupled")
+    state = start_of("coupled", scene)
+    request = played_request(scene, state, FOOTSTEPS)
+    inputs = np.array([float(leaf) for leaf in jax.tree.leaves(request.inputs)])
+    _, recorded = LANES.compile(request).run_table(inputs[:, None], room=STEPS)
+    rows = recorded.values[0, : int(recorded.counts[0])]
+    named = dict(zip(recorded_names(scene), rows.T, strict=True))
+    walk = jb.simulate(scene, state, footsteps=FOOTSTEPS, engine="lanes")
+    np.testing.assert_array_equal(named["theta_leg_1"], np.asarray(walk.state.theta_leg_1)[1:])
+    mean = 0.5 * (named["theta_leg_1"] + named["theta_leg_2"])
+    np.testing.assert_allclose(named["theta_torso"], mean, atol=1e-12)
+    page = jb.plot.playground(scene, state, footsteps=FOOTSTEPS)
+    words = [slider["words"] for slider in page.sliders]
+    assert words[-2:] == ["Angle of leg_1", "Rate of leg_1"]

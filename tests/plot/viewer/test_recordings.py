@@ -8,7 +8,9 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 import jaxbiped as jb
-from jaxbiped.plot._animation import poses
+from jaxbiped.plot._samples import DrawnMotion
+from jaxbiped.plot._skeleton import motion_names, poses
+from tests.mechanisms import scene_of, start_of
 
 pytestmark = pytest.mark.slow
 
@@ -31,7 +33,7 @@ def played(recording, t):
 
 def feet_of(recording, t):
     x, z, *angles = played(recording, t)
-    reach = recording.l - recording.r
+    reach = 0.40 - 0.08
     return [(x + reach * np.sin(a), z - reach * np.cos(a)) for a in angles]
 
 
@@ -80,7 +82,7 @@ def test_footprints_are_the_heel_strikes(seed_walk):
     scene, walk = seed_walk
     prints = recorded(scene, walk).footprints
     assert [each.strike for each in prints] == [False] + [True] * (len(prints) - 1)
-    assert [each.foot for each in prints] == [2, 1, 2, 1, 2][: len(prints)]
+    assert [each.leg for each in prints] == [2, 1, 2, 1, 2][: len(prints)]
     steps = jb.footsteps(scene, walk)
     np.testing.assert_allclose([each.t for each in prints[2:]], steps.time_s)
     np.testing.assert_allclose(np.diff([each.x for each in prints[1:]]), steps.length_m)
@@ -91,7 +93,7 @@ def test_a_rigid_walk_keeps_its_legs():
     walk = jb.rigid_walk(scene, start, footsteps=3, max_arrivals=3)
     found = recorded(scene, walk, start=start)
     strikes = np.asarray(walk.arrivals.t)
-    assert [each.foot for each in found.footprints] == [2, 1, 2]
+    assert [each.leg for each in found.footprints] == [2, 1, 2]
     t = np.array([0.1, strikes[0] + 0.1, strikes[1] + 0.2])
     states = jax.vmap(lambda time: jb.rigid_walk(scene, start, duration=time).final)(t)
     x, _, one, two = played(found, t)
@@ -114,7 +116,7 @@ def test_the_page_stands_upright(seed_walk):
     found = recorded(scene, walk)
     x, z, *_ = played(found, np.array([1.0]))
     sine, cosine = np.sin(found.slope), np.cos(found.slope)
-    hip = poses(scene, walk.at(np.array([1.0]))).hip[0]
+    hip = poses(scene, DrawnMotion(scene, walk).at(np.array([1.0]))).root[0]
     assert hip == pytest.approx(
         [cosine * x[0] + sine * z[0], cosine * z[0] - sine * x[0]], abs=1e-5
     )
@@ -122,12 +124,40 @@ def test_the_page_stands_upright(seed_walk):
 
 def test_what_cannot_be_viewed_is_told(seed_walk):
     scene, walk = seed_walk
-    with pytest.raises(jb.ArgumentError, match="start is only allowed with a rigid walk"):
+    with pytest.raises(jb.ArgumentError, match="start is allowed only with a rigid walk"):
         jb.plot.view(scene, walk, start=jb.dynamics.rigid_state(START))
     end = jb.simulate(scene, START, duration=0.1, save="end")
-    with pytest.raises(ValueError, match="Nothing is known between"):
+    with pytest.raises(ValueError, match="There is no solution between"):
         jb.plot.view(scene, end)
     with pytest.raises(jb.ArgumentError, match="views"):
         jb.plot.side_by_side()
     with pytest.raises(jb.ArgumentError, match="views"):
         jb.plot.side_by_side(walk)
+
+
+@pytest.mark.parametrize("name", ["coupled", "flat"])
+def test_mechanisms_are_where_they_were(name):
+    scene = scene_of(name)
+    walk = jb.simulate(scene, start_of(name, scene), duration=0.1)
+    found = recorded(scene, walk)
+    sent = found.numbers()
+    assert [part["name"] for part in sent["skeleton"]["parts"]] == list(
+        scene.mechanism.structure.bodies
+    )
+    t = np.linspace(0.0, float(walk.t[-1]), 300)
+    knots = found.t
+    motion = {
+        place: CubicHermiteSpline(knots, found.channels[place], found.channels[rate])(t)
+        for place, rate in zip(*np.array_split(motion_names(scene.mechanism.structure), 2),
+                               strict=True)
+    }  # fmt: skip
+    shown = found.skeleton.pose(motion, found.slope)
+    there = poses(scene, DrawnMotion(scene, walk).at(t))
+    for own, expected in zip((*shown.feet, *shown.centres), (*there.feet, *there.centres),
+                             strict=True):  # fmt: skip
+        np.testing.assert_allclose(own, expected, rtol=0.0, atol=2e-5)
+    struck = jb.measure.heel_strikes(scene, walk)
+    prints = [each for each in found.footprints if each.strike]
+    assert [each.leg for each in prints] == struck.foot.tolist()
+    normal = [found.channels[f"normal_{k + 1}"] for k in range(len(scene.mechanism.feet))]
+    assert max(map(np.max, normal)) > 1.0

@@ -6,7 +6,7 @@ import json
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.plot.viewer._page import style, widget_script
+from jaxbiped.plot.viewer._view import asset, widget_script
 
 pytestmark = pytest.mark.slow
 
@@ -42,7 +42,7 @@ def test_time_is_shared_with_python(viewed, browser, tmp_path):
     (tmp_path / "empty.html").write_text("<!doctype html><title>notebook</title>")
     script = base64.b64encode(widget_script().encode()).decode()
     page = browser.open(tmp_path / "empty.html")
-    assert page.driver.execute_async_script(MODEL, script, style(), viewed.sent())
+    assert page.driver.execute_async_script(MODEL, script, asset("view.css"), viewed.sent())
     assert page.run(TIME) == 0.25
     # A notebook's cell has no lower edge in sight: the player is above the walker, and charts
     # stand beside it only where the cell, not the window, is wide.

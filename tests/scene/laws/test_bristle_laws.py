@@ -123,7 +123,7 @@ def test_only_scenes_with_bristles_carry_them():
 
 def test_exchanging_legs_exchanges_bristles():
     state = jb.dynamics.BristleState(*[jnp.asarray(float(i)) for i in range(10)])
-    swapped = [float(leaf) for leaf in jb.dynamics.exchange_legs(state)]
+    swapped = [float(leaf) for leaf in jb.dynamics.exchange_legs(jb.seed_scene(), state)]
     assert swapped == [0.0, 1.0, 3.0, 2.0, 4.0, 5.0, 7.0, 6.0, 9.0, 8.0]
 
 

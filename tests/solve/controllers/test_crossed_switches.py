@@ -31,7 +31,7 @@ def _standing(depth=5e-4, slip=0.0, sinks=0.0, other=-0.01):
         hip_vz=-sinks - float(reach * jnp.sin(angle)) * rate,
     )
     state = jb.State(*map(jnp.asarray, moving))
-    foot = feet(SCENE, state).foot_1
+    foot = feet(SCENE, state)[0]
     assert foot.penetration == pytest.approx(depth, abs=1e-12)
     assert foot.slip_speed == pytest.approx(slip, abs=1e-12)
     assert foot.penetration_rate == pytest.approx(sinks, abs=1e-12)

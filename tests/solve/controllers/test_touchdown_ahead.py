@@ -39,7 +39,7 @@ def _next_end(state, error, span=1e-3):
 
 def test_the_next_attempt_ends_just_past_the_touchdown():
     state = _falling(1.5e-4, 0.3)
-    assert feet(SCENE, state).foot_1.admitted
+    assert feet(SCENE, state)[0].admitted
     plain, ahead = _next_end(state, 1e6)
     assert plain == pytest.approx(2e-4)
     assert ahead == pytest.approx(5e-4 + 0.03 * 5e-4, rel=1e-6)

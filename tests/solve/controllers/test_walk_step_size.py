@@ -52,6 +52,12 @@ def test_the_next_size_is_the_one_that_the_error_allows(order, error, kept):
     assert float(end - start) == pytest.approx(SPAN * SAFETY * error ** (-1.0 / order), rel=1e-9)
 
 
+def test_a_state_that_runs_away_is_not_kept_for_a_small_relative_error():
+    """To itself its error is half a tolerance, which for any other state would be kept."""
+    assert bool(_adapted(0.5, grown=1e3)[0])
+    assert not bool(_adapted(0.5, grown=1e12)[0])
+
+
 def test_sizes_change_by_limited_factors():
     for error, factor in ((1e-12, 10.0), (0.0, 10.0), (1e9, 0.2), (np.inf, 0.2), (np.nan, 0.2)):
         _, start, end, *_ = _adapted(error)

@@ -1,5 +1,6 @@
 """Linearising a vector field, against dense algebra: sizes, structure, answers."""
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import diffrax
@@ -9,6 +10,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.dynamics._state import field_of
+from jaxbiped.scene._state_types import BristleState
+from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitLinearisation, implicit_form
 from jaxbiped.solve.rosenbrock._linearisation import linearise, split
 
 MASS, BOB, LENGTH, GRAVITY = 2.0, 0.7, 0.9, 9.81
@@ -126,6 +130,68 @@ def test_solutions_equal_those_of_a_dense_matrix(name, step):
     mine = _solve(lin, jacobian, g, jnp.asarray(right))
     truth = np.linalg.solve(np.eye(len(dense)) - step * dense, right)
     np.testing.assert_allclose(mine, truth, rtol=1e-12, atol=1e-12)
+
+
+STANDS = jb.seed_state()._replace(hip_z=jnp.asarray(0.3944), omega_1=jnp.asarray(0.7))
+SCENES = {
+    "seed": jb.seed_scene(slope=0.02),
+    "bristles": dataclasses.replace(
+        jb.seed_scene(slope=0.02), friction=jb.laws.LuGre.like_seed(jb.seed_scene().friction)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("step", [1e-6, 1e-3, -1e-4])
+def test_the_implicit_form_solves_the_dense_system(name, step):
+    scene = SCENES[name]
+    start = STANDS
+    if name == "bristles":
+        start = BristleState(*STANDS, jnp.asarray(0.1), jnp.asarray(-0.2))
+    field = field_of(scene)
+    components, join = split(start, field)
+
+    def rates(t, y):
+        return list(field(t, join(y), scene))
+
+    lin = linearise(rates, jnp.zeros(()), components, implicit_form(field, join, scene))
+    assert isinstance(lin, ImplicitLinearisation)
+    dense = jax.jacfwd(lambda y: jnp.stack(rates(0.0, list(y))))(jnp.stack(components))
+    right = np.random.default_rng(0).normal(size=len(components))
+    jacobian, g = lin.jacobian(), jnp.asarray(step)
+    mine = _solve(lin, jacobian, g, jnp.asarray(right))
+    whole = np.eye(len(dense)) - step * np.asarray(dense)
+    np.testing.assert_allclose(mine, np.linalg.solve(whole, right), rtol=1e-9, atol=1e-10)
+    by_kept, by_direct = lin.solution_matrices(lin.factorise(jacobian, g), jacobian, g)
+    direct = right[list(lin.direct())]
+    again = by_kept @ right[lin.kept()] + by_direct @ direct
+    np.testing.assert_allclose(again, [mine[i] for i in lin.kept()], rtol=1e-9, atol=1e-10)
+
+
+def test_legs_do_not_touch_each_other_in_the_tree_s_form():
+    field, scene = field_of(SCENES["seed"]), SCENES["seed"]
+    components, join = split(STANDS, field)
+    form = implicit_form(field, join, scene)
+    lin = linearise(lambda t, y: list(field(t, join(y), scene)), jnp.zeros(()), components, form)
+    factors = lin.factorise(lin.jacobian(), jnp.asarray(1e-3))
+    omega_1, omega_2 = (STANDS._fields.index(f"omega_{leg}") for leg in "12")
+    assert (omega_1, omega_2) not in factors.entries
+    assert (omega_2, omega_1) not in factors.entries
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_steps_in_the_implicit_form_are_the_same(back):
+    """Through diffrax, forwards and, where it wraps the field, backwards."""
+    scene = SCENES["seed"]
+    t0, t1, dt = (0.01, 0.0, -1e-4) if back else (0.0, 0.01, 1e-4)
+
+    def end(field):
+        return diffrax.diffeqsolve(
+            diffrax.ODETerm(field), jb.solvers.Rodas4(), t0, t1, dt, STANDS, args=scene
+        ).ys
+
+    implicit, plain = end(field_of(scene)), end(lambda t, y, args: field_of(args)(t, y, args))
+    np.testing.assert_allclose(np.stack(implicit), np.stack(plain), rtol=1e-9, atol=1e-11)
 
 
 def _steps(field, start):

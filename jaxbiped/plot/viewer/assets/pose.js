@@ -11,24 +11,31 @@ export function onPage(walk, x, z) {
 /** Everything that is drawn or told of a walk at a time [s], lengths in m, forces in N. */
 export function poseAt(walk, time) {
   const t = within(walk, time);
-  const x = hermite(walk, "hip_x", "hip_vx", t);
-  const z = hermite(walk, "hip_z", "hip_vz", t);
-  const legs = [1, 2].map((leg) => {
-    const angle = hermite(walk, `theta_${leg}`, `omega_${leg}`, t);
-    const foot = [
-      x + (walk.l - walk.r) * Math.sin(angle),
-      z - (walk.l - walk.r) * Math.cos(angle),
-    ];
+  const { root, parts, feet } = walk.skeleton;
+  const [x, z] = ["x", "z"].map((name) => hermite(walk, `${root}_${name}`, `${root}_v${name}`, t));
+  const bodies = [];
+  for (const { name, parent, hinge, path, centre } of parts) {
+    const angle = hermite(walk, `theta_${name}`, `omega_${name}`, t);
+    const start = parent < 0 ? [x, z] : pointOf(bodies[parent], hinge);
+    const body = { start, angle, sine: Math.sin(angle), cosine: Math.cos(angle) };
+    const seen = (place) => onPage(walk, ...pointOf(body, place));
+    bodies.push({ ...body, hinge: onPage(walk, ...start), path: path.map(seen), centre: seen(centre) });
+  }
+  const soles = feet.map(({ part, centre }, k) => {
+    const place = pointOf(bodies[part], centre);
     return {
-      angle,
-      rate: linear(walk, `omega_${leg}`, t),
-      centre: onPage(walk, ...foot),
-      place: foot[0],
-      normal: linear(walk, `normal_${leg}`, t),
-      tangential: linear(walk, `tangential_${leg}`, t),
+      centre: onPage(walk, ...place),
+      place: place[0],
+      normal: linear(walk, `normal_${k + 1}`, t),
+      tangential: linear(walk, `tangential_${k + 1}`, t),
     };
   });
-  return { t, x, hip: onPage(walk, x, z), legs, ended: time >= walk.end };
+  return { t, x, root: onPage(walk, x, z), bodies, feet: soles, ended: time >= walk.end };
+}
+
+/** A point of a body in the slope's frame: so far down the body, so far ahead. */
+function pointOf({ start, sine, cosine }, [along, ahead]) {
+  return [start[0] + along * sine + ahead * cosine, start[1] - along * cosine + ahead * sine];
 }
 
 /** How many heel strikes there were until a time. */

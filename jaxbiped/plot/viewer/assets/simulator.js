@@ -52,7 +52,7 @@ class Simulator {
   run(inputs, slope) {
     const { rows, count, code } = this.solve(inputs);
     if (count < 2) return null;
-    const { recorded, endings, l, r, weight } = this.sent;
+    const { recorded, endings, skeleton, weight } = this.sent;
     const channels = {};
     recorded.forEach((name, k) => {
       channels[name] = Float64Array.from({ length: count }, (_, n) => rows[n * recorded.length + k]);
@@ -60,9 +60,9 @@ class Simulator {
     const [height, total] = [channels.gravitational, totalEnergy(channels)];
     channels.supplied = height.map((value) => height[0] - value);
     channels.lost = total.map((value) => total[0] - value);
-    const footprints = heelStrikes(channels);
+    const footprints = heelStrikes(channels, skeleton);
     const told = { name: "your walk", ending: endings[code], driven: false };
-    return { ...told, slope, l, r, weight, t: channels.t, channels, footprints };
+    return { ...told, slope, skeleton, weight, t: channels.t, channels, footprints };
   }
 }
 
@@ -70,18 +70,28 @@ function totalEnergy({ kinetic, gravitational, elastic }) {
   return kinetic.map((value, k) => value + gravitational[k] + elastic[k]);
 }
 
-/** The foot ahead comes to touch, the other one having struck before. */
-function heelStrikes({ t, touches_1, touches_2, place_1, place_2 }) {
-  const [touches, places, found] = [[touches_1, touches_2], [place_1, place_2], []];
-  const alone = [0, 1].filter((foot) => touches[foot][0]);
-  let last = alone.length === 1 ? alone[0] : -1;
-  for (const foot of alone) found.push({ t: t[0], foot: foot + 1, x: places[foot][0], strike: false });
+/** The leg ahead of all others that carry comes to touch, another one having struck before. */
+function heelStrikes(channels, { feet, legs }) {
+  const { t } = channels;
+  const own = legs.map((_, leg) => feet.map((_, k) => k + 1).filter((k) => feet[k - 1].leg === leg));
+  const touching = (leg, k) => own[leg].filter((foot) => channels[`touches_${foot}`][k]);
+  const place = (feetOf, k) =>
+    feetOf.reduce((sum, foot) => sum + channels[`place_${foot}`][k], 0) / feetOf.length;
+  const every = legs.map((_, leg) => leg);
+  const standing = every.filter((leg) => touching(leg, 0).length);
+  let last = standing.length === 1 ? standing[0] : -1;
+  const print = (leg, k, strike) => ({ t: t[k], leg: leg + 1, x: place(touching(leg, k), k), strike });
+  const found = standing.length === 1 ? [print(last, 0, false)] : [];
   for (let k = 1; k < t.length; k++) {
-    for (const foot of [0, 1]) {
-      const lands = !touches[foot][k - 1] && touches[foot][k];
-      if (!lands || foot === last || places[foot][k] <= places[1 - foot][k]) continue;
-      found.push({ t: t[k], foot: foot + 1, x: places[foot][k], strike: true });
-      last = foot;
+    for (const leg of every) {
+      if (touching(leg, k - 1).length || !touching(leg, k).length) continue;
+      const others = every.filter((other) => other !== leg);
+      const carry = others.filter((other) => touching(other, k).length);
+      const behind = (other) => place(own[leg], k) > place(own[other], k);
+      const ahead = (carry.length ? carry : others).every(behind);
+      if (!ahead || (leg === last && others.length)) continue;
+      found.push(print(leg, k, true));
+      last = leg;
     }
   }
   return found;

@@ -6,7 +6,7 @@ import { onPage, poseAt, strikesUntil } from "./pose.js";
 const WIDTH = 480;
 const HEIGHT = 300;
 const TICK = 0.1;
-/** Length of an arrow for the walker's weight, and of the longest, in leg lengths. */
+/** Length of an arrow for the walker's weight, and of the longest, in heights of the walker. */
 const PER_WEIGHT = 0.3;
 const LONGEST = 1.1;
 
@@ -14,6 +14,8 @@ const LONGEST = 1.1;
 export class Stage {
   constructor(walk) {
     this.walk = walk;
+    this.size = walk.skeleton.height;
+    this.tall = 1.2 * (this.size + walk.skeleton.above);
     this.world = svg("g");
     this.clock = svg("text", { x: 10, y: 22, class: "clock" });
     this.badge = svg("text", { x: 10, y: 42, class: "badge" });
@@ -31,11 +33,11 @@ export class Stage {
   }
 
   drawGround() {
-    const places = this.walk.channels.hip_x;
+    const places = this.walk.channels[`${this.walk.skeleton.root}_x`];
     let [first, last] = [Infinity, -Infinity];
     for (const x of places) [first, last] = [Math.min(first, x), Math.max(last, x)];
     [this.first, this.last] = [first, last];
-    const margin = 3 * this.walk.l;
+    const margin = 3 * this.size;
     const point = (x, z) => onPage(this.walk, x, z).map((v) => v.toFixed(5)).join(" ");
     let [path, ticks] = [`M${point(first - margin, 0)}L${point(last + margin, 0)}`, ""];
     for (let n = Math.ceil((first - margin) / TICK); n * TICK < last + margin; n++) {
@@ -49,12 +51,12 @@ export class Stage {
 
   drawFootprints() {
     this.prints = this.walk.footprints.map((print) => {
-      const half = 0.06 * this.walk.l;
-      const depth = 0.035 * this.walk.l;
+      const half = 0.06 * this.size;
+      const depth = 0.035 * this.size;
       const [left, right] = [-half, half].map((x) => onPage(this.walk, print.x + x, -depth));
       const line = svg("line", {
         x1: left[0], y1: left[1], x2: right[0], y2: right[1],
-        class: `footprint leg-${print.foot}`,
+        class: `footprint ${this.walk.skeleton.legs[print.leg - 1].look}`,
       });
       return { time: print.t, line };
     });
@@ -62,28 +64,39 @@ export class Stage {
   }
 
   drawWalker() {
-    const radius = Math.max(this.walk.r, 0.012 * this.walk.l);
-    this.legs = [1, 2].map((leg) => ({
-      line: svg("line", { class: `limb leg-${leg}`, "data-part": `leg-${leg}` }),
-      foot: svg("circle", { r: radius, class: `foot leg-${leg}`, "data-part": `foot-${leg}` }),
-      arrow: svg("path", { class: `arrow leg-${leg}`, "data-part": `force-${leg}` }),
-    }));
-    this.hip = svg("circle", { r: 0.03 * this.walk.l, class: "hip", "data-part": "hip" });
-    const parts = ["line", "foot", "arrow"].flatMap((part) => this.legs.map((leg) => leg[part]));
-    this.world.append(...parts, this.hip);
+    const { parts, feet } = this.walk.skeleton;
+    const dot = (share, look) => svg("circle", { r: share * this.size, class: look, "data-part": look });
+    this.limbs = parts.map(({ name, look }) =>
+      svg("path", { class: `limb ${look}`, "data-part": `body-${name}` }),
+    );
+    this.feet = feet.map(({ look, radius }, k) => {
+      const r = Math.max(radius, 0.012 * this.size);
+      return svg("circle", { r, class: `foot ${look}`, "data-part": `foot-${k + 1}` });
+    });
+    this.arrows = feet.map(({ look }, k) =>
+      svg("path", { class: `arrow ${look}`, "data-part": `force-${k + 1}` }),
+    );
+    this.centres = parts.map(() => dot(0.012, "centre"));
+    this.hinges = parts.map(() => dot(0.02, "hinge"));
+    this.root = dot(0.03, "root");
+    const dots = [...this.centres, ...this.hinges, this.root];
+    this.world.append(...this.limbs, ...this.feet, ...this.arrows, ...dots);
   }
 
   draw(time, follow) {
     const { walk } = this;
     const pose = poseAt(walk, time);
-    pose.legs.forEach((leg, k) => {
-      const { line, foot, arrow } = this.legs[k];
-      const [x, y] = leg.centre;
-      setAttributes(line, { x1: pose.hip[0], y1: pose.hip[1], x2: x, y2: y });
-      setAttributes(foot, { cx: x, cy: y });
-      arrow.setAttribute("d", this.arrowPath(leg));
+    const move = (circle, [cx, cy]) => setAttributes(circle, { cx, cy });
+    pose.bodies.forEach(({ path, hinge, centre }, k) => {
+      this.limbs[k].setAttribute("d", `M${path.map((point) => point.join(" ")).join("L")}`);
+      move(this.hinges[k], hinge);
+      move(this.centres[k], centre);
     });
-    setAttributes(this.hip, { cx: pose.hip[0], cy: pose.hip[1] });
+    pose.feet.forEach((foot, k) => {
+      move(this.feet[k], foot.centre);
+      this.arrows[k].setAttribute("d", this.arrowPath(foot));
+    });
+    move(this.root, pose.root);
     for (const print of this.prints) {
       print.line.style.display = print.time <= pose.t ? "" : "none";
     }
@@ -95,15 +108,15 @@ export class Stage {
   }
 
   /** An arrow from the point of contact, as long as the force is large. */
-  arrowPath(leg) {
+  arrowPath(foot) {
     const { walk } = this;
-    const size = Math.hypot(leg.normal, leg.tangential);
+    const size = Math.hypot(foot.normal, foot.tangential);
     if (!(size > 1e-3 * walk.weight)) return "";
-    const length = Math.min((PER_WEIGHT * size) / walk.weight, LONGEST) * walk.l;
-    const [ux, uz] = [leg.tangential / size, leg.normal / size];
-    const head = Math.min(0.07 * walk.l, 0.6 * length);
+    const length = Math.min((PER_WEIGHT * size) / walk.weight, LONGEST) * this.size;
+    const [ux, uz] = [foot.tangential / size, foot.normal / size];
+    const head = Math.min(0.07 * this.size, 0.6 * length);
     const at = (along, across) =>
-      onPage(walk, leg.place + along * ux - across * uz, along * uz + across * ux).join(" ");
+      onPage(walk, foot.place + along * ux - across * uz, along * uz + across * ux).join(" ");
     const neck = length - head;
     return (
       `M${at(0, 0)}L${at(neck, 0)}` +
@@ -111,20 +124,20 @@ export class Stage {
     );
   }
 
-  /** Along with the hip, or far enough to see the whole walk. */
+  /** Along with the root point, or far enough to see the whole walk. */
   moveCamera(pose, follow) {
     const { walk } = this;
     if (follow) {
-      const scale = WIDTH / (2.4 * walk.l);
+      const scale = Math.min(WIDTH / (2.4 * this.size), (0.87 * HEIGHT) / this.tall);
       const below = onPage(walk, pose.x, 0);
-      this.place(scale, pose.hip[0], below[1], 0.87 * HEIGHT);
+      this.place(scale, pose.root[0], below[1], 0.87 * HEIGHT);
       return;
     }
-    const [left, right] = [this.first - walk.l, this.last + walk.l].map((x) => onPage(walk, x, 0));
+    const [left, right] = [this.first - this.size, this.last + this.size].map((x) => onPage(walk, x, 0));
     const drop = Math.abs(right[1] - left[1]);
-    const scale = Math.min(WIDTH / (right[0] - left[0]), (0.9 * HEIGHT) / (drop + 1.2 * walk.l));
+    const scale = Math.min(WIDTH / (right[0] - left[0]), (0.9 * HEIGHT) / (drop + this.tall));
     const middle = 0.5 * (left[1] + right[1]);
-    this.place(scale, 0.5 * (left[0] + right[0]), middle, 0.5 * HEIGHT + 0.5 * walk.l * scale);
+    this.place(scale, 0.5 * (left[0] + right[0]), middle, 0.5 * HEIGHT + 0.42 * this.tall * scale);
   }
 
   place(scale, x, y, height) {

@@ -10,7 +10,7 @@ export function stepTable(walk) {
     const numbers = [print.t, period, length, length / period];
     const cells = numbers.map((value) => html("td", {}, fixed(value, 3)));
     const number = html("th", { scope: "row" }, String(k + 1));
-    return html("tr", {}, number, html("td", {}, `leg ${print.foot}`), ...cells);
+    return html("tr", {}, number, html("td", {}, walk.skeleton.legs[print.leg - 1].label), ...cells);
   });
   if (!rows.length) return null;
   const heads = ["footstep", "strikes", "time (s)", "period (s)", "length (m)", "speed (m/s)"];

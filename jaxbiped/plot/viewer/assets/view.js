@@ -78,14 +78,16 @@ function panel(walk, walks, pick) {
   return { walk, stage, charts, reading, element };
 }
 
-/** What a pose reads, leg by leg. */
-function reading(walk, { legs }) {
-  const forces = ({ normal, tangential }) => `, ${fixed(normal, 1)} N, ${fixed(tangential, 1)} N`;
-  const told = legs.map(
-    (leg, k) => `leg ${k + 1}: ${fixed(leg.angle, 3)} rad${tellsForces(walk) ? forces(leg) : ""}`,
+/** What a pose reads: angles body by body, forces foot by foot. */
+function reading(walk, { bodies, feet }) {
+  const { parts, feet: soles } = walk.skeleton;
+  const angles = bodies.map(({ angle }, k) => `${parts[k].label}: ${fixed(angle, 3)} rad`);
+  const told = `${angles.join("; ")} (angle)`;
+  if (!tellsForces(walk)) return told;
+  const forces = feet.map(
+    ({ normal, tangential }, k) => `${soles[k].label}: ${fixed(normal, 1)} N, ${fixed(tangential, 1)} N`,
   );
-  const what = tellsForces(walk) ? "angle, normal and tangential force" : "angle";
-  return `${told.join("; ")} (${what})`;
+  return `${told}; ${forces.join("; ")} (normal and tangential force)`;
 }
 
 function tellsForces(walk) {
@@ -96,8 +98,8 @@ function marksNote(walk) {
   const marks = "Marks under the slope: footprints; ticks: every 0.1 m.";
   if (!tellsForces(walk)) return marks;
   return (
-    "Arrows: forces of the ground on the feet, 0.3 leg lengths for the walker's weight of " +
-    `${fixed(walk.weight, 1)} N, cut at 1.1 leg lengths. ${marks}`
+    "Arrows: forces of the ground on the feet, 0.3 of its height for the walker's weight of " +
+    `${fixed(walk.weight, 1)} N, cut at 1.1 heights. ${marks}`
   );
 }
 

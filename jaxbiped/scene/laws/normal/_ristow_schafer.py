@@ -7,7 +7,7 @@ import numpy as np
 
 from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.caching._cached_jit import kept_alone
+from jaxbiped.compiler import kept_alone
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractNormalLaw,
     depth_in_contact,

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
-from jaxbiped.caching._cached_jit import kept_alone
+from jaxbiped.compiler import kept_alone
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, hertz_energy, hertz_force
 
 

@@ -1,0 +1,302 @@
+"""What is tried on each mechanism: one number a capability."""
+
+import functools
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from _mechanisms import Case
+
+import jaxbiped as jb
+
+CLEARANCES = {jb.laws.StanceRotation: "stance-rotation", jb.laws.AlwaysTouching: "always-touching"}
+"""Rules of clearance by the names that the command line has."""
+
+
+class Trial:
+    """A mechanism, and what several capabilities need of it."""
+
+    def __init__(self, name: str, case: Case, folder: Path) -> None:
+        self.name, self.case, self.scene, self.folder = name, case, case.scene, folder
+
+    @functools.cached_property
+    def gait(self) -> jb.Gait:
+        """Its gait near the start, with the derivatives of its measures."""
+        how = dict(parameters=("slope",), radius_sensitivities=False)
+        found = jb.find_gait(self.scene, self.case.guess, **how)
+        if found.outcome != jb.gait.Search.FOUND:
+            raise LookupError(f"no gait near the start: {found.outcome}.")
+        return found
+
+    @functools.cached_property
+    def start(self) -> Any:
+        """The state with which the gait's cycle begins, where it is known."""
+        try:
+            return self.gait.measures.state
+        except (jb.ArgumentError, LookupError):
+            return self.case.guess
+
+    @functools.cached_property
+    def walk(self) -> jb.Trajectory:
+        """Four footsteps from there."""
+        return jb.simulate(self.scene, self.start, footsteps=4)
+
+    @functools.cached_property
+    def labelling(self) -> jb.Labelling:
+        """A labelling that knows the gait."""
+        return jb.labelling(self.scene, guess=self.gait.measures.state, footsteps=15)
+
+    @property
+    def mass(self) -> str:
+        """The name of its first parameter that is a mass."""
+        quantities = jb.parameter_quantities(self.scene)
+        return next(name for name in quantities if quantities[name].unit == "kg")
+
+
+def walk(trial: Trial) -> float:
+    return float(trial.walk.t[-1])
+
+
+def footsteps(trial: Trial) -> int:
+    found = jb.footsteps(trial.scene, trial.walk)
+    return len(found.period_s)
+
+
+def accurate_walk(trial: Trial) -> float:
+    found = jb.simulate(trial.scene, trial.start, footsteps=2, accuracy=1e-4, save="end")
+    return float(max(np.max(leaf) for leaf in jax.tree.leaves(found.error)))
+
+
+def ledger(trial: Trial) -> float:
+    books = jb.energy_ledger(trial.scene, trial.walk)
+    return float(abs(books.residual[0]) / books.gravity_work[0])
+
+
+def transport(trial: Trial) -> float:
+    return float(np.mean(jb.measure.cost_of_transport(trial.scene, trial.walk).cost))
+
+
+def slope_of_walk(trial: Trial) -> float:
+    def place(slope: Any) -> Any:
+        scene = jb.with_parameters(trial.scene, {"slope": slope})
+        return jb.simulate(scene, trial.start, footsteps=1, save="end").final
+
+    slope = trial.scene.ground.slope
+    return float(jax.jacfwd(place)(slope)[0])
+
+
+def gait(trial: Trial) -> float:
+    return float(trial.gait.measures.period)
+
+
+def without_guess(trial: Trial) -> float:
+    found = jb.find_gait(trial.scene, parameters=(), radius_sensitivities=False)
+    if found.outcome != jb.gait.Search.FOUND:
+        raise LookupError(f"no gait without a guess: {found.outcome}.")
+    return float(found.measures.period)
+
+
+def radius(trial: Trial) -> float:
+    return float(trial.gait.measures.spectral_radius)
+
+
+def unit_multiplier(trial: Trial) -> float:
+    return float(trial.gait.unit_multiplier_error)
+
+
+def elasticity(trial: Trial) -> float:
+    place = trial.gait.parameters.index("slope")
+    return float(trial.gait.elasticities.period[place])
+
+
+def gradient(trial: Trial) -> float:
+    """By reverse mode through the gait, of its period with respect to the slope, relative."""
+
+    def period(slope: Any) -> Any:
+        scene = jb.with_parameters(trial.scene, {"slope": slope})
+        return jb.gait_measures(scene, trial.gait.measures.state).period
+
+    slope = trial.scene.ground.slope
+    return float(jax.grad(period)(slope) * slope / trial.gait.measures.period)
+
+
+def branch(trial: Trial) -> int:
+    slope = float(trial.scene.ground.slope)
+    bounds = (0.9 * slope, 1.1 * slope)
+    return len(jb.continue_gait(trial.scene, "slope", bounds=bounds, guess=trial.gait))
+
+
+def grid(trial: Trial) -> int:
+    slopes = float(trial.scene.ground.slope) * np.array([0.98, 1.0, 1.02])
+    found = jb.gait_sweep(trial.scene, {"slope": slopes}, parameters=(), radius_sensitivities=False)
+    return int((found.ending == int(jb.gait.Search.FOUND)).sum())
+
+
+def basin(trial: Trial) -> float:
+    structure = trial.scene.mechanism.structure
+    swings, stands = (structure.bodies[i] for i in structure.pairs[0]) if structure.pairs else "12"
+    at = trial.gait.measures.state._asdict()
+    axes = {
+        name: float(at[name]) + np.linspace(-half, half, 12)
+        for name, half in ((f"theta_{swings}", 0.2), (f"omega_{stands}", 0.5))
+    }
+    starts = jb.starts.grid(trial.scene, axes, base=trial.gait.measures.state)
+    found = jb.sweep(trial.labelling, starts, look_for_gaits=False)
+    return float(jb.basins.fractions(found.label)["walking"].estimate)
+
+
+def shock(trial: Trial) -> float:
+    return float(jb.nearest_failure(trial.labelling, gradients=False, tolerance=1e-3).distance)
+
+
+def optimum(trial: Trial) -> float:
+    values = jb.parameter_values(trial.scene)
+    mass = float(values[trial.mass])
+    best = jb.optimise_gait(
+        trial.scene, vary={trial.mass: (0.98 * mass, 1.02 * mass)}, maximise="speed", iterations=8
+    )
+    return float(best.objective / trial.gait.measures.speed - 1.0)
+
+
+def fit(trial: Trial) -> float:
+    seen = jb.identify.MeasuredGait({"period": (float(trial.gait.measures.period), 1e-4)})
+    name = trial.mass
+    true = float(jb.parameter_values(trial.scene)[name])
+    begun = jb.with_parameters(trial.scene, {name: 1.01 * true})
+    return float(jb.fit_gait(begun, (name,), seen).estimates[name] / true - 1.0)
+
+
+def redundant(trial: Trial) -> float:
+    """Accelerations by all methods beside those in minimal coordinates, relative to the largest."""
+
+    @jax.jit
+    def every(scene: jb.Scene, state: Any) -> tuple[Any, list[Any]]:
+        held = [jb.RedundantScene(scene, each) for each in jb.constraints.CONSTRAINT_METHODS]
+        starts = [jb.dynamics.redundant_state(each, state) for each in held]
+        motions = map(jb.dynamics.redundant_motion, held, starts)
+        return jb.dynamics.accelerations(scene, state), [each.minimal for each in motions]
+
+    expected, found = every(trial.scene, trial.start)
+    gaps = np.abs(np.array(found) - np.array(expected))
+    return float(np.max(gaps) / np.max(np.abs(expected)))
+
+
+def rigid(trial: Trial) -> float:
+    scene = jb.RigidScene(walker=trial.scene.walker, ground=trial.scene.ground)
+    return float(jb.find_gait(scene, parameters=(), radius_sensitivities=False).measures.period)
+
+
+def engines(trial: Trial) -> float:
+    """Explicit Euler through XLA beside the implicit method by lanes."""
+    after = dict(duration=2e-3, save="end")
+    euler = dict(solver="euler", dt=1e-6, engine="xla")
+    ends = [
+        jax.jit(lambda scene, start, how=how: jb.simulate(scene, start, **after, **how).final)
+        for how in (dict(engine="lanes"), euler)
+    ]
+    there = [each(trial.scene, trial.start) for each in ends]
+    return float(max(abs(np.subtract(*pair)) for pair in zip(*there, strict=True)))
+
+
+def operations(trial: Trial) -> int:
+    return sum(jb.measure.operation_counts(trial.scene).values())
+
+
+def dataset(trial: Trial) -> int:
+    return len(jb.trajectory_dataset(trial.scene, trial.walk).data_vars)
+
+
+def picture(trial: Trial) -> int:
+    figure = jb.plot.leg_angles(trial.scene, trial.walk)
+    return len(figure.axes[0].lines)
+
+
+def animation(trial: Trial) -> int:
+    made = jb.plot.animate(trial.scene, trial.walk, frames_per_second=10.0)
+    frames = list(made.new_frame_seq())
+    made.save(trial.folder / "walk.gif", writer="pillow")
+    return len(frames)
+
+
+def viewer(trial: Trial) -> float:
+    path = trial.folder / "walk.html"
+    jb.plot.view(trial.scene, trial.walk).save(path)
+    return path.stat().st_size / 1e3
+
+
+def command(trial: Trial) -> int:
+    """Footsteps of `jaxbiped walk` of a walker in a file."""
+    file, numbers = trial.folder / "walker.py", trial.folder / "walk.json"
+    known = f"import sys\n\nsys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+    made = f"from _mechanisms import cases\n\nwalker = cases()[{trial.name!r}].scene.walker\n"
+    file.write_text(known + made)
+    start = (f"{name}={value}" for name, value in trial.case.start.items())
+    words = {
+        "--walker": [f"{file}:walker"],
+        "--slope": [str(float(trial.scene.ground.slope))],
+        "--clearance": [CLEARANCES[type(trial.scene.clearance)]],
+        "--standing": [trial.case.standing],
+        "--state": list(start),
+        "--duration": ["2"],
+        "--out": [str(trial.folder)],
+        "--json": [str(numbers)],
+    }
+    flags = [word for flag, values in words.items() for word in (flag, *values)]
+    run = [sys.executable, "-m", "jaxbiped", "walk", *flags]
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise LookupError(done.stderr.strip().splitlines()[-1])
+    return len(json.loads(numbers.read_text())["steps"])
+
+
+def playground(trial: Trial) -> float:
+    path = trial.folder / "play.html"
+    jb.plot.playground(trial.scene, trial.start).save(path)
+    return path.stat().st_size / 1e3
+
+
+class Capability(NamedTuple):
+    """A number of a mechanism that one capability gives, and what that number is."""
+
+    measured: Callable[[Trial], float | int]
+    meaning: str
+
+
+CAPABILITIES = {
+    "walk": Capability(walk, "time of four footsteps, s"),
+    "footsteps": Capability(footsteps, "in that walk"),
+    "energy ledger": Capability(ledger, "residual over gravity's work"),
+    "cost of transport": Capability(transport, "of the four footsteps"),
+    "operations": Capability(operations, "of one evaluation of the vector field"),
+    "dataset": Capability(dataset, "variables"),
+    "figure": Capability(picture, "lines of the angles' figure"),
+    "animation": Capability(animation, "frames"),
+    "viewer": Capability(viewer, "kB of the page"),
+    "redundant coordinates": Capability(
+        redundant, "largest difference of accelerations, seven methods"
+    ),
+    "accuracy=1e-4": Capability(accurate_walk, "error bar of two footsteps"),
+    "gait": Capability(gait, "period, s"),
+    "multipliers": Capability(radius, "spectral radius"),
+    "unit multiplier": Capability(unit_multiplier, "distance from 1"),
+    "sensitivities": Capability(elasticity, "elasticity of the period with respect to the slope"),
+    "branch": Capability(branch, "points from 0.9 to 1.1 of the slope"),
+    "basin": Capability(basin, "share of 144 starts that walk"),
+    "nearest_failure": Capability(shock, "smallest fatal push, scaled"),
+    "gait without a guess": Capability(without_guess, "period, s"),
+    "gait_sweep": Capability(grid, "gaits found at three slopes"),
+    "optimum": Capability(optimum, "relative gain of speed, a mass varied by 2 %"),
+    "fit": Capability(fit, "relative error of a mass"),
+    "gradient": Capability(gradient, "the same elasticity by `jax.grad`"),
+    "slope of a walk": Capability(slope_of_walk, "d hip_x/d slope after a footstep, m/rad"),
+    "rigid feet": Capability(rigid, "period, s"),
+    "command line": Capability(command, "footsteps of `jaxbiped walk --walker FILE.py:NAME`"),
+    "playground": Capability(playground, "kB of the page"),
+    "both engines": Capability(engines, "largest difference after 2 ms, XLA by explicit Euler"),
+}
+"""What is tried, and what its number is."""

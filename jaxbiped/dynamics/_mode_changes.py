@@ -1,0 +1,274 @@
+"""Changes of a rigid walker's mode: a stop that is hit or let go, a foot that comes down or lifts.
+
+A mode goes on until one of its surfaces is reached. What holds by being pressed is let go as soon
+as it would have to pull.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped._types import Scalar, select
+from jaxbiped.compiler import kept_alone
+from jaxbiped.dynamics._holds import ROUNDING
+from jaxbiped.dynamics._plastic_impact import Grip, Struck, plastic_impact
+from jaxbiped.dynamics._rolling import Turning, ground_force, turning_of
+from jaxbiped.dynamics._stance import Stance, angles_and_rates, of_stance, stance_on
+from jaxbiped.dynamics._switches import Switch
+from jaxbiped.scene._couplings import with_fixed
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._modes import THROUGH_STRIKE, Limit, Mode, Modes
+from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes, standing_legs
+from jaxbiped.scene._scene import RigidScene
+from jaxbiped.scene._structure import Angle
+
+SLACK = 1e-9
+"""Distance from a limit [rad], and of a foot from the ground in units of the walker's height, at
+which a mode may change."""
+
+
+def mode_switches(scene: RigidScene, state: Any) -> tuple[Switch, ...]:
+    """Where a scene's mode changes: gaps and reactions of limits, heights and loads of two feet.
+
+    Values are in rad, heights in units of the walker's, and loads in units of its weight too.
+    """
+    mechanism, modes = scene.mechanism, rigid_modes(scene.mechanism)
+    if not modes.any:
+        return ()
+    weight = mechanism.total_mass * scene.ground.g
+    mode = modes.decoded(jnp, state.mode)
+
+    def gaps_and_reactions(stance: Stance) -> list[Scalar]:
+        reactions = _reactions(stance, turning_of(scene, stance))
+        gaps = [_gap(scene, limit, stance) for limit in modes.limits]
+        return [*gaps, *(each / (weight * mechanism.height) for each in reactions)]
+
+    pressed = [a & b for a, b in zip(mode.held, _loose(modes, mode), strict=True)]
+    live = [*(~held for held in mode.held), *pressed]
+    values = of_stance(scene, state, gaps_and_reactions) if modes.limits else []
+    found = [_falls(*each) for each in zip(values, live, strict=True)]
+    for leg, flat in modes.flat(mode).items():
+        stance, here = stance_on(scene, state, leg), modes.stands_on(mode, leg)
+        for k, stands in zip(stance.feet, stance.stands, strict=True):
+            found.append(_falls(stance.height(k) / mechanism.height, here & ~stands))
+        loads = foot_loads(scene, stance, turning_of(scene, stance))
+        found += [_falls(load / weight, flat) for load in loads]
+    return tuple(found)
+
+
+def _falls(value: Scalar, live: Scalar) -> Switch:
+    return Switch(value, live, resets=True)
+
+
+def _reactions(stance: Stance, turning: Turning) -> list[Scalar]:
+    """Of limits that are held."""
+    return turning.reactions[1:] if len(stance.feet) > 1 else turning.reactions
+
+
+def _gap(scene: RigidScene, limit: Limit, stance: Stance) -> Scalar:
+    """How far a limit is [rad]."""
+    found: Scalar = limit.distance(stance.mechanism, stance.pose.motion.angles, scene.ground.slope)
+    return found
+
+
+def _loose(modes: Modes, mode: Mode) -> list[Any]:
+    """Of each limit, whether it is held only while it is pressed on."""
+    by_lock = dict(zip(modes.locks, mode.loose, strict=True))
+    return [by_lock.get(i, True) for i in range(len(modes.limits))]
+
+
+def foot_loads(scene: RigidScene, stance: Stance, turning: Turning) -> tuple[Scalar, Scalar]:
+    """Normal forces on both feet of a leg that lies flat [N]."""
+    first, second = stance.feet
+    front = turning.reactions[0] / (stance.foot(second).x - stance.foot(first).x)
+    return ground_force(scene, stance, turning.free).normal - front, front
+
+
+def with_mode(scene: RigidScene, state: Any, mode: Mode) -> Any:
+    """A state in another mode."""
+    modes = rigid_modes(scene.mechanism)
+    return state._replace(mode=modes.encoded(jnp, mode, state.mode))
+
+
+def with_rates(state: Any, stance: Stance) -> Any:
+    """A state with the rates of a stance."""
+    structure, count = stance.mechanism.structure, len(stance.mechanism.structure.free)
+    turning = (stance.pose.motion.rates[j] for j in structure.free)
+    return type(state)(*state[: 1 + count], *turning, *state[1 + 2 * count :])
+
+
+def grip_at_strike(scene: RigidScene, old: Stance, slack: Scalar | float = SLACK) -> Grip:
+    """What takes part in a heel strike.
+
+    Locked limits of the leg that lands do whatever the impulse; those of the leg that stood do
+    where their stops hold through heel strike, else while they are pressed on.
+    """
+    modes, mode = rigid_modes(old.mechanism), old.mode
+    assert mode is not None
+    stood = old.leg
+    loose = [
+        each if limit.leg != stood or limit.holds == THROUGH_STRIKE else True
+        for limit, each in zip(modes.limits, _loose(modes, mode), strict=True)
+    ]
+    hits = _hits(scene, old, modes, mode, slack)
+    return Grip([held | hit for held, hit in zip(mode.held, hits, strict=True)], loose)
+
+
+def _hits(
+    scene: RigidScene, old: Stance, modes: Modes, mode: Mode, slack: Scalar | float
+) -> list[Scalar]:
+    """Limits that are reached, or that an angle rests at."""
+    return [
+        ~held & (_gap(scene, limit, old) <= slack) & (rate <= _still(scene))
+        for limit, held, rate in zip(modes.limits, mode.held, _gap_rates(old, modes), strict=True)
+    ]
+
+
+def _gap_rates(stance: Stance, modes: Modes) -> list[Any]:
+    return [limit.gap.of(stance.pose.motion.rates) for limit in modes.limits]
+
+
+def _still(scene: RigidScene) -> Scalar:
+    """Rate below which an angle rests [rad/s]."""
+    return SLACK * jnp.sqrt(scene.ground.g / scene.mechanism.height)
+
+
+def mode_after_strike(scene: RigidScene, old: Stance, found: Struck) -> Mode:
+    """The mode after a heel strike, sides exchanged: the leg that stood locks nothing any more."""
+    modes, mode = rigid_modes(old.mechanism), old.mode
+    assert mode is not None
+    stood = old.leg
+    held = [found.held[i] for i in modes.twins]
+    loose = dict(zip(modes.locks, mode.loose, strict=True))
+    loose = {
+        i: jnp.ones_like(each) if modes.limits[i].leg == stood else each & mode.held[i]
+        for i, each in loose.items()
+    }
+    leg = leg_after_strike(old.mechanism.structure, stood)
+    stands = modes.standing(leg, found.stands, old.pose.motion.x)
+    return Mode(stands, tuple(held), tuple(loose[modes.twins[i]] for i in modes.locks))
+
+
+@kept_alone
+def change_mode(
+    scene: RigidScene, state: Any, slack: Scalar | float = SLACK, least: Scalar | float = 0.0
+) -> Any:
+    """The state behind a surface of its mode, just there.
+
+    Limits that are reached and a foot that comes down are hit at once, with all that is held; what
+    would have to pull afterwards is let go.
+
+    Args:
+        scene: the rigid walker.
+        state: on a surface, or not: it then stays as it is.
+        slack: distance from a limit [rad], and of a foot from the ground in units of the walker's
+            height, that counts as there.
+        least: load below which a foot lifts, in units of the weight; likewise of stops.
+    """
+    return of_stance(scene, state, lambda old: _changed(scene, state, old, slack, least))
+
+
+def _changed(
+    scene: RigidScene, state: Any, old: Stance, slack: Scalar | float, least: Scalar | float
+) -> Any:
+    mechanism, modes, mode = old.mechanism, rigid_modes(old.mechanism), old.mode
+    assert mode is not None
+    if not old.may_hold:
+        return state
+    hits = _hits(scene, old, modes, mode, slack)
+    comes = [
+        ~stands & (old.height(k) <= slack * mechanism.height) & (old.foot(k).vz < 0.0)
+        for k, stands in zip(old.feet, old.stands, strict=False)
+    ]
+    held = [a | b for a, b in zip(mode.held, hits, strict=True)]
+    stands = tuple(a | b for a, b in zip(old.stands, comes, strict=True))
+    grip = Grip(held, _loose(modes, mode))
+    found = plastic_impact(old, old.feet, stands, None, modes, grip)
+    # What rests at a limit has not hit it: it locks nothing.
+    rests = [jnp.abs(rate) <= _still(scene) for rate in _gap_rates(old, modes)]
+    loose = [
+        jnp.where(hits[i], rests[i], each & mode.held[i])
+        for i, each in zip(modes.locks, mode.loose, strict=True)
+    ]
+    stands = modes.standing(old.leg, found.stands, state.mode)
+    then = Mode(stands, tuple(found.held), tuple(loose))
+    struck = with_mode(scene, with_rates(state, found.stance), then)
+    happens = jnp.zeros_like(state.mode, dtype=bool)
+    for each in (*hits, *comes):
+        happens = happens | each
+    return settled(scene, select(happens, struck, state), old.leg, least)
+
+
+def settled(scene: RigidScene, state: Any, leg: int, least: Scalar | float = 0.0) -> Any:
+    """The state without what would have to pull: first a foot of two, then limits of stops.
+
+    `leg`: the one that stands; `least`: as of `change_mode`.
+    """
+    stance, modes = stance_on(scene, state, leg), rigid_modes(scene.mechanism)
+    g, mechanism = scene.ground.g, scene.mechanism
+    if stance.stands:
+        assert stance.mode is not None
+        first, second = stance.stands
+        loads = foot_loads(scene, stance, turning_of(scene, stance))
+        bearing = least * (mechanism.total_mass * g)
+        pulls = [first & second & (load < bearing) for load in loads]
+        stands = modes.standing(leg, (first & ~pulls[0], second & ~pulls[1]), state.mode)
+        state = with_mode(scene, state, stance.mode._replace(stands=stands))
+        stance = stance_on(scene, state, leg)
+    if not modes.limits:
+        return state
+    turning, mode = turning_of(scene, stance), stance.mode
+    assert turning.holds is not None
+    assert mode is not None
+    count = len(stance.held) - len(modes.limits)
+    loose = [*[False] * count, *_loose(modes, mode)]
+    pressed = least * (g / mechanism.height) - ROUNDING
+    held = turning.holds.pressed(turning.unheld, stance.held, loose, pressed)
+    return with_mode(scene, state, mode._replace(held=tuple(held[count:])))
+
+
+def on_held(scene: RigidScene, state: Any) -> Any:
+    """The state with what is held where it belongs and at rest: stops at their limits, flat feet.
+
+    One step of Newton's method; derivatives are those of states that are held there.
+    """
+    mechanism, modes = scene.mechanism, rigid_modes(scene.mechanism)
+    if not modes.any:
+        return state
+    structure, fixed = mechanism.structure, jax.lax.stop_gradient(state.mode)
+    mode, flat = modes.decoded(jnp, fixed), modes.flat(modes.decoded(jnp, fixed))
+    soles = [Angle(((structure.feet[structure.feet_of_leg[leg][0]], 1.0),)) for leg in flat]
+    angles = [*soles, *(limit.gap for limit in modes.limits)]
+    unit = with_fixed(structure, _unit_rows(mechanism))
+    off = [_tilt(stance_on(scene, state, leg)) for leg in flat]
+    off += [_gap(scene, limit, stance_on(scene, state, standing_legs(structure)[-1]))
+            for limit in modes.limits]  # fmt: skip
+    begun, rates = (jnp.stack(part) for part in angles_and_rates(structure, state))
+    now, projection = begun, jnp.eye(len(structure.free))
+    held = (*flat.values(), *mode.held)
+    for angle, value, is_held in zip(angles, off, held, strict=True):
+        row = np.asarray(angle.of(unit))
+        left = projection @ row
+        along = jnp.where(is_held, left / jnp.maximum(left @ left, 1e-12), 0.0)
+        now = now - along * (value + row @ (now - begun))
+        rates = rates - along * (row @ rates)
+        projection = projection - jnp.outer(left, along)
+    return type(state)(state[0], *now, *rates, fixed)
+
+
+def _tilt(stance: Stance) -> Scalar:
+    """How far the feet of a leg are from lying flat [rad]."""
+    first, second = stance.feet
+    apart = stance.foot(first).x - stance.foot(second).x
+    return (stance.height(first) - stance.height(second)) / apart
+
+
+def _unit_rows(mechanism: Mechanism) -> list[np.ndarray]:
+    """Of each body its angle's derivatives by the free angles; of those that follow, zeros."""
+    free = mechanism.structure.free
+    found = [np.zeros(len(free))] * len(mechanism.bodies)
+    for j, row in zip(free, np.eye(len(free)), strict=True):
+        found[j] = row
+    return found

@@ -1,0 +1,190 @@
+"""Motion as laws of motors see it: any angle, the phase, and the roles of a mirror's two sides."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxbiped._checks import ArgumentError, is_number
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._joint_loads import angle_value
+from jaxbiped.dynamics._legs import LegMotion
+from jaxbiped.dynamics._tree import Motion
+from jaxbiped.scene._joint_parts import Motor
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._mechanism_pieces import named_sum
+from jaxbiped.scene._structure import Angle, Indices, Structure
+
+
+class MotorMotion(NamedTuple):
+    """A motion as a motor's law sees it; see `JointMotion`.
+
+    Attributes:
+        structure: of the mechanism.
+        motion: angles and rates of all bodies, exchanged where the law's sides are.
+        slope: angle of the vertical [rad].
+        own: the motor's angle.
+        stance: line of the leg that stands; None where no leg does.
+    """
+
+    structure: Structure
+    motion: Motion
+    slope: Scalar
+    own: Angle
+    stance: LegMotion | None
+
+    @property
+    def angle(self) -> Scalar:
+        """The motor's own angle [rad]."""
+        return angle_value(self.own, self.motion.angles, self.slope)
+
+    @property
+    def rate(self) -> Scalar:
+        """Its rate [rad/s]."""
+        return angle_value(self.own, self.motion.rates, None)
+
+    def of(self, angle: Any) -> tuple[Scalar, Scalar]:
+        """Value [rad] and rate [rad/s] of a body's angle by its name, or of weighted angles.
+
+        Raises:
+            ArgumentError: a name that is no body, "normal" or "vertical".
+        """
+        found = named_sum("motion.of", angle, self.structure.parents, self.structure.bodies)
+        value = angle_value(found, self.motion.angles, self.slope)
+        return value, angle_value(found, self.motion.rates, None)
+
+    @property
+    def phase(self) -> Scalar:
+        """Minus the angle of the leg that stands [rad]."""
+        return -self._stance().angle
+
+    @property
+    def phase_rate(self) -> Scalar:
+        """Its rate [rad/s]."""
+        return -self._stance().rate
+
+    def _stance(self) -> LegMotion:
+        if self.stance is None:
+            raise ArgumentError(
+                "motion.phase is not known for a motor by side, or of a mechanism without a "
+                "mirror: read an angle by motion.of instead."
+            )
+        return self.stance
+
+
+def exchange_of(structure: Structure) -> Indices:
+    """Number of the body whose role each body takes where the sides of the mirror are exchanged."""
+    twin = list(range(len(structure.bodies)))
+    for one, other in structure.pairs:
+        twin[one], twin[other] = other, one
+    return tuple(twin)
+
+
+def exchanged(structure: Structure, motion: Motion) -> Motion:
+    """The same motion with the names of both sides exchanged."""
+    twin = exchange_of(structure)
+    return motion._replace(
+        angles=tuple(motion.angles[j] for j in twin), rates=tuple(motion.rates[j] for j in twin)
+    )
+
+
+def swings_at_section(structure: Structure, leg: int) -> bool:
+    """Whether a leg is on the side of the mirror that swings where a cycle begins."""
+    return any(first in structure.bodies_of_leg(leg) for first, _ in structure.pairs)
+
+
+class MotorTorque(NamedTuple):
+    """Torque of a motor [N·m], and the angle on which it acts."""
+
+    angle: Angle
+    torque: Scalar
+
+
+def motor_torque(
+    mechanism: Mechanism,
+    number: int,
+    motion: Motion,
+    slope: Scalar,
+    leg: int | None = None,
+    line: LegMotion | None = None,
+) -> MotorTorque:
+    """The torque of a motor while a leg stands.
+
+    The law of a motor by role is written for the second of each pair standing. While the first one
+    stands, the law sees the motion with both sides exchanged, and its torque is exchanged back.
+
+    Args:
+        mechanism: whose motor it is.
+        number: of the motor among the joint parts.
+        motion: angles and rates of all bodies.
+        slope: angle of the vertical [rad].
+        leg: number of the leg that stands; None for none.
+        line: from the root point to its feet.
+    """
+    structure, motor = mechanism.structure, mechanism.joints[number]
+    assert isinstance(motor, Motor)
+    own = structure.joints[number]
+    if motor.by == "side" or leg is None or not swings_at_section(structure, leg):
+        return MotorTorque(own, _told(motor, MotorMotion(structure, motion, slope, own, line)))
+    seen = MotorMotion(structure, exchanged(structure, motion), slope, own, line)
+    return MotorTorque(own.mirrored(exchange_of(structure)), _told(motor, seen))
+
+
+def _told(motor: Motor, motion: MotorMotion) -> Scalar:
+    torque = motor.law(motion)
+    is_one = not isinstance(torque, list | tuple) and is_number(torque)
+    if not isinstance(torque, jax.Array) and not is_one:
+        raise ArgumentError(
+            f"the law of Motor({motor.angle!r}) returns {torque!r}, which is not allowed: it must "
+            "return one torque [N m]."
+        )
+    return jnp.asarray(torque) if motor.share is None else motor.share * torque
+
+
+def motor_torques(
+    mechanism: Mechanism,
+    motion: Motion,
+    slope: Scalar,
+    legs: Sequence[LegMotion],
+    shares: Sequence[Scalar | None],
+) -> list[tuple[int, Angle, Scalar]]:
+    """Torques of all motors, those by role once for each leg that may carry [N·m].
+
+    Args:
+        mechanism: whose motors they are.
+        motion: angles and rates of all bodies.
+        slope: angle of the vertical [rad].
+        legs: the line of each leg.
+        shares: of the load, on each leg; None for one that never touches.
+
+    Returns:
+        The motor's number among the joint parts, the angle on which it acts, and the torque.
+    """
+    structure, found = mechanism.structure, []
+    for number, motor in enumerate(mechanism.joints):
+        if not isinstance(motor, Motor):
+            continue
+        if motor.by == "side" or not structure.pairs:
+            found.append((number, *motor_torque(mechanism, number, motion, slope)))
+            continue
+        for leg, (line, share) in enumerate(zip(legs, shares, strict=True)):
+            if share is not None:
+                told = motor_torque(mechanism, number, motion, slope, leg, line)
+                found.append((number, told.angle, share * told.torque))
+    return found
+
+
+def motor_powers(
+    mechanism: Mechanism,
+    motion: Motion,
+    slope: Scalar,
+    legs: Sequence[LegMotion],
+    shares: Sequence[Scalar | None],
+) -> tuple[Scalar, ...]:
+    """Power of each motor on the walker [W]; see `motor_torques`."""
+    found: dict[int, Scalar] = {}
+    for number, angle, torque in motor_torques(mechanism, motion, slope, legs, shares):
+        power = torque * angle_value(angle, motion.rates, None)
+        found[number] = found[number] + power if number in found else power
+    return tuple(found.values())

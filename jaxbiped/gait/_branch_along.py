@@ -1,0 +1,133 @@
+"""Branch of gaits along a homotopy, from its first scene towards the one asked for."""
+
+from collections.abc import Callable
+from itertools import chain
+from typing import Any
+
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._state_quantities import state_of_recurring
+from jaxbiped.gait._fixed_point_search import ROUGH, FixedPointProblem, Found, Search
+from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, follow_branch
+from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
+from jaxbiped.gait._pseudo_arclength import Change
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
+from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.gait._walk_waves import is_far_from_seed, walks_of
+from jaxbiped.scene._state_types import WalkerState
+from jaxbiped.scene._walker import Walker
+from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve._units import recurring_sizes
+
+_TURNS = 20
+"""Turns that each search may take."""
+_SMALLEST, _FINER = 2e-4, Precision(3e-7, 3e-6)
+"""Step at which the seed's gait is lost; how exactly it is then followed again, by finer steps."""
+_LEAPS, _GAPS = 4, (0.01, 0.05)
+"""Leaps over kinks of a branch at most, and how far each leads in s."""
+
+Searching = Callable[[FixedPointProblem, int], Found]
+"""Newton's method on a return map from a guess, in at most so many evaluations."""
+
+
+def state_at(like: PyTree, point: np.ndarray) -> WalkerState:
+    """The state with these components besides hip_x, of numbers that take no time to make."""
+    return jtu.tree_map(as_float, state_of_recurring(type(like), point.tolist()))
+
+
+def branch_along(
+    line: Homotopy, search: Searching, problem: FixedPointProblem, like: WalkerState
+) -> FollowedBranch:
+    """The branch of gaits from a line's first scene.
+
+    Args:
+        line: the scenes.
+        search: Newton's method, for the first gait and behind kinks of the branch.
+        problem: of cycles of one footstep, in minimal coordinates.
+        like: a state of the scenes.
+    """
+    begin: Any = line.first
+    start = default_guess(begin)
+    first = search(problem._replace(args=begin, guess=start), _TURNS)
+    if int(first.ending) != int(Search.FOUND) and not isinstance(begin.walker, Walker):
+        for point in (row for walks in walks_of(begin, list) for row in walks.settled()):
+            first = search(problem._replace(args=begin, guess=state_at(start, point)), _TURNS)
+            if int(first.ending) == int(Search.FOUND):
+                break
+    point = np.asarray(first.recurring)
+    if int(first.ending) != int(Search.FOUND):
+        return FollowedBranch(point[None], np.zeros(1), BranchEnd.NO_BEGINNING, int(first.code))
+
+    def followed(
+        point: np.ndarray, s: float, precision: Precision, smallest: float
+    ) -> FollowedBranch:
+        def change(point: np.ndarray, s: float) -> Change:
+            given: PyTree = point, np.float64(s), precision
+            value, by_point, by_s, code = map(
+                np.asarray, _scene_along(problem.spec, line, like, *given)
+            )
+            return Change(value, by_point, by_s, int(code))
+
+        scales = recurring_sizes(line.first, like)
+        return follow_branch(change, point, s, scales=scales, smallest=smallest)
+
+    branch = followed(point, 0.0, ROUGH, _SMALLEST)
+    if branch.is_lost and not is_far_from_seed(begin):
+        # On stiff ground rough solves and long steps may lose the branch before it ends.
+        return followed(point, 0.0, _FINER, 0.1 * _SMALLEST)
+    for _ in range(_LEAPS):
+        beyond = _beyond(search, problem, line, branch) if branch.is_lost else None
+        tail = None if beyond is None else followed(*beyond, ROUGH, _SMALLEST)
+        if tail is None or tail.end is BranchEnd.NO_BEGINNING:
+            break
+        branch = tail
+    return branch
+
+
+def _beyond(
+    search: Searching, problem: FixedPointProblem, line: Homotopy, branch: FollowedBranch
+) -> tuple[np.ndarray, float] | None:
+    """A gait and its place a little beyond the one where a branch was lost; None where none is.
+
+    There the return map has a kink, as where a foot begins to scuff: the walker may still walk.
+    """
+    last = branch.points[branch.farthest]
+    for gap in _GAPS:
+        s = min(float(branch.s[branch.farthest]) + gap, 1.0)
+        scene: Any = line.at(np.float64(s))
+        like = default_guess(scene)
+
+        def found_from(point: np.ndarray, scene: Any = scene, like: WalkerState = like) -> Found:
+            return search(problem._replace(args=scene, guess=state_at(like, point)), _TURNS)
+
+        about = walks_of(scene, lambda: [last], most=1)
+        settled = (row for walks in about for row in walks.settled())
+        for found in map(found_from, chain([last], settled)):
+            if int(found.ending) == int(Search.FOUND) and bool(found.sound):
+                return np.asarray(found.recurring), s
+    return None
+
+
+@host_jit(runs_by_lanes, within=True)
+def _scene_along(
+    scout: ReturnMapSpec,
+    line: Homotopy,
+    like: WalkerState,
+    point: Scalar,
+    s: Scalar,
+    precision: Precision,
+) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """What a return changes in a point, and how that depends on the point and on s."""
+    m, scene = point.shape[0], line.at(s)
+    seeds, sizes = seed_directions(scene, tuple(range(len(jtu.tree_leaves(scene)))), m)
+    start = state_with(scout.system, like, point)
+    once = linearised_return(
+        scout, seeds, start, precision, jnp.asarray(False), carries_parameters=jnp.asarray(True)
+    )
+    by_s = once.jacobian[:, m:] @ (line.slopes(s) / sizes)
+    return once.recurring - point, once.jacobian[:, :m] - jnp.eye(m), by_s, once.code

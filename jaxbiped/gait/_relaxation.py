@@ -1,0 +1,135 @@
+"""Relaxed walkers: the scenes from which a homotopy begins, whose gait is known or easily found."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar, cast
+
+import equinox as eqx
+import jax
+import jax.tree_util as jtu
+
+from jaxbiped._types import as_float
+from jaxbiped.scene._joint_parts import Motor
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._mirror import with_fields
+from jaxbiped.scene._ready_scenes import seed_scene
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene.actuation._abstract_actuator import Actuation
+from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
+from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
+
+_Law = TypeVar("_Law", bound=eqx.Module)
+_LIGHT, _STRENGTHS = 1e-3, ("mass", "inertia", "stiffness", "damping", "torque")
+"""Factor of what is taken in along a line, and what is."""
+
+
+def relaxed(scene: Scene) -> tuple[Scene, Scene] | None:
+    """A scene whose walker walks more easily, and the given one; None where there is no such.
+
+    Bodies that are no part of a leg have hardly any mass, and springs and latches on them are as
+    weak. Mass centres of legs of one body lie on the line along it, and so do their feet.
+    Motors and actuators hardly do anything; where there are any the ground slopes as the seed's.
+    """
+    mechanism = scene.mechanism
+    light, straight = _light_pieces(mechanism), _straightened_pieces(mechanism)
+    is_driven = mechanism.has_motors or scene.actuation is not None
+    if not light and not straight and not is_driven:
+        return None
+    whole = [_with_share(piece) for piece in mechanism.pieces]
+    easy = list(whole)
+    for k in light:
+        easy[k] = _weakened(easy[k])
+    for k, changed in straight.items():
+        easy[k] = with_fields(easy[k], centre=changed)
+    first, last = (
+        dataclasses.replace(scene, walker=with_fields(mechanism, pieces=tuple(pieces)))
+        for pieces in (easy, whole)
+    )
+    if is_driven:
+        ground = dataclasses.replace(scene.ground, slope=seed_scene().ground.slope)
+        first = dataclasses.replace(first, ground=ground, actuation=_idle(scene))
+    return jtu.tree_map(as_float, first), jtu.tree_map(as_float, last)
+
+
+def _light_pieces(mechanism: Mechanism) -> set[int]:
+    """Bodies that are no part of a leg, what acts on them, and motors."""
+    structure = mechanism.structure
+    legs = range(len(structure.legs))
+    on_legs = {body for leg in legs for body in structure.bodies_of_leg(leg)}
+    light = {j for j in range(len(structure.bodies)) if j not in on_legs}
+    found = {structure.body_pieces[j] for j in light}
+    for k, angle, part in zip(
+        structure.joint_pieces, structure.joints, mechanism.joints, strict=True
+    ):
+        if isinstance(part, Motor) or light & {j for j, _ in angle.weights}:
+            found.add(k)
+    return found
+
+
+def _straightened_pieces(mechanism: Mechanism) -> dict[int, Any]:
+    """By the numbers of bodies and feet of legs of one body: centres on the line along it.
+
+    A leg of several may need its mass centres ahead, as a knee that they keep at its stop.
+    """
+    structure, pieces = mechanism.structure, cast("tuple[Any, ...]", mechanism.pieces)
+    alone = {j for j in structure.feet if structure.parents[j] < 0 and not structure.children[j]}
+    straight = {j for j in alone if structure.feet.count(j) == 1}
+    places = [
+        *zip(range(len(structure.bodies)), structure.body_pieces, strict=True),
+        *zip(structure.feet, structure.foot_pieces, strict=True),
+    ]
+    centres = {k: pieces[k].centre for j, k in places if j in straight}
+    return {
+        k: with_fields(centre, ahead=0.0 * centre.ahead)
+        for k, centre in centres.items()
+        if centre.ahead is not None
+    }
+
+
+def _with_share(piece: Any) -> Any:
+    """The piece itself; a motor with its share written."""
+    if not isinstance(piece, Motor) or piece.share is not None:
+        return piece
+    return with_fields(piece, share=as_float(1.0))
+
+
+def _weakened(piece: Any) -> Any:
+    names = ("share",) if isinstance(piece, Motor) else _STRENGTHS
+    known = {name: getattr(piece, name, None) for name in names}
+    return with_fields(piece, **{k: _LIGHT * x for k, x in known.items() if x is not None})
+
+
+def seed_like(scene: Scene | RigidScene) -> Scene | RigidScene:
+    with jax.ensure_compile_time_eval():
+        own = jtu.tree_map(float, seed_scene())
+        if isinstance(scene, RigidScene):
+            rigid = dataclasses.replace(
+                scene, walker=own.walker, ground=own.ground, actuation=_idle(scene)
+            )
+            return jtu.tree_map(as_float, rigid)
+        begin = dataclasses.replace(
+            scene,
+            walker=own.walker,
+            ground=own.ground,
+            normal=_like_seed(scene.normal, NORMAL_LAWS, normal_law_like),
+            friction=_like_seed(scene.friction, FRICTION_LAWS, friction_law_like),
+            actuation=_idle(scene),
+        )
+        return jtu.tree_map(as_float, begin)
+
+
+def _idle(scene: Scene | RigidScene) -> Actuation:
+    """The scene's actuators at strength zero: the seed's walker is passive."""
+    return None if scene.actuation is None else tuple(part.idle() for part in scene.actuation)
+
+
+def _like_seed(law: _Law, catalogue: Mapping[str, type], like: Callable[[str], Any]) -> _Law:
+    """A law of the catalogue with numbers that resemble the seed's; its own where these lack."""
+    name = next((name for name, kind in catalogue.items() if kind is type(law)), None)
+    if name is None:
+        return law
+    alike = like(name)
+    own = [field.name for field in dataclasses.fields(law) if not field.metadata.get("static")]
+    values = {name: getattr(alike, name) for name in own if getattr(law, name) is not None}
+    known = {name: value for name, value in values.items() if value is not None}
+    return dataclasses.replace(law, **known)

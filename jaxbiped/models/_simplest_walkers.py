@@ -1,0 +1,61 @@
+"""The simplest walker: a mass on massless legs, going down a slope or pushing off on level ground.
+
+Scenes are made by public names alone, so that whoever only asks for a walker's name does not wait
+for JAX.
+"""
+
+from typing import TYPE_CHECKING
+
+import jaxbiped as jb
+
+if TYPE_CHECKING:
+    from jaxbiped._types import Parameter
+
+_FOOT_MASS = 1e-13
+"""Mass of a foot, of the hip's: it swings the leg, and the hip does not feel it in 64 bits."""
+
+
+def garcia(slope: "Parameter" = 0.009) -> "jb.RigidScene":
+    """The simplest walking model: a mass at the hip, point feet, legs without mass.
+
+    Dimensionless: the hip's mass, the legs' length and gravity are 1, and the slope is all there is
+    to choose. Angles are the paper's, from the slope's normal: θ is `theta_2`, φ is `theta_2` less
+    `theta_1`.
+
+    Source: Garcia, Chatterjee, Ruina and Coleman 1998, The simplest walking model: stability,
+    complexity, and scaling, Journal of Biomechanical Engineering 120, 281.
+
+    Args:
+        slope: γ of the paper [rad]; gaits of one footstep are stable below 0.0151.
+
+    Returns:
+        The walker on rigid feet.
+
+    Raises:
+        ArgumentError: a slope that is not allowed.
+    """
+    walker = jb.Walker(m=_FOOT_MASS, J=0.0, l=1.0, d=1.0, r=0.0, hip_mass=1.0)
+    return jb.RigidScene(walker, jb.Ground(slope=slope, g=1.0))
+
+
+def kuo(impulse: "Parameter" = 0.04, slope: "Parameter" = 0.0) -> "jb.RigidScene":
+    """The simplest walking model on level ground, pushed off along its trailing leg.
+
+    Dimensionless as `garcia`. The push comes just before the foot ahead strikes; the spring at the
+    hip, by which the paper chooses speed and step length apart, is left out.
+
+    Source: Kuo 2002, Energetics of actively powered locomotion using the simplest walking model,
+    Journal of Biomechanical Engineering 124, 113.
+
+    Args:
+        impulse: P̂ of the paper, the push-off [in units of the hip's mass times √(g l)].
+        slope: slope of the ground [rad].
+
+    Returns:
+        The walker on rigid feet.
+
+    Raises:
+        ArgumentError: a number that is not allowed.
+    """
+    passive = garcia(slope)
+    return jb.RigidScene(passive.walker, passive.ground, (jb.actuation.PushOff(impulse),))

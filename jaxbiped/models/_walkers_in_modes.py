@@ -1,0 +1,83 @@
+"""Walkers whose feet or stops change what holds them: knees that lock, a wheel without a rim."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import jaxbiped as jb
+from jaxbiped._checks import check_at_least
+
+if TYPE_CHECKING:
+    from jaxbiped._types import Parameter
+
+
+def hsu_chen(slope: "Parameter" = 0.0504) -> "jb.RigidScene":
+    """A walker with knees and point feet: point masses on thighs, shanks and hip; legs of 1 m.
+
+    A knee locks where it is straight and stays so until its leg has struck and stood. The paper's
+    angles are from the vertical: its q1 is `theta_thigh_2` less the slope, q2 and q3 are
+    `theta_thigh_1` and `theta_shank_1` less the slope. It prints no gravity; 9.81 m/s² is taken.
+
+    Source: Hsu Chen 2007, Passive dynamic walking with knees: a point foot model, thesis, MIT.
+
+    Args:
+        slope: slope of the ground [rad].
+
+    Returns:
+        The walker on rigid feet.
+
+    Raises:
+        ArgumentError: a slope that is not allowed.
+    """
+    walker = jb.Kneed(
+        m_thigh=0.5,
+        J_thigh=0.0,
+        l_thigh=0.5,
+        d_thigh=0.325,
+        m_shank=0.05,
+        J_shank=0.0,
+        l_shank=0.5,
+        d_shank=0.125,
+        w_shank=0.0,
+        r=0.0,
+        hip_mass=0.5,
+        epsilon=0.0,
+        holds="through heel strike",
+    )
+    return jb.RigidScene(walker, jb.Ground(slope=slope, g=9.81))
+
+
+def rimless_wheel(
+    slope: "Parameter" = 0.08, *, spokes: int = 8, inertia: "Parameter" = 0.5
+) -> "jb.RigidScene":
+    """A wheel without a rim, which rolls from spoke to spoke: a mass of 1, spokes of 1, gravity 1.
+
+    With the angle 2α between spokes, the rate ω behind an impact is η ω before it,
+    η = (inertia + cos 2α)/(inertia + 1), and the multiplier of its gait is η².
+
+    Source: McGeer 1990, Passive dynamic walking; Coleman, Chatterjee and Ruina 1997, Motions of a
+    rimless spoked wheel: a simple three-dimensional system with impacts.
+
+    Args:
+        slope: slope of the ground [rad].
+        spokes: how many spokes.
+        inertia: moment of inertia about the hub [of the mass times the spokes' length squared].
+
+    Returns:
+        The wheel on rigid feet.
+
+    Raises:
+        ArgumentError: a number that is not allowed.
+    """
+    check_at_least("spokes", spokes, "3", 3)
+    hub: Any = 0.0
+    tips: list[Any] = [
+        (math.cos(turn), math.sin(turn))
+        for turn in (2.0 * math.pi * k / spokes for k in range(spokes))
+    ]
+    wheel = jb.Mechanism(
+        root="hub",
+        bodies=(jb.Body("wheel", mass=1.0, inertia=inertia, centre=hub),),
+        feet=tuple(jb.Foot("wheel", centre=tip, leg=f"spoke_{k}") for k, tip in enumerate(tips)),
+        turn={"wheel": spokes},
+    )
+    return jb.RigidScene(wheel, jb.Ground(slope=slope, g=1.0))

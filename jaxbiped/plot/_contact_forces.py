@@ -1,0 +1,157 @@
+"""Contact forces over time (paper, figure 8), and one heel strike of them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped.dynamics._contacts import Contacts, contacts
+from jaxbiped.measure._footsteps import heel_strikes
+from jaxbiped.measure._samples import evaluate_along
+from jaxbiped.plot import style
+from jaxbiped.plot._samples import sample, state_at
+from jaxbiped.plot._skeleton import Sole, skeleton_of
+from jaxbiped.plot._symbols import NORMAL_FORCE, TANGENTIAL_FORCE, TIME
+from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots
+from jaxbiped.scene._scene import RedundantScene, Scene
+from jaxbiped.solve._scene_key import check_scene_of
+from jaxbiped.solve._trajectory import Trajectory
+
+_KINDS = ("normal", "tangential")
+_EXACT = 1e-5
+"""How far off straight lines between samples may be, in parts of the largest force of a kind."""
+_SHORTEST = 1e-10
+"""Interval of time that is not split further [s]."""
+_BEFORE, _AFTER = 0.5e-3, 4.5e-3
+"""What is enlarged around a heel strike [s]."""
+
+
+def contact_forces(
+    scene: Scene,
+    trajectory: Trajectory,
+    *,
+    figure: Figure | SubFigure | None = None,
+    strike: int = -1,
+) -> Figure:
+    """Draws the forces of the ground on all feet [N] over time.
+
+    Left, the whole motion; right, one heel strike in milliseconds, with double support shaded.
+    Above, the normal force; below, the tangential one, downhill positive, where there is friction.
+    Drawn so closely that straight lines are right to 1e-5 of the largest force (see
+    `sampled_forces`), so that peaks do not depend on where the solver's steps happen to end.
+
+    Args:
+        scene: what was simulated.
+        trajectory: the motion, saved step by step.
+        figure: empty figure or subfigure to draw into; a new one unless given.
+        strike: which heel strike to enlarge, counted from 0, or from the last: -1. A motion
+            without a heel strike has no right-hand column.
+
+    Returns:
+        The figure given, or the new one.
+
+    Raises:
+        ValueError: the trajectory was not saved step by step, or has fewer heel strikes.
+    """
+    check_type("scene", scene, Scene, RedundantScene)
+    check_scene_of(trajectory, scene)
+    t, forces = sampled_forces(scene, trajectory)
+    times, legs = heel_strikes(scene, trajectory)
+    if times.size and not -times.size <= strike < times.size:
+        raise ArgumentError(
+            f"strike = {strike} is not allowed: this motion has {times.size} heel strikes."
+        )
+    rows = 2 if "tangential_1" in forces else 1
+    columns = 2 if times.size else 1
+    if figure is None:
+        figure = style.new_figure(4.6 * columns, 1.0 + 2.2 * rows)
+    widths = [1.35, 1.0][:columns]
+    axes = figure.subplots(rows, columns, sharex="col", squeeze=False, width_ratios=widths)
+    _draw_column(axes[:, 0], t, forces, skeleton_of(scene.mechanism).feet)
+    axes[0, 0].margins(x=0.01)
+    style.dress(axes[0, 0], "Contact forces", "", NORMAL_FORCE.on_axis())
+    style.legend_above(axes[0, 0], axes[-1, 0])
+    if rows == 2:
+        style.dress(axes[1, 0], "", "", TANGENTIAL_FORCE.on_axis())
+    axes[-1, 0].set_xlabel(TIME.on_axis())
+    if times.size:
+        _draw_strike(axes[:, 1], scene, trajectory, times[strike], legs[strike] - 1)
+    return style.figure_of(axes[0, 0])
+
+
+def forces_in(found: Contacts) -> Channels:
+    """The forces [N] by their kinds and the numbers of the feet: "normal_1", "tangential_1"."""
+    forces: Channels = {}
+    for foot, force in enumerate(found.forces, 1):
+        forces[f"normal_{foot}"] = np.asarray(force.normal)
+        if force.tangential is not None:
+            forces[f"tangential_{foot}"] = np.asarray(force.tangential)
+    return forces
+
+
+def sampled_forces(
+    scene: Scene,
+    trajectory: Trajectory,
+    *,
+    start: float | None = None,
+    stop: float | None = None,
+) -> tuple[np.ndarray, Channels]:
+    """Times [s] of shape (n,) between two times, and the forces at them, as `forces_in` has them.
+
+    The solver's steps follow the state, which does not feel how sharp a peak of the force is:
+    where slip passes the peak of friction, the force has a corner and then loses two thirds of
+    itself within half a microsecond, less than a step.
+    """
+
+    def evaluate(t: np.ndarray) -> Channels:
+        return forces_in(evaluate_along(scene, state_at(trajectory, t), contacts))
+
+    first = sample(trajectory, start=start, stop=stop).t
+    largest: dict[str, float] = {}
+    for name, force in (forces := evaluate(first)).items():
+        kind = name.partition("_")[0]
+        largest[kind] = max(largest.get(kind, 1e-9), float(np.abs(force).max()))
+    allowed = {name: _EXACT * largest[name.partition("_")[0]] for name in forces}
+    return adaptive_knots(evaluate, first, Tolerances({}, allowed, _SHORTEST))
+
+
+def _draw_column(axes: np.ndarray, t: np.ndarray, forces: Channels, feet: Sequence[Sole]) -> None:
+    for k, foot in enumerate(feet, 1):
+        look = foot.look.line | {"linewidth": 1.1, "label": foot.label}
+        for ax, kind in zip(axes, _KINDS, strict=False):
+            ax.plot(t, forces[f"{kind}_{k}"], **look)
+
+
+def _draw_strike(
+    axes: np.ndarray, scene: Scene, trajectory: Trajectory, time: float, leg: int
+) -> None:
+    t, forces = sampled_forces(scene, trajectory, start=time - _BEFORE, stop=time + _AFTER)
+    milliseconds, skeleton = (t - time) * 1e3, skeleton_of(scene.mechanism)
+    _draw_column(axes, milliseconds, forces, skeleton.feet)
+    normal = np.stack([forces[f"normal_{k}"] for k, _ in enumerate(skeleton.feet, 1)])
+    feet_of_leg = scene.mechanism.structure.feet_of_leg
+    carried = [(normal[list(feet)] > 0.0).any(axis=0) for feet in feet_of_leg]
+    both = milliseconds[np.sum(carried, axis=0) > 1]
+    look = {"color": style.SHADE_COLOUR, "linewidth": 0, "label": "double support"}
+    for ax in axes:
+        if both.size:
+            ax.axvspan(both[0], both[-1], **look)
+        ax.margins(x=0.0, y=0.12)
+        style.dress(ax, "", "", "")
+    title = f"Heel strike of {skeleton.legs[leg]} at {time:.3f} s"
+    axes[0].set_title(title, loc="left", fontsize="medium")
+    axes[-1].set_xlabel("time after the foot touches, $t$ (ms)")
+    loaded = max(feet_of_leg[leg], key=lambda k: float(normal[k].max()))
+    for ax, kind in zip(axes, _KINDS, strict=False):
+        _mark_peak(ax, milliseconds, forces[f"{kind}_{loaded + 1}"])
+    if both.size:
+        axes[0].legend(handles=[axes[0].patches[-1]], loc="best", fontsize="small")
+
+
+def _mark_peak(ax: Axes, t: np.ndarray, force: np.ndarray) -> None:
+    peak = int(np.argmax(np.abs(force)))
+    text = f"{force[peak]:.4g} N".replace("-", "−")
+    shift, anchor = (3, "bottom") if force[peak] > 0.0 else (-3, "top")
+    style.label_point(ax, text, (float(t[peak]), float(force[peak])), (7, shift), va=anchor)

@@ -1,0 +1,263 @@
+"""Along a parameter: branches of gaits and fractions of basins; in two, curves of bifurcations."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
+from jaxbiped._quantity import Quantity
+from jaxbiped.basins._fractions import Fraction, wilson_interval
+from jaxbiped.continuation._bifurcation_curve import BifurcationCurve
+from jaxbiped.continuation._bifurcations import BranchEvent
+from jaxbiped.continuation._branch import Branch
+from jaxbiped.continuation._branch_point import BranchPoint
+from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
+from jaxbiped.plot import style
+from jaxbiped.plot._symbols import NORMAL_FORCE, axis_label
+from jaxbiped.scene._parameter_access import parameter_quantities
+
+_MEASURES = {
+    "period": Quantity("time of a footstep", r"$T$", "s"),
+    "step_length": Quantity("step length", r"$L$", "m"),
+    "speed": Quantity("speed", r"$v$", "m/s"),
+    "peak_normal": NORMAL_FORCE._replace(words="largest normal force"),
+    "spectral_radius": Quantity("spectral radius of a cycle", r"$\rho$"),
+}
+_STYLES: dict[bool | None, Any] = {True: "-", False: (0, (5, 2)), None: (0, (1, 1.5))}
+_WORDS = {True: "stable", False: "unstable", None: "undecided"}
+_MARKS = {
+    BranchEvent.FOLD: ("s", "fold"),
+    BranchEvent.PERIOD_DOUBLING: ("D", "period doubling"),
+    BranchEvent.NEIMARK_SACKER: ("^", "Neimark–Sacker"),
+    BranchEvent.BRANCH_POINT: ("P", "branch point"),
+    BranchEvent.LIMIT: ("X", "limit of the model"),
+    BranchEvent.NOT_LOCATED: ("*", "bifurcation, not located"),
+}
+
+
+def branch(
+    branches: Branch | Sequence[Branch], measure: str = "step_length", *, ax: Axes | None = None
+) -> Figure:
+    """Draws a measure of the gaits on one branch or several over the parameter.
+
+    Stable gaits are solid lines, unstable ones dashed, and dotted those whose stability the
+    multipliers' errors leave open. Colours tell the footsteps of a cycle, marks the bifurcations.
+    Period and step length are those of a footstep, on average over the cycle.
+
+    Args:
+        branches: of one scene along one parameter.
+        measure: "period", "step_length", "speed", "peak_normal", "spectral_radius" or a component
+            of the state, such as "theta_2".
+        ax: axes to draw into; a new figure unless given.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
+
+    Raises:
+        ArgumentError: an unknown measure, branches along several parameters, or without points.
+    """
+    given = [branches] if isinstance(branches, Branch) else list(branches)
+    if not given or not all(len(each) for each in given):
+        raise ArgumentError("branches is not allowed: each must have a point.")
+    if len({each.along for each in given}) > 1:
+        raise ArgumentError("branches is not allowed: they must go along one parameter.")
+    components = recurring_names(given[0].state_type)
+    check_choice("measure", measure, (*_MEASURES, *components))
+    ax = style.axes_or_new(ax, 6.8, 4.6)
+    counts = sorted({each.footsteps for each in given})
+    for each in given:
+        _draw_lines(ax, each, measure, style.colour_of(counts.index(each.footsteps)))
+    for each in given:
+        for event in each.bifurcations:
+            height, marker = _value(measure, each, event.point), _MARKS[event.kind][0]
+            ax.plot(event.value, height, marker, color=style.GROUND_COLOUR, markersize=6, zorder=3)
+    if given[0].axis.log:
+        ax.set_xscale("log")
+    if measure == "spectral_radius":
+        ax.axhline(1.0, color=style.GROUND_COLOUR, linewidth=0.6, zorder=0.5)
+    quantity = _MEASURES.get(measure) or state_quantity(measure) or Quantity(measure, "", "SI")
+    along = parameter_quantities(given[0].scene)[given[0].along]
+    style.dress(ax, f"Gaits along {along.words}", along.on_axis(), quantity.on_axis())
+    handles = [*_entries(given, counts)]
+    style.legend_below(ax, columns=min(len(handles), 5), handles=handles)
+    return style.figure_of(ax)
+
+
+def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = None) -> Figure:
+    """Draws curves of bifurcations in the plane of two parameters.
+
+    Args:
+        curves: along the same two parameters.
+        ax: axes to draw into; a new figure unless given.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
+
+    Raises:
+        ArgumentError: no curve, or curves along other parameters.
+    """
+    if len({(each.along, each.units) for each in curves}) != 1:
+        raise ArgumentError("curves is not allowed: they must go along the same two parameters.")
+    ax = style.axes_or_new(ax, 6.4, 4.4)
+    for k, curve in enumerate(curves):
+        marker, words = _MARKS[curve.kind]
+        first, second = curve.values.T
+        ax.plot(
+            second, first, marker=marker, markersize=3.5, color=style.colour_of(k),
+            linewidth=1.2, label=words,
+        )  # fmt: skip
+    seconds = np.concatenate([curve.values[:, 1] for curve in curves])
+    if seconds.min() > 0.0 and seconds.max() > 10.0 * seconds.min():
+        ax.set_xscale("log")
+    names, units = curves[0].along, curves[0].units
+    labels = [Quantity(name, unit=unit).on_axis() for name, unit in zip(names, units, strict=True)]
+    style.dress(ax, "Where gaits lose their stability", labels[1], labels[0])
+    style.legend(ax)
+    return style.figure_of(ax)
+
+
+def _value(measure: str, each: Branch, point: BranchPoint) -> float:
+    if measure == "spectral_radius":
+        return float(np.abs(point.multipliers[0]))
+    if measure == "speed":
+        return point.step_length / point.period
+    if measure in ("period", "step_length"):
+        return float(getattr(point, measure)) / each.footsteps
+    if measure == "peak_normal":
+        return point.peak_normal
+    place = each.state_type._fields.index(measure) - 1  # type: ignore[attr-defined]
+    return float(point.recurring[place])
+
+
+def _draw_lines(ax: Axes, each: Branch, measure: str, colour: str) -> None:
+    """Lines between neighbours; a bifurcation belongs to the gaits on either side of it."""
+    special = {point.point.value for point in each.bifurcations}
+    values = [(point.value, _value(measure, each, point)) for point in each.points]
+    kinds = [
+        (there if here.value in special else here).stable for here, there in pairwise(each.points)
+    ]
+    if not kinds:
+        ax.plot(*values[0], ".", color=colour)
+    for kind, group in groupby(range(len(kinds)), key=kinds.__getitem__):
+        first, *others = group
+        x, y = zip(*values[first : first + len(others) + 2], strict=True)
+        ax.plot(x, y, color=colour, linestyle=_STYLES[kind], linewidth=1.3)
+
+
+def _entries(given: list[Branch], counts: list[int]) -> Iterator[Line2D]:
+    """Of the legend: kinds of stability, footsteps of cycles where they differ, bifurcations."""
+    grey = style.GROUND_COLOUR
+    stable = {kind for each in given for kind in each.stable}
+    if None in stable and not any(map(_is_undecided, given)):
+        stable.remove(None)
+    for kind in (kind for kind in _WORDS if kind in stable):
+        yield Line2D([], [], color=grey, linestyle=_STYLES[kind], label=_WORDS[kind])
+    for k, count in enumerate(counts) if len(counts) > 1 else ():
+        words = f"{count} footstep{'s' * (count > 1)}"
+        yield Line2D([], [], color=style.colour_of(k), label=words)
+    drawn = {event.kind for each in given for event in each.bifurcations}
+    for event, (marker, words) in _MARKS.items():
+        if event in drawn:
+            yield Line2D([], [], color=grey, marker=marker, linestyle="none", label=words)
+
+
+def _is_undecided(each: Branch) -> bool:
+    """Whether gaits besides bifurcations are undecided."""
+    special = {event.point.value for event in each.bifurcations}
+    return any(point.stable is None and point.value not in special for point in each.points)
+
+
+def basin_fractions(
+    values: npt.ArrayLike,
+    fractions: Sequence[Mapping[str, Fraction]],
+    *,
+    name: str | Quantity,
+    unit: str = "",
+    kind: str = "lines",
+    confidence: float = 0.95,
+    log: bool = False,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draws the fraction of starts with each label against a parameter.
+
+    Lines lie in bands, Wilson's intervals of the counts (see `wilson_interval`); a label that
+    did not occur at a value counts as none of the starts there.
+
+    Args:
+        values: the parameter, increasing, shape (n,).
+        fractions: what `jaxbiped.basins.fractions` found at each value.
+        name, unit: of the parameter; its own name, as "K", says all by itself, as does a
+            `jaxbiped.laws.Quantity`.
+        kind: "lines", or "stacked": areas that add up to one, without bands.
+        confidence: of the bands.
+        log: whether the parameter's axis is logarithmic.
+        ax: axes to draw into; a new figure unless given.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
+
+    Raises:
+        ArgumentError: no value, as many values as fractions are not there, values that do not
+            increase or are not above 0 on a logarithmic axis, one value to stack, or nothing
+            labelled at a value.
+    """
+    check_choice("kind", kind, ("lines", "stacked"))
+    along = _check(values, fractions, log)
+    if kind == "stacked" and along.size == 1:
+        raise ArgumentError("values has one entry: a stacked figure must have at least 2.")
+    labels = style.in_order({label for found in fractions for label in found})
+    counts = np.asarray(
+        [[found[name].count if name in found else 0 for found in fractions] for name in labels]
+    )
+    totals = counts.sum(axis=0)
+    parts, colours = counts / totals, [style.label_colour(label) for label in labels]
+    ax = style.axes_or_new(ax, 7.2, 4.0)
+    title, margin, order = "Fractions of the starts", 0.0, -1
+    if kind == "stacked":
+        edges: dict[str, Any] = {"edgecolor": "white", "linewidth": 0.4}
+        ax.stackplot(along, parts, labels=labels, colors=colours, **edges)
+    else:
+        title += f" (bands: {100.0 * confidence:.4g} % confidence)"
+        margin, order = 0.02, 1
+        bands = zip(*wilson_interval(counts, totals, confidence=confidence), strict=True)
+        for label, colour, part, band in zip(labels, colours, parts, bands, strict=True):
+            ax.fill_between(along, *band, color=colour, alpha=0.25, linewidth=0.0)
+            look: dict[str, Any] = {"marker": style.label_marker(label), "markersize": 4.0}
+            ax.plot(along, part, color=colour, label=label, clip_on=False, **look)
+    style.dress(ax, title, axis_label(name, unit), "fraction of the starts")
+    if log:
+        ax.set_xscale("log")
+    if along.size > 1:
+        ax.set_xlim(along[0], along[-1])
+    ax.set_ylim(-margin, 1.0 + margin)
+    handles, entries = ax.get_legend_handles_labels()
+    style.legend_right(ax, handles=handles[::order], labels=entries[::order])
+    return style.figure_of(ax)
+
+
+def _check(
+    values: npt.ArrayLike, fractions: Sequence[Mapping[str, Fraction]], log: bool
+) -> np.ndarray:
+    check_finite("values", values)
+    along = np.asarray(values, dtype=float)
+    if along.ndim != 1 or along.size == 0 or along.size != len(fractions):
+        raise ArgumentError(
+            f"values has shape {along.shape} and there are {len(fractions)} fractions: there must "
+            "be one for each value, and at least one."
+        )
+    if (np.diff(along) <= 0.0).any():
+        raise ArgumentError("values does not increase everywhere: it must.")
+    if log:
+        check_positive("values", along)
+    empty = [k for k, found in enumerate(fractions) if not found]
+    if empty:
+        raise ArgumentError(
+            f"fractions[{empty[0]}] is empty: at least one start must be labelled at each value."
+        )
+    return along

@@ -1,0 +1,167 @@
+"""Walkers of commands, against the scenes and walks that they stand for."""
+
+import jax
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.cli._basin_starts import StartsOptions, read_starts
+from jaxbiped.cli._scene_options import ActuationOptions, SceneOptions
+from jaxbiped.cli._start_options import StartOptions
+from jaxbiped.cli._walkers import WALKERS
+from jaxbiped.models import MODELS
+from tests.cli.commands import numbers_of, outputs_of, refused
+
+OWN = """
+import jaxbiped as jb
+from beside import MASS
+
+legs = tuple(jb.Body(f"leg_{i}", mass=MASS, inertia=0.0096, centre=0.10) for i in (1, 2))
+feet = tuple(jb.Foot(f"leg_{i}", centre=0.32, radius=0.08) for i in (1, 2))
+walker = jb.Mechanism(bodies=legs, feet=feet, mirror=(("leg_1", "leg_2"),))
+number = 3
+
+def make():
+    return walker
+
+def of(mass):
+    return walker
+
+def broken():
+    return 1 / 0
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    """A user's file with walkers, and what it imports beside it."""
+    (tmp_path / "beside.py").write_text("MASS = 1.5\n")
+    path = tmp_path / "my_walkers.py"
+    path.write_text(OWN)
+    return path
+
+
+@pytest.mark.parametrize("name", ["walker", "make"])
+def test_a_file_s_walker_is_modelled(name, file):
+    options = SceneOptions(walker=f"{file}:{name}", clearance="stance-rotation", slope=0.03)
+    options.check()
+    scene = options.scene()
+    assert scene.mechanism.structure.bodies == ("leg_1", "leg_2")
+    assert float(scene.mechanism.total_mass) == 3.0
+    assert isinstance(scene.clearance, jb.laws.StanceRotation)
+    assert float(scene.ground.slope) == 0.03
+    assert isinstance(SceneOptions(walker=f"{file}:{name}").scene().clearance,
+                      jb.laws.AlwaysTouching)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("nobody", "does not define nobody; it defines MASS, broken, feet, jb, legs"),
+        ("number", "it is 3; give a Mechanism"),
+        ("of", "raises TypeError: of() missing 1 required"),
+        ("broken", "raises ZeroDivisionError: division by zero"),
+    ],
+)
+def test_what_is_no_walker_is_refused(name, words, file, capsys):
+    assert words in refused(f"walk --walker {file}:{name}", capsys)
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        ("--walker three-legs", "one of seed, kneed, with-torso, garcia, "),
+        ("--walker nowhere.py:walker", "nowhere.py:walker' cannot be read"),
+        ("--walker kneed --m 2", "m = 2.0 is not allowed with walker = 'kneed'"),
+        ("--walker kneed --theta-1 0.1", "theta_1' is not known: choose one of hip_x"),
+        ("--walker kneed --state omega_nose=1", "omega_nose"),
+        ("--walker with-torso --state theta_torso=1", "theta_torso"),
+        ("--state theta_1", "write name=value"),
+        ("--state theta_1=x", "theta_1 must be a number"),
+        ("--state theta_1=0.1 --theta-1 0.2", "theta_1 is given twice"),
+        ("--standing 2", "standing = '2' is not allowed without state"),
+        ("--clearance never", "clearance = 'never'"),
+        ("--model rigid --clearance always-touching", "clearance = always-touching"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(flags, words, capsys):
+    assert words in refused(f"walk {flags}", capsys)
+
+
+@pytest.mark.parametrize("name", WALKERS)
+def test_named_walkers_walk_on_the_usual_slope(name):
+    scene = SceneOptions(walker=name).scene()
+    start = StartOptions().start(scene, name)
+    walk = jb.simulate(scene, start, duration=4.0, accuracy="draft", save="end")
+    assert walk.outcome is jb.Ending.WALKING
+
+
+def test_published_walkers_have_scenes_of_their_own_that_flags_change():
+    for name, model in MODELS.items():
+        scene, own = SceneOptions(walker=name).scene(), model.make()
+        assert jax.tree.all(jax.tree.map(np.array_equal, scene, own)), name
+        start, (known, *_) = StartOptions().start(scene, name), model.starts.values()
+        held = known.get("held")
+        numbers = {key: value for key, value in known.items() if key != "held"}
+        assert {key: float(getattr(start, key)) for key in numbers} == numbers
+        assert held is None or float(start.mode) == float(scene.state(held=held).mode)
+    steeper = SceneOptions(walker="garcia", slope=0.02, g=9.8).scene()
+    assert (float(steeper.ground.slope), float(steeper.ground.g)) == (0.02, 9.8)
+    soft = SceneOptions(walker="goswami", model="compliant", K=1e7).scene()
+    assert (soft.compliant, float(soft.normal.K)) == (True, 1e7)
+    assert float(soft.ground.slope) == float(MODELS["goswami"].make().ground.slope)
+    pushed = SceneOptions(walker="kuo", driven=ActuationOptions(push_off=("impulse=0.05",))).scene()
+    assert [float(each.impulse) for each in pushed.actuation] == [0.05]
+    with pytest.raises(jb.ArgumentError, match="no laws of contact"):
+        SceneOptions(walker="garcia", K=2e6).check()
+    with pytest.raises(jb.ArgumentError, match="parameters of its own"):
+        SceneOptions(walker="garcia", m=2.0).check()
+
+
+def test_a_start_is_said_by_the_names_of_the_state():
+    scene = SceneOptions(walker="kneed").scene()
+    said = StartOptions(state=("theta_thigh_1=0.2", "hip_x=1.5"), standing="shank_2")
+    start = said.start(scene, "kneed")
+    assert (float(start.theta_thigh_1), float(start.hip_x)) == (0.2, 1.5)
+    assert float(start.theta_shank_1) == WALKERS["kneed"].start["theta_shank_1"]
+    foot = jb.dynamics.feet(scene, start)[1]
+    assert float(foot.penetration) == pytest.approx(0.0, abs=1e-12)
+    assert float(foot.slip_speed) == pytest.approx(0.0, abs=1e-12)
+    seed = jb.seed_scene()
+    plain = StartOptions(state=("omega_1=0.3",)).start(seed)
+    assert plain == StartOptions(omega_1=0.3).start(seed)
+
+
+def test_starts_of_a_file_have_the_names_of_the_state(tmp_path):
+    scene = SceneOptions(walker="kneed").scene()
+    names = scene.mechanism.structure.coordinates + scene.mechanism.structure.rates
+    rows = [",".join(names), *(",".join(f"{k}.{n}" for n in range(len(names))) for k in (0, 1))]
+    (tmp_path / "starts.csv").write_text("\n".join(rows))
+    starts = read_starts(tmp_path / "starts.csv", scene)
+    assert type(starts) is type(scene.state())
+    np.testing.assert_array_equal(starts.hip_x, [0.0, 1.0])
+    with pytest.raises(jb.ArgumentError, match="header"):
+        read_starts(tmp_path / "starts.csv", jb.seed_scene())
+    assert StartsOptions().axes == ()
+
+
+def test_walkers_are_listed(capsys):
+    listed = {each["name"]: each for each in numbers_of(capsys, "models")["walkers"]}
+    assert list(listed) == list(WALKERS)
+    assert listed["seed"]["bodies"] == ["1", "2"]
+    assert listed["seed"]["parameters"]["l"] == {"value": 0.4, "unit": "m"}
+    assert listed["kneed"]["states"] == 12
+    assert listed["kneed"]["parameters"]["stop.K"]["unit"] == "N·m/radⁿ"
+    assert "slope" not in listed["with-torso"]["parameters"]
+
+
+@pytest.mark.slow
+def test_a_walk_with_a_torso_leaves_everything(tmp_path, capsys):
+    flags = ("--walker", "with-torso", "--duration", "2")
+    code, folder, figures, numbers = outputs_of(tmp_path, "walk", *flags)
+    assert (code, numbers["ending"]) == (0, "walking")
+    assert [step["leg"] for step in numbers["steps"]] == ["2", "1"]
+    assert set(figures) >= {"strobe.png", "leg_angles.png", "phase_portrait.png"}
+    assert (folder / "walk.html").exists()
+    assert (folder / "trajectory.nc").exists()
+    capsys.readouterr()

@@ -1,0 +1,318 @@
+"""Stops and flat feet on rigid feet, against maximal coordinates with what is held as loads."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import jaxbiped as jb
+from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._mode_changes import change_mode, foot_loads, mode_switches
+from jaxbiped.dynamics._rolling import turning_of
+from jaxbiped.dynamics._stance import stance_on
+from jaxbiped.scene._bodies import Body, Foot, Point
+from jaxbiped.scene._joint_parts import HOLDS, Spring, Stop
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._modes import Mode
+from jaxbiped.scene._rigid_feet import rigid_modes
+from tests.dynamics.test_rolling_mechanisms import (
+    a_state,
+    floats,
+    hinges,
+    places,
+    rigid,
+    sole_of,
+    whole,
+)
+from tests.mechanisms import SLOPE, WALKERS, G
+from tests.random_mechanisms import maximal_accelerations
+
+HIP = {"thigh_1": 1, "thigh_2": -1}
+
+
+@host_jit()
+def held_by(scene, state):
+    """Reactions of what is held."""
+    return turning_of(scene, stance_on(scene, state, 1)).reactions
+
+
+@host_jit()
+def loads_of_feet(scene, state):
+    stance = stance_on(scene, state, 1)
+    return foot_loads(scene, stance, turning_of(scene, stance))
+
+
+@host_jit()
+def switches_of(scene, state):
+    return [each.live for each in mode_switches(scene, state)]
+
+
+@st.composite
+def kneed(draw):
+    """Two legs with knees, a torso on a spring; stops at the knees and between the thighs."""
+    number = lambda low, high: draw(floats(low, high))
+    thigh = dict(mass=number(0.1, 1.0), inertia=number(0.002, 0.02), centre=draw(places))
+    shank = dict(mass=number(0.1, 1.0), inertia=number(0.002, 0.02), centre=draw(places))
+    knee = draw(hinges)
+    bodies = [Body(f"thigh_{i}", **thigh) for i in (1, 2)]
+    bodies += [Body(f"shank_{i}", **shank, parent=f"thigh_{i}", at=knee) for i in (1, 2)]
+    bodies.append(Body("torso", mass=number(0.1, 2.0), inertia=0.01, centre=draw(places)))
+    sole = dict(centre=number(0.2, 0.4), radius=draw(st.one_of(st.none(), floats(0.01, 0.2))))
+    holds = draw(st.sampled_from(HOLDS))
+    joints = [Stop(f"shank_{i}", upper=3.0, lower=-3.0, holds=holds) for i in (1, 2)]
+    joints += [
+        Stop(HIP, upper=3.0, lower=-3.0),
+        Spring({"torso": 1, "thigh_1": -0.5, "thigh_2": -0.5}, stiffness=5.0, damping=0.2),
+    ]
+    return Mechanism(
+        root_mass=draw(st.one_of(st.none(), floats(0.1, 2.0))),
+        bodies=bodies,
+        feet=[Foot(f"shank_{i}", **sole) for i in (1, 2)],
+        joints=joints,
+        mirror=[("thigh_1", "thigh_2"), ("shank_1", "shank_2")],
+    )
+
+
+def in_mode(scene, state, held, stands=()):
+    """A state in which these limits are held, by their numbers."""
+    modes = rigid_modes(scene.mechanism)
+    flags = tuple(np.bool_(i in held) for i in range(len(modes.limits)))
+    mode = Mode(tuple(map(np.bool_, stands)), flags, (np.False_,) * len(modes.locks))
+    return state._replace(mode=modes.encoded(np, mode, np.float64(0.0)))
+
+
+def couples(scene, motion, limits, sizes):
+    """The torques of limits as pairs of forces on the bodies that they turn."""
+    forces = []
+    for limit, size in zip(limits, sizes, strict=True):
+        for body, weight in limit.gap.weights:
+            across = np.array([np.cos(motion.angles[body]), np.sin(motion.angles[body])])
+            torque = weight * float(size) * across
+            forces += [(body, Point(1.0), *torque), (body, Point(0.0), *-torque)]
+    return forces
+
+
+@settings(deadline=None, max_examples=6)
+@given(st.data(), kneed(), st.sampled_from([(), (0,), (0, 3), (1, 2, 4), (3, 5)]))
+def test_held_angles_stay_under_the_torques_that_hold_them(data, mechanism, held):
+    scene = rigid(mechanism)
+    state = in_mode(scene, a_state(data.draw, scene), held)
+    motion, reactions = whole(scene, state), held_by(scene, state)
+    body, lowest, *_ = sole_of(scene, motion, 1)
+    found = jb.dynamics.rolling(scene, state)
+    limits = rigid_modes(mechanism).limits
+    forces = [(body, lowest, float(found.force.tangential), float(found.force.normal))]
+    forces += couples(scene, motion, limits, reactions)
+    moved = maximal_accelerations(mechanism, motion, SLOPE, G, forces)
+    scale = 1.0 + np.abs(moved).max()
+    np.testing.assert_allclose(np.array(found[:-1]), moved[2:], atol=1e-9 * scale)
+    for i, limit in enumerate(limits):
+        along = limit.gap.of(moved[2:])
+        assert (i in held) == (float(reactions[i]) != 0.0)
+        assert i not in held or abs(along) < 1e-9 * scale
+
+
+@settings(deadline=None, max_examples=3)
+@given(st.data(), kneed(), st.sampled_from([(), (0,), (0, 2), (2, 4), (1, 3, 5)]))
+def test_stops_take_part_in_an_impact_while_they_are_pressed(data, mechanism, held):
+    """What is held is at rest afterwards; what is let go leaves, and no loose stop has pulled."""
+    scene = rigid(mechanism)
+    state = in_mode(scene, a_state(data.draw, scene), held)
+    limits, s = rigid_modes(mechanism).limits, mechanism.structure
+    before = whole(scene, state)
+    rates = np.array(before.rates)
+    for i in held:  # a held angle is at rest before, too
+        row = np.zeros(len(rates))
+        for j, weight in limits[i].gap.weights:
+            row[j] = weight
+        rates = rates - row * (row @ rates) / (row @ row)
+    names = [f"omega_{name}" for name in s.bodies]
+    state = state._replace(**dict(zip(names, map(np.float64, rates), strict=True)))
+    before, struck = whole(scene, state), jb.dynamics.impact(scene, state)
+    after = whole(scene, struck.state)
+    twins = list(s.body_twins)
+    seen = np.array(after.rates)[twins]
+    # The impulses of the limits, from what neither the ground nor they leave.
+    still = before._replace(vx=0.0, vz=0.0, rates=(0.0,) * len(rates))
+    body, lowest, *_ = sole_of(scene, before, 0)
+    ground = [(body, lowest, float(struck.impulse_x), float(struck.impulse_z))]
+    free = maximal_accelerations(mechanism, still, SLOPE, 0.0)
+    given_ = maximal_accelerations(mechanism, still, SLOPE, 0.0, ground) - free
+    columns = [
+        maximal_accelerations(mechanism, still, SLOPE, 0.0, couples(scene, still, [limit], [1.0]))
+        - free
+        for limit in limits
+    ]
+    change = np.array([after.vx, after.vz, *seen]) - [before.vx, before.vz, *rates]
+    impulses = np.linalg.lstsq(
+        np.array([columns[i] for i in held]).T if held else np.zeros((len(change), 1)),
+        change - given_,
+    )[0]
+    still = np.zeros(len(change))
+    rebuilt = given_ + sum((p * columns[i] for i, p in zip(held, impulses, strict=False)), still)
+    scale = 1.0 + np.abs(change).max()
+    np.testing.assert_allclose(change, rebuilt, atol=1e-8 * scale)
+    stood = s.stance_leg
+    for i, impulse in zip(held, impulses, strict=False):
+        limit, rate = limits[i], limits[i].gap.of(seen)
+        locked = limit.locks and (limit.leg != stood or limit.holds == HOLDS[2])
+        if locked:
+            assert abs(rate) < 1e-8 * scale
+        else:
+            assert impulse > -1e-8 * scale
+            assert rate > -1e-8 * scale
+            assert min(abs(rate), abs(impulse)) < 1e-8 * scale
+
+
+HEEL_TOE = WALKERS["flat"]
+
+
+@settings(deadline=None, max_examples=6)
+@given(st.data())
+def test_a_flat_foot_is_pressed_at_both_ends(data):
+    """Forces on heel and toe turn and carry all bodies as the flat foot does."""
+    scene = rigid(HEEL_TOE)
+    state = a_state(data.draw, scene)
+    state = state._replace(theta_foot_2=np.float64(0.0), omega_foot_2=np.float64(0.0))
+    state = in_mode(scene, state, (), stands=(True, True))
+    motion, found = whole(scene, state), jb.dynamics.rolling(scene, state)
+    heel, toe = loads_of_feet(scene, state)
+    along = float(found.force.tangential)
+    forces = []
+    for number, load, tangential in ((2, heel, along), (3, toe, 0.0)):
+        body, lowest, *_ = sole_of(scene, motion, number)
+        forces.append((body, lowest, tangential, float(load)))
+    moved = maximal_accelerations(HEEL_TOE, motion, SLOPE, G, forces)
+    scale = 1.0 + np.abs(moved).max()
+    np.testing.assert_allclose(np.array(found[:-1]), moved[2:], atol=1e-9 * scale)
+    assert abs(moved[2 + HEEL_TOE.structure.bodies.index("foot_2")]) < 1e-9 * scale
+
+
+def hsu_chen(holds="through heel strike"):
+    """Hsu Chen's walker: thighs and shanks of point masses, and a latch at each knee."""
+    bodies = []
+    for i in (1, 2):
+        bodies += [
+            Body(f"thigh_{i}", mass=0.5, inertia=0.0, centre=0.325),
+            Body(f"shank_{i}", mass=0.05, inertia=0.0, centre=0.125, parent=f"thigh_{i}", at=0.5),
+        ]
+    walker = Mechanism(
+        root_mass=0.5,
+        bodies=bodies,
+        feet=[Foot(f"shank_{i}", centre=0.5) for i in (1, 2)],
+        joints=[Stop(f"shank_{i}", upper=0.0, holds=holds) for i in (1, 2)],
+        mirror=[("thigh_1", "thigh_2"), ("shank_1", "shank_2")],
+    )
+    return jb.RigidScene(walker, jb.Ground(slope=0.0504, g=9.81))
+
+
+ANGLES = dict(theta_thigh_1=-0.2, theta_shank_1=-0.2, theta_thigh_2=0.2, theta_shank_2=0.2)
+RATES = dict(omega_thigh_2=-1.1, omega_shank_2=-1.1)
+
+
+def test_the_mode_is_in_the_state():
+    """The same angles and rates with a free and with a held knee differ by it alone."""
+    scene = hsu_chen()
+    one = scene.state(**ANGLES, **RATES, standing="shank_2", held="shank_2")
+    both = scene.state(**ANGLES, **RATES, standing="shank_2", held=("shank_1", "shank_2"))
+    assert one[:-1] == both[:-1]
+    assert one.mode != both.mode
+    assert scene.state(**ANGLES, **RATES).mode == both.mode
+    assert scene.state(**ANGLES, **RATES, held=()).mode == 0.0
+    assert scene.state(**ANGLES | {"theta_shank_1": -0.3}, **RATES).mode == one.mode
+
+
+@pytest.mark.parametrize(
+    ("words", "changed"),
+    [
+        ("passes the stop 'shank_1'", dict(theta_shank_1=-0.1)),
+        ("held = 'shank_1' is not allowed", dict(theta_shank_1=-0.3, held="shank_1")),
+        ("held = 'shank_1' is not allowed", dict(omega_shank_1=-0.3, held="shank_1")),
+        ("held = 'knee'", dict(held="knee")),
+        ("the second of each pair stands", dict(standing="shank_1")),
+    ],
+)
+def test_states_that_no_mode_allows_are_refused(words, changed):
+    with pytest.raises(jb.ArgumentError, match=words):
+        hsu_chen().state(**ANGLES | RATES | changed)
+
+
+def test_mirrored_stops_on_one_body_keep_their_names():
+    parts = dict(mass=1.0, inertia=0.01)
+    bodies = [Body(f"leg_{i}", **parts, centre=0.1) for i in (1, 2)]
+    feet = [Foot(f"leg_{i}", centre=0.3) for i in (1, 2)]
+    torso = Body("torso", **parts, centre=-0.1)
+
+    def scene_of(names):
+        stops = [
+            Stop({"torso": 1, f"leg_{i}": -1}, upper=0.2, name=name)
+            for i, name in zip((1, 2), names, strict=True)
+        ]
+        mirror = [("leg_1", "leg_2")]
+        return rigid(Mechanism(bodies=[*bodies, torso], feet=feet, joints=stops, mirror=mirror))
+
+    named, angles = scene_of(("back", "front")), dict(theta_torso=0.2)
+    modes = [named.state(**angles, held=held).mode for held in ("back", "front")]
+    assert modes[0] != modes[1]
+    apart = jb.parameter_names(rigid(named.mechanism.untied()))
+    assert {"torso.back.upper", "torso.front.upper"} <= set(apart)
+    assert "torso.back.upper" in jb.parameter_names(named)
+    with pytest.raises(jb.ArgumentError, match="that of several stops"):
+        scene_of((None, None)).state(**angles, held="torso")
+
+
+def test_the_hip_moves_as_the_leg_that_stands_carries_it():
+    """A leg with a knee and a straight one, whose feet hang at the ends of unlike chains."""
+    parts = dict(mass=0.5, inertia=0.01, centre=0.2)
+    scene = rigid(
+        Mechanism(
+            bodies=(
+                Body("thigh", **parts),
+                Body("shank", **parts, parent="thigh", at=0.5),
+                Body("leg", **parts),
+            ),
+            feet=(Foot("shank", centre=0.5), Foot("leg", centre=0.99)),
+        )
+    )
+    angles = dict(theta_thigh=0.1, theta_shank=-0.05, theta_leg=-0.2)
+    rates = dict(omega_thigh=-1.0, omega_shank=-0.5, omega_leg=0.3)
+    thigh, shank = 0.5 * np.exp(0.1j), 0.5 * np.exp(-0.05j)
+    leg = 0.99 * np.exp(-0.2j)
+    # Along each link from its hinge: cosine down the normal, sine ahead; the hip moves against it.
+    expected = {
+        "shank": (thigh + shank, 1j * (-1.0 * thigh - 0.5 * shank)),
+        "leg": (leg, 0.3j * leg),
+    }
+    for foot, (place, moves) in expected.items():
+        found = jb.dynamics.whole_state(scene, scene.state(**angles, **rates, standing=foot))
+        told = (found.hip_z, found.hip_vz, found.hip_vx)
+        np.testing.assert_allclose(told, (place.real, moves.real, -moves.imag), atol=1e-15)
+
+
+def test_what_locks_lies_within_one_leg():
+    with pytest.raises(jb.ArgumentError, match="does not lie within one leg"):
+        rigid(
+            Mechanism(
+                bodies=[Body(f"thigh_{i}", mass=1.0, inertia=0.01, centre=0.1) for i in (1, 2)],
+                feet=[Foot(f"thigh_{i}", centre=0.3) for i in (1, 2)],
+                joints=[Stop(HIP, upper=0.6, lower=-0.6, holds=HOLDS[1])],
+                mirror=[("thigh_1", "thigh_2")],
+            )
+        )
+
+
+def test_a_locked_knee_is_held_with_either_sign_and_a_pressed_one_is_let_go():
+    """A swing knee at its limit whose shank is swung back by gravity: the lock pulls."""
+    back = ANGLES | dict(theta_thigh_1=-0.6, theta_shank_1=-0.6)
+    modes = {}
+    for holds in HOLDS:
+        scene = hsu_chen(holds)
+        state = scene.state(**back, **RATES, held=("shank_1", "shank_2"))
+        modes[holds] = [bool(each) for each in switches_of(scene, state)][2:]
+        after = change_mode(scene, state)
+        still = float(after.mode) == float(state.mode)
+        pull = float(held_by(scene, state)[0])
+        assert pull < 0.0
+        assert still == (holds != HOLDS[0])
+    assert modes[HOLDS[0]] == [True, True]
+    assert modes[HOLDS[1]] == [False, False]

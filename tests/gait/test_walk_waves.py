@@ -1,0 +1,168 @@
+"""Waves of walks against walks that are made up, and what a relaxed walker is against its rules."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.dynamics._state_quantities import recurring_names
+from jaxbiped.gait import _walk_waves
+from jaxbiped.gait._homotopy import homotopy_to
+from jaxbiped.gait._settled_walks import Walks
+from jaxbiped.gait._walk_waves import walks_of
+from jaxbiped.scene._parameter_access import parameter_values
+from tests.mechanisms import FEET, LEGS, PAIR, TORSO, scene_of
+
+LEVEL = dict(ground=jb.Ground(slope=0.0), clearance=jb.laws.StanceRotation())
+PLAIN = dict(parameters=(), radius_sensitivities=False)
+
+
+def made_up(monkeypatch, target, *, reach):
+    """Walks that get the farther the nearer their scatter is to a target; `reach` is how near all
+    the way needs."""
+    scene, begun = scene_of("torso"), []
+
+    def starts(scene, scatter):
+        begun.append(scatter.T)
+        kind = type(scene.state())
+        return kind(*[jnp.zeros(scatter.shape[1])] * len(kind._fields))
+
+    def walks(scene, states):
+        off = np.linalg.norm(begun[-1] - target, axis=1)
+        counts = np.where(off < reach, 40, np.clip(6.0 - 2.0 * off, 0.0, 39.0)).astype(int)
+        m = len(recurring_names(states))
+        gone = np.arange(40) < counts[:, None]
+        points = np.where(gone[..., None], np.broadcast_to(off[:, None, None], (len(off), 40, m)),
+                          np.nan)  # fmt: skip
+        return Walks(counts, points, np.ones(m), np.where(gone, 0.4 * np.arange(40), np.nan))
+
+    monkeypatch.setattr(_walk_waves, "starts_scattered_by", starts)
+    monkeypatch.setattr(_walk_waves, "walks_from", walks)
+    return scene, begun
+
+
+def test_waves_come_to_walks_far_from_the_first_starts(monkeypatch):
+    target = np.array([1.5, -1.0, 0.8, -0.7, 0.3, 0.2])
+    scene, begun = made_up(monkeypatch, target, reach=0.3)
+    waves = list(walks_of(scene, list))
+    assert not waves[0].settled()
+    assert waves[-1].settled()
+    assert len(waves) < 10
+    nearest = [np.linalg.norm(each - target, axis=1).min() for each in begun]
+    assert nearest[-1] < 0.3 < nearest[0]
+    # They are the same each time.
+    first = begun[0].copy()
+    next(walks_of(scene, list))
+    assert np.array_equal(begun[-1], first)
+
+
+def test_waves_end_where_none_gets_farther(monkeypatch):
+    scene, _ = made_up(monkeypatch, np.zeros(6), reach=0.0)
+    assert 5 <= len(list(walks_of(scene, list))) < 24
+    assert len(list(walks_of(scene, list, most=1))) == 1
+
+
+def test_walks_get_as_far_as_they_step_ahead_and_all_but_return():
+    """Of three walks one steps on, one only chatters at the section, one ends at once."""
+    steps = np.full((3, 40, 1), np.nan)
+    places = np.full((3, 40), np.nan)
+    steps[0, :4, 0], places[0, :4] = [0.5, 0.3, 0.2, 0.7], [0.1, 0.5, 0.9, 1.3]
+    steps[1, :5, 0], places[1, :5] = 0.2, 0.1
+    steps[2, :1, 0], places[2, :1] = 0.4, 0.1
+    walks = Walks(np.array([4, 5, 1]), steps, np.array([2.0]), places)
+    np.testing.assert_allclose(walks.progress(), [3.0 + 1.0 / 1.1, 0.0, 0.0], atol=1e-6)
+    # The arrival from which a step led nearest to itself, in the state's own size.
+    assert [point.tolist() for point in walks.near_returns(8)] == [[0.6]]
+
+
+def test_a_relaxed_walker_is_straight_and_passive_and_of_legs_alone():
+    skew = [dataclasses.replace(foot, centre=(0.32, 0.01)) for foot in FEET]
+    lean = jb.actuation.PD(kp=4.0, kd=0.4, of={"torso": 1, "normal": -1})
+    walker = jb.Mechanism(
+        bodies=(*LEGS, TORSO),
+        feet=skew,
+        joints=(
+            jb.Spring({"torso": 1, "vertical": -1}, stiffness=2.0),
+            jb.Motor({"torso": 1, "leg_2": -1}, lean),
+        ),
+        mirror=PAIR,
+    )
+    scene = scene_of("torso", walker=walker, **LEVEL)
+    line = homotopy_to(scene)
+    asked, first, last = (
+        {name: float(x) for name, x in parameter_values(each).items()}
+        for each in (scene, line.at(0.0), line.at(1.0))
+    )
+    assert last == asked | {"torso.motor.share": 1.0}
+    changed = {name: first[name] for name in last if first[name] != last[name]}
+    assert changed == {
+        "slope": 0.02,
+        "torso.mass": pytest.approx(3e-4),
+        "torso.inertia": pytest.approx(1.5e-6),
+        "torso.spring.stiffness": pytest.approx(2e-3),
+        "torso.motor.share": pytest.approx(1e-3),
+        "leg.foot.centre_ahead": 0.0,
+    }
+    assert homotopy_to(scene_of("unequal")) is None
+
+
+def test_a_share_multiplies_the_motors_torque():
+    motor = jb.Motor({"leg_1": 1, "leg_2": -1}, jb.actuation.PD(kp=3.0, kd=0.1, target=0.5))
+
+    def accelerations(share):
+        joint = dataclasses.replace(motor, share=share)
+        walker = jb.Mechanism(bodies=LEGS, feet=FEET, joints=(joint,), mirror=PAIR)
+        scene = scene_of("torso", walker=walker)
+        state = scene.state(theta_leg_1=0.2, theta_leg_2=-0.1, omega_leg_1=1.0, hip_z=0.398)
+        return np.array(jb.dynamics.accelerations(scene, state))
+
+    none, half, whole, plain = (accelerations(x) for x in (0.0, 0.5, 1.0, None))
+    np.testing.assert_array_equal(whole, plain)
+    np.testing.assert_allclose(half, 0.5 * (none + whole), rtol=1e-12, atol=1e-12)
+    assert np.abs(whole - none).max() > 1.0
+
+
+def light_legs(ahead):
+    """Legs of a fifth of the root point's mass, their mass centres ahead of them."""
+    legs = tuple(jb.Body(f"leg_{i}", mass=0.2, inertia=0.002, centre=(0.1, ahead)) for i in (1, 2))
+    walker = jb.Mechanism(root_mass=1.0, bodies=legs, feet=FEET, mirror=PAIR)
+    seed = jb.seed_scene()
+    return jb.Scene(walker, seed.ground, seed.normal, seed.friction, jb.laws.StanceRotation())
+
+
+@pytest.mark.nightly
+def test_a_walker_without_a_gait_is_told_where_its_branch_folds():
+    """The fold is that of `continue_gait` from straight legs."""
+    none = jb.find_gait(light_legs(0.012), **PLAIN)
+    assert none.outcome is not jb.gait.Search.FOUND
+    said = jb.gait.explain_search(light_legs(0.012), none)
+    told = float(said.partition("turns back at a fold at leg.centre_ahead = ")[2].split(",")[0])
+    straight = light_legs(0.0)
+    gait = jb.find_gait(straight, **PLAIN)
+    bounds = (0.0, 0.002)
+    branch = jb.continue_gait(straight, "leg.centre_ahead", bounds=bounds, guess=gait)
+    folds = [each.value for each in branch.bifurcations if str(each.kind) == "fold"]
+    assert told == pytest.approx(folds[0], rel=1e-3)
+
+
+@pytest.mark.nightly
+def test_a_kneed_walker_far_from_the_seed_is_found_by_waves():
+    """Heavy thighs and shanks: no walk about the seed's start goes on; the gait is unstable."""
+    stop = jb.laws.RistowSchafer(K=300.0, c=3000.0, n=1.0)
+    walker = jb.Kneed(
+        m_thigh=0.4, J_thigh=5.8e-4, l_thigh=0.184, d_thigh=0.080, m_shank=0.2, J_shank=6.9e-4,
+        l_shank=0.216, d_shank=0.096, w_shank=-0.004, r=0.08, hip_mass=1.0, epsilon=0.2, stop=stop,
+    )  # fmt: skip
+    seed = jb.seed_scene(slope=0.05)
+    scene = jb.Scene(walker, seed.ground, seed.normal, seed.friction)
+    gait = jb.find_gait(scene, **PLAIN)
+    assert gait.outcome is jb.gait.Search.FOUND
+    assert gait.found_by is jb.gait.FoundBy.WALKING
+    start, walk = gait.measures.state, jb.simulate(scene, gait.measures.state, footsteps=4)
+    assert float(walk.t[-1]) > 3.0 * float(gait.measures.period)
+    after = jax.tree.map(float, jb.return_map(scene, start).state)
+    for name in recurring_names(start):
+        assert getattr(after, name) == pytest.approx(float(getattr(start, name)), abs=1e-4)

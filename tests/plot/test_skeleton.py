@@ -1,0 +1,158 @@
+"""Figures of mechanisms, against where their bodies and feet are, by names."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+
+import jaxbiped as jb
+from jaxbiped import plot
+from jaxbiped.measure._samples import evaluate_along
+from jaxbiped.plot._skeleton import body_motion, poses, skeleton_of
+from jaxbiped.plot.style import LEG_COLOURS
+from tests.drawn import assert_is_drawn, legend_of
+from tests.mechanisms import WALKERS, scene_of, start_of
+
+
+@pytest.fixture(scope="module")
+def walks():
+    """A short motion of each mechanism, by name."""
+    found = {}
+    for name in ("coupled", "kneed", "flat"):
+        scene = scene_of(name)
+        found[name] = scene, jb.simulate(scene, start_of(name, scene), duration=0.1)
+    return found
+
+
+@pytest.mark.parametrize("name", ["coupled", "kneed", "flat"])
+def test_feet_and_mass_centres_are_where_the_equations_have_them(name, walks):
+    scene, walk = walks[name]
+    shown = poses(scene, evaluate_along(scene, walk.state, body_motion))
+    sine, cosine = math.sin(scene.ground.slope), math.cos(scene.ground.slope)
+    for drawn, foot in zip(shown.feet, jb.dynamics.feet(scene, walk.state), strict=True):
+        x, z = np.asarray(foot.x), np.asarray(foot.z)
+        expected = np.stack([cosine * x + sine * z, cosine * z - sine * x], axis=-1)
+        np.testing.assert_allclose(drawn, expected, rtol=0.0, atol=1e-12)
+    weight = float(scene.mechanism.total_mass) * float(scene.ground.g)
+    heights = sum(
+        float(body.mass) * centre[:, 1]
+        for body, centre in zip(scene.mechanism.bodies, shown.centres, strict=True)
+    )
+    mass = scene.mechanism.root_mass
+    heights = heights + (0.0 if mass is None else float(mass) * shown.root[:, 1])
+    potential = np.asarray(jb.dynamics.energies(scene, walk.state).gravitational)
+    drop = (heights - heights[0]) * float(scene.ground.g)
+    np.testing.assert_allclose(drop, potential - potential[0], atol=1e-9 * weight)
+
+
+def test_lines_go_from_hinge_to_hinge_round_feet_and_to_lonely_mass_centres():
+    lines = {
+        name: {part.name: part.path for part in skeleton_of(WALKERS[name]).parts}
+        for name in ("kneed", "flat", "torso")
+    }
+    assert lines["kneed"]["thigh_1"] == ((0.0, 0.0), (0.184, 0.0))
+    assert lines["kneed"]["shank_1"] == ((0.0, 0.0), (0.136, 0.0))
+    assert lines["flat"]["foot_2"] == ((0.0, 0.0), (0.03, -0.04), (0.03, 0.08), (0.0, 0.0))
+    assert lines["torso"]["torso"] == ((0.0, 0.0), (-0.10, 0.0))
+    wheel = jb.Mechanism(
+        root="hub",
+        bodies=(jb.Body("wheel", mass=1.0, inertia=0.5, centre=0.0),),
+        feet=tuple(jb.Foot("wheel", centre=(1.0, float(k)), leg=f"spoke_{k}") for k in (1, 2)),
+    )
+    (rim,) = skeleton_of(wheel).parts
+    assert rim.path == ((0.0, 0.0), (1.0, 1.0), (0.0, 0.0), (1.0, 2.0), (0.0, 0.0))
+
+
+def test_what_belongs_to_a_leg_has_its_colour():
+    parts = {part.name: part.look for part in skeleton_of(WALKERS["five"]).parts}
+    assert [parts[f"thigh_{i}"].colour for i in (1, 2)] == list(LEG_COLOURS[:2])
+    assert parts["trunk"].colour == LEG_COLOURS[2]
+    assert [look.depth for look in parts.values()] == [0, 0, 1, 0, 1]
+    assert len({look.colour for look in parts.values()}) == 5
+
+
+@pytest.mark.parametrize(
+    ("name", "bodies"),
+    [
+        ("coupled", ["leg_1", "leg_2", "torso"]),
+        ("kneed", ["thigh_1", "shank_1", "thigh_2", "shank_2"]),
+    ],
+)
+def test_legends_name_all_bodies(name, bodies, walks):
+    scene, walk = walks[name]
+    strobe = plot.gait_strobe(scene, walk)
+    (ax,) = strobe.axes
+    assert legend_of(ax) == [*bodies, "slope 0.03 rad"]
+    assert sum(isinstance(each, LineCollection) for each in ax.collections) == len(bodies)
+    (ax,) = plot.leg_angles(scene, walk).axes
+    assert legend_of(ax) == bodies
+    assert ax.get_ylabel() == r"body angle, $\theta$ (rad)"
+    for figure in (strobe, ax.figure, plot.phase_portrait(scene, walk, bodies=bodies[-1:])):
+        assert_is_drawn(figure)
+
+
+def test_an_angle_that_a_coupling_fixes_is_drawn(walks):
+    scene, walk = walks["coupled"]
+    (ax,) = plot.time_series(scene, walk, "theta_torso", "theta_leg_1", "theta_leg_2").axes
+    torso, one, two = (line.get_ydata() for line in ax.lines)
+    np.testing.assert_allclose(torso, 0.5 * (one + two), atol=1e-12)
+    assert ax.get_ylabel() == "angle (rad)"
+    (ax,) = plot.time_series(scene, walk, "hip_vx").axes
+    assert ax.get_ylabel() == r"hip velocity along the slope, $\dot x_S$ (m/s)"
+
+
+def test_each_foot_of_a_leg_has_its_line(walks):
+    scene, walk = walks["flat"]
+    names = ["foot_1.heel", "foot_1.toe", "foot_2.heel", "foot_2.toe"]
+    figure = plot.contact_forces(scene, walk)
+    normal = figure.axes[0]
+    assert [line.get_label() for line in normal.lines] == names
+    assert len({line.get_color() for line in normal.lines}) == 4
+    assert "Heel strike of foot_2" in figure.axes[1].get_title(loc="left")
+    # Double support is of legs: two of these four feet carry.
+    assert figure.axes[1].patches
+    assert legend_of(plot.penetrations(scene, walk).axes[0]) == names
+
+
+def test_a_torso_is_within_the_picture(walks):
+    scene, walk = walks["coupled"]
+    animation = plot.animate(scene, walk)
+    ax = animation._fig.axes[0]
+    animation._func(0)
+    line = next(line for line in ax.lines if line.get_label() == "torso")
+    assert line.get_ydata().max() < ax.get_ylim()[1]
+    animation._draw_was_started = True
+
+
+@pytest.mark.parametrize(
+    ("draw", "words"),
+    [
+        (lambda *walk: plot.time_series(*walk), "names is empty"),
+        (lambda *walk: plot.time_series(*walk, "theta_nose"), "theta_nose"),
+        (lambda *walk: plot.time_series(*walk, "hip_x", "hip_vx"), "m, m/s"),
+        (lambda *walk: plot.phase_portrait(*walk, bodies=("nose",)), "nose"),
+        (lambda *walk: plot.phase_portrait(*walk, legs=(3,)), "legs 1 to 2"),
+    ],
+)
+def test_what_is_not_there_is_not_drawn(draw, words, walks):
+    with pytest.raises(jb.ArgumentError, match=words):
+        draw(*walks["kneed"])
+
+
+def test_a_gait_s_bodies_are_its_scene_s(seed_gait_orbit):
+    scene, gait = seed_gait_orbit
+    own = [line.get_xydata() for line in plot.gait_orbit(gait).axes[0].lines]
+    named = [line.get_xydata() for line in plot.gait_orbit(gait, scene=scene).axes[0].lines]
+    for one, other in zip(own, named, strict=True):
+        np.testing.assert_array_equal(one, other)
+    with pytest.raises(jb.ArgumentError, match="scene"):
+        plot.gait_orbit(gait, scene=scene_of("kneed"))
+
+
+@pytest.fixture(scope="module")
+def seed_gait_orbit():
+    """The seed's walker as bodies of its own names, and the seed's gait."""
+    seed = jb.seed_scene()
+    return dataclasses.replace(seed, walker=seed.mechanism), jb.find_gait(seed, parameters=())

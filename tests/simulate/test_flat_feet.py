@@ -1,0 +1,204 @@
+"""Walks on flat rigid feet, against equations and contact conditions written a second time."""
+
+import jax
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import jaxbiped as jb
+
+SLOPE, G = 0.05, 9.81
+HIP, LEG, FOOT = 8.0, (2.0, 0.05, 0.4), (0.3, 3e-3, (0.02, 0.03))
+ANKLE, HEEL, TOE = 0.9, (0.06, -0.06), (0.06, 0.14)
+STIFFNESS, DAMPING = 8.0, 0.3
+START = dict(
+    theta_leg_1=-0.25, theta_foot_1=-0.05, theta_leg_2=0.25, omega_leg_1=0.2, omega_leg_2=-1.0
+)
+
+
+def scene():
+    (leg_mass, leg_inertia, leg_centre), (mass, inertia, centre) = LEG, FOOT
+    of_leg = dict(mass=leg_mass, inertia=leg_inertia, centre=leg_centre)
+    of_foot = dict(mass=mass, inertia=inertia, centre=centre, at=ANKLE)
+    legs = [jb.Body(f"leg_{i}", **of_leg) for i in (1, 2)]
+    feet = [jb.Body(f"foot_{i}", parent=f"leg_{i}", **of_foot) for i in (1, 2)]
+    soles = [
+        jb.Foot(f"foot_{i}", centre=place, name=name)
+        for i in (1, 2)
+        for place, name in ((HEEL, "heel"), (TOE, "toe"))
+    ]
+    springs = [
+        jb.Spring({f"foot_{i}": 1, f"leg_{i}": -1}, stiffness=STIFFNESS, damping=DAMPING)
+        for i in (1, 2)
+    ]
+    walker = jb.Mechanism(
+        root_mass=HIP,
+        bodies=(*legs, *feet),
+        feet=tuple(soles),
+        joints=tuple(springs),
+        mirror=(("leg_1", "leg_2"), ("foot_1", "foot_2")),
+    )
+    return jb.RigidScene(walker, jb.Ground(slope=SLOPE, g=G))
+
+
+def point(q, rates, links):
+    """Place of a chain's end, its velocity by the rates, and its acceleration without theirs.
+
+    Coordinates are the hip's place, then the angles of both legs and of both feet.
+    """
+    place, moves, left = q[:2].copy(), np.zeros((2, 6)), np.zeros(2)
+    moves[0, 0] = moves[1, 1] = 1.0
+    for body, (along, ahead) in links:
+        sine, cosine = np.sin(q[2 + body]), np.cos(q[2 + body])
+        turned = np.array([along * cosine - ahead * sine, along * sine + ahead * cosine])
+        offset = np.array([turned[1], -turned[0]])
+        place += offset
+        moves[:, 2 + body] += turned
+        left -= offset * rates[2 + body] ** 2
+    return place, moves, left
+
+
+def sole(leg, where):
+    return [(leg, (ANKLE, 0.0)), (2 + leg, where)]
+
+
+def bodies():
+    yield HIP, 0.0, None, []
+    for leg in (0, 1):
+        yield LEG[0], LEG[1], leg, [(leg, (LEG[2], 0.0))]
+        yield FOOT[0], FOOT[1], 2 + leg, sole(leg, FOOT[2])
+
+
+def mass_and_load(q, rates):
+    mass, load = np.zeros((6, 6)), np.zeros(6)
+    for m, inertia, body, links in bodies():
+        _, moves, left = point(q, rates, links)
+        mass += m * moves.T @ moves
+        load += m * moves.T @ (G * np.array([np.sin(SLOPE), -np.cos(SLOPE)]) - left)
+        if body is not None:
+            mass[2 + body, 2 + body] += inertia
+    for leg in (0, 1):
+        bent, bends = (each[4 + leg] - each[2 + leg] for each in (q, rates))
+        torque = -STIFFNESS * bent - DAMPING * bends
+        load[4 + leg] += torque
+        load[2 + leg] -= torque
+    return mass, load
+
+
+def contacts(q, rates, leg, stands):
+    """Rows of what stands, along and up each, but along once; accelerations without the rates'."""
+    rows, left = [], []
+    for where in stands:
+        _, moves, own = point(q, rates, sole(leg, where))
+        chosen = [1] if rows else [0, 1]
+        rows += [moves[i] for i in chosen]
+        left += [own[i] for i in chosen]
+    return np.array(rows), np.array(left)
+
+
+def held(mass, load, rows, target):
+    """What moves so that the rows come to a target, and the forces that make it."""
+    n, k = 6, len(rows)
+    matrix = np.block([[mass, -rows.T], [rows, np.zeros((k, k))]])
+    found = np.linalg.solve(matrix, np.concatenate([load, target]))
+    return found[:n], found[n:]
+
+
+def forces(y, leg, stands):
+    q, rates = y[:6], y[6:]
+    rows, left = contacts(q, rates, leg, stands)
+    return held(*mass_and_load(q, rates), rows, -left)
+
+
+def landed(y, leg, stands):
+    """Behind the plastic impact of what stands then, without what would have to pull."""
+    q, rates = y[:6], y[6:]
+    mass, _ = mass_and_load(q, rates)
+    rows, _ = contacts(q, rates, leg, stands)
+    after, impulses = held(mass, mass @ rates, rows, np.zeros(len(rows)))
+    up = impulses[[1, *range(2, len(rows))]]
+    if len(stands) > 1 and up.min() < 0.0:
+        return landed(y, leg, (stands[1 - int(np.argmin(up))],))
+    return np.concatenate([q, after]), stands
+
+
+def height(y, leg, where):
+    return point(y[:6], y[6:], sole(leg, where))[0][1]
+
+
+def phase(y, t, leg, stands):
+    """Until the other leg's foot comes down, or this one's other end does, or one end lifts."""
+    events = [lambda _, y, w=w: height(y, 1 - leg, w) for w in (HEEL, TOE)]
+    if len(stands) == 1:
+        (other,) = {HEEL, TOE} - set(stands)
+        events.append(lambda _, y: height(y, leg, other))
+    else:
+        events += [lambda _, y, i=i: forces(y, leg, stands)[1][1 + i] for i in (0, 1)]
+    for event in events:
+        event.terminal, event.direction = True, -1.0
+
+    def rates(_, y):
+        return np.concatenate([y[6:], forces(y, leg, stands)[0]])
+
+    how = dict(method="DOP853", rtol=1e-11, atol=1e-12)
+    while True:
+        found = solve_ivp(rates, (t, t + 3.0), y, events=events, **how)
+        t, y = found.t[-1], found.y[:, -1]
+        which = next(i for i, times in enumerate(found.t_events) if times.size)
+        new, old = (point(y[:6], y[6:], sole(k, HEEL))[0][0] for k in (1 - leg, leg))
+        if which >= 2 or new > old:
+            return y, t, which
+        # It scuffs, and passes through.
+        y, t = solve_ivp(rates, (t, t + 1e-6), y, **how).y[:, -1], t + 1e-6
+
+
+def walk(y, footsteps):
+    """Times of heel strikes, and the state behind the last one."""
+    leg, stands, t, strikes = 1, (HEEL, TOE), 0.0, []
+    while len(strikes) < footsteps:
+        y, t, which = phase(y, t, leg, stands)
+        if which < 2:
+            leg = 1 - leg
+            y, stands = landed(y, leg, ((HEEL, TOE)[which],))
+            strikes.append(t)
+        elif len(stands) == 1:
+            y, stands = landed(y, leg, (HEEL, TOE))
+        else:
+            stands = ((TOE, HEEL)[which - 2],)
+    return strikes, y
+
+
+@pytest.mark.slow
+def test_heel_strikes_and_toe_strikes_are_those_of_equations_by_hand():
+    walker = scene()
+    state = walker.state(**START)
+    found = jb.simulate(walker, state, footsteps=2, accuracy="tight", save=jb.HeelStrike())
+    names = ("leg_1", "leg_2", "foot_1", "foot_2")
+    y = np.array(
+        [0.0, 0.0]
+        + [float(getattr(state, f"theta_{name}")) for name in names]
+        + [0.0, 0.0]
+        + [float(getattr(state, f"omega_{name}")) for name in names]
+    )
+    heel = point(y[:6], y[6:], sole(1, HEEL))
+    y[:2] -= heel[0]
+    y[6:8] -= heel[1] @ y[6:]
+    strikes, end = walk(y, 2)
+    np.testing.assert_allclose(np.asarray(found.arrivals.t)[:2], strikes, atol=1e-8)
+    ours = [
+        float(getattr(found.final, f"{kind}_{name}"))
+        for kind in ("theta", "omega")
+        for name in names
+    ]
+    np.testing.assert_allclose(ours, [*end[2:6], *end[8:]], atol=1e-7)
+    # What the ankles' dampers lose jumps where the toe comes down.
+    books = jb.measure.rigid_ledger(walker, found)
+    np.testing.assert_allclose(books.residual / books.joint_loss, 0.0, atol=1e-6)
+
+    def lasts(rate):
+        start = state._replace(omega_leg_1=rate)
+        return jb.simulate(walker, start, footsteps=2, accuracy="tight").t[-1]
+
+    h = 1e-5
+    difference = (float(lasts(0.2 + h)) - float(lasts(0.2 - h))) / (2.0 * h)
+    assert float(jax.jacfwd(lasts)(0.2)) == pytest.approx(difference, rel=1e-5)
