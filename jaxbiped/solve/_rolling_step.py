@@ -76,7 +76,7 @@ def rolling_step(
 
     # A loop, which XLA compiles once; lanes write it out, without what is multiplied by zero.
     here = np.eye(len(_STAGES) + 1, dtype=bool)[1:]
-    found, _ = jax.lax.scan(stage, found, (_STAGES.astype(step.dtype), here))
+    found, _ = jax.lax.scan(stage, found, (_STAGES.astype(found.dtype), here))
     stages: list[Rates] = [tuple(row) for row in found]
     weights = _TABLEAU.b_sol - _TABLEAU.b_error if embedded else _TABLEAU.b_sol
     end = advance(state, step, weights[:-1], stages)
