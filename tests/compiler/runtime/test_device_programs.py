@@ -10,6 +10,7 @@ import jaxbiped as jb
 from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES, ptx_text
 from tests.compiler.assembler import assembled
 from tests.compiler.fake_driver import install
+from tests.mechanisms import scene_of, start_of
 from tests.rigid_walkers import rigid_seed, simplest_state
 from tests.sweep.walkers import gaitless, stacked, with_attractor
 
@@ -97,7 +98,34 @@ def rigid_labels(engine):
     return [*with_attractor(known)(stacked([simplest_state(angle, -1.2) for angle in angles]))][:-1]
 
 
-PROGRAMS = (end, steps, gradient, times, arrivals, extremes, tangents, labels, rigid, rigid_labels)
+def modes(engine):
+    """Knees that lock and are struck, on rigid feet."""
+    scene = jb.models.hsu_chen()
+    start = scene.state(
+        theta_thigh_1=-0.24, theta_shank_1=-0.3, theta_thigh_2=0.24, theta_shank_2=0.24,
+        omega_thigh_2=-1.11, omega_shank_2=-1.11, held="shank_2",
+    )  # fmt: skip
+    found = jb.rigid_walk(scene, start, footsteps=2, max_arrivals=2, engine=engine)
+    return found.t, found.state, found.ending, found.arrivals.t, found.arrivals.state
+
+
+def mechanism(engine):
+    """Knees with compliant stops, on compliant feet."""
+    scene = scene_of("kneed")
+    start = start_of("kneed", scene)
+
+    def walk(speed):
+        how = dict(duration=_TIME, save="end", accuracy="draft", engine=engine)
+        return jb.simulate(scene, start._replace(hip_vx=speed), **how)
+
+    found = jax.vmap(walk)(jnp.linspace(0.25, 0.35, COUNT))
+    return found.t, found.state, found.ending, found.accepted
+
+
+PROGRAMS = (
+    end, steps, gradient, times, arrivals, extremes, tangents, labels, rigid, rigid_labels, modes,
+    mechanism,
+)  # fmt: skip
 CASES = {each.__name__: each for each in PROGRAMS}
 
 LANDING = ("end", "steps", "labels", "rigid")
