@@ -23,6 +23,7 @@ from jaxbiped.compiler.runtime._machine_code import host, machine_code
 OUT_OF_MEMORY, NOT_READY, LAUNCH_FAILED = 2, 600, 719
 _WARP = 32
 _VOTE = "emulated_warp_vote"
+_NEAREST = "llvm.fptosi.sat"
 _PATIENCE = 120.0
 _WARPS = {}
 """The warp that a thread of this process belongs to."""
@@ -65,6 +66,14 @@ def host_text(text):
     text = text.replace(
         "declare i1 @llvm.nvvm.vote.any.sync(i32, i1)", f"declare i32 @{_VOTE}(i32)"
     )
+    # Out of range, a device converts to the nearest whole number, this machine to the least one.
+    for new in ("i32", "i64"):
+        text, count = re.subn(
+            rf"fptosi double (\S+) to {new}\b",
+            rf"call {new} @{_NEAREST}.{new}.f64(double \1)",
+            text,
+        )
+        text += f"\ndeclare {new} @{_NEAREST}.{new}.f64(double)\n" if count else ""
     call = "  %any = call i1 @llvm.nvvm.vote.any.sync(i32 -1, i1 %x)"
     assert call in text
     return text.replace(

@@ -12,7 +12,7 @@ walk gives the same bits in a jitted function as in a thread of our own.
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from jaxbiped.compiler.codegen._llvm_function import BYTES, FunctionBuilder, vector
+from jaxbiped.compiler.codegen._llvm_function import BYTES, FunctionBuilder, literal, vector
 from jaxbiped.compiler.ir._graph import Kind
 from jaxbiped.compiler.runtime._machine_code import Host
 
@@ -159,9 +159,9 @@ def select_instruction(
         name = target.library + op.removeprefix("libm ")
         return _per_lane(text, name, operands, width, target.architecture)
     if op == "ldexp":
-        return (_scale if target.scales else _scale_by_halves)(
-            text, operands[0], operands[1], width
-        )
+        return (_scale if target.scales else _scale_by_halves)(text, *operands, width, target)
+    if op == "to_int":
+        return _to_int(text, kinds[1], kind, operands[0], width, target)
     return _convert(text, op, kinds[1], kind, operands[0], width)
 
 
@@ -187,30 +187,47 @@ def _convert(text: FunctionBuilder, op: str, old: Kind, new: Kind, operand: str,
     wider = BYTES[new] > BYTES[old]
     word = {
         "bitcast": "bitcast",
-        "to_int": "fptosi",
         "to_float": "sitofp",
         "resize_float": "fpext" if wider else "fptrunc",
         "resize_int": "sext" if wider else "trunc",
     }[op]
-    found = text.assign(f"{word} {vector(old, width)} {operand} to {vector(new, width)}")
-    # Out of range is any number, but always the same one.
-    return text.assign(f"freeze {vector(new, width)} {found}") if op == "to_int" else found
+    return text.assign(f"{word} {vector(old, width)} {operand} to {vector(new, width)}")
 
 
-def _scale(text: FunctionBuilder, x: str, exponent: str, width: int) -> str:
+def _to_int(
+    text: FunctionBuilder, old: Kind, new: Kind, operand: str, width: int, target: KernelTarget
+) -> str:
+    """Rounds towards zero; out of range and NaN are the least whole number, as x86 has it."""
+    of, whole = vector(old, width), vector(new, width)
+    found = text.assign(f"freeze {whole} {text.assign(f'fptosi {of} {operand} to {whole}')}")
+    if target.architecture == "x86_64":
+        return found
+    size = text.intrinsic("fabs", [old, old], [operand], width)
+    end = 2 ** (8 * BYTES[new] - 1)
+    bound = text.splat_constant(literal(end, old), old, width)
+    least = text.splat_constant(literal(-end, new), new, width)
+    within = text.assign(f"fcmp olt {of} {size}, {bound}")
+    return text.assign(
+        f"select {vector(Kind.BOOL, width)} {within}, {whole} {found}, {whole} {least}"
+    )
+
+
+def _scale(text: FunctionBuilder, x: str, exponent: str, width: int, target: KernelTarget) -> str:
     """x 2ⁿ by one instruction."""
     of, short = vector(Kind.F64, width), vector(Kind.I32, width)
-    n = _convert(text, "to_int", Kind.F64, Kind.I32, exponent, width)
+    n = _to_int(text, Kind.F64, Kind.I32, exponent, width, target)
     name = f"llvm.ldexp.{'f64.i32' if width == 1 else f'v{width}f64.v{width}i32'}"
     text.declarations.add(f"declare {of} @{name}({of}, {short})")
     return text.assign(f"call {of} @{name}({of} {x}, {short} {n})")
 
 
-def _scale_by_halves(text: FunctionBuilder, x: str, exponent: str, width: int) -> str:
+def _scale_by_halves(
+    text: FunctionBuilder, x: str, exponent: str, width: int, target: KernelTarget
+) -> str:
     """x 2ⁿ by two powers of two, for the smallest results."""
     of, whole = vector(Kind.F64, width), vector(Kind.I64, width)
     one, bias, shift = (text.splat_constant(c, Kind.I64, width) for c in ("1", "1023", "52"))
-    n = _convert(text, "to_int", Kind.F64, Kind.I64, exponent, width)
+    n = _to_int(text, Kind.F64, Kind.I64, exponent, width, target)
     half = text.assign(f"ashr {whole} {n}, {one}")
     for part in (half, text.assign(f"sub {whole} {n}, {half}")):
         biased = text.assign(f"add {whole} {part}, {bias}")

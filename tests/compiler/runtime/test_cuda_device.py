@@ -118,6 +118,23 @@ def test_streams_are_read_in_both_directions(monkeypatch):
         _same([CUDA.run(request).outputs], [LANES.run(request).outputs])
 
 
+@pytest.mark.parametrize("kind", [jnp.int32, jnp.int64])
+def test_numbers_beyond_whole_ones_become_the_lanes(monkeypatch, kind):
+    """As quadrants of angles are, of a step that has gone astray."""
+    install(monkeypatch, lanes=4, multiprocessors=1)
+    program = Program(
+        start=lambda inputs: inputs,
+        attempt=lambda inputs, now: (now, jnp.asarray(True)),
+        finish=lambda inputs, now: now.astype(kind),
+    )
+    end = 2.0 ** (8 * jnp.dtype(kind).itemsize - 1)
+    numbers = [2.9, -2.9, end - 1024.0, end, -end, 1e300, -1e300, np.inf, -np.inf, np.nan]
+    request = Request(program, np.array(numbers), batch=True)
+    found = CUDA.run(request).outputs
+    assert int(found[3]) == int(found[-1]) == -int(end)
+    _same([found], [LANES.run(request).outputs])
+
+
 def test_under_jit_and_vmap(monkeypatch):
     install(monkeypatch, lanes=4, multiprocessors=1)
 
