@@ -220,7 +220,7 @@ def _draws_in(
     goals = Goals(*[*(np.stack([each]) for each in aim.goal), scales])
     strikes = cycles * attractor.cycle_footsteps + (1 if scene.compliant else 0)
     found = follow_starts(
-        broadcast_leaves(scene, count),
+        scene,
         starts,
         broadcast_leaves(goals, count),
         (attractor.cycle_footsteps,),

@@ -85,11 +85,13 @@ def follow_starts(
     cycles: tuple[int, ...],
     effort: Effort,
 ) -> Labelled:
-    """Follows n starts; leaves of scene, states and goals are NumPy's arrays (n, …).
+    """Follows n starts; leaves of states and goals are NumPy's arrays (n, …), of the scene too, or
+    numbers of all starts.
 
     `cycles` are footsteps in the cycles of the goals.
     """
     count, each = len(states[0]), scene.arrival_footsteps
+    waits = _PATIENCE * np.sqrt(np.asarray(scene.mechanism.height) / np.asarray(scene.ground.g))
     arrivals = tuple(max(length // each, 1) for length in cycles)
     # Labels by a number may doubt what grazes.
     counted = effort.wanted is not None
@@ -103,7 +105,7 @@ def follow_starts(
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
 
     common = dict(
-        scene=scene,
+        scene=jtu.tree_map(same, scene),
         state=states,
         duration=same(_LONGEST),
         footsteps=same(effort.footsteps),
@@ -118,8 +120,7 @@ def follow_starts(
         atol = same(1e-2 * effort.rtol)
         units = jtu.tree_map(same, units_of(scene, states))
         solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))
-    waits = _PATIENCE * np.sqrt(np.asarray(scene.mechanism.height) / np.asarray(scene.ground.g))
-    starts = Start(solve, goals, same(effort.gap), waits)
+    starts = Start(solve, goals, same(effort.gap), same(waits))
     embedded = effort.embedded and not scene.compliant
     fenced = effort.engine == "xla"
     program = _program(scene.compliant, effort.solver, arrivals, fenced, embedded, counted)

@@ -16,7 +16,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._identity import identity
-from jaxbiped._types import JsonObject, as_float
+from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.dynamics._state import state_type, without_whole_turns
 from jaxbiped.scene._parameter_access import scene_identity, with_parameters
@@ -156,7 +156,6 @@ class Labelling(eqx.Module):
         count = len(states[0])
         scene = with_parameters(self.scene, {k: jnp.asarray(v) for k, v in given.items()})
         scene = check_scene(scene, Scene, RigidScene)
-        scene = jtu.tree_map(lambda leaf: np.broadcast_to(as_float(leaf), (count,)), scene)
         goals, cycles = self.family.goals(given, count)
         found = follow_starts(scene, states, goals, cycles, effort)
         if not given or self.family.names:

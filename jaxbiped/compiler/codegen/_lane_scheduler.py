@@ -20,8 +20,11 @@ FIELDS = (
     "streams",
     "stream_lengths",
     "stream_stride",
+    "input_places",
+    "input_steps",
 )
-"""What a kernel's entry takes: 64-bit numbers one behind the other, addresses among them."""
+"""What a kernel's entry takes: 64-bit numbers one behind the other, addresses among them. Number k
+of simulation i is input `input_places[k] + i input_steps[k]`, and output i n + k of n numbers."""
 _NUMBERS = ("count", "record_room", "schedule_length", "stream_stride")
 
 
@@ -95,7 +98,7 @@ class LaneScheduler:
         has = t.assign(f"icmp sge i64 {index}, 0")
         t.line(f"br i1 {has}, label %{give}, label %{take}")
         t.begin(give)
-        self._copy_column(self.sizes.outputs, self.rooms.given, lane, "outputs", index)
+        self._give_outputs(lane, index)
         if self.sizes.recorded:
             count = t.assign(f"load i64, ptr {count_at}")
             self._put(count, self.field["record_counts"], index)
@@ -115,7 +118,7 @@ class LaneScheduler:
             self._put("0", self.bits["rows"], lane)
         if self.scheduled:
             self._schedule(lane, "0")
-        self._copy_column(self.sizes.inputs, self.rooms.taken, lane, "inputs", following)
+        self._take_inputs(lane, following)
         t.line(f"br label %{after}")
         t.begin(rest)
         t.line(f"store i64 -1, ptr {index_at}")
@@ -156,21 +159,33 @@ class LaneScheduler:
         place = self.text.assign(f"add i64 {numbers.first}, {k * numbers.step}")
         return self.text.address(numbers.pointer, Kind.F64, place)
 
-    def _copy_column(self, many: int, own: str, lane: str, field: str, index: str) -> None:
-        """Copies one lane's numbers to or from its column of an array (numbers, simulations)."""
-        if not many:
+    def _take_inputs(self, lane: str, index: str) -> None:
+        """Copies a simulation's inputs to its lane."""
+        t = self.text
+        if not self.sizes.inputs:
             return
-        t, array = self.text, self.field[field]
-        with t.loop(t.fresh("copy"), t.fresh("copied"), many, index="k") as k:
-            own_row = t.assign(f"mul i64 {k}, {self.width}")
-            here = t.assign(f"add i64 {own_row}, {lane}")
-            row = t.assign(f"mul i64 {k}, {self.field['count']}")
-            there = t.assign(f"add i64 {row}, {index}")
-            source, target = t.address(own, Kind.F64, here), t.address(array, Kind.F64, there)
-            if field == "inputs":
-                source, target = target, source
-            number = t.assign(f"load double, ptr {source}")
-            t.line(f"store double {number}, ptr {target}")
+        with t.loop(t.fresh("copy"), t.fresh("copied"), self.sizes.inputs, index="k") as k:
+            moved = t.assign(f"mul i64 {self._get(self.field['input_steps'], k)}, {index}")
+            there = t.assign(f"add i64 {self._get(self.field['input_places'], k)}, {moved}")
+            at = t.address(self.field["inputs"], Kind.F64, there)
+            number = t.assign(f"load double, ptr {at}")
+            t.line(f"store double {number}, ptr {self._own(self.rooms.taken, k, lane)}")
+
+    def _give_outputs(self, lane: str, index: str) -> None:
+        """Copies a lane's outputs to its simulation's."""
+        t = self.text
+        if not self.sizes.outputs:
+            return
+        row = t.assign(f"mul i64 {index}, {self.sizes.outputs}")
+        with t.loop(t.fresh("copy"), t.fresh("copied"), self.sizes.outputs, index="k") as k:
+            number = t.assign(f"load double, ptr {self._own(self.rooms.given, k, lane)}")
+            at = t.address(self.field["outputs"], Kind.F64, t.assign(f"add i64 {row}, {k}"))
+            t.line(f"store double {number}, ptr {at}")
+
+    def _own(self, room: str, k: str, lane: str) -> str:
+        """Where the k-th number of a lane is in a room of all lanes."""
+        row = self.text.assign(f"mul i64 {k}, {self.width}")
+        return self.text.address(room, Kind.F64, self.text.assign(f"add i64 {row}, {lane}"))
 
     def _schedule(self, lane: str, place: str) -> None:
         """Looks up a lane's next time, infinity behind the last one."""

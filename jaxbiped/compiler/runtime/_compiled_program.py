@@ -16,6 +16,7 @@ from jaxbiped.compiler.runtime._machine_code import default_threads, run_in_thre
 from jaxbiped.compiler.runtime._processor import (
     AbstractProcessor,
     HostProcessor,
+    InputTable,
     Launch,
     input_streams_of,
 )
@@ -108,24 +109,19 @@ class CompiledProgram:
         They are 64-bit floating-point numbers, whatever they stand for. See `run_table` for the
         options.
         """
-        leaves = [np.asarray(leaf) for leaf in jtu.tree_leaves(inputs)]
-        count = leaves[0].shape[0]
-        rows = [
-            np.moveaxis(leaf, 0, -1).reshape(int(np.prod(shape.shape)), count)
-            for leaf, shape in zip(leaves, jtu.tree_leaves(self.kernel.inputs), strict=True)
-        ]
-        found, recorded = self.run_table(np.concatenate(rows).astype(np.float64), **options)
+        table = InputTable.of_leaves([np.asarray(leaf) for leaf in jtu.tree_leaves(inputs)])
+        found, recorded = self.run_table(table, **options)
         with np.errstate(invalid="ignore"):
             outputs = outputs_of(
                 self.kernel.outline.outputs,
-                found,
-                lambda part, dtype: np.moveaxis(part, -1, 0).astype(dtype),
+                found.T,
+                lambda part, dtype: np.moveaxis(part, -1, 0).astype(dtype, order="C"),
             )
         return Ran(outputs, recorded)
 
     def run_table(
         self,
-        table: np.ndarray,
+        table: InputTable,
         *,
         schedule: np.ndarray | None = None,
         stream: Sequence[np.ndarray] | None = None,
@@ -135,7 +131,7 @@ class CompiledProgram:
         width: int | None = None,
         quick: bool = False,
     ) -> tuple[np.ndarray, Recorded | None]:
-        """Runs n simulations; inputs and outputs are tables (numbers, n), leaf by leaf.
+        """Runs n simulations; their outputs, shape (n, numbers), leaf by leaf.
 
         Args:
             table: inputs.
@@ -151,10 +147,8 @@ class CompiledProgram:
         Raises:
             KeyboardInterrupt: the user interrupts; the simulations end within a tenth of a second.
         """
-        table = np.ascontiguousarray(table, dtype=np.float64)
-        count = table.shape[1]
-        signature = self.kernel.signature
-        outputs = np.full((signature.outputs, count), np.nan)
+        count, signature = table.count, self.kernel.signature
+        outputs = np.full((count, signature.outputs), np.nan)
         times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
         streams = input_streams_of(stream, count, signature.row, backwards=signature.backwards)
         shape = (count, room, signature.recorded)
@@ -168,7 +162,9 @@ class CompiledProgram:
         arrays = dict(
             queue=queue,
             stop=stop,
-            inputs=table,
+            inputs=table.numbers,
+            input_places=table.places,
+            input_steps=table.steps,
             outputs=outputs,
             records=records,
             record_counts=record_counts,
@@ -180,7 +176,7 @@ class CompiledProgram:
             count=count, record_room=room, schedule_length=len(times), stream_stride=streams.stride
         )
         if count:
-            launch = Launch(arrays, numbers, streams.rows)
+            launch = Launch(arrays, numbers, streams.rows, table)
             job = self.processor.job(self.kernel, launch, chosen, many)
             run_in_threads(job.run, job.workers, stop, quick=quick)
             job.finish()
@@ -192,7 +188,7 @@ class CompiledProgram:
         constants = self.kernel.signature.constants
         if not constants:
             return varying
-        whole = np.empty((len(varying) + len(constants), varying.shape[1]))
-        whole[list(constants)] = np.array(list(constants.values()))[:, None]
-        whole[[i for i in range(len(whole)) if i not in constants]] = varying
+        whole = np.empty((len(varying), varying.shape[1] + len(constants)))
+        whole[:, list(constants)] = list(constants.values())
+        whole[:, [i for i in range(whole.shape[1]) if i not in constants]] = varying
         return whole

@@ -125,6 +125,8 @@ _POLL = 2e-4
 """How long to wait before looking whether a kernel is over [s]."""
 WRITTEN = ("outputs", "records", "record_counts")
 """Arrays that a kernel writes for the host."""
+_WHOLLY_WRITTEN = ("outputs", "record_counts")
+"""Those of which it writes every entry; of records only as many as there are."""
 
 
 class LoadedKernel(NamedTuple):
@@ -201,7 +203,7 @@ class CudaDevice:
             (rows,) = part.rows
             streams = part.arrays["streams"] + stack.enter_context(self._copied(rows))
             address = {
-                name: stack.enter_context(self._copied(array))
+                name: stack.enter_context(self._copied(array, only_room=name in _WHOLLY_WRITTEN))
                 for name, array in {**part.arrays, "streams": streams}.items()
             }
             fields = np.array(
@@ -246,14 +248,15 @@ class CudaDevice:
             self._driver.call("cuStreamDestroy_v2", stream)
 
     @contextlib.contextmanager
-    def _copied(self, array: np.ndarray) -> Iterator[int]:
-        """Address of a copy on the device; 0 for an array without entries."""
+    def _copied(self, array: np.ndarray, *, only_room: bool = False) -> Iterator[int]:
+        """Address of a copy on the device, or of room for one; 0 for an array without entries."""
         if not array.nbytes:
             yield 0
             return
         address = self._driver.allocate(array.nbytes)
         try:
-            self._driver.call("cuMemcpyHtoD_v2", address, array.ctypes.data, array.nbytes)
+            if not only_room:
+                self._driver.call("cuMemcpyHtoD_v2", address, array.ctypes.data, array.nbytes)
             yield address
         finally:
             self._driver.call("cuMemFree_v2", address)

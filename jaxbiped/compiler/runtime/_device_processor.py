@@ -69,9 +69,7 @@ class DeviceProcessor(AbstractProcessor):
                         place = parts.get_nowait()
                     except queue.Empty:
                         return
-                    part = _part(launch, place)
-                    device.run(loaded, part, stop)
-                    _give(launch, place, part)
+                    device.run(loaded, _part(launch, place), stop)
             except BaseException as error:  # of a thread: told by `finish`
                 errors.append(error)
 
@@ -96,11 +94,14 @@ def _part(launch: Launch, place: slice) -> Launch:
     before = np.cumsum([0, *(each.nbytes for each in rows)])[: len(rows)]
     own = np.array([each.ctypes.data for each in rows], dtype=np.int64)
     starts = arrays["streams"][place] - own + before if rows else np.zeros(0, dtype=np.int64)
+    table = launch.table.part(place)
     taken = dict(
         queue=np.zeros(1, dtype=np.int64),
         stop=np.zeros(1, dtype=np.int64),
-        inputs=np.ascontiguousarray(arrays["inputs"][:, place]),
-        outputs=np.ascontiguousarray(arrays["outputs"][:, place]),
+        inputs=table.numbers,
+        input_places=table.places,
+        input_steps=table.steps,
+        outputs=arrays["outputs"][place],
         records=arrays["records"][place],
         record_counts=arrays["record_counts"][place],
         schedule=arrays["schedule"],
@@ -108,9 +109,4 @@ def _part(launch: Launch, place: slice) -> Launch:
         stream_lengths=arrays["stream_lengths"][place],
     )
     every = np.concatenate([each.ravel() for each in rows]) if rows else np.zeros(0)
-    return Launch(taken, {**launch.numbers, "count": place.stop - place.start}, [every])
-
-
-def _give(launch: Launch, place: slice, part: Launch) -> None:
-    """Puts what a part gave where it belongs; its records are there already."""
-    launch.arrays["outputs"][:, place] = part.arrays["outputs"]
+    return Launch(taken, {**launch.numbers, "count": table.count}, [every], table)

@@ -18,6 +18,7 @@ from jaxbiped._types import Numbers
 from jaxbiped.caching._caches import half_of_cache_bytes, register_cache
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._machine_code import default_threads
+from jaxbiped.compiler.runtime._processor import InputTable
 from jaxbiped.compiler.runtime._program import Recorded
 
 BLOCK = 512
@@ -71,7 +72,7 @@ class BufferPool:
 
 
 Tables: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Of n simulations: outputs (numbers, n), records (n, room, numbers), and how many these are."""
+"""Of n simulations: outputs (n, numbers), records (n, room, numbers), and how many these are."""
 _Key: TypeAlias = tuple[Hashable, bytes]
 """A program and the bytes of one simulation's inputs."""
 
@@ -103,44 +104,44 @@ class RecordCache:
     def run(
         self, program: Hashable, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
     ) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Outputs of what `run` finds for inputs (numbers, n), and its records, now known."""
+        """Outputs of what `run` finds for inputs (n, numbers), and its records, now known."""
         every, found = [], []
-        for first in range(0, inputs.shape[1], BLOCK):
-            outputs, records, counts = run(inputs[:, first : first + BLOCK])
+        for first in range(0, len(inputs), BLOCK):
+            outputs, records, counts = run(inputs[first : first + BLOCK])
             every.append(outputs)
             # Where they fill most of their room, that stays; else it would be held for little.
             filled = 2 * np.sum(counts) >= records.shape[0] * records.shape[1]
             own = [each[:n] for each, n in zip(records, counts, strict=True)]
             found += own if filled else [each.copy() for each in own]
         with self._lock:
-            for column, each in zip(inputs.T, found, strict=True):
-                key = program, column.tobytes()
+            for row, each in zip(inputs, found, strict=True):
+                key = program, row.tobytes()
                 self._drop(key)
                 self._records[key] = each
                 self._size += _bytes_of(key, each)
             most = self._most()
             while self._size > most:
                 self._drop(next(iter(self._records)))
-        return np.concatenate(every, axis=1), found
+        return np.concatenate(every), found
 
     def records(
         self, program: Hashable, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
     ) -> list[np.ndarray]:
         """Records of each simulation (records, numbers); those that are not known `run` finds."""
-        keys = [(program, column.tobytes()) for column in inputs.T]
+        keys = [(program, row.tobytes()) for row in inputs]
         with self._lock:
             known = {key: self._records[key] for key in keys if key in self._records}
         missing = [i for i, key in enumerate(keys) if key not in known]
         if missing:
-            _, found = self.run(program, inputs[:, missing], run)
+            _, found = self.run(program, inputs[missing], run)
             known |= {keys[i]: each for i, each in zip(missing, found, strict=True)}
         return [known[key] for key in keys]
 
     def forget(self, program: Hashable, inputs: np.ndarray) -> None:
         """Holds the records of these no longer."""
         with self._lock:
-            for column in inputs.T:
-                self._drop((program, column.tobytes()))
+            for row in inputs:
+                self._drop((program, row.tobytes()))
 
     def _drop(self, key: _Key) -> None:
         records = self._records.pop(key, None)
@@ -203,22 +204,22 @@ class LaneRun(NamedTuple):
         parts = [slice(k, k + size) for k in range(0, max(1, len(numbers)), max(1, size))]
         found = []
         for part in parts:
-            own, rows = self._own_and_rows(numbers[part].T)
+            own, rows = self._own_and_rows(numbers[part])
             if stream is not None:
                 rows = list(np.asarray(stream))
             outputs, recorded = self._run(own, rows, self.room, width)
-            found.append([outputs.T, *(recorded or ())])
+            found.append([outputs, *(recorded or ())])
         return [np.concatenate(each) for each in zip(*found, strict=True)]
 
     def outputs(self, numbers: np.ndarray) -> list[np.ndarray]:
         """Outputs alone; their records are then known."""
-        return [_RECORDS.run(self, numbers.T, self._recording(len(numbers)))[0].T]
+        return [_RECORDS.run(self, numbers, self._recording(len(numbers)))[0]]
 
     def rows(self, numbers: np.ndarray) -> list[np.ndarray]:
         """Records of each simulation (records, numbers), or zeros where it made none."""
-        known = _RECORDS.records(self, numbers.T, self._recording(len(numbers)))
+        known = _RECORDS.records(self, numbers, self._recording(len(numbers)))
         if self.once:
-            _RECORDS.forget(self, numbers.T)
+            _RECORDS.forget(self, numbers)
         return [each if len(each) else np.zeros((1, each.shape[1])) for each in known]
 
     def columns(self, numbers: np.ndarray, first: np.ndarray) -> list[np.ndarray]:
@@ -226,7 +227,7 @@ class LaneRun(NamedTuple):
 
         Before those recorded comes that of `first`, shape (n, k).
         """
-        known = _RECORDS.records(self, numbers.T, self._recording(len(numbers)))
+        known = _RECORDS.records(self, numbers, self._recording(len(numbers)))
         found = [np.full((len(known), 1 + self.room), np.nan) for _ in first.T]
         for i, records in enumerate(known):
             for column, start, values in zip(found, first[i], records.T, strict=False):
@@ -257,19 +258,19 @@ class LaneRun(NamedTuple):
         memory: Callable[[tuple[int, ...]], np.ndarray] = np.zeros,
     ) -> tuple[np.ndarray, Recorded | None]:
         return self.compiled.run_table(
-            own,
+            InputTable.of_rows(own),
             schedule=None if self.schedule is None else self.schedule.times,
             stream=rows,
             room=room,
             memory=memory,
-            quick=self.quick and own.shape[1] == 1,
+            quick=self.quick and len(own) == 1,
             width=width,
         )
 
     def _own_and_rows(self, table: np.ndarray) -> tuple[np.ndarray, list[np.ndarray] | None]:
         """Own inputs of simulations, and the rows that others recorded for them."""
-        own, others = np.split(table, [self.compiled.size])
-        return own, None if self.reads is None else self.reads.rows(others.T)
+        own, others = np.split(table, [self.compiled.size], axis=1)
+        return own, None if self.reads is None else self.reads.rows(others)
 
     def _width(self, count: int) -> int:
         return self.compiled.width(count, default_threads())

@@ -15,6 +15,53 @@ _MANY = 8
 """Vectors for each thread from which on two are computed side by side."""
 
 
+class InputTable(NamedTuple):
+    """Inputs of `count` simulations: number k of simulation i is `places[k] + i steps[k]`.
+
+    Attributes:
+        numbers: the `shared` ones of all simulations, and behind them those of each, one by one.
+    """
+
+    count: int
+    shared: int
+    numbers: np.ndarray
+    places: np.ndarray
+    steps: np.ndarray
+
+    @staticmethod
+    def of_rows(rows: np.ndarray) -> "InputTable":
+        """Of n simulations that share nothing, shape (n, numbers)."""
+        count, size = rows.shape
+        numbers = np.ascontiguousarray(rows, dtype=np.float64).reshape(-1)
+        return InputTable(count, 0, numbers, np.arange(size), np.full(size, size, dtype=np.int64))
+
+    @staticmethod
+    def of_leaves(leaves: Sequence[np.ndarray]) -> "InputTable":
+        """Of arrays (n, …); those that repeat one entry in memory are shared."""
+        count = leaves[0].shape[0]
+        shared, own, is_own = [], [], []
+        for leaf in leaves:
+            varies = count > 1 and leaf.strides[0] != 0
+            rows = (leaf if varies else leaf[:1]).reshape(count if varies else 1, -1)
+            (own if varies else shared).append(rows)
+            is_own += [varies] * rows.shape[1]
+        steps = np.array(is_own, dtype=np.int64) * sum(is_own)
+        every = [np.concatenate([np.zeros((1, 0)), *shared], axis=1)]
+        if own:
+            every.append(np.concatenate(own, axis=1))
+        numbers = np.concatenate([each.reshape(-1) for each in every], dtype=np.float64)
+        places = np.empty(len(steps), dtype=np.int64)
+        # The own ones of the first simulation lie just behind the shared ones.
+        places[np.argsort(steps != 0, kind="stable")] = np.arange(len(steps))
+        return InputTable(count, len(steps) - sum(is_own), numbers, places, steps)
+
+    def part(self, place: slice) -> "InputTable":
+        """Of some simulations, one behind the other."""
+        own = self.numbers[self.shared :].reshape(self.count, -1)[place]
+        numbers = np.concatenate([self.numbers[: self.shared], own.reshape(-1)])
+        return self._replace(count=len(own), numbers=numbers)
+
+
 class InputStreams(NamedTuple):
     """Of n simulations.
 
@@ -67,11 +114,13 @@ class Launch(NamedTuple):
         arrays: on the host; `outputs`, `records` and `record_counts` are written.
         numbers: whole numbers; `count` is that of the simulations.
         rows: of the streams that they read: what must stay in memory.
+        table: the inputs that `arrays` hold.
     """
 
     arrays: Mapping[str, np.ndarray]
     numbers: Mapping[str, int]
     rows: list[np.ndarray]
+    table: InputTable
 
     @property
     def simulations(self) -> int:

@@ -62,7 +62,7 @@ def runs(powers, monkeypatch):
 
     def counted(program, table, **options):
         if program == powers:
-            counts.append(table.shape[1])
+            counts.append(table.count)
         return run_table(program, table, **options)
 
     monkeypatch.setattr(CompiledProgram, "run_table", counted)
@@ -161,16 +161,16 @@ def test_what_came_first_goes_first():
     ran = []
 
     def run(table):
-        ran.extend(table[0])
-        return table.copy(), np.ones((table.shape[1], 3, 1)), np.full(table.shape[1], 2)
+        ran.extend(table[:, 0])
+        return table.copy(), np.ones((len(table), 3, 1)), np.full(len(table), 2)
 
     # An input and two records of one number each: 24 bytes a simulation.
     held = RecordCache(lambda: 50)
     for number in (1.0, 2.0, 3.0):
         np.testing.assert_array_equal(held.run("program", np.array([[number]]), run)[0], [[number]])
-    held.records("program", np.array([[3.0, 2.0]]), run)
+    held.records("program", np.array([[3.0], [2.0]]), run)
     assert ran == [1.0, 2.0, 3.0]
-    rows = held.records("program", np.array([[1.0, 3.0]]), run)
+    rows = held.records("program", np.array([[1.0], [3.0]]), run)
     assert [each.shape for each in rows] == [(2, 1), (2, 1)]
     assert ran == [1.0, 2.0, 3.0, 1.0]
     held.records("another", np.array([[3.0]]), run)
@@ -181,10 +181,10 @@ def test_simulations_without_records_take_room_as_well():
     held = RecordCache(lambda: 800)
 
     def run(table):
-        n = table.shape[1]
+        n = len(table)
         return table, np.zeros((n, 3, 1)), np.zeros(n, dtype=int)
 
-    held.run("program", np.arange(1000.0)[None], run)
+    held.run("program", np.arange(1000.0)[:, None], run)
     assert held.kept == 800
     held.clear()
     assert held.kept == 0

@@ -10,6 +10,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 import jaxbiped as jb
 from jaxbiped.compiler import LANES
+from jaxbiped.compiler.runtime._processor import InputTable
 from jaxbiped.plot.viewer._playground import STEPS, played_request, recorded_names
 from jaxbiped.plot.viewer._view import page_of, script
 from tests.mechanisms import scene_of, start_of
@@ -51,9 +52,9 @@ def natively(scene, state):
     """Records, their number and the ending by lanes."""
     request = played_request(scene, state, FOOTSTEPS)
     inputs = np.array([float(leaf) for leaf in jax.tree.leaves(request.inputs)])
-    found, recorded = LANES.compile(request).run_table(inputs[:, None], room=STEPS)
+    found, recorded = LANES.compile(request).run_table(InputTable.of_rows(inputs[None]), room=STEPS)
     count = int(recorded.counts[0])
-    return inputs, recorded.values[0, :count], found[9, 0]
+    return inputs, recorded.values[0, :count], found[0, 9]
 
 
 def test_the_page_solves_what_lanes_solve_to_the_last_bit(playground, browser, tmp_path):
@@ -122,7 +123,7 @@ def test_a_mechanism_s_page_records_the_walk_that_lanes_make():
     state = start_of("coupled", scene)
     request = played_request(scene, state, FOOTSTEPS)
     inputs = np.array([float(leaf) for leaf in jax.tree.leaves(request.inputs)])
-    _, recorded = LANES.compile(request).run_table(inputs[:, None], room=STEPS)
+    _, recorded = LANES.compile(request).run_table(InputTable.of_rows(inputs[None]), room=STEPS)
     rows = recorded.values[0, : int(recorded.counts[0])]
     named = dict(zip(recorded_names(scene), rows.T, strict=True))
     walk = jb.simulate(scene, state, footsteps=FOOTSTEPS, engine="lanes")

@@ -25,8 +25,9 @@ class Simulator {
       return place;
     };
     const numbers = { count: 1, room: sent.room };
-    this.at = { fields: take(13), queue: take(1), stop: take(1), counts: take(1) };
-    Object.assign(this.at, { inputs: take(sent.inputs.length), outputs: take(64) });
+    this.at = { fields: take(15), queue: take(1), stop: take(1), counts: take(1) };
+    const many = sent.inputs.length;
+    Object.assign(this.at, { inputs: take(many), places: take(many), outputs: take(64) });
     this.at.records = take(sent.room * sent.recorded.length);
     memory.grow(Math.ceil((end - STACK) / PAGE));
     this.integers = new BigInt64Array(memory.buffer);
@@ -34,6 +35,9 @@ class Simulator {
     const { queue, stop, inputs, outputs, records, counts } = this.at;
     const fields = [numbers.count, queue, stop, inputs, outputs, records, counts, numbers.room];
     fields.forEach((value, k) => (this.integers[this.at.fields / 8 + k] = BigInt(value)));
+    for (let k = 0; k < many; k++) this.integers[this.at.places / 8 + k] = BigInt(k);
+    // Of a single walk, steps from one to the next do not count.
+    for (const k of [13, 14]) this.integers[this.at.fields / 8 + k] = BigInt(this.at.places);
   }
 
   /** The numbers recorded of a solve, row by row, and how it ended. */
