@@ -213,6 +213,19 @@ def _answer(found: dict[str, Any]) -> tuple[str, ...]:
     return *errors, *spent, "nothing" if found["said"] is None else small(found["said"])
 
 
+def of_gpu_speed(numbers: dict[str, Any]) -> Iterator[str]:
+    """Of docs/gpu.md; what lanes were not asked is a dash."""
+    for each in numbers["walks"]:
+        rates = (each.get(f"{engine}_steps_per_s") for engine in ("cuda", "lanes"))
+        yield row(f"{each['size']:,}", *("–" if rate is None else small(rate) for rate in rates))
+    for each in numbers["labels"]:
+        rates = (each.get(f"{engine}_starts_per_s") for engine in ("cuda", "lanes"))
+        told = ("–" if rate is None else f"{round(rate, -2):,.0f}" for rate in rates)
+        yield row(f"{each['size']:,}", *told, str(each.get("labels_that_differ", "–")))
+    yield f"{small(numbers['peak_flops'])} operations per second"
+    yield f"take {100.0 * numbers['share_of_peak']:.0f} % of that"
+
+
 def _milliseconds(seconds: float | str | None) -> str:
     if seconds is None:
         return "–"

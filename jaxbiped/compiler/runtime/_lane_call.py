@@ -119,8 +119,7 @@ class RecordCache:
                 self._drop(key)
                 self._records[key] = each
                 self._size += _bytes_of(key, each)
-            most = self._most()
-            while self._size > most:
+            while self._size > self._most():
                 self._drop(next(iter(self._records)))
         return np.concatenate(every), found
 

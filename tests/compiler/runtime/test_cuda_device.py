@@ -198,8 +198,8 @@ class _Failing:
 def test_batches_fill_a_device(monkeypatch):
     install(monkeypatch, multiprocessors=100)
     processor = CUDA.processor
-    assert processor.fills(30_000)
-    assert not processor.fills(20_000)
+    assert processor.fills(3200)
+    assert not processor.fills(3199)
     assert processor.hindrance() is None
 
 

@@ -131,15 +131,15 @@ CASES = {each.__name__: each for each in PROGRAMS}
 LANDING = ("end", "steps", "labels", "rigid")
 """One of each engine's programs that a change waits for; the others are run at night."""
 MOST = {
-    "end": (255, 752, 952),
-    "steps": (255, 708, 1012),
-    "times": (255, 816, 1080),
-    "arrivals": (255, 788, 1072),
-    "extremes": (255, 848, 1060),
-    "tangents": (255, 6308, 11356),
-    "labels": (255, 2472, 3960),
-    "rigid": (236, 0, 0),
-    "rigid_labels": (255, 636, 596),
+    "end": (255, 804, 1056),
+    "steps": (255, 812, 1084),
+    "times": (255, 856, 1120),
+    "arrivals": (255, 836, 1136),
+    "extremes": (255, 912, 1192),
+    "tangents": (255, 6572, 11428),
+    "labels": (255, 2560, 3976),
+    "rigid": (218, 0, 0),
+    "rigid_labels": (255, 612, 564),
 }
 """Registers of a thread, bytes that are stored to and loaded from memory for want of them:
 on sm_90, by `ptxas` 12.9."""
