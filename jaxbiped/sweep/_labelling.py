@@ -73,8 +73,9 @@ def relabel_doubtful(
         finer = finer._replace(max_attempts=_STEPS * finer.max_attempts)
         found, check = follow(open_, finer), follow(open_, _by_other_method(finer))
         agree_now = ~_differ(found, check)
-        settled = agree & agree_now & ~_differ(found, _some(label, open_))
-        found.attempted[:] += check.attempted + label.attempted[open_]
+        before: Labelled = jtu.tree_map(lambda leaf, rows=open_: leaf[rows], label)
+        settled = agree & agree_now & ~_differ(found, before)
+        found.attempted[:] += check.attempted + before.attempted
         for into, values in zip(jtu.tree_leaves(label), jtu.tree_leaves(found), strict=True):
             into[open_] = values
         doubt[open_[settled]] = int(Doubt.SETTLED)
@@ -97,10 +98,6 @@ def _differ(one: Labelled, another: Labelled) -> np.ndarray:
     """Whether starts have other labels, gaits or cycles (boolean)."""
     differ = one.label != another.label
     return differ | (one.gait != another.gait) | (one.cycle_footsteps != another.cycle_footsteps)
-
-
-def _some(labelled: Labelled, places: np.ndarray) -> Labelled:
-    return jtu.tree_map(lambda leaf: leaf[places], labelled)
 
 
 class Labelling(eqx.Module):
