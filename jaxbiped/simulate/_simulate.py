@@ -15,7 +15,7 @@ from jaxbiped.dynamics._section import AbstractSection, HeelStrike
 from jaxbiped.scene._linkages import LinkageScene
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState
-from jaxbiped.simulate._error_witnesses import (
+from jaxbiped.simulate._accurate_walk import (
     accurate_walk,
     check_accurate_walk,
     warn_of_long_steps,

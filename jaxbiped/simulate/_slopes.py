@@ -23,7 +23,7 @@ from jaxbiped.solve._ending_surfaces import ending_surface
 from jaxbiped.solve._rigid_progress import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.rosenbrock._rodas import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
 from jaxbiped.variational._variational_solve import (

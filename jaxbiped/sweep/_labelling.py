@@ -25,7 +25,7 @@ from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named
-from jaxbiped.solve.rosenbrock._rodas import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
 from jaxbiped.sweep._gait_family import Family
 from jaxbiped.sweep._labelling_loop import Labelled
