@@ -33,10 +33,9 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
     "gallery",
+    "markdown_tables",
     "mathml",
-    "options",
     "public_names",
-    "results",
     "watched_walks",
 ]
 

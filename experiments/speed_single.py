@@ -1,4 +1,4 @@
-"""One simulation of two seconds on one core: time against error, beside other solvers.
+"""One simulation of two seconds on one core through XLA: time against error, beside other solvers.
 
 Writes speed_single.png. Every method is compared at equal error, never at equal tolerance.
 """
@@ -77,7 +77,7 @@ def in_jax(solve):
 
 def ours(name):
     def solve(scene, state, rtol):
-        end = walk_from(state, rtol, scene=scene, solver=name)
+        end = walk_from(state, rtol, scene=scene, solver=name, engine="xla")
         return jnp.stack(end.final), end.attempted
 
     return in_jax(solve)

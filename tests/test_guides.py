@@ -124,7 +124,7 @@ def test_the_command_line_page_has_every_flag_and_no_other(capsys):
 
     sys.path.append(str(ROOT / "docs" / "_ext"))
     try:
-        from options import groups, rows
+        from markdown_tables import groups, rows
     finally:
         sys.path.pop()
     helps = ""

@@ -66,7 +66,7 @@ class SolveOptions(options.Options, of=("simulate",)):
         """The relative error asked for; None where tolerances decide. Raises `ArgumentError`."""
         if self.accuracy is None:
             return None
-        from jaxbiped.simulate._error_witnesses import check_accurate_walk
+        from jaxbiped.simulate._accurate_walk import check_accurate_walk
         from jaxbiped.solve._accuracy import accuracy_told
 
         return check_accurate_walk(accuracy_told(self.accuracy), atol=self.atol, dt=self.dt)
@@ -180,7 +180,7 @@ def _simulate(request: "jb.Simulation", wanted: float | None) -> "tuple[jb.Traje
     To a `wanted` relative error it takes several solves, compiling among them.
     """
     if wanted is not None:
-        from jaxbiped.simulate._error_witnesses import accurate_walk
+        from jaxbiped.simulate._accurate_walk import accurate_walk
 
         began = time.perf_counter()
         with warnings.catch_warnings(), stage("simulating, with error bars"):

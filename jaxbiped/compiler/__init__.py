@@ -8,7 +8,7 @@ engines that run a `Program`, `LANES`, `CUDA` and their twin `XLA`, each by `can
 from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES as ARCHITECTURES
 from jaxbiped.compiler.codegen._ptx_kernel import ptx_text as ptx_text
 from jaxbiped.compiler.host_code._host_jit import host_jit as host_jit
-from jaxbiped.compiler.host_code._kept_alone import kept_alone as kept_alone
+from jaxbiped.compiler.host_code._host_jit import kept_alone as kept_alone
 from jaxbiped.compiler.ir._vertex_elimination import partial_derivatives as partial_derivatives
 from jaxbiped.compiler.runtime._device_processor import DeviceProcessor as DeviceProcessor
 from jaxbiped.compiler.runtime._engines import AbstractEngine as AbstractEngine

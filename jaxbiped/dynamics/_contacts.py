@@ -1,7 +1,5 @@
 """Contacts: where the feet are and how they move, which touch, and the ground's forces on them."""
 
-import functools
-import operator
 from typing import NamedTuple, cast
 
 import jax.numpy as jnp
@@ -200,11 +198,6 @@ class Contacts(NamedTuple):
     feet: tuple[FootMotion, ...]
     touching: tuple[Scalar, ...]
     forces: tuple[FootForce, ...]
-
-    @property
-    def both_carry(self) -> Scalar:
-        """Whether all feet carry something (boolean): of two legs' feet, double support."""
-        return functools.reduce(operator.and_, (each.normal > 0.0 for each in self.forces))
 
 
 def contacts(scene: CompliantScene, state: CompliantState) -> Contacts:

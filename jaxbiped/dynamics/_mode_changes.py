@@ -99,7 +99,7 @@ def with_rates(state: Any, stance: Stance) -> Any:
     return type(state)(*state[: 1 + count], *turning, *state[1 + 2 * count :])
 
 
-def grip_at_strike(scene: RigidScene, old: Stance, slack: Scalar | float = SLACK) -> Grip:
+def grip_at_strike(scene: RigidScene, old: Stance) -> Grip:
     """What takes part in a heel strike.
 
     Locked limits of the leg that lands do whatever the impulse; those of the leg that stood do
@@ -112,7 +112,7 @@ def grip_at_strike(scene: RigidScene, old: Stance, slack: Scalar | float = SLACK
         each if limit.leg != stood or limit.holds == THROUGH_STRIKE else True
         for limit, each in zip(modes.limits, _loose(modes, mode), strict=True)
     ]
-    hits = _hits(scene, old, modes, mode, slack)
+    hits = _hits(scene, old, modes, mode, SLACK)
     return Grip([held | hit for held, hit in zip(mode.held, hits, strict=True)], loose)
 
 

@@ -21,7 +21,7 @@ from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
 from jaxbiped.solve._error_estimate import Judged, check_untraced, refine
 from jaxbiped.solve._units import relative_to_scene
-from jaxbiped.solve.rosenbrock._rodas import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 
 _FIRST = 1e-2
 """First tolerance as a share of the relative error wanted, at most the draft's."""

@@ -31,13 +31,13 @@ from jaxbiped.gait._fixed_point_search import (
     walks_only,
 )
 from jaxbiped.gait._gait import Gait, summarise_gait
+from jaxbiped.gait._guess_free_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.gait._held_multipliers import without_held
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes
 from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_unknown
 from jaxbiped.gait._search_starts import default_guess
-from jaxbiped.gait._staged_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene

@@ -176,7 +176,9 @@ def certify(
                 f"basin of {starts} starts", lambda: _basin(knows, gait, int(starts), scatter, seed)
             )
         if knows is not None and fatal_push:
-            push_found = parts.find("smallest fatal push", lambda: _fatal_push(knows))
+            # The simulator's derivatives would compile for as long as all the rest.
+            how: dict[str, Any] = dict(gradients=False, tolerance=_FATAL)
+            push_found = parts.find("smallest fatal push", lambda: nearest_failure(knows, **how))
         if footsteps:
             walk = parts.find(
                 f"walk of {footsteps} footsteps", lambda: _walk(scene, gait, int(footsteps), push)
@@ -252,11 +254,6 @@ def _basin(knows: Labelling, gait: Gait, count: int, scatter: float, seed: int) 
     possible, walking = np.isfinite(places).all(axis=0).sum(), np.sum(labels == int(Label.WALKING))
     low, high = wilson_interval(walking, possible)
     return Fraction(float(walking / max(possible, 1)), float(low), float(high), int(walking))
-
-
-def _fatal_push(knows: Labelling) -> FatalShock:
-    """Without the simulator's derivatives, which would compile for as long as all the rest."""
-    return nearest_failure(knows, gradients=False, tolerance=_FATAL)
 
 
 def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> PushedWalk:

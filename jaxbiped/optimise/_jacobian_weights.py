@@ -4,6 +4,7 @@ What `jacobian_functionals` tells are such functions; the weights are what an ad
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -150,19 +151,10 @@ def _radius_bound(sizes: Scalar, rows: Scalar, length: Scalar) -> WeightedEntrie
     return WeightedEntries(value, weights, rows.shape[1], jnp.zeros_like(length))
 
 
-def _push_norm(rows: Scalar, length: Scalar) -> WeightedEntries:
-    """Of relative changes of step length and step time."""
-    return _norm_of(lambda rows, length: rows[:2] / length[:, None], rows, length)
-
-
-def _clearance_norm(rows: Scalar, length: Scalar) -> WeightedEntries:
-    """Of changes of foot clearance, in leg lengths."""
-    return _norm_of(lambda rows, length: rows[1:2], rows, length)
-
-
 def _norm_of(
     response: Callable[[Scalar, Scalar], Scalar], rows: Scalar, length: Scalar
 ) -> WeightedEntries:
+    """Of the response over all footsteps."""
     own = rows[-rows.shape[1] :]
     jacobian = jnp.where(jnp.isfinite(own), own, 0.0)
     stable = jnp.max(jnp.abs(eigenpairs(jacobian)[0])) < 1.0
@@ -207,10 +199,13 @@ def entry_weights(
     return _OF_ROWS[name](rows, length)
 
 
-_OF_ROWS = {
-    "sensitivity_norm": _push_norm,
-    "floor_sensitivity": _push_norm,
-    **dict.fromkeys(CLEARANCE_NORMS, _clearance_norm),
+_PUSH_NORM = partial(_norm_of, lambda rows, length: rows[:2] / length[:, None])
+"""Of relative changes of step length and step time."""
+_OF_ROWS: dict[str, Callable[[Scalar, Scalar], WeightedEntries]] = {
+    "sensitivity_norm": _PUSH_NORM,
+    "floor_sensitivity": _PUSH_NORM,
+    # Of changes of foot clearance, in leg lengths.
+    **dict.fromkeys(CLEARANCE_NORMS, partial(_norm_of, lambda rows, length: rows[1:2])),
     "strike_divergence": _divergence,
     "next_modulus": _next_modulus,
 }

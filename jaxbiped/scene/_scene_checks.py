@@ -19,14 +19,14 @@ from jaxbiped.caching._caches import OfObjects
 SomeModule = TypeVar("SomeModule", bound=eqx.Module)
 
 
-def check_scene(scene: Any, *kinds: type[SomeModule], name: str = "scene") -> Any:
+def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
     """A scene of one of these kinds with all its numbers in 64 bits, each as its part allows.
 
     Raises:
         ArgumentError: another kind, or a number that is not allowed. A traced scene that has one is
             NaN throughout instead, in that lane.
     """
-    check_type(name, scene, *kinds)
+    check_type("scene", scene, *kinds)
     leaves, structure = jtu.tree_flatten(scene)
     exact = [_in_64_bits(leaf) for leaf in leaves]
     if any(a is not b for a, b in zip(leaves, exact, strict=True)):

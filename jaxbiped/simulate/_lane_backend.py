@@ -13,11 +13,11 @@ from jaxtyping import Array, PyTree
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import as_float
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.compiler import LaneEngine, Request
+from jaxbiped.compiler import BY_NAME, LaneEngine, Request
 from jaxbiped.scene._state_types import State
 from jaxbiped.simulate._start import Options
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adaptive_program
-from jaxbiped.solve._engine_names import ENGINES, engine_for, engine_named
+from jaxbiped.solve._engine_names import ENGINES, engine_for
 from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 from jaxbiped.solve.controllers._first_and_last_step import just_before_end
@@ -92,7 +92,7 @@ def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
     else:
         times = None if run.times is None else np.asarray(run.times)
         room = 0 if run.section is None else run.max_arrivals
-        found = engine_named(run.engine).run(request._replace(times=times, room=room))
+        found = BY_NAME[run.engine].run(request._replace(times=times, room=room))
         ended, recorded = found.outputs, found.records
         t, state = single_time(ended.t, ended.state)
         if recorded is not None:
@@ -139,21 +139,12 @@ def lane_request(run: "Simulation") -> Request:
     return Request(adaptive_program(steps), solve, quick=run.max_solver_steps <= _QUICK)
 
 
-def able_request(run: "Simulation") -> Request | None:
-    """What is asked of lanes; None where XLA runs it, also for what they lack by "auto"."""
-    if run.engine == "xla":
-        return None
-    request = lane_request(run)
-    hindered = run.replaceable and engine_named(run.engine).can(request) is not None
-    return None if hindered else request
-
-
 def prepare_lanes(run: "Simulation", request: Request) -> Callable[["Simulation"], Trajectory]:
     """`by_lanes`, with all compiled that it needs for one simulation.
 
     Where only the end is asked for, what JAX does around it is compiled as well.
     """
-    engine = engine_named(run.engine)
+    engine = BY_NAME[run.engine]
     assert isinstance(engine, LaneEngine)
     engine.compile(request).prepare(1)
     within = run.save_steps or run.times is not None or run.section is not None
@@ -174,7 +165,7 @@ def _step_by_step(run: "Simulation", request: Request) -> tuple[Solved, np.ndarr
     room = min(run.max_solver_steps, _ROOM)
     while True:
         asked = request._replace(inputs=one, room=room, batch=True)
-        outputs, recorded, _ = engine_named(run.engine).run(asked)
+        outputs, recorded, _ = BY_NAME[run.engine].run(asked)
         assert recorded is not None
         steps = int(recorded.counts[0])
         if steps <= room:

@@ -20,7 +20,7 @@ from jaxbiped._checks import (
 )
 from jaxbiped._types import Scalar, as_float, by_numpy
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import Program, Request
+from jaxbiped.compiler import BY_NAME, Program, Request
 from jaxbiped.dynamics._section import HeelStrike
 from jaxbiped.dynamics._state import check_state, state_type, without_whole_turns
 from jaxbiped.scene._rigid_feet import rigid_modes
@@ -36,7 +36,7 @@ from jaxbiped.simulate._start import (
     in_own_precision,
 )
 from jaxbiped.solve._accuracy import ACCURACIES
-from jaxbiped.solve._engine_names import engine_for, engine_named
+from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._mode_history import history_of
 from jaxbiped.solve._rigid_progress import (
     RigidProgress,
@@ -170,7 +170,7 @@ class RigidSimulation(eqx.Module):
         program = rigid_program(moded or self.max_arrivals > 0, self.waits, self.embedded)
         room = _ROWS + 8 * self.max_arrivals if moded else self.max_arrivals
         request = Request(program, self.walk, room=room, quick=True)
-        found, recorded, _ = engine_named(self.engine).run(request)
+        found, recorded, _ = BY_NAME[self.engine].run(request)
         no_rows = np.zeros((0, 1 + len(state)), state[0].dtype)
         rows: Any = no_rows if recorded is None else recorded.values
         history = None
@@ -260,18 +260,8 @@ def _slopes(
         again = walk.solved().arrivals
         assert again is not None
         strikes = again.t
-    slopes = rigid_slopes_of(
-        run.walk.scene,
-        run.walk.state,
-        strikes,
-        count,
-        found.t[-1],
-        found.ending,
-        until=run.walk.duration,
-        rtol=run.walk.rtol,
-        places=places,
-        active=active,
-    )
+    end = found.t[-1], found.ending
+    slopes = rigid_slopes_of(run.walk, strikes, count, *end, places=places, active=active)
     if len(strikes) == kept:
         return slopes
     # Of the strikes only those that are kept, then the end.

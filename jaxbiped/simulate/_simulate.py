@@ -1,5 +1,6 @@
 """Simulation of a scene from a start: the door for every kind of scene, and its short names."""
 
+import warnings
 from collections.abc import Callable
 from typing import Any, Literal
 
@@ -14,7 +15,7 @@ from jaxbiped.dynamics._section import AbstractSection, HeelStrike
 from jaxbiped.scene._linkages import LinkageScene
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState
-from jaxbiped.simulate._error_witnesses import (
+from jaxbiped.simulate._accurate_walk import (
     accurate_walk,
     check_accurate_walk,
     warn_of_long_steps,
@@ -24,7 +25,7 @@ from jaxbiped.simulate._linkage_simulation import simulate_linkage
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.simulate._start import Options
-from jaxbiped.solve._accuracy import warn_of_unresolved_slip
+from jaxbiped.solve._accuracy import unresolved_slip
 from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -146,8 +147,8 @@ def simulate(
     run = Simulation.of(scene, state, asked)
     if wanted is not None:
         return accurate_walk(run, wanted)
-    if rtol is not None and dt is None:
-        warn_of_unresolved_slip(rtol, scene.minimal)
+    if rtol is not None and dt is None and (said := unresolved_slip(rtol, scene.minimal)):
+        warnings.warn(f"{said}.", RuntimeWarning, stacklevel=2)
     walk = run()
     if dt is not None:
         warn_of_missed_contacts(run, walk)

@@ -23,13 +23,13 @@ from jaxbiped._checks import (
     traced_rules,
 )
 from jaxbiped._types import Numbers, Scalar, as_array, as_float
-from jaxbiped.compiler import Request
+from jaxbiped.compiler import BY_NAME, Request
 from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._derivatives import with_derivatives
-from jaxbiped.simulate._lane_backend import able_request, by_lanes, choose_engine, prepare_lanes
+from jaxbiped.simulate._lane_backend import by_lanes, choose_engine, lane_request, prepare_lanes
 from jaxbiped.simulate._slopes import Slopes, slopes_of
 from jaxbiped.simulate._start import (
     Options,
@@ -49,7 +49,7 @@ from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import Units, si_units, units_of
 from jaxbiped.solve.controllers._footstep_counter import PATIENCE
-from jaxbiped.solve.rosenbrock._rodas import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 _FIRST = 1e-2
@@ -220,8 +220,12 @@ class Simulation(eqx.Module):
         return min(max(_FIRST * wanted, _FINEST_FIRST), float(self.rtol) * 10.0, resolved)
 
     def lane_request(self) -> Request | None:
-        """What it asks of lanes or devices; None where XLA runs it."""
-        return able_request(self)
+        """What it asks of lanes or devices; None where XLA runs it, also for what they lack."""
+        if self.engine == "xla":
+            return None
+        request = lane_request(self)
+        hindered = self.replaceable and BY_NAME[self.engine].can(request) is not None
+        return None if hindered else request
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""

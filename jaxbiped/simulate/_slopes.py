@@ -20,9 +20,10 @@ from jaxbiped.dynamics._strike_surfaces import opening, uprightness
 from jaxbiped.dynamics._switches import switches
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._ending_surfaces import ending_surface
+from jaxbiped.solve._rigid_progress import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.rosenbrock._rodas import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
 from jaxbiped.variational._variational_solve import (
@@ -173,34 +174,29 @@ class _Strike(NamedTuple):
 
 @host_jit()
 def rigid_slopes_of(
-    scene: RigidScene,
-    state: Any,
+    walk: RigidWalk,
     strikes: Scalar,
     count: Scalar,
     end: Scalar,
     ending: Scalar,
     *,
-    until: Scalar,
-    rtol: Scalar,
     places: tuple[int, ...],
     active: tuple[int, ...],
 ) -> Slopes:
     """Derivatives with respect to some leaves of the state and of the scene.
 
     Args:
-        scene, state: what walked, and from where.
+        walk: what walked, from where, for how long and how exactly.
         strikes: times of heel strikes [s], of which the first `count` came; NaN is told where
             there were more.
         count: how many there were.
         end, ending: when and how the walk ended.
-        until: its duration [s].
-        rtol: relative tolerance of the walk.
         places, active: of the leaves that are differentiated.
     """
-    scene, state = jtu.tree_map(lambda leaf: jnp.asarray(leaf, jnp.float64), (scene, state))
+    scene, state = jtu.tree_map(_widened, (walk.scene, walk.state))
     start, seeded = seeded_directions(scene, state, places, active)
     watch = _IN_MODES if hasattr(state, "mode") else _ROLLING
-    how = motion_solve(watch, Rodas5P(), rtol)
+    how = motion_solve(watch, Rodas5P(), walk.rtol)
     unit = jnp.sqrt(scene.mechanism.height / scene.ground.g)
     n = len(places) + len(active)
 
@@ -212,7 +208,7 @@ def rigid_slopes_of(
 
     def event(surface: PyTree, at: Tangents) -> EventMotion:
         return follow_event(
-            surface, lambda a, y: rolling_field(0.0, y, a), at, seeded, rtol=rtol, unit=unit
+            surface, lambda a, y: rolling_field(0.0, y, a), at, seeded, rtol=walk.rtol, unit=unit
         )
 
     def strike(before: _Strike, given: tuple[Scalar, Scalar]) -> tuple[_Strike, _Strike]:
@@ -240,7 +236,7 @@ def rigid_slopes_of(
 
     moves = event(fallen, at)
     struck = (count > 0) & (end <= strikes[jnp.maximum(count - 1, 0)])
-    by_clock = ~struck & (end >= until)
+    by_clock = ~struck & (end >= walk.duration)
     lost = jnp.where(count > len(strikes), jnp.nan, 0.0)
     time = jnp.where(struck, last.time, jnp.where(by_clock, 0.0, moves.time)) + lost
     columns = jnp.where(by_clock, at.columns.T, moves.state)

@@ -1,6 +1,5 @@
 """Accuracy: named tolerances, the norm that errors are measured in, and what float32 can bear."""
 
-import warnings
 from typing import Any, NamedTuple
 
 import jax
@@ -128,12 +127,6 @@ def unresolved_slip(rtol: RealScalarLike, scene: PyTree) -> str:
         f"{float(getattr(scene.friction, name)):g} m/s: steps may chatter about that slip "
         f"speed; {float(finest):.1g} resolves it"
     )
-
-
-def warn_of_unresolved_slip(rtol: RealScalarLike, scene: PyTree) -> None:
-    """Warns of such a tolerance, where it is known."""
-    if said := unresolved_slip(rtol, scene):
-        warnings.warn(f"{said}.", RuntimeWarning, stacklevel=3)
 
 
 def rms_norm(error: PyTree) -> Scalar:

@@ -13,7 +13,7 @@ from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._footfalls import FootMotion, leg_places, touching_legs
 from jaxbiped.dynamics._legs import LegMotion
 from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.scene._ground import StanceRotation
+from jaxbiped.scene._clearance import StanceRotation
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._structure import Structure
 from jaxbiped.solve._failure_events import (

@@ -3,7 +3,7 @@
 import jax
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped.compiler import BY_NAME, CUDA, AbstractEngine
+from jaxbiped.compiler import BY_NAME, CUDA
 
 ENGINES = ("auto", "xla", "lanes", "cuda")
 """Names of the engines.
@@ -16,11 +16,6 @@ ENGINES = ("auto", "xla", "lanes", "cuda")
   Batches of labels that keep a CUDA device busy, where there is one, are its own.
 - an engine of a user's own: by the name that it has in `jaxbiped.compiler.BY_NAME`.
 """
-
-
-def engine_named(name: str) -> AbstractEngine:
-    """The engine of a name that is not "auto"."""
-    return BY_NAME[name]
 
 
 def engine_for(

@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import check_choice
 from jaxbiped._types import Numbers
 from jaxbiped.solve._accuracy import rms_norm
-from jaxbiped.solve.rosenbrock._rodas import Rodas3P, Rodas4, Rodas4P, Rodas5P
+from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas3P, Rodas4, Rodas4P, Rodas5P
 
 
 def _chord() -> optimistix.AbstractRootFinder[PyTree, PyTree, PyTree, PyTree]:

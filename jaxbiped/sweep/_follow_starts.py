@@ -9,10 +9,9 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import as_float
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import DEVICES, Program, Request
+from jaxbiped.compiler import BY_NAME, DEVICES, Program, Request
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._adaptive_program import Solve
-from jaxbiped.solve._engine_names import engine_named
 from jaxbiped.solve._rigid_progress import RigidWalk
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._first_and_last_step import just_before_end
@@ -124,7 +123,7 @@ def follow_starts(
     embedded = effort.embedded and not scene.compliant
     fenced = effort.engine == "xla"
     program = _program(scene.compliant, effort.solver, arrivals, fenced, embedded, counted)
-    engine = engine_named(effort.engine_of(count))
+    engine = BY_NAME[effort.engine_of(count)]
     given = jtu.tree_map(np.asarray, starts)
     found = _as_arrays(engine.run(Request(program, given, batch=True)).outputs)
     if each == 1:

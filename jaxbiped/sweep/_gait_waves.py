@@ -60,7 +60,8 @@ def waves(shape: Sequence[int], first: Place) -> list[Wave]:
     found = [Wave(each, stride, False) for each in rings(shape, first, stride)]
     while stride > 1:
         stride //= 2
-        places = [p for p in _lattice(shape, first, stride) if not _is_on(p, first, 2 * stride)]
+        coarser = set(_lattice(shape, first, 2 * stride))
+        places = [place for place in _lattice(shape, first, stride) if place not in coarser]
         found.append(Wave(places, stride, True))
     return found
 
@@ -144,10 +145,6 @@ def _between(rows: np.ndarray, odd: int) -> np.ndarray:
 def _lattice(shape: Sequence[int], first: Place, stride: int) -> Iterator[Place]:
     axes = [range(i % stride, size, stride) for i, size in zip(first, shape, strict=True)]
     return itertools.product(*axes)
-
-
-def _is_on(place: Place, first: Place, stride: int) -> bool:
-    return all((a - b) % stride == 0 for a, b in zip(place, first, strict=True))
 
 
 _TRIES = 2

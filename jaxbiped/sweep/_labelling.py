@@ -25,7 +25,7 @@ from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named
-from jaxbiped.solve.rosenbrock._rodas import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
 from jaxbiped.sweep._gait_family import Family
 from jaxbiped.sweep._labelling_loop import Labelled
@@ -73,8 +73,9 @@ def relabel_doubtful(
         finer = finer._replace(max_attempts=_STEPS * finer.max_attempts)
         found, check = follow(open_, finer), follow(open_, _by_other_method(finer))
         agree_now = ~_differ(found, check)
-        settled = agree & agree_now & ~_differ(found, _some(label, open_))
-        found.attempted[:] += check.attempted + label.attempted[open_]
+        before: Labelled = jtu.tree_map(lambda leaf, rows=open_: leaf[rows], label)
+        settled = agree & agree_now & ~_differ(found, before)
+        found.attempted[:] += check.attempted + before.attempted
         for into, values in zip(jtu.tree_leaves(label), jtu.tree_leaves(found), strict=True):
             into[open_] = values
         doubt[open_[settled]] = int(Doubt.SETTLED)
@@ -97,10 +98,6 @@ def _differ(one: Labelled, another: Labelled) -> np.ndarray:
     """Whether starts have other labels, gaits or cycles (boolean)."""
     differ = one.label != another.label
     return differ | (one.gait != another.gait) | (one.cycle_footsteps != another.cycle_footsteps)
-
-
-def _some(labelled: Labelled, places: np.ndarray) -> Labelled:
-    return jtu.tree_map(lambda leaf: leaf[places], labelled)
 
 
 class Labelling(eqx.Module):

@@ -16,7 +16,7 @@ from jaxbiped.solve.rosenbrock._abstract_linearisation import Components
 from jaxbiped.solve.rosenbrock._implicit_linearisation import implicit_form
 from jaxbiped.solve.rosenbrock._linearisation import split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import Stages, stages_of
-from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau, end_weights, error_weights
+from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau, end_weights, error_weights
 from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with_active
 
 

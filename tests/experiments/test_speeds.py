@@ -56,15 +56,6 @@ def test_what_lanes_are_timed_by_is_right(tmp_path):
     assert {line.get_label() for line in alone.lines} == ways
 
 
-def test_every_lane_of_a_batch_arrives(tmp_path):
-    labels = {"simulations in the batch", "attempted steps a second, all lanes"}
-    numbers, figures = drawn_run("speed_batch", tmp_path, unitless=labels, alone=True)
-    ours = [row for row in numbers["rows"] if row["way"] == "vmap"]
-    assert ours
-    assert all(row["failed"] == 0 and row["steps_per_second"] > 0 for row in ours)
-    assert labels_of(figures["speed_batch.png"]) == labels
-
-
 def test_single_walks_agree_with_an_independent_solve(tmp_path):
     numbers, figures = drawn_run("speed_single", tmp_path, alone=True)
     assert numbers["reference_difference"] < 1e-8

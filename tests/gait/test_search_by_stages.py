@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait import _settled_walks, _staged_search, _walk_waves
+from jaxbiped.gait import _guess_free_search, _settled_walks, _walk_waves
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
+from jaxbiped.gait._guess_free_search import origin_of, search_in_stages, spectral_radius
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.gait._settled_walks import walks_from
-from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import recurring_sizes
 
@@ -65,7 +65,7 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
         return queue[kind].pop(0) if queue[kind] else NOTHING
 
     monkeypatch.setattr(_walk_waves, "walks_from", walks)
-    monkeypatch.setattr(_staged_search, "branch_along", follow)
+    monkeypatch.setattr(_guess_free_search, "branch_along", follow)
     scout = SimpleNamespace(engine=engine)
     problem = FixedPointProblem(SimpleNamespace(steps=1), SCENE, (), START, Precision(1e-9, 1e-8))
     return search_in_stages(search, problem, scout, first), took

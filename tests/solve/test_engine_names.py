@@ -4,8 +4,8 @@ import diffrax
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.compiler import CUDA, LANES, XLA
-from jaxbiped.solve._engine_names import engine_for, engine_named
+from jaxbiped.compiler import BY_NAME, CUDA, LANES, XLA
+from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.sweep._labelling_preparation import effort_of
 from tests.compiler.fake_driver import install
 
@@ -17,7 +17,7 @@ def by_device(**how):
 
 
 def test_names():
-    assert [engine_named(name) for name in jb.ENGINES[1:]] == [XLA, LANES, CUDA]
+    assert [BY_NAME[name] for name in jb.ENGINES[1:]] == [XLA, LANES, CUDA]
 
 
 def test_devices_are_refused_where_there_is_none(monkeypatch):

@@ -25,10 +25,6 @@ def _call(w: HostWriter, op: Operation) -> list[Any]:
     return w.inline(*called, op.inputs, op.needs)
 
 
-def _call_batched(w: HostWriter, op: Operation) -> list[Any]:
-    return w.inline(*_parts(op.params["call"]), op.inputs, op.needs)
-
-
 def _linear_solve(w: HostWriter, op: Operation) -> list[Any]:
     counts, programs = op.params["const_lengths"], op.params["jaxprs"]
     before = counts.matvec + counts.vecmat
@@ -170,7 +166,7 @@ def _listed(w: HostWriter, name: str, row: Value, params: dict[str, Any]) -> Val
 
 
 CONTROL_FLOW: dict[str, Rule] = dict.fromkeys(CALLS, _call) | {
-    "custom_vmap_call": _call_batched,
+    "custom_vmap_call": lambda w, op: w.inline(*_parts(op.params["call"]), op.inputs, op.needs),
     "custom_linear_solve": _linear_solve,
     "platform_index": _platform,
     "cond": _branches,

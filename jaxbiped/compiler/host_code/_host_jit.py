@@ -1,6 +1,7 @@
 """Host compilation: functions of JAX that NumPy runs where nothing traces them, written once."""
 
 import contextlib
+import functools
 import importlib.util
 import marshal
 import re
@@ -9,8 +10,11 @@ from collections.abc import Callable, Sequence
 from typing import Any, ParamSpec, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 import jax
+import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._debug_switches import without_switches
+from jaxbiped._jax_versions import nothing_is_traced
 from jaxbiped.caching._cached_jit import Form, cached_jit
 from jaxbiped.caching._collector_pause import long_trace
 from jaxbiped.caching._compiled_store import ArrayFunction, Skeleton, flattened
@@ -23,6 +27,8 @@ from jaxbiped.compiler.host_code._moves import MOVES
 from jaxbiped.compiler.host_code._operations import LINEAR_ALGEBRA, OPERATIONS
 
 _KIND = "host"
+_FEW = 1000
+"""Numbers in an array up to which NumPy runs a function: it holds all that lies in between."""
 _RULES: dict[str, Rule] = OPERATIONS | MOVES | INDEXING | LINEAR_ALGEBRA | CONTROL_FLOW
 Converter: TypeAlias = Callable[[list[Any]], list[Any]]
 _P = ParamSpec("_P")
@@ -143,3 +149,32 @@ def host_jit(
 def _of_jax(arrays: list[Any]) -> list[Any]:
     """Makes all of them arrays of JAX, for which `jax.device_put` takes 20 µs each."""
     return arrays
+
+
+def kept_alone(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Decorator: a function of arrays that is one kept program where it is called by itself.
+
+    Operation by operation JAX would compile a program for each. NumPy runs it where arrays are
+    small: its program is written many times sooner than XLA compiles one. Where something traces
+    it, it is a part of the whole as it is.
+    """
+    kept = host_jit(_are_small)(function)
+
+    @without_switches
+    @functools.wraps(function)
+    def called(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        if not nothing_is_traced():
+            return function(*args, **kwargs)
+        args, kwargs = jtu.tree_map(_as_array, (args, kwargs))
+        return kept(*args, **kwargs)
+
+    return called
+
+
+def _are_small(*args: Any, **kwargs: Any) -> bool:
+    return all(getattr(leaf, "size", 1) <= _FEW for leaf in jtu.tree_leaves((args, kwargs)))
+
+
+def _as_array(leaf: Any) -> Any:
+    """A number of Python's as an array, for it not to be compiled in."""
+    return np.asarray(leaf) if isinstance(leaf, float | int) else leaf

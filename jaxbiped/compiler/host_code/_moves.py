@@ -123,10 +123,6 @@ def _squeeze(w: HostWriter, op: Operation) -> list[Value]:
     return [part_of(w, op.inputs[0], places, op.result()[0])]
 
 
-def _transpose(w: HostWriter, op: Operation) -> list[Value]:
-    return [transposed(w, op.inputs[0], op.params["permutation"])]
-
-
 def _reverse(w: HostWriter, op: Operation) -> list[Value]:
     gone = op.params["dimensions"]
     parts = [
@@ -184,10 +180,6 @@ def _single(value: Value) -> bool:
     return value.shape == (1,) and value.held == ()
 
 
-def _iota(w: HostWriter, op: Operation) -> list[Value]:
-    return [w.constant(iota(**op.params))]
-
-
 def _pad(w: HostWriter, op: Operation) -> list[Value]:
     config = tuple(tuple(map(int, each)) for each in op.params["padding_config"])
     if not any(itertools.chain(*config)):
@@ -201,12 +193,12 @@ MOVES: dict[str, Rule] = {
     "expand_dims": _reshape,
     "slice": _slice,
     "squeeze": _squeeze,
-    "transpose": _transpose,
+    "transpose": lambda w, op: [transposed(w, op.inputs[0], op.params["permutation"])],
     "rev": _reverse,
     "unstack": _unstack,
     "split": _split,
     "stack": _stack,
     "concatenate": _concatenate,
-    "iota": _iota,
+    "iota": lambda w, op: [w.constant(iota(**op.params))],
     "pad": _pad,
 }

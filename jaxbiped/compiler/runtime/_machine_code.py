@@ -126,7 +126,7 @@ def machine_code(text: str, entry: str, host: Host, *, as_written: bool) -> Mach
     that its turns share, which then waits in memory for want of registers.
     """
     name = code_name(text, entry, host, as_written=as_written)
-    code = _known_code(name, entry, host, as_written, text)
+    code = stored_code(name, entry, host, as_written=as_written, text=text)
     assert code is not None
     return code
 
@@ -137,14 +137,10 @@ def code_name(text: str, entry: str, host: Host, *, as_written: bool) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
-def stored_code(name: str, entry: str, host: Host, *, as_written: bool) -> MachineCode | None:
-    """The code of this name, of a module that need not be known; None where nobody has it."""
-    return _known_code(name, entry, host, as_written, None)
-
-
-def _known_code(
-    name: str, entry: str, host: Host, as_written: bool, text: str | None
+def stored_code(
+    name: str, entry: str, host: Host, *, as_written: bool, text: str | None = None
 ) -> MachineCode | None:
+    """The code of this name; None where nobody has it, unless the module's `text` is known."""
     with _LOCK:
         code = _LOADED.get(name)
         if code is None:

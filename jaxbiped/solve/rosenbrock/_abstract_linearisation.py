@@ -1,20 +1,82 @@
-"""Linearisation of a vector field about a point, whatever form its Jacobian has."""
+"""Linearisation of a vector field about a point, whatever form its Jacobian has.
+
+Which entries are zero, and which components are plain copies, is read off the field's program.
+"""
 
 import abc
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.extend.core import Jaxpr, JaxprEqn, Literal, Var
 from jaxtyping import PyTree
 
+from jaxbiped._jax_versions import ClosedJaxpr, called_program
 from jaxbiped._types import Scalar
 from jaxbiped.linalg._elimination import Entry
-from jaxbiped.solve.rosenbrock._program_structure import Structure
 
 Components: TypeAlias = list[Scalar]
 """A point of the state space: its scalars one by one, or one vector that holds them all."""
+
+
+class Structure(NamedTuple):
+    """Structure of a function of scalars.
+
+    Attributes:
+        depends: for each output, the positions of the inputs that it can depend on.
+        copies: for each output, the position of the input that it is a plain copy of, or None.
+    """
+
+    depends: tuple[frozenset[int], ...]
+    copies: tuple[int | None, ...]
+
+
+def structure_of(program: ClosedJaxpr) -> Structure:
+    """Structure of a traced program. Conservative: a dependence may be reported in vain."""
+    jaxpr = program.jaxpr
+    inputs: list[frozenset[int]] = [frozenset([i]) for i in range(len(jaxpr.invars))]
+    copies: list[int | None] = list(range(len(jaxpr.invars)))
+    depends, copied = _propagate(jaxpr, inputs, copies)
+    return Structure(tuple(depends), tuple(copied))
+
+
+def _propagate(
+    jaxpr: Jaxpr, inputs: list[frozenset[int]], copies: list[int | None]
+) -> tuple[list[frozenset[int]], list[int | None]]:
+    depends: dict[Var, frozenset[int]] = dict(zip(jaxpr.invars, inputs, strict=True))
+    copied: dict[Var, int | None] = dict(zip(jaxpr.invars, copies, strict=True))
+
+    def read(atom: Var | Literal) -> tuple[frozenset[int], int | None]:
+        if isinstance(atom, Literal):
+            return frozenset(), None
+        return depends.get(atom, frozenset()), copied.get(atom)
+
+    for equation in jaxpr.eqns:
+        arguments = [read(atom) for atom in equation.invars]
+        called = called_program(equation)
+        if called is None:
+            union: frozenset[int] = frozenset().union(*(used for used, _ in arguments))
+            results = [union] * len(equation.outvars)
+            source = arguments[0][1] if _is_copy(equation) else None
+            results_copied: list[int | None] = [source] * len(equation.outvars)
+        else:
+            results, results_copied = _propagate(
+                called[0], [used for used, _ in arguments], [source for _, source in arguments]
+            )
+        for variable, used, origin in zip(equation.outvars, results, results_copied, strict=True):
+            depends[variable], copied[variable] = used, origin
+    outputs = [read(atom) for atom in jaxpr.outvars]
+    return [used for used, _ in outputs], [source for _, source in outputs]
+
+
+def _is_copy(equation: JaxprEqn) -> bool:
+    """Whether its result is its argument, as where only a weak type becomes a strong one."""
+    if equation.primitive.name != "convert_element_type":
+        return False
+    before, after = (atom.aval for atom in (*equation.invars, *equation.outvars))
+    return bool(before.dtype == after.dtype)  # type: ignore[attr-defined]
 
 
 class AbstractLinearisation(eqx.Module):

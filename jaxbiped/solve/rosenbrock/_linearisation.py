@@ -16,9 +16,12 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._implicit_field import AbstractImplicitField
 from jaxbiped.linalg._elimination import Entry, Matrix, inverse, matmul
-from jaxbiped.solve.rosenbrock._abstract_linearisation import AbstractLinearisation, Components
+from jaxbiped.solve.rosenbrock._abstract_linearisation import (
+    AbstractLinearisation,
+    Components,
+    structure_of,
+)
 from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, ImplicitLinearisation
-from jaxbiped.solve.rosenbrock._program_structure import structure_of
 
 _MOST_SCALARS = 24
 """Up to this size a Jacobian is eliminated scalar by scalar; beyond, as one dense matrix."""

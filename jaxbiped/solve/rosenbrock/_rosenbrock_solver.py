@@ -18,7 +18,7 @@ from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._abstract_linearisation import AbstractLinearisation, Components
 from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, implicit_form
 from jaxbiped.solve.rosenbrock._linearisation import linearise, split
-from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau, error_weights, last_stage
+from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau, error_weights, last_stage
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar

@@ -1,4 +1,4 @@
-"""Staged search without a guess: each stage only where those before found no stable gait."""
+"""Search without a guess, in stages: each only where those before found no stable gait."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

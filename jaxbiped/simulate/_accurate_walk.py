@@ -1,4 +1,4 @@
-"""Witnesses of a walk: other solves of it, which tell how far it may be wrong.
+"""Accurate walks: other solves of a walk, its witnesses, tell how far it may be wrong.
 
 A wanted accuracy has two: the same method at a looser tolerance, and another method. Steps of one
 size control no error and have two as well, of other sizes: where steps are too long the walk goes

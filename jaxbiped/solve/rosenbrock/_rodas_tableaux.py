@@ -1,9 +1,9 @@
-"""The Rodas family: four Rosenbrock methods, each a class that only declares its tableau."""
+"""Tableaux of the Rodas family: four Rosenbrock methods, each a class that declares its own."""
 
 from typing import ClassVar
 
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau
+from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau
 
 
 class Rodas3P(AbstractRosenbrock):

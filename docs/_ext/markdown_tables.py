@@ -1,18 +1,24 @@
-"""Options of the command line, as the commands declare them: `{options} gait`.
+"""Tables that are made with the site, as Markdown.
 
-The table has a command's own options. Options that several commands share are those of a group:
-`{options} SceneOptions`.
+`{options} gait` has the options of a command, as it declares them. Options that several commands
+share are those of a group: `{options} SceneOptions`. `{results}` has the experiments' committed
+results: when and where each was measured.
 """
 
 import dataclasses
+import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any, get_args
 
 from docutils import nodes
 from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "experiments" / "results"
 
 
 def said_by(kind: Any) -> Iterator[Any]:
@@ -59,28 +65,58 @@ def rows(kind: Any) -> Iterator[tuple[str, str, str]]:
         yield flag, words, default
 
 
-class Options(SphinxDirective):
-    """The table of a command's or a group's options."""
+class Table(SphinxDirective):
+    """A table below some heads; who fills it says what is in its rows."""
 
-    required_arguments = 1
+    heads: tuple[str, ...]
+
+    def cells(self) -> Iterable[tuple[str, ...]]:
+        """Its rows."""
+        raise NotImplementedError
 
     def run(self) -> list[nodes.Node]:
         """The table."""
-        from jaxbiped.cli import COMMANDS
-
-        asked = self.arguments[0]
-        kind = COMMANDS.get(asked) or groups()[asked]
-        lines = ["| option | meaning | default |", "|---|---|---|"]
-        for flag, words, default in rows(kind):
-            shown = f"`{default}`" if default not in ("", "required") else default
-            meaning = re.sub(r"(--[\w-]+)", r"`\1`", words).replace("|", r"\|")
-            lines.append(f"| `{flag}` | {meaning} | {shown} |")
+        lines = [self.heads, ["---"] * len(self.heads), *self.cells()]
+        text = StringList([f"| {' | '.join(line)} |" for line in lines], source=self.name)
         made = nodes.container()
-        self.state.nested_parse(StringList(lines, source="options"), 0, made)
+        self.state.nested_parse(text, 0, made)
         return made.children
 
 
+class Options(Table):
+    """The options of a command or a group."""
+
+    required_arguments = 1
+    heads = ("option", "meaning", "default")
+
+    def cells(self) -> Iterable[tuple[str, ...]]:
+        """Of each option."""
+        from jaxbiped.cli import COMMANDS
+
+        asked = self.arguments[0]
+        for flag, words, default in rows(COMMANDS.get(asked) or groups()[asked]):
+            shown = f"`{default}`" if default not in ("", "required") else default
+            meaning = re.sub(r"(--[\w-]+)", r"`\1`", words).replace("|", r"\|")
+            yield f"`{flag}`", meaning, shown
+
+
+class Results(Table):
+    """Of each file of results: experiment, date, machine, and the command that makes it again."""
+
+    heads = ("experiment", "date", "machine", "command")
+
+    def cells(self) -> Iterable[tuple[str, ...]]:
+        """Of each file."""
+        for path in sorted(RESULTS.glob("*.json")):
+            self.env.note_dependency(str(path))
+            made: dict[str, Any] = json.loads(path.read_text()).get("made", {})
+            told = (made.get(name, "not recorded") for name in ("date", "machine"))
+            link = f"[{path.stem}](../experiments/results/{path.name})"
+            yield link, *told, f'`make figures ONLY="{path.stem}"`'
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Adds the directive."""
+    """Adds the directives."""
     app.add_directive("options", Options)
+    app.add_directive("results", Results)
     return {"parallel_read_safe": True}

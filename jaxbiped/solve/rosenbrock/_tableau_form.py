@@ -1,4 +1,4 @@
-"""Tableau: the coefficients of a Rosenbrock method."""
+"""Form of a Rosenbrock method: what its tableau holds."""
 
 from typing import NamedTuple, TypeAlias
 
