@@ -20,6 +20,10 @@ from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 
 # What decides whether a change lands draws the same examples every time; elsewhere they are new.
 hypothesis.settings.register_profile("landing", derandomize=True, print_blob=True)
+# A mutation is caught by the first example that fails: a smaller one takes minutes to find.
+hypothesis.settings.register_profile(
+    "mutants", derandomize=True, phases=(hypothesis.Phase.explicit, hypothesis.Phase.generate)
+)
 if os.environ.get("CI"):
     hypothesis.settings.load_profile("landing")
 
