@@ -8,7 +8,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._holds import Holds
 from jaxbiped.dynamics._mode_changes import change_mode
-from jaxbiped.scene._joint_parts import Stop
+from jaxbiped.scene._joint_parts import HOLDS, Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
 from jaxbiped.variational._hybrid_system import Rolling
@@ -124,6 +124,19 @@ def test_what_is_held_exchanges_its_name_with_the_legs():
     state = scene.state(**ANGLES, **RATES, held="shank_1")
     assert mode_of(scene, state)[1] == [True, False]
     assert mode_of(scene, jb.dynamics.impact(scene, state).state)[1][1]
+
+
+def test_the_leg_that_stood_stays_locked_where_its_stop_holds_through_the_strike():
+    """The impulse bends its knee unless it is held; the knee that lands is locked either way."""
+    bends = {}
+    angles = dict(theta_thigh_1=0.2, theta_shank_1=0.2, theta_thigh_2=-0.2, theta_shank_2=-0.2)
+    for holds in HOLDS:
+        scene = hsu_chen(holds)
+        after = jb.dynamics.impact(scene, scene.state(**angles, **RATES)).state
+        bends[holds] = float(after.omega_shank_1 - after.omega_thigh_1)
+        assert mode_of(scene, after)[1] == [False, holds != HOLDS[0]]
+    assert abs(bends[HOLDS[2]]) < 1e-13
+    assert bends[HOLDS[0]] < bends[HOLDS[1]] < -0.5
 
 
 @pytest.mark.parametrize("times", [-1, 1, 2])
