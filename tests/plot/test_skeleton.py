@@ -16,14 +16,18 @@ from tests.drawn import assert_is_drawn, legend_of
 from tests.mechanisms import WALKERS, scene_of, start_of
 
 
+class Walks(dict):
+    """A short motion of each mechanism, by name: each is walked where it is first asked for."""
+
+    def __missing__(self, name):
+        scene = scene_of(name)
+        self[name] = scene, jb.simulate(scene, start_of(name, scene), duration=0.1)
+        return self[name]
+
+
 @pytest.fixture(scope="module")
 def walks():
-    """A short motion of each mechanism, by name."""
-    found = {}
-    for name in ("coupled", "kneed", "flat"):
-        scene = scene_of(name)
-        found[name] = scene, jb.simulate(scene, start_of(name, scene), duration=0.1)
-    return found
+    return Walks()
 
 
 @pytest.mark.parametrize("name", ["coupled", "kneed", "flat"])
