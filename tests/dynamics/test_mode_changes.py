@@ -75,6 +75,25 @@ def test_a_foot_that_comes_down_flat_turns_no_more():
     assert abs(float(struck.state.omega_leg_2)) > 0.1
 
 
+@pytest.mark.parametrize(
+    ("angle", "stands"), [(0.2, [True, False]), (0.0, [True, True]), (-0.2, [False, True])]
+)
+def test_a_start_stands_on_the_end_of_its_foot_that_is_lower(angle, stands):
+    """A foot that is turned up at its toe stands on its heel; so it does where it lands."""
+    scene = rigid(HEEL_TOE)
+    state = scene.state(theta_leg_1=0.1, theta_leg_2=-0.1, theta_foot_2=angle)
+    assert mode_of(scene, state)[0] == stands
+    state = scene.state(theta_leg_1=0.1, theta_leg_2=-0.1, theta_foot_1=angle, omega_leg_2=-1.0)
+    assert mode_of(scene, jb.dynamics.impact(scene, state).state)[0] == stands
+
+
+@pytest.mark.parametrize(("rate", "holds"), [(-0.3, False), (0.0, True), (0.3, True)])
+def test_a_start_holds_the_stops_at_whose_limit_it_stays(rate, holds):
+    scene = hsu_chen()
+    state = scene.state(**ANGLES, **RATES, omega_shank_1=rate)
+    assert mode_of(scene, state)[1] == [holds, True]
+
+
 def with_stop(**limits):
     """Straight legs with a stop between a leg and the vertical."""
     stops = [Stop({f"leg_{i}": 1, "vertical": -1}, **limits) for i in (1, 2)]
