@@ -50,9 +50,8 @@ def _few_programs_are_kept(_memory):
         return
     many = mappings.read_bytes().count(b"\n") > MANY_MAPPINGS
     if many or _resident() > _memory[-1] + MUCH_MEMORY:
-        jb.clear_caches()
         jax.clear_caches()
-        gc.collect()
+        jb.clear_caches()  # which collects: in a worker of gigabytes seconds each time
         with contextlib.suppress(AttributeError):  # another C library
             ctypes.CDLL(None).malloc_trim(0)
         _memory.append(_resident())

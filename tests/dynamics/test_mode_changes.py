@@ -8,6 +8,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._holds import Holds
 from jaxbiped.dynamics._mode_changes import change_mode
+from jaxbiped.dynamics._stance import stance_on
+from jaxbiped.scene._bodies import Foot
 from jaxbiped.scene._joint_parts import HOLDS, Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
@@ -85,6 +87,16 @@ def test_a_start_stands_on_the_end_of_its_foot_that_is_lower(angle, stands):
     assert mode_of(scene, state)[0] == stands
     state = scene.state(theta_leg_1=0.1, theta_leg_2=-0.1, theta_foot_1=angle, omega_leg_2=-1.0)
     assert mode_of(scene, jb.dynamics.impact(scene, state).state)[0] == stands
+
+
+def test_heights_of_feet_are_those_of_their_lowest_points():
+    """Of circles of unlike radii: the hip is as high as the leg that stands carries it."""
+    scene = rigid(Mechanism(bodies=LEGS, feet=(FEET[0], Foot("leg_2", centre=0.3, radius=0.05))))
+    state = scene.state(theta_leg_1=0.3, theta_leg_2=-0.2, standing="leg_2")
+    stance = stance_on(scene, state, 1)
+    hip = 0.3 * math.cos(0.2) + 0.05
+    assert float(stance.height(0)) == pytest.approx(hip - 0.32 * math.cos(0.3) - 0.08, rel=1e-13)
+    assert abs(float(stance.height(1))) < 1e-15
 
 
 @pytest.mark.parametrize(("rate", "holds"), [(-0.3, False), (0.0, True), (0.3, True)])
