@@ -1,15 +1,15 @@
-"""Energies and powers of joint parts, against integrals of their torques by SciPy."""
+"""Joint parts: energies against integrals of torques by SciPy, couplings against their angles."""
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 import jaxbiped as jb
-from jaxbiped.dynamics._joint_loads import joint_energy
+from jaxbiped.dynamics._joint_loads import joint_energy, motion_of
 from jaxbiped.dynamics._tree import Motion
-from jaxbiped.scene._joint_parts import Latch, Spring, Stop
+from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
-from tests.mechanisms import FEET, LEGS
+from tests.mechanisms import FEET, LEGS, TORSO
 
 HIP = {"leg_1": 1, "leg_2": -1}
 RATE = 0.7
@@ -57,3 +57,14 @@ def test_joints_without_elastic_parts_have_no_energy():
     zero = np.float64(0.0)
     motion = Motion(*[zero] * 4, (zero, zero), (zero, zero))
     assert joint_energy(mechanism, motion, 0.02, stops=True) is None
+
+
+def test_a_coupling_keeps_its_angle_at_rest():
+    """φ = θ_torso − θ_1/2 − slope/2 is 0.3 whatever the legs do, and does not turn."""
+    coupling = Coupling({"torso": 1, "leg_1": -0.5, "vertical": -0.5}, rest=0.3)
+    walker = Mechanism(bodies=(*LEGS, TORSO), feet=FEET, joints=(coupling,))
+    given = [np.float64(x) for x in (0.0, 0.4, 0.2, -0.7)]
+    found = motion_of(walker, jb.Ground(slope=0.1), given, given)
+    assert float(found.angles[2]) == pytest.approx(0.3 + 0.5 * 0.2 + 0.5 * 0.1, rel=1e-15)
+    assert float(found.rates[2]) == pytest.approx(0.5 * 0.2, rel=1e-15)
+    assert [float(x) for x in found.angles[:2]] == [0.2, -0.7]
