@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.variational._hybrid_system import Rolling
 from tests.mechanisms import scene_of, start_of
 
 SCENE = jb.seed_scene()
@@ -32,3 +33,15 @@ def test_mid_stance_counts_where_the_stance_leg_touches():
     for height, counts in ((0.399, True), (0.401, False)):
         state = low._replace(hip_z=np.float64(height))
         assert bool(jb.MidStance().counts(SCENE, state)) is counts
+
+
+@pytest.mark.parametrize("stands", [-0.19, -0.21])
+def test_a_rigid_walker_arrives_where_the_foot_ahead_comes_down(stands):
+    """A swing foot of an equal leg is on the ground where both angles are as large."""
+    rigid, swings = jb.ladder()["rigid"], 0.2
+    state = jb.dynamics.RigidState(*map(np.float64, (0.0, swings, stands, -0.3, -1.0)))
+    value, counts = Rolling().arrival(jb.HeelStrike(), rigid, state)
+    assert bool(value > 0.0) == (np.cos(stands) < np.cos(swings))
+    assert bool(counts)
+    behind = state._replace(theta_1=-state.theta_1, theta_2=-state.theta_2)
+    assert not bool(Rolling().arrival(jb.HeelStrike(), rigid, behind)[1])
