@@ -54,6 +54,7 @@ def _few_programs_are_kept(_memory):
         jb.clear_caches()  # which collects: in a worker of gigabytes seconds each time
         with contextlib.suppress(AttributeError):  # another C library
             ctypes.CDLL(None).malloc_trim(0)
+        gc.freeze()  # what is left stays, and need not be looked at again
         _memory.append(_resident())
 
 
