@@ -20,6 +20,10 @@ from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 
 # What decides whether a change lands draws the same examples every time; elsewhere they are new.
 hypothesis.settings.register_profile("landing", derandomize=True, print_blob=True)
+# A mutation is caught by the first example that fails: a smaller one takes minutes to find.
+hypothesis.settings.register_profile(
+    "mutants", derandomize=True, phases=(hypothesis.Phase.explicit, hypothesis.Phase.generate)
+)
 if os.environ.get("CI"):
     hypothesis.settings.load_profile("landing")
 
@@ -46,11 +50,11 @@ def _few_programs_are_kept(_memory):
         return
     many = mappings.read_bytes().count(b"\n") > MANY_MAPPINGS
     if many or _resident() > _memory[-1] + MUCH_MEMORY:
-        jb.clear_caches()
         jax.clear_caches()
-        gc.collect()
+        jb.clear_caches()  # which collects: in a worker of gigabytes seconds each time
         with contextlib.suppress(AttributeError):  # another C library
             ctypes.CDLL(None).malloc_trim(0)
+        gc.freeze()  # what is left stays, and need not be looked at again
         _memory.append(_resident())
 
 

@@ -47,8 +47,10 @@ def mechanisms(draw, most_bodies=10):
             ),
         ]
     for k in range(draw(st.integers(0, min(2, n - 1)))):
-        other = draw(st.sampled_from(["vertical", *(f"b{i}" for i in range(k + 1, n))]))
-        joints.append(Coupling({f"b{k}": 1, other: -1}, rest=draw(_numbers(-0.5, 0.5))))
+        others = st.sampled_from(["vertical", *(f"b{i}" for i in range(k + 1, n))])
+        led = draw(st.lists(others, min_size=1, max_size=2, unique=True))
+        weights = {f"b{k}": 1} | {name: -1 / len(led) for name in led}
+        joints.append(Coupling(weights, rest=draw(_numbers(-0.5, 0.5))))
     root_mass = draw(st.one_of(st.none(), _numbers(0.1, 2.0)))
     return Mechanism(
         root_mass=root_mass, bodies=bodies, feet=[Foot("b0", centre=0.1)], joints=joints

@@ -92,36 +92,43 @@ def test_two_means_two(kind):
     assert check_scene(rigid, jb.RigidScene).walker.m.dtype == np.float64
 
 
-def test_traced_it_fails_in_its_own_lane_alone():
-    """Of a parameter, a duration, a tolerance and a start; the first of each three is allowed."""
+def ends_alone(make, values):
+    """Of values by lane the first is allowed and walks as alone; the others are not, and fail."""
+    run = jax.vmap(lambda x: (lambda w: (w.ending, w.final))(make(x)))
+    ending, final = run(jnp.asarray(values))
+    final = jax.tree.leaves(final)
+    assert [str(jb.Ending(int(x))) for x in ending] == ["walking", *["solver failed"] * 2]
+    assert all(np.isnan(leaf[1:]).all() for leaf in final)
+    pairs = zip(final, jax.tree.leaves(make(values[0]).final), strict=True)
+    assert all(np.array_equal(a[0], b) for a, b in pairs)
 
-    def ends(make, values):
-        run = jax.vmap(lambda x: (lambda w: (w.ending, w.final))(make(x)))
-        ending, final = run(jnp.asarray(values))
-        final = jax.tree.leaves(final)
-        assert [str(jb.Ending(int(x))) for x in ending[1:]] == ["solver failed"] * 2
-        assert all(np.isnan(leaf[1:]).all() for leaf in final)
-        _, allowed = run(jnp.asarray([values[0]] * 3))
-        assert int(ending[0]) == 0
-        pairs = zip(final, jax.tree.leaves(allowed), strict=True)
-        assert all(np.array_equal(a[0], b[0]) for a, b in pairs)
 
-    lanes = {"engine": "lanes"}
-    ends(lambda K: short(put(SCENE, "K", K), **lanes), [1e6, np.nan, -1e6])
-    ends(lambda l: short(put(SCENE, "l", l), **lanes), [0.4, 0.01, np.inf])
-    ends(lambda J: short(put(SCENE, "J", J), **lanes), [0.0096, 0.0, -0.1])
-    ends(lambda t: short(SCENE, duration=t, **lanes), [0.02, -1.0, np.nan])
-    ends(lambda r: short(SCENE, rtol=r, **lanes), [1e-5, -1.0, np.nan])
-    ends(lambda w: short(SCENE, START._replace(omega_1=w), **lanes), [-0.0052, np.nan, np.inf])
+LANES = {"engine": "lanes"}
+TRACED = {
+    "K": (lambda K: short(put(SCENE, "K", K), **LANES), [1e6, np.nan, -1e6]),
+    "l": (lambda l: short(put(SCENE, "l", l), **LANES), [0.4, 0.01, np.inf]),
+    "J": (lambda J: short(put(SCENE, "J", J), **LANES), [0.0096, 0.0, -0.1]),
+    "duration": (lambda t: short(SCENE, duration=t, **LANES), [0.02, -1.0, np.nan]),
+    "rtol": (lambda r: short(SCENE, rtol=r, **LANES), [1e-5, -1.0, np.nan]),
+    "start": (
+        lambda w: short(SCENE, START._replace(omega_1=w), **LANES), [-0.0052, np.nan, np.inf]
+    ),
+    "rigid": (
+        lambda d: jb.rigid_walk(put(RIGID, "d", d), ROLLING, footsteps=1), [0.1, -0.1, np.nan]
+    ),
+    "rigid duration": (lambda t: jb.rigid_walk(RIGID, ROLLING, duration=t), [0.1, -0.1, np.nan]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", TRACED)
+def test_traced_it_fails_in_its_own_lane_alone(what):
+    ends_alone(*TRACED[what])
+
+
+def test_traced_in_redundant_coordinates_it_fails_in_its_own_lane_alone():
     redundant = jb.RedundantScene(SCENE)
-    of_legs = eqx.tree_at(lambda s: s.scene.walker.d, redundant, 0.1)
-    assert short(of_legs, **lanes).outcome is jb.Ending.WALKING
-    ends(
-        lambda d: short(eqx.tree_at(lambda s: s.scene.walker.d, redundant, d), **lanes),
-        [0.1, -0.1, np.nan],
-    )
-    ends(lambda d: jb.rigid_walk(put(RIGID, "d", d), ROLLING, footsteps=1), [0.1, -0.1, np.nan])
-    ends(lambda t: jb.rigid_walk(RIGID, ROLLING, duration=t), [0.1, -0.1, np.nan])
+    change = lambda d: eqx.tree_at(lambda s: s.scene.walker.d, redundant, d)
+    ends_alone(lambda d: short(change(d), **LANES), [0.1, -0.1, np.nan])
 
 
 def test_a_traced_return_of_a_scene_that_is_not_allowed_is_none():

@@ -1,6 +1,7 @@
 """Continuation of a gait in a parameter of its scene, from the gait or on from a branch's point."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax.tree_util as jtu
 import numpy as np
@@ -104,14 +105,21 @@ def continue_gait(
             bar.set_postfix_str(f"{along} = {point.value:.6g}", refresh=False)
 
         steps = dict(largest_step=float(largest_step), max_points=int(max_points), tell=tell)
-        before = setup.trace(begin._replace(tangent=-begin.tangent), **steps)
-        known = before.reversed()
-        if before.stop.end is BranchEnd.CLOSED:
-            after = Trace(known.points[-1:], [], before.stop)
-        else:
-            after = setup.trace(begin, passed=known.points[:-1], **steps)
+        before, after = traces_from(setup, begin, **steps)
     before, after = map(setup.with_cause, (before, after))
     return setup.branch(before.reversed(), after)
+
+
+def traces_from(setup: ContinuationSetup, begin: CurvePoint, **options: Any) -> tuple[Trace, Trace]:
+    """What lies to both sides of a gait, each part in its order away from there.
+
+    First that towards smaller values of the parameter; `options` are those of `trace`.
+    """
+    before = setup.trace(begin._replace(tangent=-begin.tangent), **options)
+    known = before.reversed()
+    if before.stop.end is BranchEnd.CLOSED:
+        return before, Trace(known.points[-1:], [], before.stop)
+    return before, setup.trace(begin, passed=known.points[:-1], **options)
 
 
 def first_gait(

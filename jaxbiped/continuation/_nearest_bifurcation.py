@@ -3,14 +3,14 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
-from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._continue_gait import continue_gait
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.continuation._branch_point import axis_of
+from jaxbiped.continuation._continuation_setup import continuation_setup
+from jaxbiped.continuation._continue_gait import first_gait, traces_from
+from jaxbiped.continuation._trace import Trace
 from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._search_starts import state_of_guess
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
@@ -21,6 +21,8 @@ STEEPEST = 0.1
 """How far the slope is followed to both sides of level ground [rad]."""
 _NEAR = 1e-12
 """Relative distance to which the end of what a walker allows is found."""
+_STEPS = dict(largest_step=0.02, max_points=200)
+"""As of `continue_gait`."""
 
 
 class NearestBifurcation(NamedTuple):
@@ -104,9 +106,15 @@ def nearest_bifurcation(
     if not factor > 1.0:
         raise ArgumentError(f"factor = {factor!r} is not allowed: it must be above 1.")
     bounds, level = range_of(scene, along, factor), own == 0.0
-    steps = gait.step_lengths.shape[0]
-    branch = continue_gait(scene, along, bounds=bounds, guess=gait, footsteps=steps)
-    seen = [each for each in _first_each_way(branch, gait, own) if level or each.value / own > 0.0]
+    axis, steps = axis_of(scene, along, bounds, None), gait.step_lengths.shape[0]
+    setup = continuation_setup(scene, axis, footsteps=steps, accuracy="balanced", engine="auto")
+    begin = first_gait(setup, own, state_of_guess(scene, gait), "auto")
+    parts: tuple[Trace, ...] = ()
+    if not isinstance(begin, str):
+        # What lies beyond a fold are other gaits.
+        parts = traces_from(setup, begin, until=tuple(BranchEvent), **_STEPS)
+    first_seen = [each for part in parts for each in part.bifurcations[:1]]
+    seen = [each for each in first_seen if level or each.value / own > 0.0]
     if not seen:
         return NearestBifurcation(along, None, math.nan, math.nan, complex(math.nan), math.nan)
 
@@ -121,23 +129,3 @@ def nearest_bifurcation(
     first = min(seen, key=nearest)
     ratio = math.nan if level else first.value / own
     return NearestBifurcation(along, first.kind, first.value, ratio, first.multiplier, first.error)
-
-
-def _first_each_way(branch: Branch, gait: Gait, own: float) -> list[BifurcationPoint]:
-    """What a branch comes to first on both sides of one of its gaits, at the parameter's own value.
-
-    Beyond a fold the branch passes the same values once more, with other gaits.
-    """
-    values = [each.value for each in branch.points]
-    at = [k for k, value in enumerate(values) if math.isclose(value, own, abs_tol=_NEAR)]
-    if not at:
-        return []
-    state = np.stack(recurring_leaves(gait.measures.state))
-    own_place = min(at, key=lambda k: float(np.max(np.abs(branch.points[k].recurring - state))))
-    places = [each.place for each in branch.points]
-    before: list[BifurcationPoint] = []
-    after: list[BifurcationPoint] = []
-    for each in branch.bifurcations:
-        where = next(k for k, place in enumerate(places) if np.array_equal(place, each.point.place))
-        (after if where > own_place else before).append(each)
-    return [*before[-1:], *after[:1]]

@@ -4,6 +4,7 @@ At the multiplier −1 a cycle of k footsteps throws off one of 2 k, at first al
 Seydel, Practical Bifurcation and Stability Analysis (2010), section 7.4.
 """
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -111,7 +112,7 @@ def doubling_cascade(
         raise ArgumentError("branch is not allowed: it has no period doubling.")
     branches, found, step, near = [branch], [here], largest_step, _NEAR
     while len(found) < doublings:
-        until = BranchEvent.PERIOD_DOUBLING
+        until = (BranchEvent.PERIOD_DOUBLING,)
         branches.append(
             _doubled_branch(branches[-1], found[-1], step, max_points, until=until, near=near)
         )
@@ -138,7 +139,7 @@ def _doubled_branch(
     largest_step: float,
     max_points: int,
     *,
-    until: BranchEvent | None = None,
+    until: Collection[BranchEvent] = (),
     near: float = _NEAR,
 ) -> Branch:
     setup = setup_of(branch, footsteps=2 * branch.footsteps)

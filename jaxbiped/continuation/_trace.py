@@ -1,6 +1,6 @@
 """Trace of a curve of gaits in one direction: its points, its bifurcations, and how it ends."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from itertools import islice
 from typing import NamedTuple, cast
 
@@ -167,7 +167,7 @@ def trace(
     *,
     largest_step: float,
     max_points: int,
-    until: BranchEvent | None = None,
+    until: Collection[BranchEvent] = (),
     passed: Sequence[BranchPoint] = (),
     tell: Callable[[BranchPoint], object] = lambda point: None,
 ) -> Trace:
@@ -178,7 +178,7 @@ def trace(
         begin: where to begin.
         largest_step: arclength of a step at most.
         max_points: points at most.
-        until: a kind of bifurcation at the first of which to stop.
+        until: kinds of bifurcations at the first of which to stop.
         passed: points of the same branch before the first, in their order.
         tell: is called with each point.
     """
@@ -212,11 +212,13 @@ def trace(
         for place, event in located:
             points.append(branch_point(curve, axis, place))
             events.append(event)
-            if event.kind is until:
-                return stopped(BranchEnd.UNFINISHED, f"stopped at the {until}")
+            if event.kind in until:
+                return stopped(BranchEnd.UNFINISHED, f"stopped at the {event.kind}")
         points.append(branch_point(curve, axis, there))
         if not explains(here, there, [event.kind for _, event in located]):
             events.append(not_located(points[-1], axis.value(float(here.place[-1]))))
+            if BranchEvent.NOT_LOCATED in until:
+                return stopped(BranchEnd.UNFINISHED, f"stopped at the {events[-1].kind}")
         tell(points[-1])
         if abs(points[-1].multipliers[0]) > _DIVERGED:
             return stopped(BranchEnd.BREAKS_OFF, NOT_SMOOTH)

@@ -46,14 +46,23 @@ class Conditions(NamedTuple):
 
 def conditions(symmetric: np.ndarray, radius: float) -> Conditions:
     """Of multipliers by their elementary symmetric functions, shape (3,)."""
-    by_one = np.array([-1.0 / radius, 1.0 / radius**2, -1.0 / radius**3])
+    by_one = _by_one(radius)
     coefficients = by_one * symmetric
-    hurwitz = _LEADING + _BY_COEFFICIENT @ coefficients
-    by_hurwitz = np.vstack([np.eye(4), hurwitz[[3, 2, 1, 0]] * [-1.0, 1.0, 1.0, -1.0]])
-    values = np.append(hurwitz, hurwitz[1] * hurwitz[2] - hurwitz[0] * hurwitz[3])
+    values = _values(coefficients)
+    by_hurwitz = np.vstack([np.eye(4), values[[3, 2, 1, 0]] * [-1.0, 1.0, 1.0, -1.0]])
     by_coefficient = by_hurwitz @ _BY_COEFFICIENT
     by_radius = by_coefficient @ (-np.array([1.0, 2.0, 3.0]) * coefficients / radius)
     return Conditions(values, by_coefficient * by_one, by_radius)
+
+
+def _by_one(radius: float) -> np.ndarray:
+    """Coefficients of the polynomial in x by the symmetric functions."""
+    return np.array([-1.0 / radius, 1.0 / radius**2, -1.0 / radius**3])
+
+
+def _values(coefficients: np.ndarray) -> np.ndarray:
+    hurwitz = _LEADING + _BY_COEFFICIENT @ coefficients
+    return np.append(hurwitz, hurwitz[1] * hurwitz[2] - hurwitz[0] * hurwitz[3])
 
 
 def radius_of(symmetric: np.ndarray, margin: np.ndarray | float = 0.0) -> float:
@@ -68,7 +77,7 @@ def radius_of(symmetric: np.ndarray, margin: np.ndarray | float = 0.0) -> float:
     high = 1.5 * low + 1e-9
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        kept = np.all(conditions(symmetric, middle).values >= margin)
+        kept = np.all(_values(_by_one(middle) * symmetric) >= margin)
         low, high = (low, middle) if kept else (middle, high)
     return high
 

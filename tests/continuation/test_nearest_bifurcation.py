@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.continuation._cycle import CycleProblem
 from jaxbiped.continuation._nearest_bifurcation import range_of
 
 pytestmark = pytest.mark.slow
@@ -23,6 +24,23 @@ def test_it_is_that_of_the_whole_branch(gait):
     assert found.kind is jb.continuation.BranchEvent.PERIOD_DOUBLING
     assert found.value == pytest.approx(doubling.value, rel=1e-7)
     assert found.ratio == pytest.approx(doubling.value / float(RIGID.ground.slope))
+
+
+def test_it_follows_each_side_to_its_first_event_alone(gait, monkeypatch):
+    """Far fewer cycles than a branch that goes on beyond them."""
+    counts = [0]
+    cycle = CycleProblem.cycle
+
+    def counted(*given):
+        counts[-1] += 1
+        return cycle(*given)
+
+    monkeypatch.setattr(CycleProblem, "cycle", counted)
+    found = jb.continuation.nearest_bifurcation(RIGID, gait, factor=12.0)
+    counts.append(0)
+    branch = jb.continue_gait(RIGID, "slope", bounds=range_of(RIGID, "slope", 12.0), guess=gait)
+    assert found.value in [each.value for each in branch.bifurcations]
+    assert 0 < counts[0] < 0.8 * counts[1]
 
 
 def test_level_ground_is_left_to_both_sides():

@@ -182,7 +182,7 @@ def test_sheets_that_a_fold_joins_are_no_gait_twice():
 
 
 def test_it_stops_at_the_first_of_a_kind():
-    found = traced(*logistic((2.0, 4.0)), [0.5], 2.0, until=BranchEvent.PERIOD_DOUBLING)
+    found = traced(*logistic((2.0, 4.0)), [0.5], 2.0, until=(BranchEvent.PERIOD_DOUBLING,))
     assert found.points[-1].value == pytest.approx(3.0, abs=1e-9)
     assert found.stop.end is BranchEnd.UNFINISHED
 

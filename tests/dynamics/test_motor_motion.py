@@ -10,7 +10,13 @@ import pytest
 import jaxbiped as jb
 from jaxbiped._trigonometry import angle_of_vector
 from jaxbiped.dynamics._contacts import legs_in
-from jaxbiped.dynamics._motor_motion import MotorMotion, exchanged, motor_torque
+from jaxbiped.dynamics._motor_motion import (
+    MotorMotion,
+    exchanged,
+    motor_powers,
+    motor_torque,
+    motor_torques,
+)
 from jaxbiped.dynamics._tree import Motion, pose_of
 from tests.scene.test_mechanism import BISECTING, LEGS, TORSO, kneed, two_legs
 
@@ -135,6 +141,21 @@ def test_roles_are_exchanged_where_the_first_leg_stands():
     by_side = with_motor(jb.actuation.PD(1.0), angle="torso", by="side")
     told = [torque_of(by_side, leg=leg) for leg in (0, 1, None)]
     assert [float(each.torque) for each in told] == [-0.1] * 3
+
+
+def test_in_double_support_each_leg_drives_by_its_share_of_the_load():
+    """A constant torque from leg to torso: 0.7 times each share, on the leg that has it."""
+    walker = with_motor(jb.actuation.Constant(0.7), angle={"leg_2": 1, "torso": -1})
+    lines = [leg_line(walker, MOTION, leg) for leg in (0, 1)]
+    shares = (jnp.asarray(0.25), jnp.asarray(0.75))
+    found = motor_torques(walker, MOTION, 0.02, lines, shares)
+    by_leg = {angle.weights[0][0]: float(torque) for _, angle, torque in found}
+    assert by_leg == pytest.approx({0: 0.25 * 0.7, 1: 0.75 * 0.7}, rel=1e-15)
+    alone = motor_torques(walker, MOTION, 0.02, lines, (None, jnp.asarray(1.0)))
+    assert [float(torque) for _, _, torque in alone] == [0.7]
+    (power,) = motor_powers(walker, MOTION, 0.02, lines, shares)
+    expected = 0.25 * 0.7 * (1.0 - 0.5) + 0.75 * 0.7 * (-2.0 - 0.5)
+    assert float(power) == pytest.approx(expected, rel=1e-14)
 
 
 def test_gains_are_parameters_and_functions_are_none():

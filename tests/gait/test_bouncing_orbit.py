@@ -112,6 +112,32 @@ def test_an_orbit_with_its_multiplier_and_all_derivatives():
     np.testing.assert_allclose(np.stack(ours), expected, rtol=1e-5, atol=1e-6)
 
 
+def back(n, v):
+    """Speed above the paddle and time of a return that begins upwards at the speed v."""
+    return jnp.stack([n.kick + n.keep * v - n.curb * v * v, times(n, v)])
+
+
+def columns_of(n, names):
+    """Derivatives of a return from 2 m/s, with respect to the speed and to logarithms."""
+    by_args, by_speed = jax.jacfwd(back, argnums=(0, 1))(
+        jax.tree.map(jnp.asarray, n), jnp.asarray(2.0)
+    )
+    columns = [by_speed, *(getattr(by_args, name) * getattr(n, name) for name in names)]
+    return np.stack(columns, axis=1)
+
+
+@pytest.mark.parametrize("tangent_rtol", [1e-6, 1e-9])
+def test_steps_are_short_enough_for_the_tangents(tangent_rtol):
+    """However loosely the state is solved."""
+    names = ("k", "level")
+    once = jb.gait.linearise_return_map(
+        SPRING, (0.0, HEIGHT, 2.0), rtol=1e-4, tangent_rtol=tangent_rtol, parameters=names,
+        section=ABOVE, system=Trampoline(False), engine="lanes",
+    )  # fmt: skip
+    ours = np.stack([once.jacobian[1, 1:], once.period_row[1:]])
+    np.testing.assert_allclose(ours, columns_of(SPRING, names), rtol=0.0, atol=tangent_rtol)
+
+
 @pytest.mark.parametrize("engine", ["lanes"])
 def test_a_force_that_jumps_makes_tangents_jump(engine):
     names, start = ("g", "push", "level"), (0.0, HEIGHT, 2.0)
@@ -120,13 +146,7 @@ def test_a_force_that_jumps_makes_tangents_jump(engine):
         system=Trampoline(True), engine=engine,
     )  # fmt: skip
 
-    def back(n, v):
-        return jnp.stack([n.kick + n.keep * v - n.curb * v * v, times(n, v)])
-
-    numbers = jax.tree.map(jnp.asarray, PUSH)
     np.testing.assert_allclose([once.recurring[1], once.period], back(PUSH, 2.0), rtol=1e-8)
-    by_args, by_speed = jax.jacfwd(back, argnums=(0, 1))(numbers, jnp.asarray(2.0))
-    columns = [by_speed, *(getattr(by_args, n) * getattr(PUSH, n) for n in names)]
     ours = np.stack([once.jacobian[1, 1:], once.period_row[1:]])
-    np.testing.assert_allclose(ours, np.stack(columns, axis=1), rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(ours, columns_of(PUSH, names), rtol=1e-6, atol=1e-7)
     assert int(once.jumps) == 2

@@ -82,7 +82,11 @@ def test_an_idle_actuator_leaves_the_passive_gait():
 
 @pytest.mark.parametrize(
     ("actuation", "rigid"),
-    [(A.PushOff(0.1), True), (A.FootPreload(extension=3e-3), False), (A.HipTorque(0.1), False)],
+    [
+        (A.PushOff(0.1), True),
+        (A.FootPreload(extension=3e-3), False),
+        pytest.param(A.HipTorque(0.1), False, marks=pytest.mark.nightly),
+    ],
     ids=["push-off", "preload", "torque"],
 )
 def test_level_ground_is_walked_from_nothing(actuation, rigid):

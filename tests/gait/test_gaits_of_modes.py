@@ -14,13 +14,24 @@ def gait():
 
 
 @pytest.mark.slow
-def test_walks_and_derivatives_go_through_the_modes(gait):
-    """Each step has a phase with a bent knee and one with both straight; dt/dω by differences."""
-    scene, state = hsu_chen(), gait.measures.state
-    walk = jb.simulate(scene, state, footsteps=2, accuracy="tight")
+def test_walks_go_through_the_modes(gait):
+    """Each step has a phase with a bent knee and one with both straight."""
+    walk = jb.simulate(hsu_chen(), gait.measures.state, footsteps=2, accuracy="tight")
     bent, straight = ("shank_2", "shank_2 held"), ("shank_2", "shank_1 held", "shank_2 held")
     assert walk.modes == (bent, straight, bent, straight, bent)
     assert np.sum(walk.mode_durations) == pytest.approx(float(walk.t[-1]), abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    "derivative",
+    [
+        pytest.param(jax.grad, marks=pytest.mark.nightly),
+        pytest.param(jax.jacfwd, marks=pytest.mark.slow),
+    ],
+)
+def test_derivatives_go_through_the_modes(gait, derivative):
+    """dt/dω of two footsteps by differences."""
+    scene, state = hsu_chen(), gait.measures.state
 
     def lasts(rate):
         start = state._replace(omega_thigh_2=rate, omega_shank_2=rate)
@@ -28,8 +39,7 @@ def test_walks_and_derivatives_go_through_the_modes(gait):
 
     rate, h = float(state.omega_thigh_2), 1e-5
     expected = (float(lasts(rate + h)) - float(lasts(rate - h))) / (2.0 * h)
-    for derivative in (jax.grad, jax.jacfwd):
-        assert float(derivative(lasts)(rate)) == pytest.approx(expected, rel=1e-6)
+    assert float(derivative(lasts)(rate)) == pytest.approx(expected, rel=1e-6)
 
 
 _CENTRAL = (-1.0, 1.0), (-0.5, 0.5)

@@ -194,7 +194,7 @@ def _kneed():
     return jb.Scene(walker=walker, ground=jb.Ground(slope=0.0456), **LAWS)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_kneed_walker_of_a_users_own_is_found_without_a_guess():
     scene = _kneed()
     assert {"K", "m_thigh", "epsilon", "stop.K"} <= set(jb.parameter_names(scene))
@@ -247,7 +247,7 @@ def rimless_wheel():
 def test_a_rimless_wheel_on_compliant_feet():
     """It turns to the next spoke at each step; its gait is near that on rigid feet."""
     rigid, scene = rimless_wheel()
-    gait = jb.find_gait(scene, parameters=("wheel.inertia",), radius_sensitivities=False)
+    gait = jb.find_gait(scene, **PLAIN)
     assert gait.found_by is jb.gait.FoundBy.START
     assert gait.cycle == "step"
     assert float(gait.unit_multiplier_error) < 1e-5
@@ -258,6 +258,14 @@ def test_a_rimless_wheel_on_compliant_feet():
     near = jb.find_gait(rigid, **PLAIN)
     assert near.cycle == "step"
     assert float(gait.measures.period) == pytest.approx(float(near.measures.period), rel=5e-3)
+
+
+@pytest.mark.nightly
+def test_a_rimless_wheel_on_compliant_feet_from_any_spoke():
+    """Its sensitivity by differences, three steps, and labels of the same gait."""
+    _, scene = rimless_wheel()
+    gait = jb.find_gait(scene, parameters=("wheel.inertia",), radius_sensitivities=False)
+    length = 2.0 * np.sin(np.pi / 8.0)
     slopes = [
         float(
             jb.find_gait(jb.with_parameters(scene, {"wheel.inertia": x}), **PLAIN).measures.period
@@ -268,7 +276,6 @@ def test_a_rimless_wheel_on_compliant_feet():
     assert float(gait.sensitivities.period[0]) == pytest.approx(by_difference, rel=1e-3)
     three = jb.find_gait(scene, gait.measures.state, footsteps=3, **PLAIN)
     np.testing.assert_allclose(three.step_lengths, [length] * 3, atol=1e-4)
-    # From any spoke, and labelled as the same gait.
     state = gait.measures.state
     turned = [state._replace(theta_wheel=state.theta_wheel + k * np.pi / 4.0) for k in range(3)]
     back = [jb.return_map(scene, each).state.omega_wheel for each in turned]

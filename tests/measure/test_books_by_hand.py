@@ -12,7 +12,7 @@ from jaxbiped.dynamics._energy import Energies, Powers
 from jaxbiped.dynamics._footfalls import FootMotion
 from jaxbiped.measure import _cost_of_transport, _energy_ledger, _footsteps
 from jaxbiped.measure._footsteps import HeelStrikes
-from jaxbiped.measure._samples import NODES, Samples
+from jaxbiped.measure._samples import NODES, ModeChanges, Samples
 from jaxbiped.solve._trajectory import Trajectory
 
 SCENE = jb.with_parameters(jb.seed_scene(), {"hip_mass": 0.7})
@@ -161,6 +161,31 @@ def test_a_rigid_ledger_closes_with_its_push_off(monkeypatch):
         # gravity; hip and push; lost; stored; left open; motors; joints; stops
         [2.5, -0.25, 1.75, 0.75, 2.5 - 0.25 - 1.75 - 0.75 - 0.09375, 0.375, 0.0625, 0.03125]
     )
+
+
+def test_what_a_change_of_mode_takes_is_the_energy_beside_it(monkeypatch):
+    """Energies that fall steadily but where a mode changes, once in one footstep, twice in another.
+
+    What joints lose on the way is no loss of the change's; NaN where a change was left out.
+    """
+    scene = jb.RigidScene(SCENE.walker, SCENE.ground)
+    changes = np.array([0, 2, 2]), np.array([0.25, 0.5, 0.75])
+    taken = np.array([2.0, 0.5, 0.125])
+
+    def held(_, states):
+        number, time = states
+        gone = [
+            sum(taken[(changes[0] == k) & (changes[1] < t)])
+            for k, t in zip(number, time, strict=True)
+        ]
+        return Energies(5.0 - 0.5 * time, 1.0 - 0.25 * time, -np.array(gone))
+
+    monkeypatch.setattr(_energy_ledger, "_held", held)
+    monkeypatch.setattr(_energy_ledger, "rows_of", lambda starts, number: number)
+    monkeypatch.setattr(_energy_ledger, "states_after", lambda _, rows, times: (rows, times))
+    known = np.array([True, True, True, False])
+    found = _energy_ledger._stop_losses(scene, None, np.ones(4), ModeChanges(*changes, known))
+    np.testing.assert_allclose(found, [2.0, 0.0, 0.625, np.nan], atol=1e-12)
 
 
 def test_samples_lie_at_gauss_points_and_integrate_what_is_above_zero():

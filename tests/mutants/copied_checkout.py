@@ -49,7 +49,7 @@ class CopiedCheckout:
         """
         tier = [] if slow else ["-m", "not slow"]
         arguments = ["-x", "-rfE", "--tb=no", "--ignore=tests/mutants", f"--rootdir={self.folder}",
-                     "--hypothesis-profile=landing", "-o", f"cache_dir={cache}"]  # fmt: skip
+                     "--hypothesis-profile=mutants", "-o", f"cache_dir={cache}"]  # fmt: skip
         output = self.folder / "output"
         run = _SERVER.Process(
             target=_run_pytest, args=(str(self.folder), output, [*arguments, *tier, *paths])

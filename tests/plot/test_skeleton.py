@@ -16,14 +16,18 @@ from tests.drawn import assert_is_drawn, legend_of
 from tests.mechanisms import WALKERS, scene_of, start_of
 
 
+class Walks(dict):
+    """A short motion of each mechanism, by name: each is walked where it is first asked for."""
+
+    def __missing__(self, name):
+        scene = scene_of(name)
+        self[name] = scene, jb.simulate(scene, start_of(name, scene), duration=0.1)
+        return self[name]
+
+
 @pytest.fixture(scope="module")
 def walks():
-    """A short motion of each mechanism, by name."""
-    found = {}
-    for name in ("coupled", "kneed", "flat"):
-        scene = scene_of(name)
-        found[name] = scene, jb.simulate(scene, start_of(name, scene), duration=0.1)
-    return found
+    return Walks()
 
 
 @pytest.mark.parametrize("name", ["coupled", "kneed", "flat"])
@@ -45,6 +49,26 @@ def test_feet_and_mass_centres_are_where_the_equations_have_them(name, walks):
     potential = np.asarray(jb.dynamics.energies(scene, walk.state).gravitational)
     drop = (heights - heights[0]) * float(scene.ground.g)
     np.testing.assert_allclose(drop, potential - potential[0], atol=1e-9 * weight)
+
+
+def test_each_body_hangs_on_the_one_before_it():
+    """A chain of three: places and directions are summed up link by link."""
+    link = dict(mass=1.0, inertia=0.01)
+    chain = jb.Mechanism(
+        bodies=[
+            jb.Body("a", **link, centre=0.1),
+            jb.Body("b", **link, centre=0.1, parent="a", at=0.5),
+            jb.Body("c", **link, centre=0.1, parent="b", at=0.3),
+        ],
+        feet=[jb.Foot("c", centre=0.2)],
+    )
+    angles = np.array([0.3, -0.2, 0.5])
+    motion = dict(hip_x=np.zeros(1), hip_z=np.ones(1))
+    motion |= {f"theta_{k}": angle[None] for k, angle in zip("abc", angles, strict=True)}
+    shown = skeleton_of(chain).pose(motion, 0.0)
+    ends = np.cumsum(np.array([0.5, 0.3, 0.2]) * np.exp(1j * angles))
+    for place, end in zip((*shown.hinges[1:], *shown.feet), ends, strict=True):
+        np.testing.assert_allclose(place[0], (end.imag, 1.0 - end.real), atol=1e-15)
 
 
 def test_lines_go_from_hinge_to_hinge_round_feet_and_to_lonely_mass_centres():

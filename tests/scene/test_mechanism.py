@@ -210,6 +210,9 @@ REFUSED = {
     "list them in this order": lambda: wheel((0, 2, 1)),
     "a leg of their own": lambda: wheel(leg="all"),
     "whose mass centre lies off its hinge": lambda: wheel(centre=0.1),
+    "whose centre differ: leave the mirror out": lambda: two_legs(
+        feet=(FEET[0], Foot("leg_2", centre=0.5))
+    ),
     "mirror = 5": lambda: two_legs(mirror=5),
     "mirror = 'leg_1'": lambda: two_legs(mirror="leg_1"),
     "in angle = 1j": lambda: Spring({"leg_1": 1j, "leg_2": -1}, stiffness=1.0),

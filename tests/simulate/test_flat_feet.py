@@ -191,6 +191,9 @@ def test_heel_strikes_and_toe_strikes_are_those_of_equations_by_hand():
         for name in names
     ]
     np.testing.assert_allclose(ours, [*end[2:6], *end[8:]], atol=1e-7)
+    # The hip goes on its way where another end of the foot stands.
+    moved = float(found.final.hip_x) - float(state.hip_x)
+    assert moved == pytest.approx(end[0] - y[0], abs=1e-7)
     # What the ankles' dampers lose jumps where the toe comes down.
     books = jb.measure.rigid_ledger(walker, found)
     np.testing.assert_allclose(books.residual / books.joint_loss, 0.0, atol=1e-6)

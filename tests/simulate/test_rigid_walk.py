@@ -33,6 +33,13 @@ def test_the_gait_goes_on(engine):
     assert float(walk.t[-1]) == float(times[4])
 
 
+def test_a_walk_begins_where_its_start_is():
+    start = GAIT._replace(hip_x=jnp.asarray(0.7), theta_2=jnp.asarray(0.15))
+    speed = float(jb.dynamics.rolling_field(0.0, start, rigid_seed()).hip_x)
+    walk = jb.rigid_walk(rigid_seed(), start, duration=1e-6, engine="lanes")
+    assert float(walk.final.hip_x) == pytest.approx(0.7 + 1e-6 * speed, abs=1e-11)
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_endings(engine):
     def walk(omega, slope=0.02, **options):

@@ -51,6 +51,14 @@ def test_steady_slip_meets_its_stated_coefficient(slip):
         np.testing.assert_allclose(coefficient, np.sign(slip) * expected, rtol=1e-6)
 
 
+@pytest.mark.parametrize("slip", [-0.2, 1e-3])
+def test_straight_bristles_are_damped_as_they_begin_to_bend(slip):
+    """At z = 0 they bend at the slip's own speed: F/F_N = (σ1 + σ2) V, and Dahl's have no force."""
+    slip, straight = jnp.asarray(slip), jnp.asarray(0.0)
+    np.testing.assert_allclose(LUGRE.coefficient(slip, straight), (60.0 + 0.02) * slip, rtol=1e-13)
+    assert float(DAHL.coefficient(slip, straight)) == 0.0
+
+
 def test_dahl_bends_exponentially_over_its_slip():
     """F = F_C (1 − exp(−σ0 x/F_C)) after a slip of x from straight bristles."""
     for x in (1e-6, 1e-5, 5e-5):

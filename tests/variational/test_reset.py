@@ -1,0 +1,62 @@
+"""Columns through a switch that resets the state, against a ball that bounces, known exactly."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped.dynamics._switches import Switch
+from jaxbiped.variational._reset import behind_reset
+from jaxbiped.variational._saltation import at_fixed_time, meet, meeting_at
+from jaxbiped.variational._tangents import Seeded, Watch
+
+G = 9.8
+LEVEL, BOUNCE = 0.5, 0.8
+SIZES = np.array([1.0, 2.0])
+"""By how much the columns of level and bounce move these."""
+
+
+def field(t, y, args):
+    return y[1], -G + 0.0 * y[1]
+
+
+def bounced(args, y):
+    _, bounce = args
+    return y[0], -bounce * y[1]
+
+
+WATCH = Watch(
+    field=field,
+    switches=lambda args, y: (Switch(y[0] - args[0], True, resets=True),),
+    reset=bounced,
+)
+
+
+def exact(y, v, level, bounce, time):
+    """Height and speed so long after a start above the level."""
+    speed = -jnp.sqrt(v * v + 2.0 * G * (y - level))
+    rest, after = time - (v - speed) / G, -bounce * speed
+    return jnp.stack([level + after * rest - 0.5 * G * rest**2, after - G * rest])
+
+
+@jax.jit
+def through_the_bounce(state, by_state, met):
+    args = Seeded((jnp.asarray(LEVEL), jnp.asarray(BOUNCE)), jnp.eye(2), jnp.ones(2), (0, 1))
+    columns, shifts = (by_state, jnp.zeros((2, 2))), (jnp.zeros(2), jnp.zeros(2))
+    meeting = meeting_at(WATCH, state, args, jnp.asarray(1))
+    columns, shifts = meet(meeting, columns, shifts, jnp.asarray(SIZES))
+    after, columns = behind_reset(bounced, met, state, columns, args, jnp.asarray(SIZES))
+    return after, at_fixed_time(field(0.0, after, args.args), columns, shifts)
+
+
+def test_a_bounce_carries_the_columns_of_the_exact_motion():
+    """With respect to the start, to the level and to how much speed is left."""
+    y, v = 1.0, -0.5
+    speed = -np.sqrt(v * v + 2.0 * G * (y - LEVEL))
+    fall = (v - speed) / G
+    state, by_state = (jnp.asarray(LEVEL), jnp.asarray(speed)), jnp.array([[1.0, 0.0], [fall, 1.0]])
+    after, columns = through_the_bounce(state, by_state, True)
+    slopes = np.stack(jax.jacfwd(exact, argnums=(0, 1, 2, 3))(y, v, LEVEL, BOUNCE, fall))
+    slopes[2:] *= SIZES[:, None]
+    np.testing.assert_allclose(np.concatenate(columns), slopes, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(after, (LEVEL, -BOUNCE * speed), rtol=1e-15)
+    np.testing.assert_array_equal(through_the_bounce(state, by_state, False)[0], state)
