@@ -15,6 +15,7 @@ from jaxbiped.scene._abstract_scene import AbstractMinimalScene, AbstractWalkerS
 from jaxbiped.scene._ground import AbstractClearance, AlwaysTouching, Ground, OneFoot
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._linkages import check_loaded_bodies, walker_linkage
+from jaxbiped.scene._modes import limits_named
 from jaxbiped.scene._placement import placement
 from jaxbiped.scene._rigid_feet import check_rolls, check_stands, rigid_modes
 from jaxbiped.scene._starting_mode import starting_mode
@@ -193,6 +194,7 @@ class RigidScene(AbstractMinimalScene):
         feet = check_stands(mechanism.structure, standing)
         modes, names = rigid_modes(mechanism), self.state_names
         if not modes.any:
+            limits_named(modes, held or ())
             placed = placement(mechanism, slope, values, standing, names)
             return state_type_of(names)(**placed)
         placed = placement(mechanism, slope, values, standing, names[:-1])
