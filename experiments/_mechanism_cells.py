@@ -90,15 +90,19 @@ def slope_of_walk(trial: Trial) -> float:
     return float(jax.jacfwd(place)(slope)[0])
 
 
+def period_of(found: jb.Gait, where: str) -> float:
+    if found.outcome != jb.gait.Search.FOUND:
+        raise LookupError(f"no gait {where}: {found.outcome}.")
+    return float(found.measures.period)
+
+
 def gait(trial: Trial) -> float:
     return float(trial.gait.measures.period)
 
 
 def without_guess(trial: Trial) -> float:
     found = jb.find_gait(trial.scene, parameters=(), radius_sensitivities=False)
-    if found.outcome != jb.gait.Search.FOUND:
-        raise LookupError(f"no gait without a guess: {found.outcome}.")
-    return float(found.measures.period)
+    return period_of(found, "without a guess")
 
 
 def radius(trial: Trial) -> float:
@@ -187,8 +191,8 @@ def redundant(trial: Trial) -> float:
 
 
 def rigid(trial: Trial) -> float:
-    scene = jb.RigidScene(walker=trial.scene.walker, ground=trial.scene.ground)
-    return float(jb.find_gait(scene, parameters=(), radius_sensitivities=False).measures.period)
+    found = jb.find_gait(*trial.case.on_rigid_feet(), parameters=(), radius_sensitivities=False)
+    return period_of(found, "on rigid feet")
 
 
 def engines(trial: Trial) -> float:

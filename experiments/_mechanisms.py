@@ -1,6 +1,8 @@
 """Eight walkers whose mechanisms differ: their scenes, and starts near their gaits."""
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import jaxbiped as jb
@@ -17,11 +19,13 @@ class Case(NamedTuple):
         scene: the walker on its slope.
         start: angles and rates by the names of the state; the others are 0.
         standing: the body whose foot stands at that start.
+        flat: what of the start is another on rigid feet, where that foot lies flat.
     """
 
     scene: jb.Scene
     start: dict[str, float]
     standing: str
+    flat: Mapping[str, float] = MappingProxyType({})
 
     @property
     def guess(self) -> Any:
@@ -29,6 +33,11 @@ class Case(NamedTuple):
         state = self.scene.state(**self.start, standing=self.standing)
         height = f"{self.scene.mechanism.structure.root}_z"
         return state._replace(**{height: getattr(state, height) - PRESSED})
+
+    def on_rigid_feet(self) -> tuple[jb.RigidScene, Any]:
+        """The same walker on rigid feet, and the start there."""
+        scene = jb.RigidScene(self.scene.walker, self.scene.ground)
+        return scene, scene.state(**self.start | dict(self.flat))
 
 
 def scene_with(walker: Any, slope: float, **parts: Any) -> jb.Scene:
@@ -39,8 +48,9 @@ def scene_with(walker: Any, slope: float, **parts: Any) -> jb.Scene:
 
 
 def kneed(**changes: Any) -> jb.Kneed:
-    """McGeer's proportions of 1990, for a leg of 0.4 m and a mass of 2 kg."""
-    return dataclasses.replace(jb.models.mcgeer(knees=True).walker, **changes)
+    """McGeer's proportions of 1990, for a leg of 0.4 m and a mass of 2 kg; its knees lock."""
+    locking = {"holds": "until heel strike"} | changes
+    return dataclasses.replace(jb.models.mcgeer(knees=True).walker, **locking)
 
 
 def unequal_legs() -> jb.Mechanism:
@@ -101,7 +111,7 @@ def cases() -> dict[str, Case]:
     leaning = stepping | dict(theta_torso=0.05, omega_torso=0.8)
     bent = dict(
         theta_thigh_1=0.14, theta_shank_1=-0.20, omega_thigh_1=3.4, omega_shank_1=1.7,
-        theta_thigh_2=-0.086, theta_shank_2=0.118, omega_thigh_2=-0.88, omega_shank_2=-0.88,
+        theta_thigh_2=-0.086, theta_shank_2=0.114, omega_thigh_2=-0.88, omega_shank_2=-0.88,
     )  # fmt: skip
     return {
         "seed": Case(jb.seed_scene(slope=0.02), stepping, "2"),
@@ -123,6 +133,7 @@ def cases() -> dict[str, Case]:
                 omega_foot_2=-0.05,
             ),
             "foot_2",
+            flat=dict(theta_foot_2=0.0, omega_foot_2=0.0),
         ),
         "five links": Case(scene_with(five_links(), 0.0456), bent, "shank_2"),
     }

@@ -277,10 +277,11 @@ def near_miss(value: object, names: Iterable[object]) -> str:
 def check_type(name: str, value: object, *kinds: type) -> None:
     """Raises `ArgumentError` unless `value` is an instance of one of `kinds`."""
     if not isinstance(value, kinds):
-        allowed = " or a ".join(kind.__name__ for kind in kinds)
+        names = [kind.__name__ for kind in kinds]
+        allowed = " or ".join(f"{'an' if each[0] in 'AEIOU' else 'a'} {each}" for each in names)
         shown = repr(value)
         shown = shown if len(shown) < 80 else f"a {type(value).__name__}"
-        raise ArgumentError(f"{name} = {shown} is not allowed: it must be a {allowed}.")
+        raise ArgumentError(f"{name} = {shown} is not allowed: it must be {allowed}.")
 
 
 def _in(unit: str) -> str:

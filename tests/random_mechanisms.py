@@ -2,11 +2,14 @@
 
 import numpy as np
 from hypothesis import strategies as st
+from reference import mechanism_equations as maximal
+from reference.mechanism_equations import accelerations
 
 import jaxbiped as jb
 from jaxbiped.scene._bodies import Body, Foot
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
+from tests.mechanism_numbers import bodies_of
 
 
 def _numbers(low, high):
@@ -79,66 +82,21 @@ def arm(place, angle):
 def maximal_accelerations(mechanism, motion, slope, g, forces=()):
     """Accelerations of the root point and of all angles, each body with three coordinates.
 
-    The hinges and the couplings are constraints, solved with the equations of motion. `forces` are
-    (body, place, x, z).
+    `forces` are (body, place, x, z).
     """
-    s, bodies = mechanism.structure, mechanism.bodies
-    n = len(bodies)
-    size = 2 + 3 * n  # root point, then each body's mass centre and angle
-    mass, load = np.zeros((size, size)), np.zeros(size)
-    gravity = g * np.array([np.sin(slope), -np.cos(slope)])
-    root = 1.0 if mechanism.root_mass is None else float(mechanism.root_mass)
-    mass[0, 0] = mass[1, 1] = 0.0 if mechanism.root_mass is None else root
-    load[:2] = mass[0, 0] * gravity
-    rows, right = [], []
-
-    def constrain(pairs, value):
-        row = np.zeros(size)
-        for place, weight in pairs:
-            row[place] += weight
-        rows.append(row)
-        right.append(value)
-
-    for j, body in enumerate(bodies):
-        at, angle, rate = 2 + 3 * j, float(motion.angles[j]), float(motion.rates[j])
-        mass[at, at] = mass[at + 1, at + 1] = float(body.mass)
-        mass[at + 2, at + 2] = float(body.inertia)
-        load[at : at + 2] = float(body.mass) * gravity
-        place, moves = arm(body.centre, angle)
-        parent = s.parents[j]
-        for i in range(2):
-            # Mass centre minus its own arm is the hinge, on the parent or on the root point.
-            pairs = [(at + i, 1.0), (at + 2, -moves[i])]
-            value = -place[i] * rate**2
-            if parent < 0:
-                pairs.append((i, -1.0))
-            else:
-                up = 2 + 3 * parent
-                above, turning = float(motion.angles[parent]), float(motion.rates[parent])
-                own, own_moves = arm(bodies[parent].centre, above)
-                hinge, hinge_moves = (np.zeros(2), np.zeros(2))
-                if body.at is not None:
-                    hinge, hinge_moves = arm(body.at, above)
-                pairs += [(up + i, -1.0), (up + 2, own_moves[i] - hinge_moves[i])]
-                value += (own - hinge)[i] * turning**2
-            constrain(pairs, value)
-    for angle, part in zip(s.joints, mechanism.joints, strict=True):
-        if isinstance(part, Coupling):
-            constrain([(4 + 3 * j, weight) for j, weight in angle.weights], 0.0)
-            continue
-        torque = _torque(part, angle, motion, slope)
-        for j, weight in angle.weights:
-            load[4 + 3 * j] += weight * torque
-    for j, place, x, z in forces:
-        own, _ = arm(bodies[j].centre, float(motion.angles[j]))
-        point, _ = arm(place, float(motion.angles[j]))
-        lever = point - own
-        load[2 + 3 * j : 4 + 3 * j] += x, z
-        load[4 + 3 * j] += lever[0] * z - lever[1] * x
-    jacobian = np.array(rows)
-    whole = np.block([[mass, jacobian.T], [jacobian, np.zeros((len(rows), len(rows)))]])
-    found = np.linalg.solve(whole, np.concatenate([load, right]))
-    return np.concatenate([found[:2], found[4:size:3]])
+    tree = bodies_of(mechanism, slope, g)
+    moving = np.array(motion.angles, float), np.array(motion.rates, float)
+    torques = [
+        (angle.weights, _torque(part, angle, motion, slope))
+        for angle, part in zip(mechanism.structure.joints, mechanism.joints, strict=True)
+        if not isinstance(part, Coupling)
+    ]
+    pushed = [
+        (j, arm(place, float(motion.angles[j]))[0], np.array([x, z], float))
+        for j, place, x, z in forces
+    ]
+    root = np.zeros(2)  # where it is and how it moves does not count
+    return accelerations(tree, maximal.Motion(root, root, *moving), tree.p, pushed, torques)
 
 
 def _torque(part, angle, motion, slope):

@@ -1,7 +1,7 @@
 """Motion as laws of motors see it: any angle, the phase, and the roles of a mirror's two sides."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import jax
 import jax.numpy as jnp
@@ -63,6 +63,14 @@ class MotorMotion(NamedTuple):
     def phase_rate(self) -> Scalar:
         """Its rate [rad/s]."""
         return -self._stance().rate
+
+    @property
+    def time(self) -> NoReturn:
+        """Not known to laws."""
+        raise ArgumentError(
+            "motion.time is not known, because a motor's law may not depend on time: use "
+            "motion.phase, or an angle by motion.of."
+        )
 
     def _stance(self) -> LegMotion:
         if self.stance is None:

@@ -21,10 +21,11 @@ def check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
             raise ArgumentError(f"{argument} = {group!r} is not allowed: give a tuple of them.")
         for each in group:
             check_type(argument, each, kind)
-    if not feet:
-        raise ArgumentError(
-            "feet is empty, which is not allowed: a mechanism needs at least one foot."
-        )
+    for argument, one, group in (("bodies", "body", bodies), ("feet", "foot", feet)):
+        if not group:
+            raise ArgumentError(
+                f"{argument} is empty, which is not allowed: a mechanism needs at least one {one}."
+            )
     if root[0] not in string.ascii_letters:
         raise ArgumentError(
             f"root = {root!r} is not allowed: it must begin with a letter, because names of "

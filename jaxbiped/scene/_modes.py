@@ -208,6 +208,8 @@ def limits_named(modes: Modes, held: str | Sequence[str]) -> Indices:
     if not isinstance(wanted, list | tuple):
         raise ArgumentError(f"held = {held!r} is not allowed: give a stop's name, or several.")
     names = [limit.name for limit in modes.limits]
+    if wanted and not names:
+        raise ArgumentError(f"held = {held!r} is not allowed: the walker has no stops.")
     for name in wanted:
         check_choice("held", name, names)
         if names.count(name) > 1:

@@ -16,6 +16,7 @@ from jaxbiped.scene._clearance import AbstractClearance, AlwaysTouching, OneFoot
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._linkages import check_loaded_bodies, walker_linkage
+from jaxbiped.scene._modes import limits_named
 from jaxbiped.scene._placement import placement
 from jaxbiped.scene._rigid_feet import check_rolls, check_stands, rigid_modes
 from jaxbiped.scene._starting_mode import starting_mode
@@ -194,6 +195,7 @@ class RigidScene(AbstractMinimalScene):
         feet = check_stands(mechanism.structure, standing)
         modes, names = rigid_modes(mechanism), self.state_names
         if not modes.any:
+            limits_named(modes, held or ())
             placed = placement(mechanism, slope, values, standing, names)
             return state_type_of(names)(**placed)
         placed = placement(mechanism, slope, values, standing, names[:-1])

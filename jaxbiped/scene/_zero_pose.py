@@ -25,6 +25,7 @@ def check_zero_pose(mechanism: "Mechanism") -> None:
     """
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(mechanism)):
         return
+    _check_shapes(mechanism)
     height = np.min(np.asarray(mechanism.height))
     if height <= 0.0:
         raise ArgumentError(
@@ -47,6 +48,22 @@ def check_zero_pose(mechanism: "Mechanism") -> None:
         worst = np.reshape(vectors[..., 2:, 0], (-1, len(structure.free)))
         most = int(np.argmax(np.max(np.abs(worst), axis=0)))
         _refuse(mechanism, structure.free[most])
+
+
+def _check_shapes(mechanism: "Mechanism") -> None:
+    """Raises `ArgumentError` where two numbers are arrays that do not broadcast to one shape."""
+    known: dict[tuple[int, ...], str] = {}
+    leaves = jtu.tree_leaves(mechanism)
+    for name, leaf in zip(mechanism.parameter_names(), leaves, strict=True):
+        for shape, other in known.items():
+            try:
+                np.broadcast_shapes(shape, np.shape(leaf))
+            except ValueError:
+                raise ArgumentError(
+                    f"{other} and {name} have the shapes {shape} and {np.shape(leaf)}, which are "
+                    "not allowed together: give arrays of one shape."
+                ) from None
+        known.setdefault(np.shape(leaf), name)
 
 
 def _refuse(mechanism: "Mechanism", body: int) -> None:

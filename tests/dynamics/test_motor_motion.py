@@ -176,6 +176,11 @@ def test_coupled_bodies_are_exchanged_with_the_others():
     assert [float(a) for a in swapped.angles] == [-0.2, 0.3, 0.1]
 
 
+def test_a_law_may_not_depend_on_time():
+    with pytest.raises(jb.ArgumentError, match=r"motion\.time is not known, .* motion\.phase"):
+        torque_of(with_motor(lambda motion: motion.time), leg=1)
+
+
 @pytest.mark.parametrize("told", [None, (1.0, 2.0)])
 def test_a_law_that_returns_no_torque_is_refused(told):
     with pytest.raises(jb.ArgumentError, match="must return one torque"):

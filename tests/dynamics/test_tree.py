@@ -56,7 +56,7 @@ def test_accelerations_equal_those_in_maximal_coordinates(data):
     forces = [(len(mechanism.structure.bodies) - 1, PLACE, *force)]
     expected = maximal_accelerations(mechanism, motion, SLOPE, GRAVITY, forces)
     size = max(1.0, np.abs(expected).max())
-    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10 * size)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * size)
 
 
 def test_every_parameter_moves_the_accelerations():

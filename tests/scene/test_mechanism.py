@@ -148,6 +148,16 @@ REFUSED = {
         feet=tuple(Foot(f"leg_{i}", centre=0.3, leg="both") for i in (1, 2))
     ),
     "needs at least one foot": lambda: two_legs(feet=()),
+    "needs at least one body": lambda: two_legs(bodies=(), mirror=()),
+    "have the shapes (2,) and (3,)": lambda: two_legs(
+        bodies=[
+            Body(f"leg_{i}", mass=np.ones(2), inertia=np.full(3, 0.01), centre=0.1) for i in (1, 2)
+        ]
+    ),
+    "it must be an AbstractJointPart": lambda: two_legs("spring"),
+    "held = 'leg_1' is not allowed: the walker has no stops": lambda: jb.RigidScene(
+        two_legs(), jb.Ground(slope=0.03)
+    ).state(held="leg_1"),
     "names are unique": lambda: two_legs(bodies=(LEGS[0], LEGS[0])),
     "parents come first": lambda: kneed(bodies=(*leg(1)[::-1], *leg(2))),
     "called 'heel'": lambda: two_legs(

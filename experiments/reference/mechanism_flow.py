@@ -1,0 +1,194 @@
+"""The motion of a mechanism over a while and its derivatives, by collocation on smooth pieces.
+
+Every surface between pieces is located, tangents jump there by saltation, and are carried by the
+equations that the collocation's own solution satisfies.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.optimize
+
+from .collocation import Radau, radau
+from .mechanism_equations import FREE, Tree, contacts, leg_rates, motion_of
+from .mechanism_pieces import KINDS, TINY, Field, beyond, pieces_at, sides, surfaces
+
+FIRST_STEP, GROWTH = 1e-10, 2.5
+"""Steps after a switch begin so small [s] that a root's singularity at touchdown is graded away."""
+
+
+class Flow(NamedTuple):
+    """A motion's end, and its derivatives at equal times.
+
+    Attributes:
+        state: (n,). gradient: with respect to the start and the directions, (n, n + k).
+        rates: of the state at the end, (n,). switches: what was met, with its times [s].
+    """
+
+    state: np.ndarray
+    gradient: np.ndarray
+    rates: np.ndarray
+    switches: list[tuple[str, float]]
+
+
+class _Step(NamedTuple):
+    """A step's beginning on a piece, and the method."""
+
+    y: np.ndarray
+    field: Field
+    method: Radau
+
+    def stages(self, h: float) -> np.ndarray | None:
+        """States at the stages (s, n) by Newton's method; None where it does not converge."""
+        p, (nodes, matrix) = self.field.tree.p, self.method[:2]
+        s, n = len(nodes), len(self.y)
+        at = self.y + h * nodes[:, None] * self.field(self.y, p)
+        change, factors = np.inf, None
+        with np.errstate(all="ignore"):
+            for trial in range(40):
+                rates = self.field(at, p)
+                left = (self.y - at + h * matrix @ rates).ravel()
+                if not np.isfinite(left).all():
+                    return None
+                if trial % 3 == 0:
+                    system = _system(h, matrix, self.field.slopes(at, p, np.zeros((0, len(p)))))
+                    if not np.isfinite(system).all():
+                        return None
+                    factors = np.linalg.inv(system)
+                step = (factors @ left).reshape(s, n)
+                at = at + step
+                before, change = change, float(np.max(np.abs(step)))
+                if not np.isfinite(change) or change > 1e3:
+                    return None
+                if change < 1e-15 or (change < 1e-12 and change > 0.5 * before):
+                    return at
+        return None
+
+    def carried(self, w: np.ndarray, at: np.ndarray, h: float, to: np.ndarray) -> np.ndarray:
+        """Tangents at the stages (s, n, n + k): what the collocation's solution changes by."""
+        every = self.field.slopes(at, self.field.tree.p, to)
+        (s, n), matrix = at.shape, self.method.matrix
+        left = np.repeat(w[None], s, 0)
+        left[:, :, n:] += h * np.tensordot(matrix, every[:, :, n:], 1)
+        system = _system(h, matrix, every[:, :, :n])
+        return np.linalg.solve(system, left.reshape(s * n, -1)).reshape(s, n, -1)
+
+
+def _system(h: float, matrix: np.ndarray, every: np.ndarray) -> np.ndarray:
+    s, n = every.shape[:2]
+    blocks = -h * matrix[:, None, :, None] * np.swapaxes(every, 0, 1)[None]
+    return np.eye(s * n) + blocks.reshape(s * n, s * n)
+
+
+def flow(
+    tree: Tree,
+    start: np.ndarray,
+    duration: float,
+    directions: np.ndarray,
+    *,
+    stages: int = 7,
+    resolution: float = 1e-10,
+) -> Flow:
+    """The motion from a start and its derivatives.
+
+    Args:
+        tree: the mechanism.
+        start: root point, free angles, and their rates, (n,).
+        duration: [s].
+        directions: in its numbers, by which to differentiate, (k, P).
+        stages: of the collocation, whose order is twice that less one.
+        resolution: what its last Legendre mode may have of state and tangents.
+    """
+    method, y, n = radau(stages), np.array(start, float), len(start)
+    w = np.eye(n, n + len(directions))
+    field = Field(tree, pieces_at(tree, y))
+    t, h, met = 0.0, FIRST_STEP, []
+    while t < duration:
+        h = min(h, duration - t)
+        step = _Step(y, field, method)
+        at = step.stages(h)
+        size = np.inf if at is None else _unresolved(method.last, at)
+        if at is None or size > resolution:
+            h *= 0.5 if at is None else max(0.2, 0.9 * (resolution / size) ** (1.0 / stages))
+            if h < 1e-16:
+                raise RuntimeError(f"no step at {t} s")
+            continue
+        which, span = _first_crossing(step, at, h)
+        if which is not None and span < h:
+            found = step.stages(span)
+            assert found is not None
+            at = found
+        moved = step.carried(w, at, span, directions)
+        rough = max(_unresolved(method.last, at), _unresolved(method.last, moved))
+        if rough > resolution:
+            h = span * max(0.2, 0.9 * (resolution / rough) ** (1.0 / stages))
+            continue
+        y, w, t = at[-1], moved[-1], t + span
+        room = (resolution / max(rough, 1e-30)) ** (1.0 / stages)
+        h = span * min(GROWTH, max(0.2, 0.9 * room))
+        if which is None:
+            continue
+        met.append((f"{KINDS[which % 5]} {which // 5}", t))
+        after = Field(tree, beyond(tree, field.pieces, which, y))
+        later = _delay(field, which, y, w, directions)
+        w = w + np.outer(field(y, tree.p) - after(y, tree.p), later)
+        field, h = after, FIRST_STEP
+    return Flow(y, w, field(y, tree.p), met)
+
+
+def _delay(
+    field: Field, which: int, y: np.ndarray, w: np.ndarray, directions: np.ndarray
+) -> np.ndarray:
+    """Derivative of the time at which a surface is met."""
+    tree, n = field.tree, len(y)
+    by_state = surfaces(tree, y + 1j * TINY * np.eye(n), tree.p + 0j)[:, which].imag / TINY
+    moved = tree.p + 1j * TINY * directions
+    by_number = surfaces(tree, y + 0j, moved)[:, which].imag / TINY if len(directions) else []
+    speed = by_state @ field(y, tree.p)
+    return -(by_state @ w + np.append(np.zeros(n), by_number)) / speed
+
+
+def _unresolved(last: np.ndarray, stages: np.ndarray) -> float:
+    """The last Legendre mode over a step, relative to 1 or the column's largest number."""
+    size = np.maximum(1.0, np.max(np.abs(stages), axis=(0, 1) if stages.ndim == 3 else 0))
+    return float(np.max(np.abs(np.tensordot(last, stages, 1)) / size))
+
+
+def _first_crossing(step: _Step, at: np.ndarray, h: float) -> tuple[int | None, float]:
+    """The surface at which the piece ends within a step, and the step that ends there."""
+    tree, pieces = step.field.tree, step.field.pieces
+    motion = motion_of(tree, at, tree.p)
+    values, rates = surfaces(tree, at, tree.p), leg_rates(tree, motion, tree.p)
+    sinking = [each.sinking for each in contacts(tree, motion, tree.p)]
+    found: list[tuple[float, int]] = []
+    for which, side in sides(tree, pieces).items():
+        k, kind = divmod(which, 5)
+        past = side * values[:, which] < 0.0
+        if kind == 0:
+            past &= side * sinking[k] < 0.0
+        if k < len(tree.feet) and tree.gated:
+            turning_back = rates[tree.legs[k]] < 0.0
+            deep = values[:, 5 * k] > 0.0
+            if pieces.pressing[k] == FREE:
+                if (deep & turning_back).any() and (deep & ~turning_back).any():
+                    raise RuntimeError(f"the leg of foot {k} turns back while it is in the ground")
+                past &= turning_back
+            elif not turning_back.all():
+                raise RuntimeError(f"the leg of foot {k} stops while it stands")
+        if past.any():
+            found.append((_span(step, which, side, h * step.method.nodes[past.argmax()]), which))
+    if not found:
+        return None, h
+    span, which = min(found)
+    return which, span
+
+
+def _span(step: _Step, which: int, side: float, high: float) -> float:
+    """The step that ends on a surface which is crossed within `high`."""
+
+    def value(span: float) -> float:
+        at = step.stages(span)
+        assert at is not None
+        return side * float(surfaces(step.field.tree, at[-1], step.field.tree.p)[which])
+
+    return float(scipy.optimize.brentq(value, 1e-6 * high, high, xtol=1e-22, rtol=1e-15))

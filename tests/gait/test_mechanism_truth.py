@@ -1,0 +1,73 @@
+"""Gaits of eight mechanisms against collocation in maximal coordinates, written independently."""
+
+import functools
+
+import numpy as np
+import pytest
+from _mechanisms import cases
+from reference.mechanism_gait import checked_cycle
+from reference.mechanism_pieces import Field, pieces_at
+
+import jaxbiped as jb
+from tests.mechanism_numbers import directions_of, tree_of
+
+CASES = cases()
+NIGHTLY = [
+    pytest.param(name, marks=() if name == "torso coupled" else pytest.mark.nightly)
+    for name in CASES
+]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_fields_are_those_of_maximal_coordinates(name):
+    scene, start = CASES[name].scene, CASES[name].guess
+    tree, y = tree_of(scene), np.array([float(leaf) for leaf in start])
+    expected = Field(tree, pieces_at(tree, y))(y, tree.p)
+    found = np.array([float(leaf) for leaf in jb.dynamics.vector_field(0.0, start, scene)])
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+
+
+@functools.cache
+def both(name):
+    """The gait at tight, with derivatives of its period by all parameters, and the check's."""
+    scene = CASES[name].scene
+    gait = jb.find_gait(scene, CASES[name].guess, accuracy="tight", radius_sensitivities=False)
+    assert gait.outcome is jb.gait.Search.FOUND
+    checked = checked_cycle(
+        tree_of(scene),
+        gait.measures.state,
+        float(gait.measures.period),
+        directions_of(scene, gait.parameters),
+        exchanges=gait.cycle == "step",
+    )
+    return gait, checked
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NIGHTLY)
+def test_gaits_are_those_of_maximal_coordinates(name):
+    gait, checked = both(name)
+    assert checked.residual < 5e-9
+    period = float(gait.measures.period)
+    assert period == pytest.approx(checked.period, abs=1e-9)
+    # The check's has the flow's own direction among them, which must be 1.
+    own = np.append(1.0, np.asarray(gait.multipliers))[: len(checked.multipliers)]
+    away = np.abs(own[:, None] - checked.multipliers[None, :])
+    assert away.min(axis=0).max() < 1e-6
+    assert away.min(axis=1).max() < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NIGHTLY)
+def test_sensitivities_are_within_their_bars(name):
+    gait, checked = both(name)
+    found, bars = (
+        np.asarray(each.period) for each in (gait.sensitivities, gait.sensitivity_errors)
+    )
+    outside = {
+        each: (float(a), float(b), float(bar))
+        for each, a, b, bar in zip(gait.parameters, found, checked.slopes, bars, strict=True)
+        if not abs(a - b) <= bar
+    }
+    assert not outside
+    np.testing.assert_allclose(found, checked.slopes, rtol=1e-4, atol=1e-9 * np.abs(found).max())
