@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped._progress import Stage
 from jaxbiped.gait import _settled_walks, _staged_search, _walk_waves
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._homotopy import BranchEnd
@@ -68,7 +69,8 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
     monkeypatch.setattr(_staged_search, "branch_along", follow)
     scout = SimpleNamespace(engine=engine)
     problem = FixedPointProblem(SimpleNamespace(steps=1), SCENE, (), START, Precision(1e-9, 1e-8))
-    return search_in_stages(search, problem, scout, first), took
+    now = Stage("searching for a gait", None, "searches", 0)
+    return search_in_stages(search, problem, scout, first, now), took
 
 
 def test_a_stable_gait_ends_the_search_and_an_unstable_one_does_not(monkeypatch):
