@@ -160,10 +160,7 @@ states without `ROOT_x` that are given, shape (n, m)."""
 
 
 class GaitWaves:
-    """A sweep under way.
-
-    Points that led to no stable gait are doubtful: they are written when all else is.
-    """
+    """A sweep under way. Points that led to no stable gait are doubtful: they are written last."""
 
     def __init__(
         self,
