@@ -68,18 +68,22 @@ class Stage:
             parts.append(f"{self.count:,} {self.unit}")
         return ", ".join([*parts, self.found] if self.found else parts)
 
+    def times(self) -> str:
+        """Time so far, and time left and rate where they are known."""
+        elapsed, fresh = time.monotonic() - self._began, self.count - self._done
+        told = f"{elapsed:.0f} s"
+        if not self.total or not fresh:
+            return told
+        rate, left = fresh / elapsed, elapsed * (self.total - self.count) / fresh
+        return f"{told}, {left:.0f} s left" + (f", {rate:,.0f} {self.unit}/s" if rate > 1 else "")
+
     def line(self) -> str:
-        """All of it on a line: a bar, time so far and time left, stages within."""
-        elapsed, bar, rest = time.monotonic() - self._began, "", ""
-        fresh = self.count - self._done
+        """All of it on a line: a bar, what is found, times, stages within."""
+        told = self.doing
         if self.total:
             share = min(1.0, self.count / self.total)
-            bar = f" |{'█' * round(_BAR * share):<{_BAR}}|"
-            if fresh:
-                rate, left = fresh / elapsed, elapsed * (self.total - self.count) / fresh
-                rest = f", {left:.0f} s left" + (f", {rate:,.0f} {self.unit}/s" if rate > 1 else "")
-        told = " ".join(filter(None, [f"{self.doing}:" if bar else self.doing, bar.strip()]))
-        told = f"{told} {self.progress()}".rstrip() + f" [{elapsed:.0f} s{rest}]"
+            told += f": |{'█' * round(_BAR * share):<{_BAR}}|"
+        told = f"{told} {self.progress()}".rstrip() + f" [{self.times()}]"
         return told if self.within is None else f"{told} › {self.within.words()}"
 
     def words(self) -> str:
@@ -200,7 +204,7 @@ def _log_writer() -> Write:
         if ended is None:
             return
         if passed >= due or (ended and now.total is not None):
-            after = f" [{passed:.0f} s]" if due else ""
+            after = f" [{now.times()}]" if due else ""
             print(f"{now.words()}{after}{'.' if ended else ' …'}", file=sys.stderr, flush=True)
             due = 2.0 * passed
 

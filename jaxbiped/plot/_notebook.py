@@ -110,7 +110,7 @@ def _of_gait(gait: Gait) -> str:
         if value is not None and found:
             error = getattr(gait.measure_errors, name)
             rows.append((name.replace("_", " "), *_with_error(float(value), float(error)), unit))
-    told = str(gait.outcome)
+    told = f"{gait.outcome} (jaxbiped.gait.explain_search(scene, gait) tells why)"
     if found:
         told = f"{_STABLE[bool(gait.stable)]}, found by {FoundBy(int(gait.origin.found_by))}"
     caption = f"Gait: {told}; its cycle is a {gait.cycle}"

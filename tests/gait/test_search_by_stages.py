@@ -174,3 +174,14 @@ def test_a_search_is_explained_in_one_sentence(made, said):
     sentence = jb.gait.explain_search(SCENE, made)
     assert said in sentence
     assert not sentence.endswith(".")
+
+
+def test_straight_legs_that_scuff_are_told_what_to_try():
+    seed = jb.seed_scene()
+    parts = dict(walker=seed.walker, ground=seed.ground, normal=seed.normal, friction=seed.friction)
+    scuffing = jb.Scene(**parts, clearance=jb.laws.AlwaysTouching())
+    gait = jb.find_gait(scuffing, jb.seed_state(), parameters=(), radius_sensitivities=False)
+    told = jb.gait.explain_search(scuffing, gait)
+    assert "stumbled" in told
+    assert told.endswith("give the scene clearance=jaxbiped.laws.StanceRotation()")
+    assert "clearance" not in jb.gait.explain_search(seed, gait)
