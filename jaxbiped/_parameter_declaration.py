@@ -6,7 +6,7 @@ what its parameters are in the one place where it declares them. Parts of a scen
 
 import dataclasses
 from collections.abc import Iterable
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import equinox as eqx
 
@@ -109,6 +109,10 @@ class AbstractNamedPart(AbstractPart):
     name: ClassVar[str | None] = None
     catalogue: ClassVar[dict[str, Any]] = {}
     needed: ClassVar[tuple[str, ...]] = ()
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...  # a scene's law has parameters of its own
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)

@@ -1,4 +1,8 @@
-"""Summary of a result in a line: how it ended, its shape, precision and memory, and what ran it."""
+"""Summary of a result in a line: how it ended, its shape, precision and memory, and what ran it.
+
+And what a notebook shows of it, which `jaxbiped.plot` draws: through the public name, when it is
+first asked for, as this lies below all that draws.
+"""
 
 import collections
 import enum
@@ -31,6 +35,13 @@ def summary(
         f"{type(result).__name__}({_outcomes(code, names)}, engine={engine}, "
         f"shape={tuple(like.shape)}, dtype={like.dtype}, {_memory(size)})"
     )
+
+
+def notebook_html(shown: object) -> str:
+    """HTML of a result or a scene, see `jaxbiped.plot.notebook_html`."""
+    import jaxbiped as jb
+
+    return jb.plot.notebook_html(shown)
 
 
 def _outcomes(code: ArrayLike, names: type[enum.IntEnum]) -> str:

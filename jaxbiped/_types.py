@@ -15,6 +15,9 @@ from jaxbiped._files import JsonObject as JsonObject
 Scalar: TypeAlias = Float[Array, "..."]
 """A number: one scalar leaf, or one such leaf for each entry of a batch or a time series."""
 
+StateLeaf: TypeAlias = Any
+"""A `Scalar` of a state, which users also write as a number of Python's or an array of NumPy's."""
+
 Numbers: TypeAlias = Array | np.ndarray
 """An array, of JAX or of NumPy."""
 

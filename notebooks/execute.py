@@ -53,7 +53,7 @@ def executed(path: Path) -> str:
     notebook.metadata = about
     for cell in notebook.cells:
         if cell.cell_type == "code":
-            cell.outputs = joined([each for each in cell.outputs if each.get("name") != "stderr"])
+            cell.outputs = joined([each for each in cell.outputs if not is_passing(each)])
             for output in cell.outputs:
                 if "image/png" in output.get("data", {}):
                     output.data["image/png"] = lighter(output.data["image/png"])
@@ -65,6 +65,11 @@ def executed(path: Path) -> str:
     if len(text.encode()) > LARGEST:
         raise ValueError(f"{path.name} has {len(text.encode())} bytes: at most {LARGEST} are kept.")
     return text
+
+
+def is_passing(output: nbformat.NotebookNode) -> bool:
+    """Whether an output is a warning or progress; a line of progress is empty in the end."""
+    return output.get("name") == "stderr" or output.get("data") == {"text/plain": ""}
 
 
 def joined(outputs: list[nbformat.NotebookNode]) -> list[nbformat.NotebookNode]:

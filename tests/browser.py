@@ -80,6 +80,15 @@ class Page:
         actions = webdriver.ActionChains(self.driver)
         actions.move_to_element_with_offset(element, x, y).click().perform()
 
+    def nameless(self):
+        """Controls and pictures that a screen reader has no name for, of all that there are."""
+        self.run("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
+        script = "return [...document.querySelectorAll(arguments[0])]"
+        kinds = "button, input, select, summary, [tabindex], svg[role=img], iframe"
+        found = self.run(script, kinds)
+        assert found
+        return [each.get_attribute("outerHTML") for each in found if not each.accessible_name]
+
     def errors(self):
         """What the console has said."""
         return self.driver.get_log("browser")

@@ -53,3 +53,23 @@ def test_nothing_of_the_machine_is_kept(path):
             assert output.get("name") != "stderr"
             said = output.get("text", "") + output.get("data", {}).get("text/plain", "")
             assert not re.search(r"(?<!\w)/(home|root|tmp|work|Users|usr|var|opt)/\w", said)
+
+
+def test_each_lesson_has_one_question_and_one_exercise():
+    for path in NOTEBOOKS:
+        cells = nbformat.read(path, as_version=4).cells
+        words = [cell.source for cell in cells if cell.cell_type == "markdown"]
+        title, question, *_ = words[0].split("\n\n")
+        assert title.startswith("# "), path
+        assert re.fullmatch(r"\*\*Question\.\*\* .*\?", question), path
+        assert sum(each.count("**Question.**") for each in words) == 1, path
+        assert sum(each.count("**Exercise.**") for each in words) == 1, path
+
+
+def test_readme_and_site_list_the_same_lessons_in_the_same_order():
+    root = FOLDER.parent
+    readme = re.findall(r"\(notebooks/(\w+)\.ipynb\)", (root / "README.md").read_text())
+    site = re.findall(r"^\.\./notebooks/(\w+)$", (root / "docs/index.md").read_text(), re.MULTILINE)
+    assert readme == site
+    assert sorted(site) == [path.stem for path in NOTEBOOKS]
+    assert len(site) <= 11

@@ -114,8 +114,8 @@ def fractions(
     _, high = wilson_interval(counts + own.sum() - own, total, confidence=confidence)
     order = np.argsort(-counts, kind="stable")
     return {
-        str(distinct[k]): Fraction(counts[k] / total, float(low[k]), float(high[k]), int(counts[k]))
-        for k in order
+        str(distinct[k]): Fraction(count / total, float(low[k]), float(high[k]), count)
+        for k, count in zip(order, counts[order].tolist(), strict=True)
     }
 
 

@@ -57,13 +57,23 @@ _MOVED = {
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _SIDES = re.compile(r"^[\s│|]*(.*?)[\s│|]*$")
 _RULE = re.compile(r"^[╭╰]?[─━=-]{3,}.*$")
-_OPTIONAL = re.compile(r"no type matching \{None\}\|(\w+) could be instantiated from \[(.*)\]")
+_PLAIN = {
+    r"no type matching \{None\}\|(\w+) could be instantiated from \[(.*)\]": r"\2 is not \1",
+    r"invalid literal for int\(\) with base 10: ('.*')": r"\1 is not INT",
+    r"could not convert string to float: ('.*')": r"\1 is not FLOAT",
+    r"[Ee]rror parsing (--\S+): ('.*') is not": r"\1 = \2 is not",
+    "is not FLOAT": "is not a number",
+    "is not INT": "is not a whole number",
+    r" \(applied to [^)]*\)| Arguments are applied to .*": "",
+}
+"""Words of the parser, by what they are replaced with."""
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs a command and exits.
 
-    With one sentence and 2 for an argument that is not allowed, 1 for a full disk or lost workers.
+    With one sentence and 2 for an argument that is not allowed, 1 for a full disk or lost workers,
+    130 for Ctrl-C.
     """
     try:
         try:
@@ -95,6 +105,10 @@ def _run(given: list[str]) -> None:
         sys.exit(command.run())
     except BrokenPipeError:
         raise
+    except KeyboardInterrupt as error:
+        told = " ".join(getattr(error, "__notes__", ["Interrupted."]))
+        print(f"jaxbiped: {told}", file=sys.stderr)
+        sys.exit(130)
     except (ArgumentError, ResourceError, OSError) as error:
         print(f"jaxbiped: {error}", file=sys.stderr)
         sys.exit(2 if isinstance(error, ArgumentError) else 1)
@@ -163,7 +177,10 @@ def one_sentence(box: str) -> str:
     message, *others = filled
     # A message may go on to list its reasons.
     told = takewhile(lambda line: not line.startswith(("Got errors", "- <class")), message)
-    parts = [_OPTIONAL.sub(r"\2 is no \1", " ".join(told)).rstrip(". ")]
+    sentence = " ".join(told)
+    for words, plain_words in _PLAIN.items():
+        sentence = re.sub(words, plain_words, sentence)
+    parts = [sentence.rstrip(". ")]
     for block in others:
         flags = [line.split()[0] for line in block[1:] if line.startswith("--")]
         flags = [flag for flag in flags if flag not in parts[0].split()]

@@ -28,7 +28,7 @@ _GAIT = {
     "period s": "{0[duration_s]:.6f}",
     "length m": "{0[step_length_m]:.6f}",
     "largest multiplier": "{0[largest]:.5f}",
-    "radius": "{0[radius]:.3g}",
+    "radius": "{0[reach]}",
 }
 _REDUNDANT = (
     'formulation = "redundant" is not allowed for a basin: starts are labelled in minimal '
@@ -95,7 +95,6 @@ class Basin(options.Command):
                     known,
                     starts,
                     executor=executor,
-                    progress=True,
                     **self.sweep.arguments("sweep") | {"workers": workers},
                 )
         finally:
@@ -123,7 +122,11 @@ def _basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
     fractions = jb.basins.fractions(_label_names(found), doubt=doubt)
     fresh = int(found.attrs["labelled_in_this_run"])
     gaits = [
-        gait | {"parameters": row["parameters"]}
+        gait
+        | {
+            "parameters": row["parameters"],
+            "radius": gait["radius"] if gait["radius"] > 0.0 else None,
+        }
         for row in json.loads(found.attrs["gaits"])
         for gait in row["gaits"]
     ]
@@ -164,7 +167,8 @@ def _print(report: Report, numbers: JsonObject) -> None:
     for gait in numbers["gaits"]:
         at = "".join(f", {name} {value:.4g}" for name, value in gait["parameters"].items())
         name, largest = f"period-{gait['cycle_footsteps']}{at}", math.hypot(*gait["multipliers"][0])
-        gaits.append(gait | {"name": name, "largest": largest})
+        reach = "not known" if gait["radius"] is None else f"{gait['radius']:.3g}"
+        gaits.append(gait | {"name": name, "largest": largest, "reach": reach})
     report.say(columns(_GAIT, gaits) if gaits else "no stable gait is known", "")
     report.say(
         f"{numbers['starts']} starts, {numbers['labelled_in_this_run']} of them labelled in this "

@@ -1,7 +1,6 @@
 """`jaxbiped constraints`: the constraint methods compared: violation, error and time."""
 
 import dataclasses
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -39,7 +38,6 @@ _COLUMNS = {
     "to standard": (11, "{2}"),
 }
 """Widths and formats by heads: a row is printed before the others are known."""
-_BAR = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
 
 class Integrator(NamedTuple):
@@ -130,15 +128,13 @@ class Constraints(options.Command):
 
     def run(self) -> int:
         """Runs the command; returns the exit code, 1 where Ctrl-C ended it."""
-        from tqdm import tqdm
-
         scene = self.scene.scene()
         assert isinstance(scene, jb.Scene)
         integrators = [Integrator.read(text) for text in self.integrators]
         options.make_folder(self.out)
         report, runs = Report(self.json), list[ConstraintRun]()
         many = len(integrators) * len(self.methods)
-        with tqdm(total=many, smoothing=0.0, bar_format=_BAR, desc=f"0/{many} runs") as bar:
+        with stage("comparing", total=many, unit="runs") as now:
             try:
                 for run in compare_constraints(
                     scene,
@@ -149,10 +145,9 @@ class Constraints(options.Command):
                     repeats=self.repeats,
                 ):
                     runs.append(run)
-                    with bar.external_write_mode(file=sys.stdout):
-                        report.say(_line(runs))
-                    bar.set_description_str(f"{len(runs)}/{many} runs", refresh=False)
-                    bar.update()
+                    now.clear()
+                    report.say(_line(runs))
+                    now.update()
             except KeyboardInterrupt:
                 report.say(f"stopped by Ctrl-C after {len(runs)} of {many} runs")
         complete = len(runs) == many

@@ -50,7 +50,6 @@ class ContinueGait(options.Command, of=("continue_gait",)):
             self.along,
             bounds=(self.first, self.last),
             guess=guess,
-            progress=True,
             **self.arguments("continue_gait"),
         )
         report, wall = Report(self.output.json), wall_times(imported)

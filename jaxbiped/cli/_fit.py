@@ -41,7 +41,7 @@ class Fit(options.Command, of=("fit_gait",)):
         assert not isinstance(scene, jb.RedundantScene)
         names = tuple(name.strip() for name in self.vary.split(",") if name.strip())
         measured, how = jb.identify.read_measured(self.file), self.arguments("fit_gait")
-        fit = jb.fit_gait(scene, names, measured, progress=True, **how)
+        fit = jb.fit_gait(scene, names, measured, **how)
         report, units = Report(self.json), jb.parameter_quantities(scene)
         parts = (units, fit.estimates, fit.standard_errors, fit.intervals)
         report.say(columns(_ESTIMATE, [(name, *(part[name] for part in parts)) for name in names]))

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
@@ -70,7 +69,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         how = self.arguments("optimise_gait")
         del how["footsteps"]  # of the certificate's walk
         how |= {"vary": _bounds(scene, self.vary), "subject_to": self.subject_to or None}
-        found = jb.optimise_gait(scene, progress=sys.stderr.isatty(), **how)
+        found = jb.optimise_gait(scene, **how)
         certificate = jb.optimise.certify(
             found,
             starts=self.basin,
@@ -78,7 +77,6 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
             fatal_push=self.fatal_push,
             bifurcations_along=along,
             other_engine=self.other_engine,
-            progress=sys.stderr.isatty(),
         )
         sense = "minimise" if self.maximise is None else "maximise"
         goal = getattr(self, sense)

@@ -87,8 +87,6 @@ class Trade(options.Command):
         self, name: str, trade: "WalkTrade | GaitTrade"
     ) -> "tuple[list[Row], Truth | None]":
         """Rows of all ways, and the truth that they are told against; no rows without one."""
-        from tqdm import tqdm
-
         from jaxbiped.trade import Way
 
         with stage(f"solving the {name} by the references"):
@@ -100,7 +98,12 @@ class Trade(options.Command):
             for solver, engine in _QUICK[name] + (_FURTHER[name] if self.full else ())
             for setting, rtol in self._settings(name, trade.scene)
         ]
-        return [trade.row(way, truth) for way in tqdm(ways, unit=f"{name}s")], truth
+        rows = []
+        with stage(f"measuring the {name}", total=len(ways), unit="ways") as now:
+            for way in ways:
+                rows.append(trade.row(way, truth))
+                now.update()
+        return rows, truth
 
     def _settings(self, name: str, scene: Any) -> Iterator[tuple[str, float]]:
         """What a user would write, and the relative tolerance that it stands for in this scene."""

@@ -10,6 +10,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
 from jaxbiped._identity import difference_of
+from jaxbiped._summary import notebook_html
 from jaxbiped._types import as_float
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch_point import Axis, BranchPoint
@@ -54,6 +55,8 @@ class Branch(eqx.Module):
 
     def __len__(self) -> int:
         return len(self.points)
+
+    _repr_html_ = notebook_html
 
     def __repr__(self) -> str:
         low, high = self.values.min(initial=np.inf), self.values.max(initial=-np.inf)

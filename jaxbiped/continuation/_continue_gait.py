@@ -5,7 +5,6 @@ from typing import Any
 
 import jax.tree_util as jtu
 import numpy as np
-from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive, check_within
 from jaxbiped._progress import stage
@@ -45,7 +44,7 @@ def continue_gait(
     max_points: int = 200,
     accuracy: str = "balanced",
     engine: str = "auto",
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Branch:
     """Follows a periodic gait along a parameter, in both directions and around folds.
 
@@ -69,10 +68,12 @@ def continue_gait(
         max_points: maximum number of points in each direction.
         accuracy: "balanced" or "tight".
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
-        progress: whether to show a bar on stderr.
+        progress: whether to show on stderr what is being done, how far it is and what was found; by
+            default (None) after two seconds, in a terminal, a notebook or a command.
 
     Returns:
-        The branch; without points where no gait was found, its `stops` then tell why. It passes no
+        The branch; without points where no gait was found, its `stops` then tell why. An interrupt
+        (Ctrl-C) ends it as "interrupted", with the points so far. It passes no
         gait twice: where it comes to one again, it ends as "closed", or as "jumped" where a step
         led back to it. Between two points that differ in how many multipliers lie outside the unit
         circle there is always an entry, "not-located" where the bifurcation was not found.
@@ -94,15 +95,15 @@ def continue_gait(
     start = start_of(scene, axis)
     near = state_of_guess(scene, guess)
     setup = continuation_setup(scene, axis, footsteps=footsteps, accuracy=accuracy, engine=engine)
-    begin = first_gait(setup, start, near, engine)
-    if isinstance(begin, str):
-        none = BranchStop(BranchEnd.NO_BEGINNING, begin, float("nan"))
-        return setup.branch(Trace([], [], none), Trace([], [], none))
-    with tqdm(unit=" gaits", disable=not progress) as bar:
+    with stage(f"following the gait along {along}", unit="gaits", show=progress) as now:
+        begin = first_gait(setup, start, near, engine)
+        if isinstance(begin, str):
+            none = BranchStop(BranchEnd.NO_BEGINNING, begin, float("nan"))
+            return setup.branch(Trace([], [], none), Trace([], [], none))
 
         def tell(point: BranchPoint) -> None:
-            bar.update()
-            bar.set_postfix_str(f"{along} = {point.value:.6g}", refresh=False)
+            radius = abs(point.multipliers[0])
+            now.update(found=f"radius {radius:.4g} at {along} = {point.value:.6g}")
 
         steps = dict(largest_step=float(largest_step), max_points=int(max_points), tell=tell)
         before, after = traces_from(setup, begin, **steps)
@@ -117,7 +118,7 @@ def traces_from(setup: ContinuationSetup, begin: CurvePoint, **options: Any) -> 
     """
     before = setup.trace(begin._replace(tangent=-begin.tangent), **options)
     known = before.reversed()
-    if before.stop.end is BranchEnd.CLOSED:
+    if before.stop.end in (BranchEnd.CLOSED, BranchEnd.INTERRUPTED):
         return before, Trace(known.points[-1:], [], before.stop)
     return before, setup.trace(begin, passed=known.points[:-1], **options)
 

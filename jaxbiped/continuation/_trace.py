@@ -197,36 +197,41 @@ def trace(
     if leaves_range(begin):
         return stopped(BranchEnd.REACHED, BOUND)
     control = StepControl(_FIRST * largest_step, largest_step, _SMALLEST, _LEAST_COSINE, _ASIDE)
-    for attempt in islice(follow(curve, here, control, low=0.0, high=1.0), max_points):
-        if attempt.found is None:
-            return stopped(*reason_of(attempt.code))
-        there = attempt.found
-        closes = len(points) > 3 and _closes(begin, here, there)
-        if closes:  # beyond its beginning everything is known
-            there = begin
-        elif (cosine := passed_before(curve, [*passed, *points], there)) is not None:
-            if cosine > 0.0:
+    try:
+        for attempt in islice(follow(curve, here, control, low=0.0, high=1.0), max_points):
+            if attempt.found is None:
+                return stopped(*reason_of(attempt.code))
+            there = attempt.found
+            closes = len(points) > 3 and _closes(begin, here, there)
+            if closes:  # beyond its beginning everything is known
+                there = begin
+            elif (cosine := passed_before(curve, [*passed, *points], there)) is not None:
+                if cosine > 0.0:
+                    return stopped(BranchEnd.CLOSED, "the branch is closed")
+                return stopped(
+                    BranchEnd.JUMPED, "a step jumped to gaits that the branch had passed"
+                )
+            located = bifurcations_between(curve, axis, here, there)
+            for place, event in located:
+                points.append(branch_point(curve, axis, place))
+                events.append(event)
+                if event.kind in until:
+                    return stopped(BranchEnd.UNFINISHED, f"stopped at the {event.kind}")
+            points.append(branch_point(curve, axis, there))
+            if not explains(here, there, [event.kind for _, event in located]):
+                events.append(not_located(points[-1], axis.value(float(here.place[-1]))))
+                if BranchEvent.NOT_LOCATED in until:
+                    return stopped(BranchEnd.UNFINISHED, f"stopped at the {events[-1].kind}")
+            tell(points[-1])
+            if abs(points[-1].multipliers[0]) > _DIVERGED:
+                return stopped(BranchEnd.BREAKS_OFF, NOT_SMOOTH)
+            if is_bound(there):
+                return stopped(BranchEnd.REACHED, BOUND)
+            if closes:
                 return stopped(BranchEnd.CLOSED, "the branch is closed")
-            return stopped(BranchEnd.JUMPED, "a step jumped to gaits that the branch had passed")
-        located = bifurcations_between(curve, axis, here, there)
-        for place, event in located:
-            points.append(branch_point(curve, axis, place))
-            events.append(event)
-            if event.kind in until:
-                return stopped(BranchEnd.UNFINISHED, f"stopped at the {event.kind}")
-        points.append(branch_point(curve, axis, there))
-        if not explains(here, there, [event.kind for _, event in located]):
-            events.append(not_located(points[-1], axis.value(float(here.place[-1]))))
-            if BranchEvent.NOT_LOCATED in until:
-                return stopped(BranchEnd.UNFINISHED, f"stopped at the {events[-1].kind}")
-        tell(points[-1])
-        if abs(points[-1].multipliers[0]) > _DIVERGED:
-            return stopped(BranchEnd.BREAKS_OFF, NOT_SMOOTH)
-        if is_bound(there):
-            return stopped(BranchEnd.REACHED, BOUND)
-        if closes:
-            return stopped(BranchEnd.CLOSED, "the branch is closed")
-        here = there
+            here = there
+    except KeyboardInterrupt:
+        return stopped(BranchEnd.INTERRUPTED, "interrupted by Ctrl-C")
     return stopped(BranchEnd.UNFINISHED, f"{max_points} points were followed")
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from jaxbiped._types import Scalar, Time
+from jaxbiped._types import Scalar, StateLeaf, Time
 from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
 from jaxbiped.constraints._linkage import Linkage
@@ -21,8 +21,8 @@ class LinkageState(NamedTuple):
         v: their rates.
     """
 
-    q: tuple[Scalar, ...]
-    v: tuple[Scalar, ...]
+    q: tuple[StateLeaf, ...]
+    v: tuple[StateLeaf, ...]
 
 
 class LinkageMotion(NamedTuple):

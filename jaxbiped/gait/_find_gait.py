@@ -2,11 +2,9 @@
 
 import dataclasses
 import functools
-from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.tree_util as jtu
 import numpy as np
@@ -14,13 +12,12 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice, check_count, check_unbatched
 from jaxbiped._debug_switches import without_switches
-from jaxbiped._progress import stage
-from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
-from jaxbiped.compiler import deferred_checks, host_jit
+from jaxbiped._progress import Stage, stage
+from jaxbiped.caching._caches import bounded_cache
+from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._consistent_state import consistent_state
 from jaxbiped.dynamics._redundant_state import BodiesState, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import state_for
 from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
@@ -36,8 +33,9 @@ from jaxbiped.gait._held_multipliers import without_held
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes
 from jaxbiped.gait._search_along import search_along
+from jaxbiped.gait._search_compilation import compile_once
 from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_unknown
-from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.gait._search_starts import default_guess, state_of_guess
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
@@ -57,7 +55,7 @@ _RESIDUAL_SHARE = 0.3
 @without_switches
 def find_gait(
     scene: Scene | RigidScene | RedundantScene,
-    guess: WalkerState | BodiesState | None = None,
+    guess: Gait | WalkerState | BodiesState | None = None,
     *,
     footsteps: int | None = None,
     section: AbstractSection | None = None,
@@ -69,6 +67,7 @@ def find_gait(
     radius_sensitivities: bool = True,
     solver: str | diffrax.AbstractSolver[PyTree] | None = None,
     engine: str = "auto",
+    progress: bool | None = None,
 ) -> Gait:
     """Finds a periodic gait, its Floquet multipliers and its sensitivities to the parameters.
 
@@ -82,9 +81,9 @@ def find_gait(
             constraint directions are left out. Second derivatives (the spectral radius's) take the
             minimal equations along the redundant motion: on the constraints these are the method's
             own, but for what a penalty leaves (a share of 1/(A s), see `Penalty`).
-        guess: a start near the gait, on the section or not; the gait is then the one that Newton's
-            method comes to from there. Unless given, the search goes through stages, each only
-            where those before found no stable gait: Newton's method from the seed's start, fitted
+        guess: a gait, or a start near one, on the section or not; the gait is then the one that
+            Newton's method comes to from there. Unless given, the search goes through stages, each
+            only if those before found no stable gait: Newton's method from the seed's start, fitted
             to the scene's legs; walks forwards from many starts (by lanes only); continuation from
             the seed's scene, or that of the same walker relaxed (straight, passive, of legs alone);
             Newton's method from scattered starts. The gait is then the stable one, or the one of
@@ -109,6 +108,8 @@ def find_gait(
         solver: a name (see `SOLVERS`) or any diffrax solver without memory; unless given "rodas4",
             for a rigid walker "rodas5p".
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
+        progress: whether to show on stderr what is being done, how far it is and what was found; by
+            default (None) after two seconds, in a terminal, a notebook or a command.
 
     Returns:
         The gait, or the best that was found instead: look at its `ending`. `found_by`, `others` and
@@ -138,16 +139,22 @@ def find_gait(
             radius_sensitivities=radius_sensitivities,
             engine=engine,
         )
-        return accurate_gait(
-            find, scene, float(accuracy), guess=guess, solver=solver, radius=radius_sensitivities
-        )
+        with stage(f"finding the gait to an error of {accuracy:g}", show=progress):
+            return accurate_gait(
+                find,
+                scene,
+                float(accuracy),
+                guess=guess,
+                solver=solver,
+                radius=radius_sensitivities,
+            )
     if isinstance(accuracy, str):
         check_accuracy_name(accuracy)
     check_choice("method", method, ("newton", "optax"))
     arrivals = arrivals_of(scene, footsteps)
     check_unbatched("scene", scene)
     section = section_of(scene, section)
-    start = _check_start(scene, section, default_guess(scene) if guess is None else guess)
+    start = _check_start(scene, section, guess)
     check_unbatched("guess", start, "one state")
     most = (40 if method == "newton" else 400) if max_evaluations is None else max_evaluations
     check_count("max_evaluations", most)
@@ -183,12 +190,15 @@ def find_gait(
         else:
             found = walks_only(search(problem))
         return summarise_gait(asked, found, names, radius, origin)
-    _compile_once(problem, asked, names, radius, origin)
-    found, told = _search(problem), origin
-    found = found if staged else walks_only(found)
-    if staged and not (_is_stable(found) and is_whole(found, problem)):
-        found, told = _search_on(problem, found, engine)
-    gait = summarise_gait(asked, found, names, radius, origin)
+    with stage("searching for a gait", unit="searches", show=progress) as now:
+        compile_once(_search, problem, asked, names, radius, origin)
+        found, told = _search(problem), origin
+        now.update()
+        found = found if staged else walks_only(found)
+        if staged and not (_is_stable(found) and is_whole(found, problem)):
+            found, told = _search_on(problem, found, engine, now)
+        now.update(0, "measuring it")
+        gait = summarise_gait(asked, found, names, radius, origin)
     if told is not origin:  # its scene may be of another structure, as of motors with a share
         gait = dataclasses.replace(gait, origin=jtu.tree_map(np.asarray, told))
     warn_of_unknown(gait)
@@ -200,7 +210,9 @@ def _is_stable(found: Found) -> bool:
     return usable and spectral_radius(found) < 1.0
 
 
-def _search_on(problem: FixedPointProblem, first: Found, engine: str) -> tuple[Found, Origin]:
+def _search_on(
+    problem: FixedPointProblem, first: Found, engine: str, now: Stage
+) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
     scene, start, method = problem.args, problem.guess, problem.method
     assert method is not None
@@ -216,17 +228,18 @@ def _search_on(problem: FixedPointProblem, first: Found, engine: str) -> tuple[F
         most = np.asarray(min(patience, method.max_evaluations))
         return _search(other._replace(method=dataclasses.replace(method, patience=most)))
 
-    staged = search_in_stages(search_from, problem, scout, first)
+    staged = search_in_stages(search_from, problem, scout, first, now)
     found = walks_only(first) if staged.best is None else staged.best.found
     return found, origin_of(staged, scene.minimal, start)
 
 
 def _check_start(
-    scene: AbstractWalkerScene, section: AbstractSection, start: PyTree
+    scene: AbstractWalkerScene, section: AbstractSection, guess: PyTree
 ) -> WalkerState:
-    if scene.redundant:
+    start = default_guess(scene) if guess is None else guess
+    if scene.redundant and not isinstance(guess, Gait):  # whose state is minimal
         start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
-    return with_leg_names_of(section, scene.minimal, state_for(scene.minimal, start, "guess"))
+    return with_leg_names_of(section, scene.minimal, state_of_guess(scene.minimal, start))
 
 
 @bounded_cache(1)  # the same object each time, so that nothing is compiled again
@@ -236,64 +249,9 @@ def _adam() -> "optax.GradientTransformation":
     return optax.adam(1e-2)
 
 
-def _compile_once(
-    problem: FixedPointProblem,
-    asked: FixedPointProblem,
-    names: tuple[str, ...],
-    radius: bool,
-    origin: Origin,
-) -> None:
-    """Compiles what is not compiled yet for this kind of search and what is asked of its gait."""
-    once = _compilation_of(_kind_of((problem, names, radius)))
-    once(lambda: _compile(problem, asked, names, radius, origin))
-
-
-@bounded_cache(PROGRAMS)
-def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
-    """What one kind of search is compiled by."""
-    return Once()
-
-
-def _compile(problem: FixedPointProblem, asked: FixedPointProblem, *more: Any) -> None:
-    """Compiles both programs, and what lanes run for them, at the same time."""
-    told = stage("compiling the search (first time for this kind of scene)")
-    with told, ThreadPoolExecutor() as meanwhile:
-        with deferred_checks() as programs:
-            # What takes lanes longest begins first.
-            begun = _search.begin(problem)
-            ready = [meanwhile.submit(begun.finish)]
-            no_result = _empty_arrays(begun.result)
-            ready.append(meanwhile.submit(summarise_gait.begin(asked, no_result, *more).finish))
-        try:
-            for program in programs:
-                program.check()
-        except BaseException:
-            _search.clear()  # it would be found compiled, and fail where XLA runs it
-            raise
-        for each in ready:
-            each.result()
-
-
-def _kind_of(tree: PyTree) -> tuple[object, ...]:
-    """What decides whether one compiled program can serve for another."""
-    arrays, rest = eqx.partition(tree, eqx.is_array)
-    shapes = tuple((leaf.shape, leaf.dtype) for leaf in jtu.tree_leaves(arrays))
-    leaves, structure = jtu.tree_flatten(rest)
-    return jtu.tree_structure(arrays), shapes, tuple(leaves), structure
-
-
 @host_jit(search_by_lanes, within=True)
 def _search(problem: FixedPointProblem) -> Found:
     # Without weak types, which would make the next program another one than was compiled.
     return jtu.tree_map(
         lambda leaf: jax.lax.convert_element_type(leaf, leaf.dtype), search(problem)
-    )
-
-
-def _empty_arrays(shape: PyTree) -> PyTree:
-    """Arrays of these shapes that hold nothing."""
-    return jtu.tree_map(
-        # Made by NumPy: JAX would compile a program for every shape.
-        lambda leaf: np.full(leaf.shape, np.nan if leaf.dtype.kind == "f" else 0, leaf.dtype),
-        shape,
     )

@@ -11,7 +11,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._quantity import Quantity
-from jaxbiped._summary import summary
+from jaxbiped._summary import notebook_html, summary
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
@@ -135,6 +135,7 @@ class Gait(eqx.Module):
     cycle: str = eqx.field(static=True)
     quantities: tuple[Quantity, ...] = eqx.field(static=True, default=())
     error: ErrorEstimate | None = None
+    _repr_html_ = notebook_html
 
     def __repr__(self) -> str:
         like, code = self.measures.period, self.ending

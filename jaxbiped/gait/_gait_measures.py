@@ -25,7 +25,7 @@ from jaxbiped.simulate._derivatives import first_derivatives_only
 
 def gait_measures(
     scene: Scene | RigidScene | RedundantScene,
-    guess: WalkerState | None = None,
+    guess: Gait | WalkerState | None = None,
     *,
     gradient: AbstractGradient | None = None,
     footsteps: int | None = None,

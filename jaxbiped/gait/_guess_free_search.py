@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._progress import stage
+from jaxbiped._progress import Stage, stage
 from jaxbiped.gait._branch_along import Searching, branch_along, state_at
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, cycle_of
 from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, homotopy_to
@@ -73,7 +73,7 @@ class Staged(NamedTuple):
 
 
 def search_in_stages(
-    search: Searching, problem: FixedPointProblem, scout: ReturnMapSpec, first: Found
+    search: Searching, problem: FixedPointProblem, scout: ReturnMapSpec, first: Found, now: Stage
 ) -> Staged:
     """Searches on after Newton's method from the fitted start came to `first`.
 
@@ -82,6 +82,7 @@ def search_in_stages(
         problem: of a walker's cycles.
         scout: how to follow the branch: cycles of one footstep, in minimal coordinates.
         first: what the first stage came to.
+        now: counts the searches, and keeps in words what they found.
     """
     modelled: Scene | RigidScene = problem.args.minimal
     seen: list[Seen] = []
@@ -104,10 +105,13 @@ def search_in_stages(
         known = any(_same(found, old) for old in seen)
         if int(found.ending) == int(Search.FOUND) and sound and not known:
             seen.append(Seen(found, by, spectral_radius(found), is_whole(found, problem)))
+            best = min(each.radius for each in seen)
+            now.update(0, f"{len(seen)} found, the smallest spectral radius {best:.4g}")
 
     def try_all(points: Sequence[np.ndarray] | np.ndarray, by: FoundBy) -> None:
         for point in points:
             add(search(problem._replace(guess=state_at(start, point)), _TURNS), by)
+            now.update()
             if has_stable():
                 return
 

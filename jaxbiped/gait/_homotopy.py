@@ -93,6 +93,7 @@ class BranchEnd(NamedCode):
     - closed: it came back to its beginning.
     - branches off: it begins at another branch.
     - jumped: a step led back to gaits that it had passed.
+    - interrupted: by Ctrl-C.
     """
 
     NOT_FOLLOWED = 0
@@ -106,6 +107,7 @@ class BranchEnd(NamedCode):
     CLOSED = 8
     BRANCHES_OFF = 9
     JUMPED = 10
+    INTERRUPTED = 11
 
 
 class FollowedBranch(NamedTuple):

@@ -13,6 +13,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
+from jaxbiped.scene._ground import AlwaysTouching
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.scene._walker import Walker
@@ -116,7 +117,9 @@ def explain_search(scene: AbstractScene, gait: "Gait") -> str:
         One sentence, without a full stop.
     """
     if gait.outcome is not Search.FOUND:
-        return f"no gait found: {_search_sentence(gait)}{_branch(scene, gait)}"
+        return (
+            f"no gait found: {_search_sentence(gait)}{_branch(scene, gait)}{_scuffs(scene, gait)}"
+        )
     text = f"found by {gait.found_by}"
     asked, least = len(gait.step_lengths), int(gait.cycle_footsteps)
     if least < asked:
@@ -162,6 +165,17 @@ def _search_sentence(gait: "Gait") -> str:
     if gait.outcome is Search.NO_WALK:
         return "an orbit that returns has a foot deep underground, or steps uphill"
     return "the search from the start does not converge"
+
+
+def _scuffs(scene: AbstractScene, gait: "Gait") -> str:
+    """What to try if straight legs scuff, after a semicolon; else nothing."""
+    always = isinstance(getattr(scene.minimal, "clearance", None), AlwaysTouching)
+    if not (always and gait.outcome is Search.NO_RETURN and gait.walk_outcome is Ending.STUMBLED):
+        return ""
+    return (
+        "; its feet touch whenever they reach the ground: if its legs are straight and scuff at "
+        "mid-swing, give the scene clearance=jaxbiped.laws.StanceRotation()"
+    )
 
 
 def _branch(scene: AbstractScene, gait: "Gait") -> str:

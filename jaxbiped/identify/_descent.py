@@ -4,9 +4,9 @@ from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import PyTree
-from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._progress import Stage
 from jaxbiped.identify._gait_fit import (
     LOOSE,
     FitEnding,
@@ -44,12 +44,12 @@ class Descent:
         measured: list[MeasuredGait],
         accuracy: str,
         engine: str,
-        bar: tqdm,
+        now: Stage,
         guess: PyTree | None = None,
     ) -> None:
         """`guess` is a state near the gait of the scene's own parameters; None to search it."""
         own = parameter_values(scene)
-        self.scene, self.measured, self.bar, self.guess = scene, measured, bar, guess
+        self.scene, self.measured, self.now, self.guess = scene, measured, now, guess
         self.names, self.first = tuple(bounds), np.array([float(own[name]) for name in bounds])
         self.limits = np.array(list(bounds.values())).T
         self.widths = np.where(self.first == 0.0, self.limits[1] - self.limits[0], 1.0)
@@ -160,12 +160,13 @@ class Descent:
             assert found is not None
             found.append(one)
         self.evaluations += 1
-        self.bar.update()
         self.last = (at.copy(), found)
         if found is not None:
             square = float(np.sum(self._scaled_misfits(found) ** 2))
             if self.best is None or square < self.best[0]:
                 self.best = (square, at.copy(), found)
+        best = "no gait yet" if self.best is None else f"chi squared {self.best[0]:.4g}"
+        self.now.update(found=best)
         return found
 
     def _predict(self, at: np.ndarray, each: MeasuredGait, k: int) -> Prediction | None:

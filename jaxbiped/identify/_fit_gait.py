@@ -5,12 +5,13 @@ import warnings
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from jaxtyping import PyTree
-from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_finite, check_type
-from jaxbiped.dynamics._state import state_for, state_type
+from jaxbiped._progress import stage
+from jaxbiped.dynamics._state import state_type
+from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
+from jaxbiped.gait._search_starts import state_of_guess
 from jaxbiped.identify._descent import UNLIKELY, Descent
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit
 from jaxbiped.identify._measured_gait import MeasuredGait
@@ -18,6 +19,7 @@ from jaxbiped.identify._predicted_gait import AnyScene
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 
@@ -26,11 +28,11 @@ def fit_gait(
     vary: Sequence[str] | Mapping[str, tuple[float, float]],
     measured: MeasuredGait | Sequence[MeasuredGait],
     *,
-    guess: PyTree = None,
+    guess: Gait | WalkerState | None = None,
     accuracy: str = "balanced",
     engine: str = "auto",
     max_evaluations: int = 50,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> GaitFit:
     """Finds the parameters under which a scene's gaits are those that were measured.
 
@@ -45,10 +47,11 @@ def fit_gait(
         scene: the walker, where the fit begins.
         vary: names of the parameters to fit (see `parameter_names`), or their bounds by name (SI).
         measured: one gait or several, under conditions that are known.
-        guess: a state near the gait where the fit begins; None to search it.
+        guess: a gait, or a state near the one where the fit begins; None to search it.
         accuracy, engine: as for `find_gait`.
         max_evaluations: maximum number of scenes that a descent tries.
-        progress: whether to show a bar on stderr.
+        progress: whether to show on stderr what is being done, how far it is and what was found; by
+            default (None) after two seconds, in a terminal, a notebook or a command.
 
     Returns:
         Estimates with standard errors, which parameters the data do not tell, and which are at
@@ -75,12 +78,11 @@ def fit_gait(
         raise ArgumentError("measured = [] is not allowed: give one gait at least.")
     for each in gaits:
         _check_measured(scene, each, bounds)
-    guess = None if guess is None else state_for(scene, guess, "guess")
+    near = state_of_guess(scene, guess)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_count("max_evaluations", max_evaluations)
-    bar = tqdm(total=max_evaluations, unit="scenes", disable=not progress)
-    with bar:
-        descent = Descent(scene, bounds, gaits, accuracy, engine, bar, guess)
+    with stage("fitting", unit="scenes", show=progress) as now:
+        descent = Descent(scene, bounds, gaits, accuracy, engine, now, near)
         fit = descent.run(int(max_evaluations))
     if fit.ending is FitEnding.CONVERGED and fit.p_value < UNLIKELY:
         warnings.warn(

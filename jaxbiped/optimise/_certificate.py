@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from tqdm import tqdm
 
 from jaxbiped._checks import check_choice, check_not_negative, check_positive, check_type
+from jaxbiped._progress import Stage, stage
 from jaxbiped._types import as_float
 from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.basins._labels import Label
@@ -118,7 +118,7 @@ def certify(
     other_engine: bool = False,
     bifurcations_along: Sequence[str] = ("slope",),
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | None = None,
 ) -> Certificate:
     """Tests an optimum by what its search did not use.
 
@@ -137,7 +137,8 @@ def certify(
             bifurcation, from an eighth to eight times the value, as far as the walker allows (from
             level ground by 0.1 rad to both sides); each compiles a program.
         seed: random seed of the starts.
-        progress: whether to show the current part on stderr.
+        progress: whether to show on stderr the current part; by default (None) after two
+            seconds, in a terminal, a notebook or a command.
 
     Returns:
         The certificate. A part that cannot be told, or that Ctrl-C cuts off, takes no other with
@@ -160,8 +161,9 @@ def certify(
     undecided = bool(np.any(np.abs(sizes - 1.0) <= errors))
     labels = bool(starts or fatal_push)
     wanted = (True, labels, starts, fatal_push, footsteps, other_engine, *bifurcations_along)
-    with tqdm(total=sum(map(bool, wanted)), unit="parts", disable=not progress) as bar:
-        parts = _Parts(bar)
+    total = sum(map(bool, wanted))
+    with stage("certifying the optimum", total=total, unit="parts", show=progress) as now:
+        parts = _Parts(now)
         norm = parts.find(
             "gait sensitivity norm",
             lambda: jacobian_functionals(
@@ -211,25 +213,25 @@ def certify(
 
 
 class _Parts:
-    """Parts of a certificate, which a bar names while they last; each fails by itself."""
+    """Parts of a certificate, which are named while they last; each fails by itself."""
 
-    def __init__(self, bar: tqdm) -> None:
-        self.bar, self.failed, self.interrupted = bar, dict[str, str](), False
+    def __init__(self, now: Stage) -> None:
+        self.now, self.failed, self.interrupted = now, dict[str, str](), False
 
     def find(self, name: str, part: Callable[[], _Found]) -> _Found | None:
         """What is found, or None where that fails, or the user has had enough."""
-        self.bar.set_description_str(f"certificate, {name}")
         found = None
         try:
             if not self.interrupted:
-                found = part()
+                with stage(name):
+                    found = part()
         except KeyboardInterrupt:
             self.interrupted = True
         except Exception as error:  # whatever it is, the optimum is not lost for it
             self.failed[name] = f"{type(error).__name__}: {error}"
         if self.interrupted:
             self.failed[name] = "interrupted"
-        self.bar.update()
+        self.now.update()
         return found
 
 

@@ -16,6 +16,7 @@ from jaxbiped._checks import (
 )
 from jaxbiped._files import user_path
 from jaxbiped._identity import DECISIVE, provenance
+from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
@@ -66,7 +67,7 @@ def optimise_gait(
     footsteps: int | None = None,
     accuracy: str = "balanced",
     engine: str = "auto",
-    progress: bool = False,
+    progress: bool | None = None,
     store: str | Path | None = None,
 ) -> Optimum:
     """Finds the parameters within bounds whose periodic gait is best.
@@ -101,7 +102,8 @@ def optimise_gait(
             legs those of a stride.
         accuracy: "balanced" or "tight".
         engine: as for `find_gait`.
-        progress: whether to show a bar on stderr.
+        progress: whether to show on stderr what is being done, how far it is and what was found; by
+            default (None) after two seconds, in a terminal, a notebook or a command.
         store: file that keeps every evaluation, from which the same call continues. It serves any
             call for the same measures of the same designs, also with another optimiser or other
             bounds of these measures.
@@ -156,9 +158,9 @@ def optimise_gait(
     problem = DesignProblem(
         scene, variables, told, sense, requirements, settings, evaluations, ensemble
     )
-    begin = problem.begin(start_of(scene, variables), near)
-    runs = Runs(problem, iterations, optimiser, progress)
-    with runs.bar:
+    with stage("optimising the gait", unit="iterations", show=progress) as now:
+        begin = problem.begin(start_of(scene, variables), near)
+        runs = Runs(problem, iterations, optimiser, now)
         try:
             runs.run(begin)
             if restarts:

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._progress import Stage
 from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
@@ -94,7 +94,7 @@ class Runs:
 
     Attributes:
         problem, iterations, optimiser: of each run.
-        bar: its progress.
+        now: counts iterates.
         history: iterates of all runs.
         best: the best design of all.
         ended: how the run ended that came to it; `interrupted` by Ctrl-C.
@@ -105,10 +105,10 @@ class Runs:
         problem: DesignProblem,
         iterations: int,
         optimiser: "str | optax.GradientTransformation",
-        progress: bool,
+        now: Stage,
     ) -> None:
         self.problem, self.iterations, self.optimiser = problem, iterations, optimiser
-        self.bar = tqdm(unit="iterations", disable=not progress)
+        self.now = now
         self.history: list[Iteration] = []
         self.ended, self.interrupted = RunEnding(False, ""), False
 
@@ -149,16 +149,17 @@ class Runs:
     def note(self, u: np.ndarray) -> None:
         """Notes an iterate."""
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
-        self.bar.update()
         known = self.problem.evaluations.get(u)
         if known is None:
+            self.now.update()
             return
         value = self.problem.sense * self.problem.objective(known).value
         excess = self.problem.excess(known)
         measures = {name: known.values[name] for name in self.problem.wanted}
         named, beyond = self.problem.variables.by_name(u), known.beyond_range
         self.history.append(Iteration(named, value, excess, measures, beyond))
-        self.bar.set_postfix(objective=f"{value:.6g}", excess=f"{excess:.1e}")
+        missed = f", requirements missed by {excess:.1e}" if excess > 0.0 else ""
+        self.now.update(found=f"objective {value:.6g}{missed}")
 
 
 def rank_of(problem: DesignProblem, design: Design) -> tuple[float, float]:

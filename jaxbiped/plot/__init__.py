@@ -19,6 +19,8 @@ from jaxbiped.plot._gait_charts import multipliers as multipliers
 from jaxbiped.plot._laws import bristle_law as bristle_law
 from jaxbiped.plot._laws import friction_law as friction_law
 from jaxbiped.plot._laws import normal_law as normal_law
+from jaxbiped.plot._notebook import notebook_html as notebook_html
+from jaxbiped.plot._notebook import walker as walker
 from jaxbiped.plot._parameter_charts import basin_fractions as basin_fractions
 from jaxbiped.plot._parameter_charts import bifurcation_curves as bifurcation_curves
 from jaxbiped.plot._parameter_charts import branch as branch

@@ -77,7 +77,7 @@ def gait_strobe(
     )
     skeleton, everything = skeleton_of(scene.mechanism), poses(scene, motion.at(times))
     shown = jtu.tree_map(lambda points: points[:count], everything)
-    corners = _corners(skeleton, everything)
+    corners = corners_of(skeleton, everything)
     across, up = corners[1] - corners[0]
     if ax is None:
         # On equal scales the picture fills a new figure.
@@ -89,7 +89,7 @@ def gait_strobe(
     look: dict[str, Any] = {"color": style.GROUND_COLOUR, "linewidth": 1.4, "zorder": 1}
     ax.axline((x, steepness * x), slope=steepness, **look)
     ax.plot(*everything.root[count:].T, color="#8C8C8C", linewidth=0.8, zorder=1)
-    _draw_bodies(ax, skeleton, shown)
+    draw_bodies(ax, skeleton, shown)
     ax.set_aspect("equal", adjustable="box")
     ax.set_xlim(*corners[:, 0])
     ax.set_ylim(*corners[:, 1])
@@ -106,7 +106,8 @@ def gait_strobe(
     return figure
 
 
-def _draw_bodies(ax: Axes, skeleton: Skeleton, shown: Pose) -> None:
+def draw_bodies(ax: Axes, skeleton: Skeleton, shown: Pose) -> None:
+    """Draws poses, the first ones fainter."""
     count = len(shown.root)
     opacity = np.linspace(_FAINTEST, 1.0, count) if count > 1 else np.ones(1)
     for part, lines in zip(skeleton.parts, shown.lines, strict=True):
@@ -123,7 +124,7 @@ def _draw_bodies(ax: Axes, skeleton: Skeleton, shown: Pose) -> None:
         ax.add_collection(circles, autolim=False)
 
 
-def _corners(skeleton: Skeleton, shown: Pose) -> np.ndarray:
+def corners_of(skeleton: Skeleton, shown: Pose) -> np.ndarray:
     """The least and the largest X and Z of all that is drawn, with a margin; shape (2, 2)."""
     soles = zip(skeleton.feet, shown.feet, strict=True)
     reach = [feet + sign * sole.radius for sole, feet in soles for sign in (-1.0, 1.0)]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import equinox as eqx
 from equinox import AbstractVar
 
+from jaxbiped._summary import notebook_html
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._mechanism import Mechanism, mechanism_of
 from jaxbiped.scene.laws._abstract_laws import (
@@ -30,6 +31,8 @@ class AbstractScene(eqx.Module):
 
     compliant: AbstractClassVar[bool]
     redundant: AbstractClassVar[bool]
+
+    _repr_html_ = notebook_html
 
     @property
     @abc.abstractmethod

@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, StateLeaf
 from jaxbiped.caching._caches import bounded_cache
 
 SomeState = TypeVar("SomeState", bound=NamedTuple)
@@ -27,14 +27,14 @@ class State(NamedTuple):
         omega_1, omega_2: leg rates [rad/s].
     """
 
-    hip_x: Scalar
-    hip_z: Scalar
-    theta_1: Scalar
-    theta_2: Scalar
-    hip_vx: Scalar
-    hip_vz: Scalar
-    omega_1: Scalar
-    omega_2: Scalar
+    hip_x: StateLeaf
+    hip_z: StateLeaf
+    theta_1: StateLeaf
+    theta_2: StateLeaf
+    hip_vx: StateLeaf
+    hip_vz: StateLeaf
+    omega_1: StateLeaf
+    omega_2: StateLeaf
 
 
 class BristleState(NamedTuple):
@@ -45,16 +45,16 @@ class BristleState(NamedTuple):
         bristle_1, bristle_2: see `AbstractBristleLaw` [–].
     """
 
-    hip_x: Scalar
-    hip_z: Scalar
-    theta_1: Scalar
-    theta_2: Scalar
-    hip_vx: Scalar
-    hip_vz: Scalar
-    omega_1: Scalar
-    omega_2: Scalar
-    bristle_1: Scalar
-    bristle_2: Scalar
+    hip_x: StateLeaf
+    hip_z: StateLeaf
+    theta_1: StateLeaf
+    theta_2: StateLeaf
+    hip_vx: StateLeaf
+    hip_vz: StateLeaf
+    omega_1: StateLeaf
+    omega_2: StateLeaf
+    bristle_1: StateLeaf
+    bristle_2: StateLeaf
 
 
 MinimalState: TypeAlias = State | BristleState
@@ -87,11 +87,11 @@ class RigidState(NamedTuple):
         omega_1, omega_2: their rates [rad/s].
     """
 
-    hip_x: Scalar
-    theta_1: Scalar
-    theta_2: Scalar
-    omega_1: Scalar
-    omega_2: Scalar
+    hip_x: StateLeaf
+    theta_1: StateLeaf
+    theta_2: StateLeaf
+    omega_1: StateLeaf
+    omega_2: StateLeaf
 
 
 class RedundantState(NamedTuple):
@@ -107,18 +107,18 @@ class RedundantState(NamedTuple):
         omega_1, omega_2: leg rates [rad/s].
     """
 
-    x_1: Scalar
-    z_1: Scalar
-    theta_1: Scalar
-    x_2: Scalar
-    z_2: Scalar
-    theta_2: Scalar
-    vx_1: Scalar
-    vz_1: Scalar
-    omega_1: Scalar
-    vx_2: Scalar
-    vz_2: Scalar
-    omega_2: Scalar
+    x_1: StateLeaf
+    z_1: StateLeaf
+    theta_1: StateLeaf
+    x_2: StateLeaf
+    z_2: StateLeaf
+    theta_2: StateLeaf
+    vx_1: StateLeaf
+    vz_1: StateLeaf
+    omega_1: StateLeaf
+    vx_2: StateLeaf
+    vz_2: StateLeaf
+    omega_2: StateLeaf
 
 
 class EulerState(NamedTuple):
@@ -131,22 +131,22 @@ class EulerState(NamedTuple):
         cos_rate_1, sin_rate_1, cos_rate_2, sin_rate_2: rates of the Euler parameters [1/s].
     """
 
-    x_1: Scalar
-    z_1: Scalar
-    cos_half_1: Scalar
-    sin_half_1: Scalar
-    x_2: Scalar
-    z_2: Scalar
-    cos_half_2: Scalar
-    sin_half_2: Scalar
-    vx_1: Scalar
-    vz_1: Scalar
-    cos_rate_1: Scalar
-    sin_rate_1: Scalar
-    vx_2: Scalar
-    vz_2: Scalar
-    cos_rate_2: Scalar
-    sin_rate_2: Scalar
+    x_1: StateLeaf
+    z_1: StateLeaf
+    cos_half_1: StateLeaf
+    sin_half_1: StateLeaf
+    x_2: StateLeaf
+    z_2: StateLeaf
+    cos_half_2: StateLeaf
+    sin_half_2: StateLeaf
+    vx_1: StateLeaf
+    vz_1: StateLeaf
+    cos_rate_1: StateLeaf
+    sin_rate_1: StateLeaf
+    vx_2: StateLeaf
+    vz_2: StateLeaf
+    cos_rate_2: StateLeaf
+    sin_rate_2: StateLeaf
 
 
 class RollingMotion(NamedTuple):

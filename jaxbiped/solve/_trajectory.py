@@ -87,7 +87,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     lowest: PyTree = None
     highest: PyTree = None
     correction: PyTree = None
-    violation: Float[Array, "..."] | None = None
+    violation: PyTree = None
     error: ErrorEstimate | None = None
     missed_contacts: Int[Array, "..."] | None = None
     grazes: Int[Array, "..."] | None = None

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
-from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._identity import provenance
+from jaxbiped._progress import stage
 from jaxbiped._types import as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.gait._find_gait import find_gait
@@ -29,7 +29,7 @@ from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._gait_grid import open_gait_grid
 from jaxbiped.sweep._gait_waves import LARGE, GaitWaves, Place
-from jaxbiped.sweep._store_files import store_path
+from jaxbiped.sweep._store_files import store_path, what_is_kept
 from jaxbiped.sweep.starts._coordinates import parameter_axes
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def gait_sweep(
     radius_sensitivities: bool = True,
     engine: str = "auto",
     store: str | Path | None = None,
-    progress: bool = False,
+    progress: bool | None = None,
     any_version: bool = False,
 ) -> "xarray.Dataset":
     """Finds the periodic gait at every point of a grid over scene parameters.
@@ -71,7 +71,8 @@ def gait_sweep(
         parameters, footsteps, accuracy, radius_sensitivities, engine: as for `find_gait`.
         store: directory of a Zarr store; in memory unless given. A run that was killed continues
             where it was.
-        progress: whether to show a bar on stderr.
+        progress: whether to show on stderr what is being done, how far it is and what was found; by
+            default (None) after two seconds, in a terminal, a notebook or a command.
         any_version: whether to continue a store that another version of jaxbiped wrote.
 
     Returns:
@@ -108,34 +109,39 @@ def gait_sweep(
         own: AnyScene = jtu.tree_map(as_float, with_parameters(scene, point))
         return own
 
-    first = find_gait(scene_at(centre), engine=engine, **options)
-    kind = type(first.measures.state)
     size = math.prod(map(len, values.values()))
-    at_once = size >= LARGE and first.engine == "lanes"
+    with stage(
+        "finding gaits", total=size, unit="gaits", show=progress, kept=what_is_kept(path)
+    ) as now:
+        first = find_gait(scene_at(centre), engine=engine, **options)
+        kind = type(first.measures.state)
+        at_once = size >= LARGE and first.engine == "lanes"
 
-    def search_alone(place: Place) -> Gait:
-        return first if place == centre else find_gait(scene_at(place), engine=engine, **options)
+        def search_alone(place: Place) -> Gait:
+            return (
+                first if place == centre else find_gait(scene_at(place), engine=engine, **options)
+            )
 
-    def find(places: Sequence[Place], guesses: np.ndarray) -> Iterator[tuple[slice, Gait]]:
-        if at_once:
-            columns = zip(values, np.transpose(places), strict=True)
-            chosen = {name: values[name][rows] for name, rows in columns}
-            yield from find_each(scene, chosen, guesses, kind, options)
-            return
-        for k, (place, guess) in enumerate(zip(places, guesses, strict=True)):
-            start = jtu.tree_map(as_float, kind(0.0, *guess))
-            gait = find_gait(scene_at(place), start, engine=engine, **options)
-            yield slice(k, k + 1), jtu.tree_map(lambda leaf: np.asarray(leaf)[None], gait)
+        def find(places: Sequence[Place], guesses: np.ndarray) -> Iterator[tuple[slice, Gait]]:
+            if at_once:
+                columns = zip(values, np.transpose(places), strict=True)
+                chosen = {name: values[name][rows] for name, rows in columns}
+                yield from find_each(scene, chosen, guesses, kind, options)
+                return
+            for k, (place, guess) in enumerate(zip(places, guesses, strict=True)):
+                start = jtu.tree_map(as_float, kind(0.0, *guess))
+                gait = find_gait(scene_at(place), start, engine=engine, **options)
+                yield slice(k, k + 1), jtu.tree_map(lambda leaf: np.asarray(leaf)[None], gait)
 
-    units = {name: parameter_quantities(scene)[name].unit for name in values}
-    grid = open_gait_grid(
-        first, values, units, settings, provenance(scene), path, any_version=any_version
-    )
-    with tqdm(total=size, unit="gaits", disable=not progress) as bar, grid.open():
-        GaitWaves(grid, (centre, first), find, search_alone, bar.update).run()
-        if at_once:
-            grid.warn_of_grazing()
-        return grid.dataset()
+        units = {name: parameter_quantities(scene)[name].unit for name in values}
+        grid = open_gait_grid(
+            first, values, units, settings, provenance(scene), path, any_version=any_version
+        )
+        with grid.open():
+            GaitWaves(grid, (centre, first), find, search_alone, now).run()
+            if at_once:
+                grid.warn_of_grazing()
+            return grid.dataset()
 
 
 def find_each(

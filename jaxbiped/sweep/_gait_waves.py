@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, TypeAlias
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._progress import Stage
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -156,10 +157,7 @@ states without `ROOT_x` that are given, shape (n, m)."""
 
 
 class GaitWaves:
-    """A sweep under way.
-
-    Points that led to no stable gait are doubtful: they are written when all else is.
-    """
+    """A sweep under way. Points that led to no stable gait are doubtful: they are written last."""
 
     def __init__(
         self,
@@ -167,11 +165,10 @@ class GaitWaves:
         first: tuple[Place, Gait],
         find: Find,
         search_alone: Callable[[Place], Gait],
-        tell: Callable[[int], object],
+        now: Stage,
     ) -> None:
-        """`first` is the gait at one point, `tell` is told how many points are done."""
-        self._grid, self._tell, self._search_alone = grid, tell, search_alone
-        self._find_from = find
+        """`first` is the gait at one point; `now` counts the points that are done."""
+        self._grid, self._now, self._search_alone, self._find_from = grid, now, search_alone, find
         self._first, gait = first
         # What is known so far: states, NaN where no gait is, and whether the gaits are stable.
         self._states = np.full_like(grid.states(), np.nan)
@@ -207,7 +204,7 @@ class GaitWaves:
             if self._grid.is_done(place):
                 self._states[place] = known[place]
                 self._stable[place] = self._grid.is_stable(place)
-                self._tell(1)
+                self._count(1)
             elif np.all(np.isfinite(guesses[k])):
                 leads.append(k)
             else:
@@ -234,7 +231,10 @@ class GaitWaves:
         for place in places:
             self._doubtful.pop(place, None)
         self._grid.write_each(places, gaits)
-        self._tell(len(places))
+        self._count(len(places))
+
+    def _count(self, points: int) -> None:
+        self._now.update(points, f"{np.sum(self._stable):,} of them stable")
 
     def _doubt(self, place: Place, gait: Gait) -> None:
         if not _is_found(self._doubtful.get(place)):
@@ -281,7 +281,7 @@ class GaitWaves:
         self._grid.write(place, best)
         if _is_found(best):
             self._states[place] = np.stack(recurring_leaves(best.measures.state))
-        self._tell(1)
+        self._count(1)
 
 
 def _is_found(gait: Gait | None) -> bool:

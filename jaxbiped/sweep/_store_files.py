@@ -124,6 +124,13 @@ def store_path(store: str | Path | None) -> Path | None:
     return path.absolute()
 
 
+def what_is_kept(path: Path | None) -> str:
+    """What an interrupt leaves of a sweep, in words."""
+    if path is None:
+        return "without a store nothing is kept"
+    return f"what is done is in {path.name!r}, where the same call continues"
+
+
 def check_store(path: Path) -> None:
     """Raises `ArgumentError` where no store can be made or continued at this path."""
     is_new(path)

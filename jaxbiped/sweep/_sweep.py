@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_count, check_type
 from jaxbiped._identity import provenance
+from jaxbiped._progress import stage
 from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_label_errors
 from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.sweep._gait_family import Guesses
@@ -23,7 +23,14 @@ from jaxbiped.sweep._labelling_preparation import (
     with_guesses,
 )
 from jaxbiped.sweep._store import ALL_GAITS, Store
-from jaxbiped.sweep._store_files import GAITS, check_continued, is_new, store_path, writing
+from jaxbiped.sweep._store_files import (
+    GAITS,
+    check_continued,
+    is_new,
+    store_path,
+    what_is_kept,
+    writing,
+)
 from jaxbiped.sweep._stored_fields import DOUBT_FIELDS, Layout, fields_of
 from jaxbiped.sweep._workers import compute_chunks
 from jaxbiped.sweep.starts._coordinates import coordinate_quantities
@@ -52,7 +59,7 @@ def sweep(
     executor: Executor | None = None,
     workers: int = 1,
     look_for_gaits: bool = True,
-    progress: bool = False,
+    progress: bool | None = None,
     any_version: bool = False,
 ) -> "xarray.Dataset":
     """Labels all starts.
@@ -71,7 +78,8 @@ def sweep(
             `distributed.Client(...).get_executor()`; this process unless given.
         workers: how many chunks the executor runs at once.
         look_for_gaits: whether to look for gaits besides those of the labelling.
-        progress: whether to show a bar on stderr.
+        progress: whether to show on stderr what is being done, how far it is and what was found; by
+            default (None) after two seconds, in a terminal, a notebook or a command.
         any_version: whether to continue a store that another version or revision of jaxbiped
             wrote, or one made with laws of yours whose code has changed since.
 
@@ -111,7 +119,9 @@ def sweep(
         early = labelling.settings() | own
         with writing(path):
             check_continued(path, early, writer, any_version=any_version, but=GAITS)
-    known = with_gaits_met(labelling, starts) if look_for_gaits else labelling
+    kept = what_is_kept(path)
+    with stage("seeking the gaits that starts converge to", show=progress, kept=kept):
+        known = with_gaits_met(labelling, starts) if look_for_gaits else labelling
     settings = known.settings() | own
     if path is None:
         results = Store.in_memory(layout, settings, writer)
@@ -120,16 +130,20 @@ def sweep(
     missing = results.behind()
     sizes = layout.sizes
     fresh = int(sizes[missing].sum())
-    with tqdm(total=starts.size, unit="starts", disable=not progress, smoothing=0.05) as bar:
-        bar.update(starts.size - fresh)
+    done = starts.size - fresh
+    with stage(
+        "labelling", total=starts.size, unit="starts", done=done, show=progress, kept=kept
+    ) as now:
         for number, fields in compute_chunks(known, layout, missing, executor, int(workers)):
             results.write(number, fields)
-            bar.update(int(sizes[number]))
+            now.update(int(sizes[number]))
     if look_for_gaits:
-        known = _resolve(known, layout, results)
+        with stage("seeking gaits from unresolved starts", show=progress, kept=kept):
+            known = _resolve(known, layout, results)
     told: dict[str, str | float] = {}
     if doubts:
-        errors = tightened(known, layout, results, executor, int(workers))
+        with stage("labelling at finer tolerances", show=progress, kept=kept):
+            errors = tightened(known, layout, results, executor, int(workers))
         errors.warn()
         told[ERRORS] = json.dumps(errors.numbers())
     results.note(

@@ -22,9 +22,10 @@ def _rows(table):
 MORE = ("", " --quick --json -", " --help")
 EARLY = _rows("""
 walk --slop 3 | --slop | perhaps you meant --slope
-walk --slope abc | --slope | 'abc' | FLOAT
-walk --hip-z abc | --hip-z | 'abc' | FLOAT
-basin --samples 1.5 | --samples | '1.5' | INT
+walk --slope abc | --slope = 'abc' is not a number.
+walk --hip-z abc | --hip-z = 'abc' is not a number.
+basin --samples 1.5 | --samples = '1.5' is not a whole number.
+basin --chunk many | --chunk = 'many' is not a whole number.
 walk --out | --out | missing value
 wlak | wlak | walk, gait, continue, optimise, fit, basin
  | walk, gait, continue, optimise, fit, basin

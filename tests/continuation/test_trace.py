@@ -218,3 +218,18 @@ def test_neighbouring_branches_are_not_mixed_up():
 )
 def test_what_an_error_bar_leaves_open_is_undecided(values, errors, expected):
     assert is_stable(np.array(values, complex), np.array(errors)) is expected
+
+
+def test_ctrl_c_ends_a_branch_with_the_points_so_far():
+    told = []
+
+    def tell(point):
+        told.append(point)
+        if len(told) == 5:
+            raise KeyboardInterrupt
+
+    whole = traced(*logistic((2.0, 4.0)), [0.5], 2.0)
+    part = traced(*logistic((2.0, 4.0)), [0.5], 2.0, tell=tell)
+    assert part.stop.end is BranchEnd.INTERRUPTED
+    assert [p.value for p in part.points] == [p.value for p in whole.points[: len(part.points)]]
+    assert part.points[-1].value == told[-1].value

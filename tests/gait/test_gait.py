@@ -102,3 +102,13 @@ def test_a_batch_as_guess_is_refused():
     many = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), jb.seed_state())
     with pytest.raises(jb.ArgumentError, match=r"jax\.vmap"):
         jb.find_gait(jb.seed_scene(), many)
+
+
+def test_a_gait_is_a_guess_as_its_state_is():
+    scene, plain = jb.ladder()["rigid"], dict(parameters=(), radius_sensitivities=False)
+    near = jb.find_gait(jb.with_parameters(scene, {"slope": 0.021}), **plain)
+    found = [jb.find_gait(scene, guess, **plain) for guess in (near, near.measures.state)]
+    assert found[0].found_by is jb.gait.FoundBy.GUESS
+    assert [float(gait.measures.period) for gait in found] == [float(found[1].measures.period)] * 2
+    with pytest.raises(jb.ArgumentError, match="guess"):
+        jb.find_gait(jb.seed_scene(), near)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped._progress import Stage
 from jaxbiped.gait import _guess_free_search, _settled_walks, _walk_waves
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._guess_free_search import origin_of, search_in_stages, spectral_radius
@@ -68,7 +69,8 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
     monkeypatch.setattr(_guess_free_search, "branch_along", follow)
     scout = SimpleNamespace(engine=engine)
     problem = FixedPointProblem(SimpleNamespace(steps=1), SCENE, (), START, Precision(1e-9, 1e-8))
-    return search_in_stages(search, problem, scout, first), took
+    now = Stage("searching for a gait", None, "searches", 0)
+    return search_in_stages(search, problem, scout, first, now), took
 
 
 def test_a_stable_gait_ends_the_search_and_an_unstable_one_does_not(monkeypatch):
@@ -172,3 +174,14 @@ def test_a_search_is_explained_in_one_sentence(made, said):
     sentence = jb.gait.explain_search(SCENE, made)
     assert said in sentence
     assert not sentence.endswith(".")
+
+
+def test_straight_legs_that_scuff_are_told_what_to_try():
+    seed = jb.seed_scene()
+    parts = dict(walker=seed.walker, ground=seed.ground, normal=seed.normal, friction=seed.friction)
+    scuffing = jb.Scene(**parts, clearance=jb.laws.AlwaysTouching())
+    gait = jb.find_gait(scuffing, jb.seed_state(), parameters=(), radius_sensitivities=False)
+    told = jb.gait.explain_search(scuffing, gait)
+    assert "stumbled" in told
+    assert told.endswith("give the scene clearance=jaxbiped.laws.StanceRotation()")
+    assert "clearance" not in jb.gait.explain_search(seed, gait)

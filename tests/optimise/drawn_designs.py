@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxbiped as jb
+from jaxbiped._progress import stage
 from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._design_variables import requirements_of, variables_of
@@ -66,7 +67,8 @@ def drawn(function, vary, told, sense=1.0, subject_to=None, *, begin=0.4, errors
 
 def solved(made, iterations=60, optimiser="trust-region"):
     """The runs of a problem from where it was begun."""
-    runs = Runs(made, iterations, optimiser, False)
+    with stage("optimising") as now:
+        runs = Runs(made, iterations, optimiser, now)
     runs.run(made.latest)
     return runs
 

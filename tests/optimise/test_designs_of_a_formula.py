@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from reference.rigid import rigid_walker
-from tqdm import tqdm
 
 import jaxbiped as jb
+from jaxbiped._progress import Stage
 from jaxbiped.continuation._nearest_bifurcation import farthest_allowed, range_of
 from jaxbiped.dynamics._actuation import actuator_powers, hip_torques
 from jaxbiped.dynamics._push_off import push_off_work
@@ -410,7 +410,7 @@ def test_a_part_of_a_certificate_fails_by_itself():
     def stops():
         raise KeyboardInterrupt
 
-    parts = _certificate._Parts(tqdm(disable=True))
+    parts = _certificate._Parts(Stage("certifying", 1, "parts", 0))
     assert parts.find("walk", fails) is None
     assert parts.find("basin", lambda: 3) == 3
     assert parts.find("push", stops) is None

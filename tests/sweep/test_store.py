@@ -18,7 +18,7 @@ import zarr
 
 import jaxbiped as jb
 from jaxbiped._identity import provenance
-from jaxbiped.sweep import _store
+from jaxbiped.sweep import _store, _store_files
 from jaxbiped.sweep._store import Store
 from jaxbiped.sweep._stored_fields import FIELDS, Layout
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
@@ -139,6 +139,24 @@ def test_a_store_in_the_home_folder(tmp_path, by_formula, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     swept("~/a")
     assert [each.name for each in tmp_path.iterdir()] == ["a"]
+
+
+@pytest.mark.parametrize("step", ["consolidate", "note", "create_store", "writing"])
+@pytest.mark.parametrize("after", [False, True])
+def test_killed_before_the_first_chunk(tmp_path, monkeypatch, by_formula, step, after):
+    """Cut off before or after each step of a store's making, the same call makes it all."""
+    path, own = tmp_path / "store", getattr(_store_files, step)
+
+    def cut(*told):
+        if after:
+            own(*told)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(_store_files, step, cut)
+        with pytest.raises(KeyboardInterrupt):
+            swept(path)
+    same_results(swept(path), swept())
 
 
 _RUN = """

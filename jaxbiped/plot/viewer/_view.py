@@ -87,7 +87,7 @@ class AbstractPage(abc.ABC):
         return (
             f'<iframe srcdoc="{html.escape(self.html())}" sandbox="allow-scripts" '
             f'title="{html.escape(title)}" '
-            f'style="width: 100%; height: {height}px; border: 0"></iframe>'
+            f'style="width: 100%; height: {height}px; border: 0; resize: vertical"></iframe>'
         )
 
 

@@ -71,7 +71,7 @@ def friction_law_like(
     mu_kinetic: Parameter = 0.4,
     v0: Parameter = 1e-4,
     xi: Parameter = 1000.0,
-) -> AbstractFrictionLaw | AbstractBristleLaw:
+) -> Any:
     """The friction law of a name that resembles `BengisuAkay` with these parameters.
 
     The seed's law rises from rest with the slope 2 mu_static/v0, peaks at v0 and falls to

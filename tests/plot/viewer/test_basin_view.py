@@ -75,8 +75,10 @@ def test_a_start_that_is_picked_shows_its_walk(basin, browser, tmp_path):
     assert page.run(ring) > at
     page.keys("\ue013")
     assert assert_shows_its_start()[1] > third[1]
-    page.open(tmp_path / "basin.html", width=400, dark=True)
-    assert page.run("return document.documentElement.scrollWidth") <= 400
+    assert page.nameless() == []
+    for width in (400, 800, 1600):
+        page.open(tmp_path / "basin.html", width=width, dark=True)
+        assert page.run("return document.documentElement.scrollWidth") <= width
     assert page.errors() == []
 
 

@@ -154,7 +154,7 @@ def test_a_press_on_a_chart_moves_every_cursor(page, walk):
 
 
 @pytest.mark.parametrize("dark", [False, True])
-@pytest.mark.parametrize("width", [400, 1200])
+@pytest.mark.parametrize("width", [400, 800, 1600])
 def test_it_fits_any_width_by_day_and_by_night(page, file, tmp_path, dark, width):
     page.open(file, width=width, dark=dark)
     page.run(SCRUB, 4.0)
@@ -180,13 +180,30 @@ def test_screen_readers_are_told(page):
     slider = page.find(TIME)
     assert slider.accessible_name == "Time"
     assert slider.get_attribute("aria-valuetext") == "1.00 of 8.77 seconds"
-    nameless = page.run(
-        "return [...document.querySelectorAll('button, input, select, svg[role=img]')]"
-    )
-    assert len(nameless) > 8
-    assert [each.tag_name for each in nameless if not each.accessible_name] == []
+    assert page.nameless() == []
     rows = page.run("return document.querySelectorAll('tbody tr').length")
     assert rows == 19
+
+
+@pytest.mark.parametrize("width", [400, 800, 1600])
+def test_a_notebook_s_frame_shows_picture_and_player_at_once(browser, walk, tmp_path, width):
+    """The frame scrolls down to the charts, never sideways; the player stays in sight."""
+    frame = jb.plot.view(*walk, name="seed")._in_frame()
+    path = tmp_path / "cell.html"
+    path.write_text(f"<!doctype html><body style='margin: 0'>{frame}")
+    page = browser.open(path, width=width)
+    assert page.nameless() == []
+    page.driver.switch_to.frame(page.find("iframe"))
+    seen = page.run(
+        "const box = (name) => document.querySelector(name).getBoundingClientRect();"
+        "return [document.documentElement.scrollWidth, innerWidth, box('.stage').bottom,"
+        "box('.player').top, box('.player').bottom, innerHeight]"
+    )
+    page.driver.switch_to.default_content()
+    assert seen[0] <= seen[1]
+    assert seen[2] <= seen[3] + 1.0
+    assert seen[4] <= seen[5] + 1.0
+    assert page.errors() == []
 
 
 def test_knees_feet_and_names_of_a_mechanism_are_shown(browser, tmp_path):

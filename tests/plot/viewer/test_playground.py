@@ -107,6 +107,9 @@ def test_a_slider_leads_to_another_walk(playground, browser, tmp_path):
         assert f"after {float(end):.2f} s" in browser.run(TOLD)
         wider = "return document.documentElement.scrollWidth - window.innerWidth"
         assert browser.run(wider) <= 0
+        assert browser.nameless() == []
+        told = browser.find('[data-leaf=".scene.ground.slope"]').get_attribute("aria-valuetext")
+        assert told == "0.0300 rad"
     assert [each for each in browser.errors() if each["level"] == "SEVERE"] == []
 
 

@@ -53,8 +53,10 @@ function row(slider, inputs, changed) {
   const tell = () => {
     const text = inputs[slider.input].toPrecision(3).replace("-", "−");
     reading.textContent = `${text} ${slider.unit}`;
+    range?.setAttribute("aria-valuetext", reading.textContent);
   };
-  const range = html("input", {
+  let range = null;
+  range = html("input", {
     type: "range", class: "time", min: slider.least, max: slider.most, step: "any",
     value: slider.value, "data-leaf": slider.leaf, oninput: () => {
       const value = Number(range.value);
