@@ -14,6 +14,7 @@ from _tables import tables
 from matplotlib.figure import Figure
 
 from jaxbiped.cli import Report
+from jaxbiped.plot import figure_style, save_figure
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,6 +27,12 @@ class Options:
     """File for the numbers in SI units; - prints only them."""
     quick: bool = False
     """A small version, in under a minute."""
+    format: tuple[str, ...] = ("png",)
+    """Formats of the pictures: png, pdf, svg."""
+    style: str = "screen"
+    """Style of the pictures: screen, or paper, with small letters and as wide as its columns."""
+    columns: int = 1
+    """Number of columns of a paper that a picture spans: 1 or 2."""
 
     def sized(self, full: Any, quick: Any) -> Any:
         """One of two sizes, as `quick` says."""
@@ -38,10 +45,10 @@ class Options:
 
     def save(self, figure: Figure, name: str) -> str:
         """Writes a picture of this name and lets go of the figure; returns where it is."""
-        path = self.path(name)
-        figure.savefig(path, dpi=150)
+        dots = {"dpi": 150} if self.style == "screen" else {}
+        paths = save_figure(figure, self.path(name), formats=self.format, **dots)
         plt.close(figure)
-        return str(path)
+        return str(paths[0])
 
 
 def experiment(measured: Callable[[Any], dict[str, Any]]) -> Callable[[], None]:
@@ -56,7 +63,8 @@ def experiment(measured: Callable[[Any], dict[str, Any]]) -> Callable[[], None]:
         kind = typing.get_type_hints(measured)["options"]
         options = tyro.cli(kind, description=measured.__globals__["__doc__"])
         began, report = time.perf_counter(), Report(options.json)
-        numbers = measured(options)
+        with figure_style(options.style, columns=options.columns):
+            numbers = measured(options)
         report.say(*tables(numbers), f"\nin {time.perf_counter() - began:.0f} s")
         report.finish(numbers)
 

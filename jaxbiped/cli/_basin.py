@@ -81,7 +81,7 @@ class Basin(options.Command):
         how = self.sweep.arguments("labelling")
         how["accuracy"] = accuracy_told(self.sweep.accuracy)
         effort = effort_of(scene, **how)
-        options.make_folder(self.output.out)
+        self.output.make_folder()
         if self.sweep.store is not None:
             check_store(self.sweep.store)
         executor, workers = self.sweep.executor()
@@ -108,7 +108,7 @@ class Basin(options.Command):
         _print(report, numbers)
         if self.output.out is not None:
             with stage("drawing the basin"):
-                paths = _write_results(found, known, starts, self.output.out)
+                paths = _write_results(found, starts, self.output)
             report.wrote(paths)
         numbers["wall_s"] = time.perf_counter() - _import_time.IMPORT_BEGAN
         report.finish(numbers)
@@ -181,35 +181,13 @@ def _print(report: Report, numbers: JsonObject) -> None:
 
 
 def _write_results(
-    found: "xarray.Dataset", known: "jb.Labelling", starts: "jb.starts.AbstractStarts", out: Path
+    found: "xarray.Dataset", starts: "jb.starts.AbstractStarts", output: options.OutputOptions
 ) -> list[Path]:
-    """Writes the results, and the picture where there are two axes; returns the paths."""
-    paths = [out / "basin.nc"]
-    found.to_netcdf(paths[0])
-    if len(starts.axes) == 2 and min(starts.shape) > 1:
-        y, x = starts.axes
-        quantities = jb.starts.coordinate_quantities(known.scene)
-        figure = jb.plot.basin(
-            found.label.values,
-            found[x].values,
-            found[y].values,
-            names=(quantities[x], quantities[y]),
-            cycle_footsteps=found.cycle_footsteps.values,
-            mark=_mark(known, x, y),
-        )
-        paths.append(out / "basin.png")
-        figure.savefig(paths[1])
-    return paths
-
-
-def _mark(known: "jb.Labelling", x: str, y: str) -> tuple[float, float] | None:
-    """Where the gait of the scene itself is in these coordinates, if it has one."""
-    from jaxbiped.sweep.starts._coordinates import state_coordinates
-
-    gaits = [gait for row in known.family.rows for gait in row]
-    if known.family.names or not gaits:
-        return None
-    values: dict[str, Any] = dict(jb.parameter_values(known.scene))
-    leaves = state_coordinates(known.scene)
-    values |= {name: getattr(gaits[0].state, leaf) for name, leaf in leaves.items()}
-    return float(values[x]), float(values[y])
+    """Writes the results, and the figure where there are two axes; returns the paths."""
+    assert output.out is not None
+    data = output.out / "basin.nc"
+    found.to_netcdf(data)
+    if len(starts.axes) != 2 or min(starts.shape) == 1:
+        return [data]
+    y, x = starts.axes
+    return [data, *output.draw({"basin": lambda: jb.plot.basin(found, found[x], found[y])})]

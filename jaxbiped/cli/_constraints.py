@@ -3,7 +3,6 @@
 import dataclasses
 import time
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import jaxbiped as jb
@@ -122,17 +121,15 @@ class Constraints(options.Command):
     """Simulated time [s]."""
     repeats: options.Count = 3
     """Number of runs, of which the fastest counts; none is repeated after a second in all."""
-    out: Path | None = None
-    """Folder for the picture."""
-    json: options.Numbers = None
+    output: options.OutputOptions
 
     def run(self) -> int:
         """Runs the command; returns the exit code, 1 where Ctrl-C ended it."""
         scene = self.scene.scene()
         assert isinstance(scene, jb.Scene)
         integrators = [Integrator.read(text) for text in self.integrators]
-        options.make_folder(self.out)
-        report, runs = Report(self.json), list[ConstraintRun]()
+        self.output.make_folder()
+        report, runs = Report(self.output.json), list[ConstraintRun]()
         many = len(integrators) * len(self.methods)
         with stage("comparing", total=many, unit="runs") as now:
             try:
@@ -158,10 +155,9 @@ class Constraints(options.Command):
             + "".join(engines.values())
         )
         numbers = [run._asdict() for run in runs]
-        if self.out is not None and runs:
-            path = self.out / "constraints.png"
-            jb.plot.constraint_runs(numbers).savefig(path)
-            report.wrote([path])
+        if runs:
+            draw = {"constraints": lambda: jb.plot.constraint_runs(numbers)}
+            report.wrote(self.output.draw(draw))
         report.finish({"duration_s": self.duration, "complete": complete, "runs": numbers})
         return 0 if complete else 1
 

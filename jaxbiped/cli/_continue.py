@@ -44,7 +44,7 @@ class ContinueGait(options.Command, of=("continue_gait",)):
         continue_gait, imported = jb.continue_gait, time.perf_counter()
         scene = self.scene.scene()
         guess = self.start.guess(scene, self.scene.walker)
-        options.make_folder(self.output.out)
+        self.output.make_folder()
         branch = continue_gait(
             scene,  # type: ignore[arg-type]
             self.along,
@@ -58,7 +58,7 @@ class ContinueGait(options.Command, of=("continue_gait",)):
         else:
             report.say(branch.stops[0].cause)
         if len(branch) and self.output.out is not None:
-            report.wrote(write_results(branch, self.output.out))
+            report.wrote(write_results(branch, self.output))
         report.finish(branch_numbers(branch) | {"wall_s": wall})
         return 0 if len(branch) else 1
 
@@ -91,14 +91,16 @@ def branch_numbers(branch: "jb.continuation.Branch") -> JsonObject:
     }
 
 
-def write_results(branch: "jb.continuation.Branch", out: Path) -> list[Path]:
-    """Writes the figures and the dataset of a branch; returns their paths."""
-    paths = []
-    for name, measure in (("branch", "step_length"), ("spectral_radius", "spectral_radius")):
-        paths.append(out / f"{name}.png")
-        jb.plot.branch(branch, measure).savefig(paths[-1])
-    branch.dataset().to_netcdf(out / "branch.nc")
-    return [*paths, out / "branch.nc"]
+def write_results(branch: "jb.continuation.Branch", output: options.OutputOptions) -> list[Path]:
+    """Writes the dataset and the figures of a branch; returns their paths."""
+    assert output.out is not None
+    data = output.out / "branch.nc"
+    branch.dataset().to_netcdf(data)
+    figures = {
+        "branch": lambda: jb.plot.branch(branch),
+        "spectral_radius": lambda: jb.plot.branch(branch, "spectral_radius"),
+    }
+    return [data, *output.draw(figures)]
 
 
 def _print(report: Report, branch: "jb.continuation.Branch", wall: dict[str, float]) -> None:

@@ -33,16 +33,17 @@ class Fit(options.Command, of=("fit_gait",)):
     accuracy: options.GaitAccuracy
     engine: options.Engine
     max_evaluations: options.Count
-    json: options.Numbers = None
+    output: options.OutputOptions
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
         scene = self.scene.scene()
         assert not isinstance(scene, jb.RedundantScene)
+        self.output.make_folder()
         names = tuple(name.strip() for name in self.vary.split(",") if name.strip())
         measured, how = jb.identify.read_measured(self.file), self.arguments("fit_gait")
         fit = jb.fit_gait(scene, names, measured, **how)
-        report, units = Report(self.json), jb.parameter_quantities(scene)
+        report, units = Report(self.output.json), jb.parameter_quantities(scene)
         parts = (units, fit.estimates, fit.standard_errors, fit.intervals)
         report.say(columns(_ESTIMATE, [(name, *(part[name] for part in parts)) for name in names]))
         report.say(
@@ -53,6 +54,7 @@ class Fit(options.Command, of=("fit_gait",)):
             report.say(f"these data do not tell {', '.join(fit.undetermined)}")
         if fit.at_bounds:
             report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
+        report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
         numbers = fit._asdict() | {"ending": str(fit.ending)}
         numbers["intervals_95"] = numbers.pop("intervals")
         report.finish(numbers | {"chi_squared": fit.chi_squared, "p_value": fit.p_value})

@@ -2,7 +2,7 @@
 
 import time
 import warnings
-from pathlib import Path
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import jaxbiped as jb
@@ -68,7 +68,7 @@ class FindGait(options.Command, of=("find_gait",)):
         find_gait, imported = jb.find_gait, time.perf_counter()
         scene = self.scene.scene()
         guess = self.start.guess(scene, self.scene.walker)
-        options.make_folder(self.output.out)
+        self.output.make_folder()
         section = None if self.section is None else getattr(jb, _SECTIONS[self.section])()
         how = self.arguments("find_gait")
         how |= {"section": section, "accuracy": accuracy_told(self.accuracy)}
@@ -91,22 +91,19 @@ class FindGait(options.Command, of=("find_gait",)):
             report.say(_failure(numbers, gait))
         if gait.error is not None:
             report.say(error_sentence(gait.error))
-        if found and self.output.out is not None:
-            report.wrote(write_figures(scene, gait, self.output.out))
+        if found:
+            report.wrote(self.output.draw(gait_figures(scene, gait)))
         report.finish(numbers)
         return 0 if found else 1
 
 
-def write_figures(scene: Any, gait: "jb.Gait", out: Path) -> list[Path]:
-    """Writes the figures of a gait; returns their paths."""
-    figures: dict[str, Any] = {
-        "multipliers.png": jb.plot.multipliers,
-        "elasticities.png": jb.plot.elasticities,
-        "orbit.png": lambda gait: jb.plot.gait_orbit(gait, scene=scene),
+def gait_figures(scene: Any, gait: "jb.Gait") -> dict[str, Callable[[], Any]]:
+    """What draws the figures of a gait, by the names of their files."""
+    return {
+        "multipliers": lambda: jb.plot.multipliers(gait),
+        "elasticities": lambda: jb.plot.elasticities(gait),
+        "orbit": lambda: jb.plot.gait_orbit(gait, scene=scene),
     }
-    for name, draw in figures.items():
-        draw(gait).savefig(out / name)
-    return [out / name for name in figures]
 
 
 def gait_numbers(gait: "jb.Gait") -> JsonObject:

@@ -10,6 +10,7 @@ import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._files import JsonObject
 from jaxbiped.cli import _options as options
+from jaxbiped.cli._gait import gait_figures
 from jaxbiped.cli._report import Report, columns, records
 from jaxbiped.cli._scene_options import SceneOptions, minimal
 
@@ -53,7 +54,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
     fatal_push: bool
     other_engine: bool
     store: Path | None
-    json: options.Numbers = None
+    output: options.OutputOptions
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
@@ -61,6 +62,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
 
         scene = self.scene.scene()
         assert not isinstance(scene, jb.RedundantScene)
+        self.output.make_folder()
         names = [name.strip() for name in self.bifurcations.split(",")]
         along = [name for name in names if name not in ("", "none")]
         for name in along:
@@ -81,9 +83,11 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         sense = "minimise" if self.maximise is None else "maximise"
         goal = getattr(self, sense)
         numbers = _optimum_numbers(found, certificate, goal, sense)
-        report = Report(self.json)
+        report = Report(self.output.json)
         _print(report, scene, found, goal)
         report.say(*_certificate_lines(certificate))
+        figures = {"optimisation": lambda: jb.plot.optimisation(found)}
+        report.wrote(self.output.draw(figures | gait_figures(found.scene, found.gait)))
         report.finish(numbers)
         ended = jb.optimise.Outcome
         good = (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE)

@@ -108,8 +108,8 @@ def one_of(registry: str) -> Check:
     return Check(lambda name, value: check_choice(name, value, names(registry)))
 
 
-def among(*allowed: str) -> Check:
-    """Whether a name is one of these."""
+def among(*allowed: object) -> Check:
+    """Whether a name or a number is one of these."""
     return Check(lambda name, value: check_choice(name, value, allowed))
 
 
@@ -131,12 +131,6 @@ def _check_accuracy(name: str, accuracy: str) -> None:
 def _check_json(name: str, path: Path) -> None:
     if str(path) != "-":
         check_writable_file(f"--{name}", path)
-
-
-def make_folder(out: Path | None) -> None:
-    """Makes the folder of --out, where there is one; raises where it cannot be written."""
-    if out is not None:
-        check_writable_directory("--out", out)
 
 
 Count = Annotated[int, Check(check_count)]
@@ -168,5 +162,30 @@ class OutputOptions(Options):
     """Where results are written."""
 
     out: Path | None = None
-    """Folder for pictures, an animation and the trajectory."""
+    """Folder for figures and data."""
+    format: Annotated[tuple[str, ...], one_of("plot.FIGURE_FORMATS")._replace(each=True)] = ("png",)
+    """Formats of the figures: png, pdf, svg."""
+    style: Annotated[str, one_of("plot.FIGURE_STYLES")] = "screen"
+    """Style of the figures: screen, or paper, with small letters and as wide as its columns."""
+    columns: Annotated[int, among(1, 2)] = 1
+    """Number of columns of a paper that a figure spans: 1 or 2."""
     json: Numbers = None
+
+    def make_folder(self) -> None:
+        """Makes the folder, where one is asked for; raises where it cannot be written."""
+        if self.out is not None:
+            check_writable_directory("--out", self.out)
+
+    def draw(self, figures: Mapping[str, Callable[[], Any]]) -> list[Path]:
+        """Draws figures by the names of their files, and writes them; returns the paths.
+
+        None is drawn where no folder is asked for.
+        """
+        import jaxbiped as jb
+
+        paths = list[Path]()
+        with jb.plot.figure_style(self.style, columns=self.columns):
+            for name, draw in figures.items() if self.out is not None else ():
+                assert self.out is not None
+                paths += jb.plot.save_figure(draw(), self.out / name, formats=self.format)
+        return paths

@@ -1,7 +1,7 @@
 """`jaxbiped trade`: what accuracy costs for a scene, by our own ways of solving."""
 
-from collections.abc import Iterator
-from pathlib import Path
+import functools
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
@@ -50,9 +50,7 @@ class Trade(options.Command):
     """Number of warm runs, of which the median counts."""
     full: bool = False
     """Try every solver, both engines and a ladder of tolerances; takes many minutes."""
-    out: Path | None = None
-    """Folder for the pictures."""
-    json: options.Numbers = None
+    output: options.OutputOptions
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
@@ -61,8 +59,8 @@ class Trade(options.Command):
         scene = self.scene.scene()
         assert isinstance(scene, jb.Scene)
         start = self.start.start(scene, self.scene.walker)
-        options.make_folder(self.out)
-        report = Report(self.json)
+        self.output.make_folder()
+        report = Report(self.output.json)
         trades: dict[str, Any] = {
             "walk": WalkTrade(scene, start, self.duration, self.repeats),
             "gait": GaitTrade(scene, 1),
@@ -77,9 +75,8 @@ class Trade(options.Command):
             "floors": {name: truth.floor for name, (_, truth) in found.items() if truth},
             "cheapest": {name: _advice(rows) for name, (rows, _) in found.items()},
         }  # fmt: skip
-        if self.out is not None:
-            for rows, truth in found.values():
-                report.wrote(_write_pictures(rows, truth, self.out))
+        for rows, truth in found.values():
+            report.wrote(self.output.draw(_figures(rows, truth)))
         report.finish(numbers)
         return 0 if found["walk"][1] is not None else 1
 
@@ -169,13 +166,12 @@ def _known(number: float | None, form: str) -> str:
     return "" if number is None else format(number, form)
 
 
-def _write_pictures(rows: "list[Row]", truth: "Truth | None", out: Path) -> Iterator[Path]:
-    """A picture for each error axis."""
+def _figures(rows: "list[Row]", truth: "Truth | None") -> dict[str, Callable[[], Any]]:
+    """What draws a figure for each error axis, by the names of their files."""
     told = [row.numbers() for row in rows]
-    for axis in _axes(rows):
+
+    def draw(axis: str) -> Any:
         assert truth is not None
-        figure = jb.plot.work_precision(told, axis, cost="seconds", floor=truth.floor.get(axis))
-        figure.axes[0].legend(fontsize="small", frameon=False)
-        path = out / f"trade_{axis}.png"
-        figure.savefig(path)
-        yield path
+        return jb.plot.work_precision(told, axis, cost="seconds", floor=truth.floor.get(axis))
+
+    return {f"trade_{axis}": functools.partial(draw, axis) for axis in _axes(rows)}

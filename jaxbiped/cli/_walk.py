@@ -127,7 +127,7 @@ class Walk(options.Command):
                 engine=solve.engine,
                 max_solver_steps=solve.most_steps(),
             )
-        options.make_folder(self.output.out)
+        self.output.make_folder()
         began = time.perf_counter()
         walk, seconds = _simulate(request, solve.wanted())
         wall = {"compile": time.perf_counter() - began - seconds, "run": seconds}
@@ -138,7 +138,7 @@ class Walk(options.Command):
     def _roll(self, scene: Any, state: Any) -> _Walked:
         """Walks on rigid feet."""
         solve = self.solve
-        options.make_folder(self.output.out)
+        self.output.make_folder()
         solve.check_rolling()
         wanted, tolerances = solve.wanted(), solve.tolerances()
         tolerances.pop("atol", None)

@@ -1,6 +1,7 @@
 """Report of a walk: footsteps, costs and warnings, for people and for programs."""
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -92,9 +93,9 @@ def report_walk(
     if output.out is not None:
         with stage("drawing the figures and the animation"):
             if rolls:
-                paths = _write_rigid_outputs(scene, state, walk, output.out)
+                paths = _write_rigid_outputs(scene, state, walk, output)
             else:
-                paths = write_outputs(scene, walk, output.out)
+                paths = write_outputs(scene, walk, output)
         report.wrote(paths)
     report.finish(numbers)
     return 1 if walk.outcome is jb.Ending.SOLVER_FAILED else 0
@@ -179,40 +180,39 @@ def _rigid_footsteps(scene: "jb.RigidScene", strikes: Any) -> list[dict[str, flo
     return _rows(found | {"speed_m_s": lengths / periods})
 
 
-def _motion_figures() -> dict[str, Any]:
-    """The figures of a walk on any feet, by the names of their files."""
+def _motion_figures(scene: Any, walk: "jb.Trajectory[Any]") -> dict[str, Callable[[], Any]]:
+    """What draws a walk on any feet, by the names of the files."""
     return {
-        "strobe.png": jb.plot.gait_strobe,
-        "phase_portrait.png": jb.plot.phase_portrait,
-        "leg_angles.png": jb.plot.leg_angles,
+        "strobe": lambda: jb.plot.gait_strobe(scene, walk),
+        "phase_portrait": lambda: jb.plot.phase_portrait(scene, walk),
+        "leg_angles": lambda: jb.plot.leg_angles(scene, walk),
     }
 
 
-def write_outputs(scene: Any, walk: "jb.Trajectory[Any]", out: Path) -> list[Path]:
+def write_outputs(scene: Any, walk: "jb.Trajectory[Any]", output: OutputOptions) -> list[Path]:
     """Writes the figures, the animations and the trajectory; returns their paths."""
-    figures = _motion_figures() | {
-        "penetrations.png": jb.plot.penetrations,
-        "contact_forces.png": jb.plot.contact_forces,
-    }
+    assert output.out is not None
     # The numbers first: no picture that fails takes them away.
-    jb.trajectory_dataset(scene, walk).to_netcdf(out / "trajectory.nc")
-    for name, draw in figures.items():
-        draw(scene, walk).savefig(out / name)
-    shown = _beginning(walk)
-    page = jb.plot.view(scene, shown).save(out / "walk.html")
-    jb.plot.save_animation(jb.plot.animate(scene, shown), out / "walk.gif")
-    return [out / "trajectory.nc", *(out / name for name in figures), out / "walk.gif", page]
+    data = output.out / "trajectory.nc"
+    jb.trajectory_dataset(scene, walk).to_netcdf(data)
+    figures = _motion_figures(scene, walk) | {
+        "penetrations": lambda: jb.plot.penetrations(scene, walk),
+        "contact_forces": lambda: jb.plot.contact_forces(scene, walk),
+    }
+    paths, shown = output.draw(figures), _beginning(walk)
+    page = jb.plot.view(scene, shown).save(output.out / "walk.html")
+    played = jb.plot.save_animation(jb.plot.animate(scene, shown), output.out / "walk.gif")
+    return [data, *paths, played, page]
 
 
 def _write_rigid_outputs(
-    scene: "jb.RigidScene", state: Any, walk: "jb.Trajectory[Any]", out: Path
+    scene: "jb.RigidScene", state: Any, walk: "jb.Trajectory[Any]", output: OutputOptions
 ) -> list[Path]:
     """The same of a walk on rigid feet."""
+    assert output.out is not None
     shown = from_start(scene, _rigid_beginning(walk), state)
-    figures = _motion_figures()
-    for name, draw in figures.items():
-        draw(scene, shown).savefig(out / name)
-    return [*(out / name for name in figures), jb.plot.view(scene, shown).save(out / "walk.html")]
+    paths = output.draw(_motion_figures(scene, shown))
+    return [*paths, jb.plot.view(scene, shown).save(output.out / "walk.html")]
 
 
 def _beginning(walk: "jb.Trajectory[Any]") -> "jb.Trajectory[Any]":

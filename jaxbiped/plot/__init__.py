@@ -3,9 +3,12 @@
 The figures of a motion take the scene and a trajectory that was saved step by step; those of a
 periodic gait take the gait; those of a law of contact take the law; those of basins take labels,
 refined boundaries or fractions; that of constraint methods takes runs; those of
-branches take branches and curves of bifurcations. Each draws into the axes or
-the figure it is given (or a new one) and returns the figure. None touches pyplot, so all work
-without a display.
+branches take branches and curves of bifurcations; those of a fit and of an optimisation take
+their results. Each draws into the axes or the figure it is given (or a new one) and returns the
+figure. None touches pyplot, so all work without a display.
+
+`figure_style("paper")` makes figures as wide as one column of a paper, or two; `save_figure` writes
+them as PNG, PDF and SVG with their fonts.
 """
 
 from jaxbiped.plot._animation import animate as animate
@@ -14,6 +17,12 @@ from jaxbiped.plot._animation import save_animation as save_animation
 from jaxbiped.plot._basin import basin as basin
 from jaxbiped.plot._basin import refined_basin as refined_basin
 from jaxbiped.plot._contact_forces import contact_forces as contact_forces
+from jaxbiped.plot._figure_style import FIGURE_FORMATS as FIGURE_FORMATS
+from jaxbiped.plot._figure_style import FIGURE_STYLES as FIGURE_STYLES
+from jaxbiped.plot._figure_style import figure_style as figure_style
+from jaxbiped.plot._figure_style import save_figure as save_figure
+from jaxbiped.plot._fit_charts import fit as fit
+from jaxbiped.plot._fit_charts import optimisation as optimisation
 from jaxbiped.plot._gait_charts import elasticities as elasticities
 from jaxbiped.plot._gait_charts import multipliers as multipliers
 from jaxbiped.plot._laws import bristle_law as bristle_law

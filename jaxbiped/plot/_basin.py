@@ -18,13 +18,18 @@ from jaxbiped.basins._fractions import fractions as fractions_of
 from jaxbiped.basins._labels import Label, check_known, label_names
 from jaxbiped.basins._refined_boundary import RefinedBoundary
 from jaxbiped.plot import style
+from jaxbiped.plot._basin_marks import GaitMark, draw_gait_marks, gait_marks, gaits_apart
 from jaxbiped.plot._symbols import axis_label
 
 if TYPE_CHECKING:
     import xarray
 
-_HATCH = "////"
+_PENDING = "////"
 """Over what is pending, so that it reads as missing in print without colour too."""
+_PATTERNS = ("#102A40", "#A0A0A0")
+"""Colours of patterns over walking and pending."""
+_ASIDE = 2.2
+"""Width that the legend beside the axes takes [inches]."""
 _CORNERS = np.asarray([(0, 0), (1, 0), (1, 1), (0, 1)])
 
 
@@ -55,7 +60,9 @@ def basin(
         cycle_footsteps: footsteps in the cycle of the gait that each start walks to, a shape that
             broadcasts to (ny, nx); only for codes. Unless given, it is not said.
         gait: which gait that is, from 0, to tell apart those of cycles alike; only for codes.
-        mark: where the gait is, in the units of the axes.
+        mark: where the gait is, in the units of the axes; of a `sweep`'s dataset the gaits that it
+            knows are marked unless this is given: along an axis that is a parameter as a curve, and
+            projected where a gait lies off the slice.
         title: above the axes.
         ax: axes to draw into; a new figure unless given.
 
@@ -65,13 +72,17 @@ def basin(
     Raises:
         ArgumentError: shapes that do not fit, an empty grid, coordinates that do not increase.
     """
-    if hasattr(labels, "data_vars"):
-        data: Any = labels
-        labels, cycle_footsteps, gait = data.label, data.cycle_footsteps, data.gait
+    data: Any = labels if hasattr(labels, "data_vars") else None
+    marks = [] if mark is None else [GaitMark.at(mark)]
+    if data is not None:
+        labels, cycle_footsteps, gait = data.label, data.cycle_footsteps, gaits_apart(data)
     if hasattr(labels, "dims"):
         known: Any = labels
         along = _axes_of(known, x, y, names)
-        names = along if names is None else names
+        if names is None:
+            names = _quantity_of(known[along[0]]), _quantity_of(known[along[1]])
+        if data is not None and mark is None:
+            marks = gait_marks(data, *along)
         x, y = (known[n] if c is None else c for n, c in zip(along, (x, y), strict=True))
         parts: tuple[Any, ...] = (known, cycle_footsteps, gait)
         labels, cycle_footsteps, gait = (
@@ -81,9 +92,9 @@ def basin(
         raise ArgumentError("x, y and names are needed, because these labels carry no axes.")
     words = _names_of(labels, cycle_footsteps, gait)
     x_edges, y_edges = _edges("x", x, words.shape[1]), _edges("y", y, words.shape[0])
-    ax = style.axes_or_new(ax, 7.2, 4.4)
+    ax = style.axes_or_new(ax, 7.2, 4.4, aside=_ASIDE)
     _draw_labels(ax, words, x_edges, y_edges)
-    return _finish(ax, words, names, units, mark, title)
+    return _finish(ax, words, names, units, marks, title)
 
 
 def refined_basin(
@@ -128,7 +139,7 @@ def refined_basin(
         raise ArgumentError(f"codes has no name for label {nameless[0]}: each must have one.")
     else:
         words = np.vectorize(codes.__getitem__, otypes=[object])(words)
-    ax = style.axes_or_new(ax, 7.2, 4.4)
+    ax = style.axes_or_new(ax, 7.2, 4.4, aside=_ASIDE)
     half = 0.5 * boundary.cell_size(boundary.levels)
     axes = (np.append(boundary.axis(k) - half[k], boundary.axis(k)[-1] + half[k]) for k in (0, 1))
     _draw_labels(ax, words, *axes)
@@ -143,7 +154,8 @@ def refined_basin(
     ax.set_xlim(boundary.lower[0], boundary.upper[0])
     ax.set_ylim(boundary.lower[1], boundary.upper[1])
     title = title or f"{boundary.asked} labels of the full grid's {boundary.full}"
-    return _finish(ax, words, names, units, mark, title, handles)
+    marks = [] if mark is None else [GaitMark.at(mark)]
+    return _finish(ax, words, names, units, marks, title, handles)
 
 
 def _axes_of(labels: Any, x: Any, y: Any, names: Any) -> tuple[str, str]:
@@ -157,6 +169,12 @@ def _axes_of(labels: Any, x: Any, y: Any, names: Any) -> tuple[str, str]:
     told = (getattr(x, "name", None), None if names is None else names[0])
     as_given = x is not None and first not in told
     return (second, first) if second in told or as_given else (first, second)
+
+
+def _quantity_of(coordinate: Any) -> str | Quantity:
+    """What a dataset's coordinate is: by its name, or by name and unit where that says nothing."""
+    name, unit = str(coordinate.name), coordinate.attrs.get("units", "")
+    return name if axis_label(name) != name else Quantity(name, unit=unit)
 
 
 def _names_of(
@@ -217,15 +235,28 @@ def _draw_labels(ax: Axes, words: np.ndarray, x_edges: np.ndarray, y_edges: np.n
     colours = ListedColormap([style.label_colour(name) for name in present])
     norm = BoundaryNorm(np.arange(len(present) + 1) - 0.5, len(present))
     ax.pcolormesh(x_edges, y_edges, codes, cmap=colours, norm=norm, rasterized=True)
-    # Each run of pending cells in a row is one rectangle: few of them on a large grid.
-    turns = np.diff(np.pad((words == str(Label.PENDING)).astype(int), ((0, 0), (1, 1))), axis=1)
+    for name in present:
+        if hatch := _hatch(name):
+            _draw_hatch(ax, words == name, x_edges, y_edges, hatch)
+
+
+def _hatch(name: str) -> str:
+    """The pattern over a label's cells, where there is one."""
+    return _PENDING if name == str(Label.PENDING) else style.walking_pattern(name)
+
+
+def _draw_hatch(
+    ax: Axes, cells: np.ndarray, x_edges: np.ndarray, y_edges: np.ndarray, hatch: str
+) -> None:
+    """A pattern over some cells; each run of them in a row is one rectangle."""
+    turns = np.diff(np.pad(cells.astype(int), ((0, 0), (1, 1))), axis=1)
     (row, left), (_, right) = np.nonzero(turns == 1), np.nonzero(turns == -1)
-    if row.size:
-        across = x_edges[np.stack([left, right, right, left], axis=1)]
-        along = y_edges[np.stack([row, row, row + 1, row + 1], axis=1)]
-        runs = list(np.stack([across, along], axis=-1))
-        look: dict[str, Any] = {"edgecolors": "#A0A0A0", "linewidths": 0.0, "hatch": _HATCH}
-        ax.add_collection(PolyCollection(runs, facecolors="none", **look), autolim=False)
+    across = x_edges[np.stack([left, right, right, left], axis=1)]
+    along = y_edges[np.stack([row, row, row + 1, row + 1], axis=1)]
+    runs = list(np.stack([across, along], axis=-1))
+    look: dict[str, Any] = {"edgecolors": _PATTERNS[hatch == _PENDING], "linewidths": 0.0}
+    look["hatch"] = hatch
+    ax.add_collection(PolyCollection(runs, facecolors="none", **look), autolim=False)
 
 
 def _finish(
@@ -233,26 +264,16 @@ def _finish(
     words: np.ndarray,
     names: tuple[str | Quantity, str | Quantity],
     units: tuple[str, str],
-    mark: tuple[float, float] | None,
+    marks: list[GaitMark],
     title: str,
     more: Sequence[Line2D] = (),
 ) -> Figure:
-    """Names of the axes, the gait's mark, and the legend with fractions right of the axes."""
-    handles = [*_patches(words), *more]
-    if mark is not None:
-        check_finite("mark", mark)
-        if np.shape(mark) != (2,):
-            raise ArgumentError(f"mark = {mark!r} is not allowed: it must be two numbers, x and y.")
-        look: dict[str, Any] = {
-            "marker": "*", "markersize": 15, "markerfacecolor": "white",
-            "markeredgecolor": "black", "linestyle": "none",
-        }  # fmt: skip
-        ax.plot(*mark, clip_on=False, zorder=5, **look)
-        handles.append(Line2D([], [], label="gait", **look))
+    """Names of the axes, the gaits' marks, and the legend with fractions right of the axes."""
+    handles = [*_patches(words), *more, *draw_gait_marks(ax, marks)]
     style.legend_right(ax, handles=handles)
     ax.set_xlabel(axis_label(names[0], units[0]))
     ax.set_ylabel(axis_label(names[1], units[1]))
-    ax.set_title(title, loc="left", fontsize="medium")
+    style.set_title(ax, title)
     return style.figure_of(ax)
 
 
@@ -261,10 +282,11 @@ def _patches(words: np.ndarray) -> Iterator[Patch]:
     fractions, pending = fractions_of(words), str(Label.PENDING)
     for name in style.in_order(set(words.ravel().tolist())):
         part = f"{int((words == name).sum())} of {words.size}"
-        look: dict[str, Any] = {"edgecolor": "#A0A0A0", "hatch": _HATCH}
+        look: dict[str, Any] = {"edgecolor": "#404040", "linewidth": 0.5}
         if name != pending:
             part = _percent(fractions[name].estimate)
-            look = {"edgecolor": "#404040", "linewidth": 0.5}
+        if hatch := _hatch(name):
+            look = {"edgecolor": _PATTERNS[hatch == _PENDING], "hatch": hatch}
         yield Patch(facecolor=style.label_colour(name), label=f"{name}: {part}", **look)
 
 

@@ -65,10 +65,7 @@ def contact_forces(
         )
     rows = 2 if "tangential_1" in forces else 1
     columns = 2 if times.size else 1
-    if figure is None:
-        figure = style.new_figure(4.6 * columns, 1.0 + 2.2 * rows)
-    widths = [1.35, 1.0][:columns]
-    axes = figure.subplots(rows, columns, sharex="col", squeeze=False, width_ratios=widths)
+    axes = _axes_of(figure, rows, columns)
     _draw_column(axes[:, 0], t, forces, skeleton_of(scene.mechanism).feet)
     axes[0, 0].margins(x=0.01)
     style.dress(axes[0, 0], "Contact forces", "", NORMAL_FORCE.on_axis())
@@ -77,8 +74,30 @@ def contact_forces(
         style.dress(axes[1, 0], "", "", TANGENTIAL_FORCE.on_axis())
     axes[-1, 0].set_xlabel(TIME.on_axis())
     if times.size:
+        if axes[0, 1].get_subplotspec().get_gridspec().ncols == 1:  # below, not beside
+            for ax, kind in zip(axes[:, 1], (NORMAL_FORCE, TANGENTIAL_FORCE), strict=False):
+                ax.set_ylabel(kind.on_axis())
         _draw_strike(axes[:, 1], scene, trajectory, times[strike], legs[strike] - 1)
     return style.figure_of(axes[0, 0])
+
+
+def _axes_of(figure: Figure | SubFigure | None, rows: int, columns: int) -> np.ndarray:
+    """Axes (rows, columns), each column with one time; one below the other where there is no room
+    for both."""
+    stacked = figure is None and columns > style.panels_abreast(columns, width=3.4)
+    if stacked:
+        figure = style.new_figure(4.6, 1.0 + 2.1 * rows * columns)
+        axes = figure.subplots(rows * columns, 1).reshape(columns, rows).T
+        for column in axes.T:
+            for ax in column[:-1]:
+                ax.sharex(column[-1])
+                ax.tick_params(labelbottom=False)
+        return axes
+    if figure is None:
+        figure = style.new_figure(4.6 * columns, 1.0 + 2.2 * rows)
+    widths = [1.35, 1.0][:columns]
+    found = figure.subplots(rows, columns, sharex="col", squeeze=False, width_ratios=widths)
+    return np.asarray(found)
 
 
 def forces_in(found: Contacts) -> Channels:
@@ -138,10 +157,9 @@ def _draw_strike(
     for ax in axes:
         if both.size:
             ax.axvspan(both[0], both[-1], **look)
-        ax.margins(x=0.0, y=0.12)
-        style.dress(ax, "", "", "")
-    title = f"Heel strike of {skeleton.legs[leg]} at {time:.3f} s"
-    axes[0].set_title(title, loc="left", fontsize="medium")
+        ax.margins(x=0.0, y=0.2)
+        style.dress(ax, "", "", ax.get_ylabel())
+    style.set_title(axes[0], f"Heel strike of {skeleton.legs[leg]} at {time:.3f} s", panel=True)
     axes[-1].set_xlabel("time after the foot touches, $t$ (ms)")
     loaded = max(feet_of_leg[leg], key=lambda k: float(normal[k].max()))
     for ax, kind in zip(axes, _KINDS, strict=False):

@@ -6,10 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from matplotlib.ticker import NullLocator
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._quantity import Quantity
+from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._stability import Bifurcation
@@ -30,14 +29,15 @@ def check_drawable(gait: Gait) -> None:
         raise ArgumentError(f"the search ended {str(gait.outcome)!r}: there is no gait to draw.")
 
 
-def multipliers(gait: Gait, *, ax: Axes | None = None) -> Figure:
-    """Draws the Floquet multipliers, without the trivial one, and the unit circle.
+def multipliers(gait: Gait | BranchPoint, *, ax: Axes | None = None) -> Figure:
+    """Draws the Floquet multipliers with their error bars, without the trivial one.
 
-    A disc about a multiplier is its estimated error, where that is larger than the dot. Those
-    near zero lie on top of each other and are named together.
+    The circle is the unit circle, within which a gait is stable. A disc about a multiplier is its
+    estimated error, where that is larger than the dot. Those near zero lie on top of each other
+    and are named together.
 
     Args:
-        gait: a gait that was found.
+        gait: a gait that was found, or a point of a branch.
         ax: axes to draw into; a new figure unless given.
 
     Returns:
@@ -46,30 +46,79 @@ def multipliers(gait: Gait, *, ax: Axes | None = None) -> Figure:
     Raises:
         ValueError: no gait was found, or this is a batch.
     """
-    check_drawable(gait)
-    values, errors = np.asarray(gait.multipliers), np.asarray(gait.multiplier_errors)
+    if isinstance(gait, BranchPoint):
+        errors, stable, critical = (
+            gait.multiplier_errors,
+            gait.stable,
+            Bifurcation(gait.bifurcation),
+        )
+    else:
+        check_drawable(gait)
+        errors = error_bars(gait, "multipliers")
+        stable, critical = bool(gait.stable), gait.critical
+    values = np.asarray(gait.multipliers)
     ax = style.axes_or_new(ax, 5.6, 5.6)
-    inside = Circle((0.0, 0.0), 1.0, facecolor="#F6F6F6", edgecolor=style.GROUND_COLOUR, zorder=0)
-    ax.add_patch(inside)
+    look: dict[str, Any] = {"edgecolor": style.GROUND_COLOUR, "zorder": 0, "label": "unit circle"}
+    ax.add_patch(Circle((0.0, 0.0), 1.0, facecolor="#F6F6F6", **look))
     for value, error in zip(values, errors, strict=True):
-        if error > _VISIBLE:
+        if _VISIBLE < error < np.inf:
             place = (value.real, value.imag)
             ax.add_patch(Circle(place, error, facecolor=style.LEG_COLOURS[1], alpha=0.25))
-    look: dict[str, Any] = {"color": style.LEG_COLOURS[0], "markersize": 5}
+    bars = np.where(np.isfinite(errors), errors, np.nan)
+    look = {"color": style.LEG_COLOURS[0], "elinewidth": 0.9, "capsize": 2.0}
+    ax.errorbar(values.real, values.imag, bars, bars, fmt="none", **look)
+    look = {"color": style.LEG_COLOURS[0], "markersize": 5}
     ax.plot(values.real, values.imag, "o", label="multipliers", **look)
     _name(ax, values)
-    _frame(ax, max(1.0, float(np.max(np.abs(values) + errors))))
+    _frame(ax, max(1.0, float(np.max(np.abs(values) + np.nan_to_num(bars)))))
     largest = float(np.max(errors))
     said = f"largest error {largest:.1e}" + ("" if largest > _VISIBLE else ": within the dots")
     look = {"fontsize": "small", "color": style.GROUND_COLOUR}
     ax.text(0.02, 0.02, said, transform=ax.transAxes, **look)
-    verdict = "stable" if bool(gait.stable) else "not stable"
-    if gait.critical is not Bifurcation.NONE:
-        verdict += f", at a bifurcation ({gait.critical})"
-    radius = float(gait.measures.spectral_radius)
-    title = f"Floquet multipliers: spectral radius {radius:.4f}\n{verdict}"
-    ax.set_title(title, loc="left", fontsize="medium")
+    verdict = _VERDICTS[stable]
+    if critical is not Bifurcation.NONE:
+        verdict += f", at a bifurcation ({critical})"
+    radius = float(np.max(np.abs(values)))
+    style.set_title(ax, f"Floquet multipliers: spectral radius {radius:.4f}\n{verdict}")
     return style.figure_of(ax)
+
+
+_VERDICTS = {True: "stable", False: "not stable", None: "undecided within the errors"}
+
+
+_ERRORS = {"multipliers": "multiplier_errors", "sensitivities": "sensitivity_errors"}
+
+
+def error_bars(gait: Gait, of: str) -> Any:
+    """Estimated errors of a gait's `multipliers` or `sensitivities`.
+
+    Of an accuracy that was asked for by a number they are the ones that the gait then has.
+    """
+    if gait.error is not None and of in gait.error.bars:
+        return gait.error.bars[of]
+    return getattr(gait, _ERRORS[of])
+
+
+def elasticity_errors(gait: Gait, name: str) -> np.ndarray:
+    """Estimated errors of the elasticities of a measure, shape (p,); NaN where none is known.
+
+    An elasticity is a sensitivity times the parameter over the measure, and has their relative
+    errors.
+    """
+    slopes, bars = gait.sensitivities, error_bars(gait, "sensitivities")
+    value = np.asarray(getattr(gait.measures, name))
+    own = np.asarray(getattr(gait.elasticities, name))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # The parameter itself, from any measure that it changes.
+        sizes = [
+            np.abs(getattr(gait.elasticities, each) * getattr(gait.measures, each))
+            / np.abs(getattr(slopes, each))
+            for each in MEASURES
+        ]
+        parameter = np.nanmax(np.where(np.isfinite(sizes), sizes, 0.0), axis=0)
+        relative = np.abs(getattr(gait.measure_errors, name) / value)
+        found = parameter * getattr(bars, name) / np.abs(value) + np.abs(own) * relative
+    return np.where(np.isfinite(own) & np.isfinite(found), found, np.nan)
 
 
 def _frame(ax: Axes, reach: float) -> None:
@@ -93,9 +142,10 @@ def _name(ax: Axes, values: np.ndarray) -> None:
             text, shift, anchor = f"{value.real:.3f} ± {value.imag:.3f} i", 6, "bottom"
         else:
             # Neighbours on the real axis are written at different depths.
-            text, shift, anchor = f"{value.real:.3f}", -6 - 12 * (reals % 2), "top"
+            text = f"{value.real:.3f}".replace("-", "−")
+            shift, anchor = -6 - 12 * (reals % 2), "top"
             reals += 1
-        across, side = (-6, "right") if value.real > 0.6 else (6, "left")
+        across, side = (-6, "right") if value.real > 0.3 else (6, "left")
         place = (value.real, value.imag)
         style.label_point(ax, text, place, (across, shift), ha=side, va=anchor)
     if small.any():
@@ -126,8 +176,10 @@ The scale is logarithmic beyond
 ±0.0001, and the same in all panels."""
 
 
-def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -> Figure:
-    """Draws elasticities, d log measure / d log parameter, the largest on top.
+def elasticities(
+    gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES), *, ax: Axes | None = None
+) -> Figure:
+    """Draws elasticities, d log measure / d log parameter, with error bars, the largest on top.
 
     A bar to the right: the measure grows with the parameter. The scale is logarithmic beyond
     1e-4 on either side of zero; the numbers stand at the right.
@@ -136,13 +188,14 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
         gait: a gait that was found, with its sensitivities to some parameters.
         measure: one or several of "period", "step_length", "speed", "peak_normal" and
             "spectral_radius", a panel each; all of them unless given.
+        ax: axes to draw one measure into; a new figure unless given.
 
     Returns:
-        A new figure.
+        The figure that holds `ax`, or the new one.
 
     Raises:
-        ValueError: no gait was found, this is a batch, a measure that is not one of those, or
-            a gait without parameters.
+        ValueError: no gait was found, this is a batch, a measure that is not one of those, several
+            for one pair of axes, or a gait without parameters.
     """
     names = (measure,) if isinstance(measure, str) else tuple(measure)
     if not names:
@@ -152,56 +205,84 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
     check_drawable(gait)
     if not gait.parameters:
         raise ArgumentError("this gait has no sensitivities: find it with parameters to vary.")
-    columns = min(len(names), 3)
-    rows = -(-len(names) // columns)
-    height = 1.3 + 0.2 * len(gait.parameters)
-    figure = style.new_figure(max(3.9 * columns, 4.6), height * rows)
-    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
+    if ax is not None and len(names) > 1:
+        raise ArgumentError("ax is one pair of axes: it shows the elasticities of one measure.")
+    rows, short = _row_labels(gait)
+    panels = [ax] if ax is not None else _new_panels(len(names), len(rows), short)
     found = [np.asarray(getattr(gait.elasticities, name)) for name in names]
-    largest = float(np.max(np.abs(np.nan_to_num(found, posinf=0.0, neginf=0.0))))
-    for ax, name, values in zip(panels, names, found, strict=False):
-        _panel(ax, MEASURES[name], gait.quantities or gait.parameters, values)
-        _scale(ax, largest)
+    errors = [elasticity_errors(gait, name) for name in names]
+    ends = np.abs(np.nan_to_num(found, posinf=0.0, neginf=0.0)) + np.nan_to_num(errors)
+    for each, name, values, bars in zip(panels, names, found, errors, strict=False):
+        _panel(each, MEASURES[name], rows, values, bars)
+        _scale(each, float(np.max(ends)), short)
     spare = panels[len(names) :]
-    for ax in spare:
-        ax.set_axis_off()
-    if spare:
-        spare[0].text(-0.4, 0.95, _READING, va="top", fontsize="small", color=style.GROUND_COLOUR)
-    return figure
+    for each in spare:
+        each.set_axis_off()
+    if spare and style.has_titles():
+        look: dict[str, Any] = {"fontsize": "small", "color": style.GROUND_COLOUR}
+        spare[0].text(-0.4, 0.95, _READING, va="top", transform=spare[0].transAxes, **look)
+    return style.figure_of(panels[0])
+
+
+def _row_labels(gait: Gait) -> tuple[list[str], bool]:
+    """What the parameters are called, and whether by their symbols alone: in the style of a paper,
+    whose text explains them, where these differ."""
+    symbols = [each.symbol for each in gait.quantities]
+    if not style.has_titles() and all(symbols) and len(set(symbols)) == len(gait.parameters):
+        return symbols, True
+    return [row_label(each) for each in gait.quantities or gait.parameters], False
+
+
+def _new_panels(count: int, parameters: int, short: bool) -> list[Axes]:
+    """Axes of a new figure, of three panels or as many as have room side by side."""
+    columns = style.panels_abreast(min(count, 3), width=1.9 if short else 3.2)
+    rows = -(-count // columns)
+    width, height = max(3.9 * columns, 4.6), (1.3 + 0.2 * parameters) * rows
+    figure = style.new_figure(width, height, rows=True)
+    return list(figure.subplots(rows, columns, squeeze=False).flat)
 
 
 def _panel(
-    ax: Axes, title: str, parameters: tuple[str | Quantity, ...], values: np.ndarray
+    ax: Axes,
+    title: str,
+    names: list[str],
+    values: np.ndarray,
+    errors: np.ndarray,
 ) -> None:
-    """One measure: bars from the largest down, unknown ones last, and their numbers beside."""
+    """One measure: bars from the largest down, unknown ones last, and their numbers beside.
+
+    Thin lines are their errors.
+    """
     order = np.argsort(-np.where(np.isfinite(values), np.abs(values), -1.0), kind="stable")
-    values = values[order]
+    values, errors = values[order], errors[order]
     drawn, places = np.nan_to_num(values, posinf=0.0, neginf=0.0), np.arange(len(values))
     colours = [style.LEG_COLOURS[int(value < 0.0)] for value in drawn]
-    ax.barh(places, drawn, color=colours, height=0.7)
+    look: dict[str, Any] = {"ecolor": "black", "elinewidth": 0.9, "capsize": 1.5}
+    ax.barh(places, drawn, color=colours, height=0.7, xerr=errors, error_kw=look)
     ax.axvline(0.0, color=style.GROUND_COLOUR, linewidth=0.8)
-    ax.set_yticks(places, [row_label(parameters[i]) for i in order], fontsize="small")
+    ax.set_yticks(places, [names[i] for i in order], fontsize="small")
     ax.set_ylim(len(values) - 0.4, -0.6)
-    look: dict[str, Any] = {"fontsize": "x-small", "color": style.GROUND_COLOUR, "va": "center"}
+    look = {"fontsize": "x-small", "color": style.GROUND_COLOUR, "va": "center"}
     for place, value in enumerate(values):
         text = "0" if value == 0.0 else f"{value:+.2g}".replace("-", "−")
         text = "unknown" if np.isnan(value) else text
         ax.text(1.02, place, text, transform=ax.get_yaxis_transform(), **look)
-    ax.set_title(title, loc="left", fontsize="medium")
-    ax.set_xlabel("d log measure / d log parameter", fontsize="small")
+    style.set_title(ax, title, panel=True)
+    label = "d log measure / d log parameter" if style.has_titles() else "elasticity (–)"
+    ax.set_xlabel(label, fontsize="small")
     ax.grid(axis="x", color="#E6E6E6", linewidth=0.6)
     ax.set_axisbelow(True)
     ax.spines[["top", "right", "left"]].set_visible(False)
     ax.tick_params(axis="y", length=0)
 
 
-def _scale(ax: Axes, largest: float) -> None:
-    """The same reach on both sides, a tick every other decade."""
+def _scale(ax: Axes, largest: float, narrow: bool) -> None:
+    """The same reach on both sides, a tick every other decade; only the last in `narrow` axes."""
     ax.set_xscale("symlog", linthresh=_LINEAR, linscale=0.5)
     reach = max(1.6 * largest, 10.0 * _LINEAR)
     ax.set_xlim(-reach, reach)
-    powers = [10.0**k for k in range(-2, 7, 2) if 10.0**k <= reach]
+    powers = [10.0**k for k in range(-2, 7, 2) if 10.0**k <= reach][-1 if narrow else 0 :]
     marks = {-power: f"−{power:g}" for power in reversed(powers)} | {0.0: "0"}
     marks |= {power: f"{power:g}" for power in powers}
     ax.set_xticks(list(marks), list(marks.values()), fontsize="small")
-    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_xticks([mark for mark in (-0.01, 0.01) if mark not in marks], minor=True)

@@ -12,7 +12,8 @@ from jaxtyping import ArrayLike
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from jaxbiped._checks import check_positive, check_type
+from jaxbiped._checks import ArgumentError, check_positive, check_type
+from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._types import Scalar
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import FORCE_RATIO, NORMAL_FORCE, PENETRATION, SLIP_SPEED, law_name
@@ -23,6 +24,7 @@ from jaxbiped.scene.laws._abstract_laws import (
 )
 
 _RATE_COLOURS = ("#56B4E9", style.GROUND_COLOUR, "#E69F00", style.LEG_COLOURS[1])
+_RATE_STYLES = (*style.LEG_STYLES[3:0:-1], style.LEG_STYLES[0])
 """One rate each, from the slowest; the fifth begins anew."""
 _MOST_STEPS = 16384
 _LONGEST = 2.0
@@ -64,30 +66,32 @@ def normal_law(
     check_positive("depth", depth, "m")
     check_positive("mass", mass, "kg")
     check_positive("approach_speed", approach_speed, "m/s")
+    abreast = 2
     if figure is None:
-        figure = style.new_figure(9.2, 3.8)
-    left, right = figure.subplots(1, 2)
+        abreast = style.panels_abreast(2, width=3.4)
+        figure = style.new_figure(4.6 * abreast, 3.8 * (2 // abreast))
+    left, right = figure.subplots(2 // abreast, abreast, squeeze=False).flat
     _draw_rates(left, law, depth, _telling_rates(law, depth) if rates is None else rates)
     _draw_drop(right, law, mass, approach_speed)
     return style.figure_of(left)
 
 
 def friction_law(
-    law: AbstractFrictionLaw,
-    *,
+    *laws: AbstractFrictionLaw,
     fastest: float | None = None,
     load: float = 20.0,
     ax: Axes | None = None,
 ) -> Figure:
-    """Draws a law of friction: force over load [–] against slip speed [m/s].
+    """Draws one law of friction, or several to compare: force over load [–] against slip speed.
 
-    The scale of speeds is linear about rest and logarithmic far from it; it passes from one to
-    the other where the rise of the force from rest slackens, which is the law's own speed.
+    The scale of speeds [m/s] is linear about rest and logarithmic far from it; it passes from one
+    to the other where the rise of the force from rest slackens, which is the law's own speed (the
+    lowest one of several laws).
 
     Args:
-        law: the law, its parameters plain numbers.
+        laws: the laws, their parameters plain numbers.
         fastest: where the scale of slip speeds ends [m/s]; unless given, at a thousand times the
-            law's own speed, at most 1 m/s.
+            highest of the laws' own speeds, at most 1 m/s.
         load: normal force [N]; it matters only to a law that is not proportional to it.
         ax: axes to draw into; a new figure unless given.
 
@@ -97,22 +101,45 @@ def friction_law(
     Raises:
         ArgumentError: no law of friction, or a load or fastest slip not above 0.
     """
-    check_type("law", law, AbstractFrictionLaw)
+    if not laws:
+        raise ArgumentError("laws is empty: give a law of friction at least.")
+    for law in laws:
+        check_type("law", law, AbstractFrictionLaw)
     check_positive("load", load, "N")
-    own = _own_speed(law, load)
-    end = min(1e3 * own, 1.0) if fastest is None else fastest
+    own = [_own_speed(law, load) for law in laws]
+    end = min(1e3 * max(own), 1.0) if fastest is None else fastest
     check_positive("fastest", end, "m/s")
-    bend = min(own, end)
+    bend = min(*own, end)
     slip = bend * np.sinh(np.linspace(-1.0, 1.0, 1601) * np.arcsinh(end / bend))
     ax = style.axes_or_new(ax, 6.4, 3.8)
     ax.axhline(0.0, color=style.GROUND_COLOUR, linewidth=0.6)
-    ax.plot(slip, _per_load(law, load, slip), color=style.LEG_COLOURS[0], linewidth=1.4)
+    for k, (law, name) in enumerate(zip(laws, names_apart(laws), strict=True)):
+        ax.plot(slip, _per_load(law, load, slip), linewidth=1.4, label=name, **style.line_of(k))
     ax.set_xscale("asinh", linear_width=bend)
     _mark_speeds(ax, bend, end)
     ax.set_xlim(-end, end)
     ax.margins(y=0.08)
-    style.dress(ax, law_name(law), SLIP_SPEED.on_axis(), FORCE_RATIO.on_axis())
+    title = law_name(laws[0]) if len(laws) == 1 else "Laws of friction"
+    style.dress(ax, title, SLIP_SPEED.on_axis(), FORCE_RATIO.on_axis())
+    if len(laws) > 1:
+        style.legend_above(ax)
     return style.figure_of(ax)
+
+
+def names_apart(laws: Sequence[object]) -> list[str]:
+    """Names of laws in words, and of those of one kind also the parameters in which they differ."""
+    names = []
+    for law in laws:
+        own, name = parameter_infos(type(law)), law_name(law)
+        alike = [each for each in laws if type(each) is type(law)]
+        for field, info in own.items():
+            value = getattr(law, field)
+            if value is not None and len({str(getattr(each, field)) for each in alike}) > 1:
+                unit = info.quantity.unit_in_figure.replace("–", "")
+                number = f"{float(value):.3g} {unit}".strip()
+                name += f", {info.quantity.symbol or field} = {number}"
+        names.append(name)
+    return names
 
 
 def _telling_rates(law: AbstractNormalLaw, depth: float) -> list[float]:
@@ -126,10 +153,17 @@ def _draw_rates(ax: Axes, law: AbstractNormalLaw, depth: float, rates: Sequence[
     depths = np.concatenate([[-0.05 * depth, 0.0], np.linspace(1e-9 * depth, depth, 400)])
     for k, rate in enumerate(rates):
         force = law.force(jnp.asarray(depths), jnp.full(depths.shape, float(rate)))
-        colour = style.GROUND_COLOUR if len(rates) == 1 else _RATE_COLOURS[k % len(_RATE_COLOURS)]
-        ax.plot(1e3 * depths, force, color=colour, linewidth=1.4, label=f"{rate:.3g} m/s")
+        colour, dashes = _RATE_COLOURS[k % 4], _RATE_STYLES[k % 4]
+        if len(rates) == 1:
+            colour, dashes = style.GROUND_COLOUR, "-"
+        look: dict[str, Any] = {
+            "linestyle": dashes,
+            "linewidth": 1.4,
+            "label": f"{rate:.3g} m/s".replace("-", "−"),
+        }
+        ax.plot(1e3 * depths, force, color=colour, **look)
     ax.margins(x=0.0)
-    style.dress(ax, law_name(law), PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis())
+    style.dress(ax, law_name(law), PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis(), panel=True)
     style.legend(ax, title="rate of penetration", title_fontsize="small")
 
 
@@ -148,7 +182,7 @@ def _draw_drop(ax: Axes, law: AbstractNormalLaw, mass: float, speed: float) -> N
     ax.margins(x=0.02)
     restitution = max(-rate[-1], 0.0) / speed
     title = f"Drop of {mass:g} kg at {speed:g} m/s: restitution {restitution:.3f}"
-    style.dress(ax, title, PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis())
+    style.dress(ax, title, PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis(), panel=True)
     style.legend(ax)
 
 

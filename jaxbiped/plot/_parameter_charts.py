@@ -47,7 +47,8 @@ def branch(
     """Draws a measure of the gaits on one branch or several over the parameter.
 
     Stable gaits are solid lines, unstable ones dashed, and dotted those whose stability the
-    multipliers' errors leave open. Colours tell the footsteps of a cycle, marks the bifurcations.
+    multipliers' errors leave open. Colours and the width of lines tell the footsteps of a cycle,
+    marks the bifurcations. The spectral radius has a band of its errors and the line of radius 1.
     Period and step length are those of a footstep, on average over the cycle.
 
     Args:
@@ -72,7 +73,7 @@ def branch(
     ax = style.axes_or_new(ax, 6.8, 4.6)
     counts = sorted({each.footsteps for each in given})
     for each in given:
-        _draw_lines(ax, each, measure, style.colour_of(counts.index(each.footsteps)))
+        _draw_lines(ax, each, measure, _look(counts.index(each.footsteps)))
     for each in given:
         for event in each.bifurcations:
             height, marker = _value(measure, each, event.point), _MARKS[event.kind][0]
@@ -80,11 +81,13 @@ def branch(
     if given[0].axis.log:
         ax.set_xscale("log")
     if measure == "spectral_radius":
-        ax.axhline(1.0, color=style.GROUND_COLOUR, linewidth=0.6, zorder=0.5)
+        for each in given:
+            _draw_errors(ax, each, style.colour_of(counts.index(each.footsteps)))
+        ax.axhline(1.0, color="black", linewidth=0.9, zorder=0.5, label="radius 1")
     quantity = _MEASURES.get(measure) or state_quantity(measure) or Quantity(measure, "", "SI")
     along = parameter_quantities(given[0].scene)[given[0].along]
     style.dress(ax, f"Gaits along {along.words}", along.on_axis(), quantity.on_axis())
-    handles = [*_entries(given, counts)]
+    handles = [*_entries(given, counts), *ax.get_legend_handles_labels()[0]]
     style.legend_below(ax, columns=min(len(handles), 5), handles=handles)
     return style.figure_of(ax)
 
@@ -108,10 +111,8 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
     for k, curve in enumerate(curves):
         marker, words = _MARKS[curve.kind]
         first, second = curve.values.T
-        ax.plot(
-            second, first, marker=marker, markersize=3.5, color=style.colour_of(k),
-            linewidth=1.2, label=words,
-        )  # fmt: skip
+        look = style.line_of(k) | {"markersize": 3.5, "linewidth": 1.2}
+        ax.plot(second, first, marker=marker, label=words, **look)
     seconds = np.concatenate([curve.values[:, 1] for curve in curves])
     if seconds.min() > 0.0 and seconds.max() > 10.0 * seconds.min():
         ax.set_xscale("log")
@@ -135,7 +136,22 @@ def _value(measure: str, each: Branch, point: BranchPoint) -> float:
     return float(point.recurring[place])
 
 
-def _draw_lines(ax: Axes, each: Branch, measure: str, colour: str) -> None:
+def _look(k: int) -> dict[str, Any]:
+    """Of the lines of the k-th number of footsteps: thinner ones for more of them."""
+    return {"color": style.colour_of(k), "linewidth": 1.6 * 0.65**k}
+
+
+def _draw_errors(ax: Axes, each: Branch, colour: str) -> None:
+    """A band of the leading multiplier's errors, where they are known."""
+    values = np.array([point.value for point in each.points])
+    sizes = np.array([np.abs(point.multipliers[0]) for point in each.points])
+    errors = np.array([point.multiplier_errors[0] for point in each.points])
+    errors = np.where(np.isfinite(errors), errors, np.nan)
+    look: dict[str, Any] = {"color": colour, "alpha": 0.25, "linewidth": 0.0, "zorder": 0.8}
+    ax.fill_between(values, sizes - errors, sizes + errors, **look)
+
+
+def _draw_lines(ax: Axes, each: Branch, measure: str, look: dict[str, Any]) -> None:
     """Lines between neighbours; a bifurcation belongs to the gaits on either side of it."""
     special = {point.point.value for point in each.bifurcations}
     values = [(point.value, _value(measure, each, point)) for point in each.points]
@@ -143,11 +159,11 @@ def _draw_lines(ax: Axes, each: Branch, measure: str, colour: str) -> None:
         (there if here.value in special else here).stable for here, there in pairwise(each.points)
     ]
     if not kinds:
-        ax.plot(*values[0], ".", color=colour)
+        ax.plot(*values[0], ".", color=look["color"])
     for kind, group in groupby(range(len(kinds)), key=kinds.__getitem__):
         first, *others = group
         x, y = zip(*values[first : first + len(others) + 2], strict=True)
-        ax.plot(x, y, color=colour, linestyle=_STYLES[kind], linewidth=1.3)
+        ax.plot(x, y, linestyle=_STYLES[kind], **look)
 
 
 def _entries(given: list[Branch], counts: list[int]) -> Iterator[Line2D]:
@@ -160,7 +176,7 @@ def _entries(given: list[Branch], counts: list[int]) -> Iterator[Line2D]:
         yield Line2D([], [], color=grey, linestyle=_STYLES[kind], label=_WORDS[kind])
     for k, count in enumerate(counts) if len(counts) > 1 else ():
         words = f"{count} footstep{'s' * (count > 1)}"
-        yield Line2D([], [], color=style.colour_of(k), label=words)
+        yield Line2D([], [], label=words, **_look(k))
     drawn = {event.kind for each in given for event in each.bifurcations}
     for event, (marker, words) in _MARKS.items():
         if event in drawn:

@@ -17,6 +17,8 @@ from jaxbiped.solve._trajectory import Trajectory
 AnyScene: TypeAlias = Scene | RedundantScene | RigidScene
 _EVEN = 2048
 """Evenly spaced times; a fixed number, so that evaluating them compiles once."""
+_IN_A_STEP = 64
+"""Evenly spaced times in each footstep of a rigid walk, however long the walk."""
 
 
 class Samples(NamedTuple):
@@ -88,7 +90,12 @@ class DrawnMotion:
         """Times fit for drawing [s], and the motion at them with all scalars of its state."""
         if self._rigid is not None:
             even = np.linspace(self.first, self.last, _EVEN)
-            t = np.union1d(even, self._rigid.both_sides())
+            edges = self._rigid.both_sides()
+            # Of a long walk, some in each part between jumps: no turn of a rate is passed over.
+            spans, parts = np.diff(edges), np.arange(1, _IN_A_STEP) / _IN_A_STEP
+            wide = spans > 1e-3 * spans.max()
+            inside = edges[:-1][wide, None] + spans[wide, None] * parts
+            t = np.unique(np.concatenate([even, inside.ravel(), edges]))
             return t, self._rigid.motion(t)
         t, states = sample(self._trajectory)
         motion = evaluate_along(self._scene, states, body_motion)

@@ -26,7 +26,8 @@ _WIDTH, _LEAST, _MOST = 8.6, 2.8, 6.0
 """Width of a new figure, and between what its height lies [inches]."""
 _LABELS = (0.8, 0.9)
 """What labels take of a new figure's width and height [inches]."""
-_PATH_POINTS = 400
+_PATH_POINTS = 256
+"""Of the root point's path, in a second: it turns sharply at a heel strike."""
 _FAINTEST = 0.3
 """Opacity of the first pose; the last is opaque."""
 
@@ -72,9 +73,8 @@ def gait_strobe(
         )
     if count is None:
         count = max(round((stop - start) / _APART), 1) + 1
-    times = np.concatenate(
-        [np.linspace(start, stop, count), np.linspace(start, stop, _PATH_POINTS)]
-    )
+    path = np.linspace(start, stop, max(400, int(_PATH_POINTS * (stop - start))))
+    times = np.concatenate([np.linspace(start, stop, count), path])
     skeleton, everything = skeleton_of(scene.mechanism), poses(scene, motion.at(times))
     shown = jtu.tree_map(lambda points: points[:count], everything)
     corners = corners_of(skeleton, everything)

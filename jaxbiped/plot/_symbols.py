@@ -70,7 +70,7 @@ def axis_label(name: str | Quantity, unit: str = "") -> str:
 
     Any other name is taken for words, with the unit behind them, if there is one.
     """
-    quantity = _quantity(name)
+    quantity = quantity_of(name)
     if quantity is not None and (not unit or isinstance(name, Quantity)):
         return quantity.on_axis(unit or None)
     return f"{name} ({unit})" if unit else str(name)
@@ -78,11 +78,11 @@ def axis_label(name: str | Quantity, unit: str = "") -> str:
 
 def row_label(name: str | Quantity) -> str:
     """Words and symbol of a quantity or a name of the table; any other name itself."""
-    quantity = _quantity(name)
+    quantity = quantity_of(name)
     return str(name) if quantity is None else quantity.in_row()
 
 
-def _quantity(name: str | Quantity) -> Quantity | None:
+def quantity_of(name: str | Quantity) -> Quantity | None:
     """That of a name of the table, also where it is told from its namesake as `part.name`."""
     if not isinstance(name, str):
         return name

@@ -88,7 +88,7 @@ def time_series(
         f"{word}_{part.name}": part.look for part in skeleton.parts for word in ("theta", "omega")
     }
     for k, (name, quantity) in enumerate(zip(names, quantities, strict=True)):
-        look = looks[name].line if name in looks else {"color": style.colour_of(k)}
+        look = looks[name].line if name in looks else style.line_of(k)
         ax.plot(t, known[name], linewidth=1.3, label=quantity.in_row(), **look)
     ax.margins(x=0.01)
     several = f"{_common_words(quantities)} ({quantities[0].unit_in_figure})"

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.plot import style
@@ -15,7 +16,6 @@ COSTS = {
     "seconds": "time of a run (s)",
     "attempted": "attempted steps (–)",
 }
-_MARKERS = "osD^vPX"
 _BAND = 0.12
 """Width of the band of failures, in parts of the axis."""
 
@@ -39,7 +39,7 @@ def work_precision(
         axis: name of the error axis, such as "state".
         cost: "cpu_s", "seconds" or "attempted".
         floor: error by which the references disagree, in the axis's units.
-        ax: where to draw; a new figure unless given.
+        ax: where to draw; a new figure, with a legend, unless given.
 
     Returns:
         The figure.
@@ -51,14 +51,15 @@ def work_precision(
     ways = list(dict.fromkeys(row["way"] for row in rows if _error(row, axis) is not None))
     if not ways:
         raise ArgumentError(f"rows have no error of axis = {axis!r}: there must be one at least.")
-    ax = style.axes_or_new(ax, 7.0, 5.0)
+    new = ax is None
+    ax = style.axes_or_new(ax, 8.6, 5.0, aside=1.6)
     ax.set_xscale("log")
     ax.set_yscale("log")
     for k, way in enumerate(ways):
         own = (row for row in rows if row["way"] == way and row["outcome"] == "ok")
         mine = [(_error(row, axis), row[cost]) for row in own if _error(row, axis) and row[cost]]
-        look: dict[str, Any] = {"marker": _MARKERS[k // len(style.COLOURS) % len(_MARKERS)]}
-        look |= {"linestyle": "-" if k < len(style.COLOURS) else "--", "color": style.colour_of(k)}
+        look: dict[str, Any] = {"marker": style.marker_of(k), "color": style.colour_of(k)}
+        look["linestyle"] = "-" if k < len(style.COLOURS) else "--"
         points = np.array(mine, dtype=float).reshape(-1, 2)
         ax.plot(*points.T, markersize=4, linewidth=1.0, label=way, **look)
     if floor is not None and floor > 0.0:
@@ -70,6 +71,8 @@ def work_precision(
     if failed := [row for row in concerned if row["outcome"] != "ok"]:
         _draw_failures(ax, failed, cost, ways)
     style.dress(ax, "", f"error of {axis.replace('_', ' ')}, relative", COSTS[cost])
+    if new:
+        style.legend_right(ax)
     return style.figure_of(ax)
 
 
@@ -99,7 +102,7 @@ def _error(row: Mapping[str, Any], axis: str) -> float | None:
 
 _MEASURES = {
     "max_violation_m": r"largest violation, $|\Phi|$ (m)",
-    "state_error": "error of the state at the end (SI units)",
+    "state_error": "error at the end (SI units)",
     "wall_s_run": "time of a run (s)",
 }
 _FLOOR = 1e-17
@@ -127,25 +130,32 @@ def constraint_runs(runs: Sequence[Mapping[str, Any]]) -> Figure:
         raise ArgumentError("runs is empty: there must be one at least.")
     methods = list(dict.fromkeys(run["method"] for run in runs))
     ways = list(dict.fromkeys(_integrator_label(run) for run in runs))
-    figure = style.new_figure(11.0, 1.7 + 0.42 * len(methods) + 0.2 * -(-len(ways) // 3))
-    panels = figure.subplots(1, len(_MEASURES), sharey=True)
+    columns = style.panels_abreast(len(_MEASURES), width=2.6)
+    rows = -(-len(_MEASURES) // columns)
+    height = (1.7 + 0.42 * len(methods)) * rows + 0.2 * -(-len(ways) // 3)
+    figure = style.new_figure(11.0, height, rows=True)
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).flat
     for ax, (measure, label) in zip(panels, _MEASURES.items(), strict=True):
         for k, way in enumerate(ways):
             mine = [run for run in runs if _integrator_label(run) == way]
-            rows = np.array([methods.index(run["method"]) for run in mine], dtype=float)
-            rows += 0.5 * (k + 0.5) / len(ways) - 0.25
-            _draw_way(ax, mine, rows, measure, k, way)
+            places = np.array([methods.index(run["method"]) for run in mine], dtype=float)
+            places += 0.5 * (k + 0.5) / len(ways) - 0.25
+            _draw_way(ax, mine, places, measure, k, way)
         ax.set_xscale("log")
         ax.margins(x=0.12)
+        low, high = ax.get_xlim()
+        if high < 100.0 * low:  # with two powers of ten at least, which alone are named
+            ax.set_xlim(low / 3.0, max(3.0 * high, 100.0 * low))
+        ax.xaxis.set_minor_formatter(NullFormatter())
         style.dress(ax, "", label, "")
     panels[0].set_yticks(np.arange(len(methods)), methods)
     panels[0].set_ylim(len(methods) - 0.5, -0.5)
-    panels[0].set_ylabel("method")
-    handles, labels = panels[0].get_legend_handles_labels()
+    for ax in panels[::columns]:
+        ax.set_ylabel("method")
+    handles, _ = panels[0].get_legend_handles_labels()
     if any(_has_failed(run) for run in runs):
-        (cross,) = panels[0].plot([], [], "x", color=style.GROUND_COLOUR)
-        handles, labels = [*handles, cross], [*labels, "failed"]
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+        handles += panels[0].plot([], [], "x", color=style.GROUND_COLOUR, label="failed")
+    style.legend_of_figure(figure, handles)
     return figure
 
 
@@ -158,8 +168,7 @@ def _draw_way(
     # A run that failed took its time all the same.
     lost = failed & (measure != "wall_s_run") | ~np.isfinite(values)
     found, colour = np.maximum(values[~lost], _FLOOR), style.colour_of(k)
-    marker = _MARKERS[k % len(_MARKERS)]
-    ax.plot(found, rows[~lost], marker, color=colour, markersize=6, label=way)
+    ax.plot(found, rows[~lost], style.marker_of(k), color=colour, markersize=6, label=way)
     edge = ax.get_yaxis_transform()
     ax.plot(np.full(lost.sum(), 0.985), rows[lost], "x", color=colour, transform=edge)
 

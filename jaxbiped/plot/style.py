@@ -1,15 +1,18 @@
-"""Style that all figures share: colours, sizes, new figures, and where legends go."""
+"""Style that all figures share: colours, markers, labels of axes, and where legends go."""
 
 import math
 import re
 from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
 from jaxbiped.basins._labels import Label
+from jaxbiped.plot._figure_style import has_titles as has_titles
+from jaxbiped.plot._figure_style import is_narrow, letter_size, make_room
+from jaxbiped.plot._figure_style import new_figure as new_figure
+from jaxbiped.plot._figure_style import panels_abreast as panels_abreast
 
 _GROUPS = (
     ("#0072B2", "#56B4E9"),
@@ -56,9 +59,23 @@ def view_colours() -> dict[str, str]:
     return {f"{pages[k]}-{name}": pair[k] for k in (0, 1) for name, pair in pairs.items()}
 
 
+MARKERS = "osD^vPX"
+"""Of kinds of points, in the order in which they take them."""
+
+
 def colour_of(k: int) -> str:
     """The colour of the k-th kind of line."""
     return COLOURS[k % len(COLOURS)]
+
+
+def marker_of(k: int) -> str:
+    """The marker of the k-th kind of points; with their colours, they repeat after 49."""
+    return MARKERS[(k + k // len(COLOURS)) % len(MARKERS)]
+
+
+def line_of(k: int) -> dict[str, Any]:
+    """Colour and style of the k-th kind of line, for `Axes.plot`: it holds without colour."""
+    return {"color": colour_of(k), "linestyle": LEG_STYLES[k % len(LEG_STYLES)]}
 
 
 class Look(NamedTuple):
@@ -98,16 +115,11 @@ def label_of(name: str, noun: str) -> str:
     return name if name[0].isalpha() else f"{noun} {name}"
 
 
-def new_figure(width: float = 6.4, height: float = 4.0) -> Figure:
-    """A figure [inches] that knows how to draw itself, apart from pyplot's list of figures."""
-    figure = Figure(figsize=(width, height), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def axes_or_new(ax: Axes | None, width: float = 6.4, height: float = 4.0) -> Axes:
-    """The axes given, or those of a new figure."""
-    return new_figure(width, height).add_subplot() if ax is None else ax
+def axes_or_new(
+    ax: Axes | None, width: float = 6.4, height: float = 4.0, *, aside: float = 0.0
+) -> Axes:
+    """The axes given, or those of a new figure, of which a legend `aside` takes so much width."""
+    return new_figure(width, height, aside=aside).add_subplot() if ax is None else ax
 
 
 def figure_of(ax: Axes) -> Figure:
@@ -117,9 +129,15 @@ def figure_of(ax: Axes) -> Figure:
     return figure
 
 
-def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
+def set_title(ax: Axes, title: str, *, panel: bool = False) -> None:
+    """A title on the left; without titles (see `figure_style`) only those of panels."""
+    if panel or has_titles():
+        ax.set_title(title, loc="left", fontsize="medium")
+
+
+def dress(ax: Axes, title: str, x_label: str, y_label: str, *, panel: bool = False) -> None:
     """Title, labels and a faint grid."""
-    ax.set_title(title, loc="left", fontsize="medium")
+    set_title(ax, title, panel=panel)
     ax.set_xlabel(x_label)
     ax.set_ylabel(y_label)
     ax.grid(color="#E6E6E6", linewidth=0.6)
@@ -140,14 +158,51 @@ def legend(ax: Axes, **options: Any) -> None:
 
 
 def legend_below(ax: Axes, *, columns: int, **options: Any) -> None:
-    """A legend under the axes and half an inch of labels, for more than fits beside the title."""
-    under = ax.transAxes + ScaledTranslation(0.0, -0.5, figure_of(ax).dpi_scale_trans)
+    """A legend under the axes and half an inch of labels, for more than fits beside the title.
+
+    It has so many columns, or as many as the figure has room for.
+    """
+    entries, figure = _entries(ax, options), figure_of(ax)
+    columns = _columns(figure, entries, columns)
+    down = -0.5 * letter_size()
+    under = ax.transAxes + ScaledTranslation(0.0, down, figure.dpi_scale_trans)
     place: dict[str, Any] = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": under}
-    legend(ax, loc="upper center", ncols=columns, borderaxespad=0.0, **place, **options)
+    place |= {"loc": "upper center", "ncols": columns, "borderaxespad": 0.0, "handles": entries}
+    legend(ax, **place | options)
+
+
+def legend_of_figure(figure: Figure, entries: list[Any], *, columns: int = 3) -> None:
+    """A legend under all axes of a figure, in so many columns or as many as there is room for."""
+    columns = _columns(figure, entries, columns)
+    look: dict[str, Any] = {"frameon": False, "fontsize": "small", "ncols": columns}
+    figure.legend(handles=entries, loc="outside lower center", **look)
+
+
+def _columns(figure: Figure, entries: list[Any], most: int) -> int:
+    """How many columns of a legend a figure has room for; it makes room for their rows."""
+    room = 0.95 * figure.get_figwidth() / letter_size()
+    columns = max(1, min(most, len(entries), int(room / max(_widths(entries), default=room))))
+    make_room(figure, -(-len(entries) // columns))
+    return columns
 
 
 _TITLE_LETTER, _ENTRY_LETTER, _ENTRY_SAMPLE = 0.066, 0.06, 0.5
-"""Widths of a letter of titles, of one of legends, and of the sample before an entry [inches]."""
+"""Widths of a letter of titles, of one of legends, and of the sample before an entry [inches], of
+letters of the usual size."""
+
+
+def _entries(ax: Axes, options: dict[str, Any]) -> list[Any]:
+    """The handles among a legend's options, taken from these, or those of what is drawn."""
+    return list(options.pop("handles", None) or ax.get_legend_handles_labels()[0])
+
+
+def _widths(entries: list[Any]) -> list[float]:
+    """Of a legend's entries [inches], of letters of the usual size."""
+    letters = (_MATHEMATICS.sub("xx", str(each.get_label())) for each in entries)
+    return [_ENTRY_SAMPLE + _ENTRY_LETTER * len(text) for text in letters]
+
+
+_MATHEMATICS = re.compile(r"\$.*?\$")
 
 
 def legend_above(
@@ -158,40 +213,44 @@ def legend_above(
     Where the axes, whose width [inches] may be told, have no room for that, in rows below them or
     below the lowest of several axes.
     """
-    entries = options.pop("handles", None) or ax.get_legend_handles_labels()[0]
-    figure = figure_of(ax)
+    entries = _entries(ax, options)
     if width is None:
-        width = 1.1 * ax.get_window_extent().width / figure.dpi
-    widths = [_ENTRY_SAMPLE + _ENTRY_LETTER * len(str(each.get_label())) for each in entries]
-    if sum(widths) + _TITLE_LETTER * len(ax.get_title(loc="left")) > width:
-        columns = max(1, min(len(entries), int(0.8 * figure.get_figwidth() / max(widths))))
-        legend_below(lowest or ax, columns=columns, handles=entries, **options)
+        width = 1.1 * ax.get_window_extent().width / figure_of(ax).dpi
+    title = _TITLE_LETTER * len(ax.get_title(loc="left"))
+    if letter_size() * (sum(_widths(entries)) + title) > width:
+        legend_below(lowest or ax, columns=len(entries), handles=entries, **options)
     else:
         row = {"handles": entries, "ncols": max(len(entries), 1), "bbox_to_anchor": (1.0, 1.0)}
         legend(ax, **{"loc": "lower right", "borderaxespad": 0.2} | row | options)
 
 
 def legend_right(ax: Axes, **options: Any) -> None:
-    """A legend right of the axes, for entries of many words."""
+    """A legend right of the axes, for entries of many words; below them in a narrow figure."""
+    if is_narrow():
+        entries = _entries(ax, options)
+        legend_below(ax, columns=len(entries), handles=entries)
+        return
     legend(ax, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **options)
 
 
 _LABEL_COLOURS = {
     str(Label.FELL_FORWARD): "#D55E00",
-    str(Label.FELL_BACK): "#E69F00",
-    str(Label.STOPPED): "#009E73",
-    str(Label.STUMBLED): "#CC79A7",
-    str(Label.SLID): "#F0E442",
-    str(Label.OUT_OF_STEPS): "#8C8C8C",
+    str(Label.FELL_BACK): "#F9C653",
+    str(Label.STOPPED): "#2CC596",
+    str(Label.STUMBLED): "#EAAACE",
+    str(Label.SLID): "#F2E850",
+    str(Label.OUT_OF_STEPS): "#484848",
     str(Label.SOLVER_FAILED): "#000000",
-    str(Label.UNRESOLVED): "#4D4D4D",
-    str(Label.TIMED_OUT): "#B4B4B4",
-    str(Label.PENDING): "#E8E8E8",
+    str(Label.UNRESOLVED): "#2A2A2A",
+    str(Label.TIMED_OUT): "#9A9A9A",
+    str(Label.PENDING): "#F2F2F2",
 }
-"""Okabe and Ito's colours, told apart by colour-blind readers; greys where nothing is known."""
-_BLUES = ("#0072B2", "#56B4E9", "#0B3C5D", "#A6D8F5", "#3A6EA5", "#1E90FF")
+"""Okabe and Ito's colours, greys where nothing is known, all of different lightness: they can be
+distinguished by colour-blind readers, and in print without colour."""
+_BLUES = ("#0072B2", "#56B4E9", "#0B3C5D", "#A6D8F5", "#1F5E96", "#1E90FF")
 """Walking: shades by gait, or else by the cycle's length; they repeat after six."""
 _WALKING_MARKERS = "os8hpH"
+_WALKING_PATTERNS = ("", "....", "ooo", "xxx", "+++", "***")
 _MARKERS = "D^vPX*<>d."
 _ORDER = list(_LABEL_COLOURS)
 GAIT_SUFFIX = ", gait {gait}"
@@ -208,6 +267,15 @@ def in_order(names: set[str]) -> list[str]:
     """Names in one order for all legends: walking, then the endings, pending last."""
     kinds = {name: _kind(name) for name in names}
     return sorted(names, key=lambda name: (kinds[name][0], math.prod(kinds[name]), name))
+
+
+def walking_pattern(name: str) -> str:
+    """The pattern over what walks in a further gait or a longer cycle; "" for all else.
+
+    Blues alone have other labels' lightness.
+    """
+    ends, place = _kind(name)
+    return "" if ends else _WALKING_PATTERNS[place % len(_WALKING_PATTERNS)]
 
 
 def label_marker(name: str) -> str:

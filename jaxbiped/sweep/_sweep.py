@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_count, check_type
+from jaxbiped._files import JsonObject
 from jaxbiped._identity import provenance
 from jaxbiped._progress import stage
 from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_label_errors
@@ -33,7 +34,7 @@ from jaxbiped.sweep._store_files import (
 )
 from jaxbiped.sweep._stored_fields import DOUBT_FIELDS, Layout, fields_of
 from jaxbiped.sweep._workers import compute_chunks
-from jaxbiped.sweep.starts._coordinates import coordinate_quantities
+from jaxbiped.sweep.starts._coordinates import coordinate_quantities, state_coordinates
 from jaxbiped.sweep.starts._starts import AbstractStarts
 
 if TYPE_CHECKING:
@@ -149,13 +150,23 @@ def sweep(
     results.note(
         told
         | {
-            GAITS: json.dumps(known.family.described()),
+            GAITS: json.dumps(_gaits_by_coordinate(known)),
             "labelled_in_this_run": fresh,
             "chunks_found_complete": layout.chunks - len(missing),
             "wall_s": time.perf_counter() - began,
         }
     )
     return results.dataset()
+
+
+def _gaits_by_coordinate(known: Labelling) -> list[JsonObject]:
+    """Each row's parameters and gaits, and where these are in the coordinates of starts."""
+    leaves, rows = state_coordinates(known.scene), known.family.described()
+    for row, gaits in zip(rows, known.family.rows, strict=True):
+        for told, gait in zip(row["gaits"], gaits, strict=True):
+            values = {name: float(getattr(gait.state, leaf)) for name, leaf in leaves.items()}
+            told["coordinates"] = values
+    return rows
 
 
 def _resolve(labelling: Labelling, layout: Layout, results: Store) -> Labelling:

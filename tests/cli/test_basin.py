@@ -65,6 +65,12 @@ def test_picture_and_results(basin, numbers):
     names = jb.basins.label_names(found.label.values, 1).ravel()
     assert shown == [label_colour(str(name)) for name in names]
     assert found.label.dims == ("omega_swing", "theta_swing")
+    # The gait is marked where it is on its section.
+    (gait,) = numbers["gaits"]
+    (star,) = [line for line in ax.lines if line.get_marker() == "*"]
+    place = gait["coordinates"]
+    assert tuple(star.get_xydata()[0]) == (place["theta_swing"], place["omega_swing"])
+    assert place["theta_swing"] == place["theta_1"]
     assert found.theta_swing.attrs["units"] == "rad"
     stored = xr.open_zarr(same[-3])
     assert np.array_equal(stored.label, found.label)

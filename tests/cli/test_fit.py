@@ -5,7 +5,8 @@ import json
 import pytest
 
 import jaxbiped as jb
-from tests.cli.commands import numbers_of, run
+from tests.cli.commands import numbers_of, outputs_of, run
+from tests.drawn import assert_is_drawn
 
 pytestmark = pytest.mark.slow
 
@@ -33,6 +34,16 @@ def test_a_table_and_its_numbers(file, tmp_path, capsys):
     assert held["p_value"] is None  # as many numbers as parameters
     assert "kg m^2" in shown
     assert "converged" in shown
+
+
+def test_figures_of_all_formats(file, tmp_path):
+    words = ("--model", "rigid", "--vary", "J,d", "--format", "pdf", "png", "--style", "paper")
+    outputs = outputs_of(tmp_path, "fit", file, *words)
+    assert set(outputs.figures) == {"fit.pdf", "fit.png"}
+    assert {path.name for path in outputs.folder.iterdir()} == {"fit.pdf", "fit.png"}
+    figure = outputs.figures["fit.png"]
+    assert_is_drawn(figure)
+    assert figure.get_figwidth() == 3.4
 
 
 def test_only_json(file, capsys):

@@ -1,10 +1,9 @@
 """`jaxbiped optimise`, against its tables and JSON; each refusal is one sentence."""
 
-import json
-
 import pytest
 
-from tests.cli.commands import numbers_of, run
+from tests.cli.commands import numbers_of, outputs_of, run
+from tests.drawn import assert_is_drawn, points_of
 
 pytestmark = pytest.mark.slow
 RIGID = [
@@ -34,9 +33,17 @@ def test_numbers_and_tables(capsys, tmp_path):
     assert certificate["unit_multiplier_error"] < 1e-5
     assert certificate["walk"]["returned"] is True
     assert certificate["basin"]["count"] > 0
-    assert run(*RIGID, *held, "--json", tmp_path / "best.json") == 0
+    outputs = outputs_of(tmp_path, *RIGID, *held, "--columns", "2", "--style", "paper")
     assert "held by step_length" in capsys.readouterr().out
-    assert json.loads((tmp_path / "best.json").read_text()) == numbers
+    assert outputs.numbers == numbers
+    drawn = {"optimisation.png", "multipliers.png", "elasticities.png", "orbit.png"}
+    assert set(outputs.figures) == {path.name for path in outputs.folder.iterdir()} == drawn
+    for figure in outputs.figures.values():
+        assert_is_drawn(figure)
+        assert figure.get_figwidth() == 7.0
+    speed = outputs.figures["optimisation.png"].axes[0]
+    told = [each["objective"] for each in numbers["history"]]
+    assert points_of(speed)[0][:, 1] == pytest.approx(told, rel=1e-12)
 
 
 def test_a_design_without_a_gait_is_refused(capsys):

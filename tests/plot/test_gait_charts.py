@@ -9,7 +9,9 @@ from matplotlib.patches import Circle
 
 import jaxbiped as jb
 from jaxbiped.plot import elasticities, gait_orbit, multipliers
-from tests.drawn import assert_is_drawn
+from jaxbiped.plot._gait_charts import elasticity_errors
+from tests.drawn import assert_is_drawn, points_of
+from tests.plot.test_parameter_charts import branch_point
 
 PARAMETERS = ("K", "c", "l", "hip_mass")
 FIGURES = [multipliers, elasticities, gait_orbit]
@@ -36,17 +38,28 @@ def _gait(*, passes=1, values=(0.35 + 0.29j, 0.35 - 0.29j, 0.42, 3e-4, 0, 0), **
     values = np.asarray(values, dtype=complex)
     state = jb.State(*(np.asarray(x) for x in (0.0, 0.4, 1.0, -1.0, 0.3, 0.0, 0.0, 0.0)))
     largest = np.asarray([0.0065, -0.2, 0.5, 0.0])
+    # All parameters but the last one, which is zero, are 4; all measures 1.
+    sizes = np.asarray([4.0, 4.0, 4.0, 1.0])
+    elasticities = _measures((4,))._replace(
+        period=largest, peak_normal=np.asarray([np.nan, 1e-9, -2.0, 0.0])
+    )
+    slopes = jb.gait.Measures(*(each / sizes for each in elasticities[:5]), state=None)
+    errors = [np.full(4, 1e-6)] * 5
+    errors[0] = np.asarray([1e-3, 2e-3, 0.0, 0.0])
+    slope_errors = jb.gait.Measures(*errors, state=None)
     known = {
         "ending": np.asarray(0),
         "measures": _measures()._replace(spectral_radius=np.max(np.abs(values)), state=state),
         "multipliers": values,
         "multiplier_errors": np.full(6, 1e-4),
         "bifurcation": np.asarray(0),
-        "elasticities": _measures((4,))._replace(
-            period=largest, peak_normal=np.asarray([np.nan, 1e-9, -2.0, 0.0])
-        ),
+        "elasticities": elasticities,
+        "sensitivities": slopes,
+        "sensitivity_errors": slope_errors,
+        "measure_errors": jb.gait.Measures(*[np.asarray(1e-2)] * 5, state=None),
         "orbit": _orbit(passes),
         "parameters": PARAMETERS,
+        "quantities": (),
     }
     nothing = dict.fromkeys(field.name for field in dataclasses.fields(jb.Gait))
     return jb.Gait(**(nothing | known | changes))
@@ -59,6 +72,7 @@ def test_multipliers_and_the_unit_circle():
     assert next(zip(*points.get_data(), strict=True)) == (0.35, 0.29)
     (circle,) = [patch for patch in ax.patches if isinstance(patch, Circle)]
     assert circle.radius == 1.0
+    assert circle.center == (0.0, 0.0)
     assert "0.4545" in ax.get_title(loc="left")
     assert ax.get_title(loc="left").endswith("\nstable")
     texts = [text.get_text() for text in ax.texts]
@@ -76,6 +90,49 @@ def test_an_unstable_gait_stays_inside_the_frame_and_names_its_bifurcation():
     assert ax.get_xlim()[0] < -1.7
     discs = [patch.radius for patch in ax.patches]
     assert discs == [1.0, 0.1]
+    (across, up) = _segments_of_bars(ax)
+    np.testing.assert_allclose(across[0], [[-1.7, 0.0], [-1.5, 0.0]])
+    np.testing.assert_allclose(up[0], [[-1.6, -0.1], [-1.6, 0.1]])
+
+
+def test_multipliers_of_a_branchs_point():
+    point = branch_point(0.02, -1.6, error=0.1)
+    (ax,) = multipliers(point).axes
+    assert points_of(ax, "multipliers")[0][0] == pytest.approx((-1.6, 0.0))
+    assert "not stable" in ax.get_title(loc="left")
+    assert "undecided" in multipliers(branch_point(0.02, 0.95, error=0.1)).axes[0].get_title("left")
+
+
+def _segments_of_bars(ax):
+    """Ends of the error bars, shape (n, 2, 2), by the direction that they lie in."""
+    return [np.asarray(bars.get_segments()) for bars in ax.containers[0].lines[2]]
+
+
+def test_bars_of_elasticities_are_the_sensitivities_and_the_measures_errors():
+    """Against the rule for quotients: 4 δS/m + |E| δm/m."""
+    expected = [4e-3 + 0.0065e-2, 8e-3 + 0.2e-2, 0.5e-2, 0.0]
+    np.testing.assert_allclose(elasticity_errors(_gait(), "period"), expected)
+    (ax,) = elasticities(_gait(), "period").axes
+    (bars,) = ax.containers[0].lines[2] if hasattr(ax.containers[0], "lines") else (None,)
+    ends = np.asarray(bars.get_segments())[:, :, 0]
+    np.testing.assert_allclose(ends[0], [0.5 - 0.5e-2, 0.5 + 0.5e-2])
+    np.testing.assert_allclose(ends[1], [-0.2 - 1e-2, -0.2 + 1e-2])
+    unknown = elasticity_errors(_gait(), "peak_normal")
+    assert np.isnan(unknown[0])
+
+
+def test_an_accuracy_asked_for_by_a_number_gives_its_own_bars():
+    error = type("Error", (), {"bars": {"multipliers": np.full(6, 0.2)}})
+    (ax,) = multipliers(_gait(error=error)).axes
+    assert _segments_of_bars(ax)[0][0] == pytest.approx(np.array([[0.15, 0.29], [0.55, 0.29]]))
+
+
+def test_one_measure_is_drawn_into_given_axes():
+    ax = Figure().add_subplot()
+    assert elasticities(_gait(), "speed", ax=ax) is ax.figure
+    assert ax.get_title(loc="left") == "speed"
+    with pytest.raises(jb.ArgumentError, match="one measure"):
+        elasticities(_gait(), ax=ax)
 
 
 def test_tornado_has_the_largest_on_top_and_says_every_number():

@@ -19,7 +19,7 @@ from tests.drawn import assert_is_drawn, legend_of, points_of
 STOP = BranchStop(jb.gait.BranchEnd.REACHED, "the range ends", 0.0)
 
 
-def _point(value, leading, error=1e-9, length=None):
+def branch_point(value, leading, error=1e-9, length=None):
     return BranchPoint(
         value=value,
         recurring=np.array([0.1, 0.2, -1.0, value]),
@@ -51,8 +51,8 @@ def _branch(points, events=(), footsteps=1, name="slope", log=False):
 
 
 LEADING = {0.02: 0.5, 0.04: -0.9, 0.05: -1.0, 0.06: -1.1, 0.07: -1.2}
-POINTS = [_point(value, leading) for value, leading in LEADING.items()]
-POINTS += [_point(0.08, -1.2, error=0.5), _point(0.09, -1.1, error=0.5)]
+POINTS = [branch_point(value, leading) for value, leading in LEADING.items()]
+POINTS += [branch_point(0.08, -1.2, error=0.5), branch_point(0.09, -1.1, error=0.5)]
 DOUBLING = BifurcationPoint(BranchEvent.PERIOD_DOUBLING, POINTS[2], -1.0 + 0j, 1e-9)
 
 
@@ -74,7 +74,7 @@ def test_stability_is_told_by_the_kind_of_line():
 
 
 def test_a_longer_cycle_is_drawn_by_its_footsteps():
-    ends = _point(0.05, 0.9, length=0.2), _point(0.06, -1.0, length=0.4)
+    ends = branch_point(0.05, 0.9, length=0.2), branch_point(0.06, -1.0, length=0.4)
     again = BifurcationPoint(BranchEvent.PERIOD_DOUBLING, ends[1], -1.0 + 0j, 1e-9)
     two = _branch(ends, [again], footsteps=2)
     figure = branch([_branch(POINTS, [DOUBLING]), two])
@@ -112,7 +112,7 @@ def test_what_cannot_be_drawn():
 
 def test_measures_are_of_a_footstep_and_have_their_units():
     """Here on a logarithmic axis."""
-    found = _branch([_point(0.02, 0.5, length=0.3)], footsteps=2, name="m", log=True)
+    found = _branch([branch_point(0.02, 0.5, length=0.3)], footsteps=2, name="m", log=True)
     measures = {"speed": 0.3 / 0.4, "period": 0.2, "step_length": 0.15, "peak_normal": 20.0,
                 "spectral_radius": 0.5, "omega_1": -1.0}  # fmt: skip
     for name, value in measures.items():

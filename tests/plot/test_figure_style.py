@@ -1,0 +1,201 @@
+"""Styles and files of figures, against the sizes of pages, fonts in files and points in paths."""
+
+import re
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+import jaxbiped as jb
+from jaxbiped import plot
+from jaxbiped.plot import style
+from jaxbiped.plot._contact_forces import sampled_forces
+from tests.drawn import assert_is_drawn
+
+WIDTHS = {1: 3.4, 2: 7.0}
+
+
+def _law():
+    return plot.friction_law(jb.seed_scene().friction)
+
+
+def _media_box(path):
+    return [float(x) for x in re.search(rb"/MediaBox \[(.+?)\]", path.read_bytes())[1].split()]
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+def test_files_are_as_wide_as_the_columns_of_a_paper(columns, tmp_path):
+    with plot.figure_style("paper", columns=columns):
+        figure = _law()
+    paths = plot.save_figure(figure, tmp_path / "law", formats=plot.FIGURE_FORMATS)
+    assert [path.name for path in paths] == ["law.png", "law.pdf", "law.svg"]
+    assert _media_box(paths[1])[2] == pytest.approx(72.0 * WIDTHS[columns])
+    with Image.open(paths[0]) as image:
+        assert image.width == pytest.approx(300.0 * WIDTHS[columns], abs=1)
+    width = re.search(r'width="([\d.]+)pt"', paths[2].read_text())[1]
+    assert float(width) == pytest.approx(72.0 * WIDTHS[columns])
+
+
+@pytest.mark.parametrize("save", ["save_figure", "savefig"])
+def test_fonts_are_embedded_as_truetype(save, tmp_path):
+    figure, path = _law(), tmp_path / "law.pdf"
+    if save == "savefig":
+        figure.savefig(path)
+    else:
+        plot.save_figure(figure, path)
+    written = path.read_bytes()
+    fonts = re.findall(rb"/Type /Font\b.*?>>", written, re.DOTALL)
+    assert any(b"/CIDFontType2" in font for font in fonts)
+    assert b"/FontFile2" in written
+    assert b"/Type3" not in written
+
+
+def test_letters_of_an_svg_are_curves(tmp_path):
+    (path,) = plot.save_figure(_law(), tmp_path / "law.svg")
+    written = path.read_text()
+    assert "<text" not in written
+    assert 'id="DejaVuSans' in written
+
+
+@pytest.mark.parametrize("form", plot.FIGURE_FORMATS)
+def test_the_same_figure_makes_the_same_file(form, tmp_path):
+    first, second = (
+        plot.save_figure(_law(), tmp_path / name, formats=[form])[0] for name in ("a", "b")
+    )
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_endings_tell_formats_and_others_belong_to_the_name(tmp_path):
+    figure = Figure()
+    figure.add_subplot()
+    for name, formats, written in (
+        ("a.svg", None, ["a.svg"]),
+        ("slope_0.02", None, ["slope_0.02.png"]),
+        ("slope_0.02", ["pdf", "svg"], ["slope_0.02.pdf", "slope_0.02.svg"]),
+        ("a.PDF", ["png"], ["a.png"]),
+    ):
+        paths = plot.save_figure(figure, tmp_path / name, formats=formats)
+        assert [path.name for path in paths] == written
+        assert all(path.stat().st_size > 0 for path in paths)
+
+
+def test_a_papers_letters_have_eight_points_also_of_ticks_made_as_it_is_drawn():
+    with plot.figure_style("paper"):
+        figure = _law()
+    figure.canvas.draw()
+    (ax,) = figure.axes
+    labels = [*ax.get_xticklabels(), *ax.get_yticklabels(), ax.xaxis.label, ax.yaxis.label]
+    assert {label.get_fontsize() for label in labels} == {8.0}
+    assert ax.get_title(loc="left") == ""
+    assert _law().axes[0].get_title(loc="left") == "Bengisu and Akay"
+    assert _law().get_figwidth() == 6.4
+
+
+def test_figures_below_the_context_have_their_own_style_again():
+    with plot.figure_style("paper"):
+        with plot.figure_style("paper", columns=2):
+            assert _law().get_figwidth() == 7.0
+        assert _law().get_figwidth() == 3.4
+    assert _law().get_figwidth() == 6.4
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: plot.figure_style("poster").__enter__(), "style = 'poster' is not known"),
+        (lambda: plot.figure_style("paper", columns=3).__enter__(), "columns = 3"),
+        (lambda: plot.save_figure(Figure(), "a", formats=["eps"]), "formats = 'eps' is not known"),
+        (lambda: plot.save_figure(Figure(), "/nowhere/a"), "cannot be written"),
+    ],
+)
+def test_bad_arguments_are_named(call, words):
+    with pytest.raises(jb.ArgumentError, match=words):
+        call()
+
+
+def _channels(colour):
+    return np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+
+
+def _luma(colour):
+    """Grey, in per cent, that programs make of a colour when they drop it."""
+    return 100.0 * float(_channels(colour) @ [0.299, 0.587, 0.114])
+
+
+def _lightness(colour):
+    """CIE's L* of a colour in print without colour."""
+    channels = _channels(colour)
+    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+    light = float(linear @ [0.2126, 0.7152, 0.0722])
+    return 116.0 * np.cbrt(light) - 16.0 if light > 0.008856 else 903.3 * light
+
+
+def test_labels_of_basins_differ_in_lightness_and_further_gaits_in_pattern():
+    names = [str(label) for label in jb.basins.Label]
+    for grey, least in ((_lightness, 4.0), (_luma, 2.5)):
+        shades = sorted(grey(style.label_colour(name)) for name in names)
+        assert min(np.diff(shades)) > least
+    walks = [jb.basins.label_name(jb.basins.Label.WALKING, k) for k in range(1, 7)]
+    assert len({style.walking_pattern(name) for name in walks}) == 6
+    assert {style.walking_pattern(name) for name in names} == {""}
+
+
+def test_lines_and_markers_hold_without_colour():
+    lines = [str(style.line_of(k)["linestyle"]) for k in range(6)]
+    assert len(set(lines)) == 6
+    assert len({style.marker_of(k) for k in range(7)}) == 7
+    assert len({(style.marker_of(k), style.colour_of(k)) for k in range(49)}) == 49
+
+
+def test_no_peak_of_a_force_is_thinned_away_in_a_file(seed_walk, tmp_path):
+    """Against the largest force of a recording right to 1e-5, in the path that the SVG holds."""
+    scene, walk = seed_walk
+    t, forces = sampled_forces(scene, walk)
+    with plot.figure_style("paper"):
+        figure = plot.contact_forces(scene, walk)
+    (path,) = plot.save_figure(figure, tmp_path / "forces.svg")
+    ax = figure.axes[0]
+    height = 72.0 * figure.get_figheight()
+    points = np.concatenate([
+        np.array(re.findall(r"[ML] (\S+) (\S+)", d), float)
+        for d in re.findall(r'<path d="([^"]*)" clip-path=[^>]*stroke-(?:dasharray|linecap)',
+                            path.read_text())
+    ])  # fmt: skip
+    for foot in (1, 2):
+        force = forces[f"normal_{foot}"]
+        peak = (t[np.argmax(force)], np.max(force))
+        x, y = ax.transData.transform(peak) * 72.0 / figure.dpi
+        assert np.min(np.hypot(*(points - (x, height - y)).T)) < 0.2
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+def test_nothing_of_a_walks_figures_is_cut_off_in_a_paper(columns, seed_walk):
+    scene, walk = seed_walk
+    draws = [
+        plot.gait_strobe, plot.phase_portrait, plot.leg_angles, plot.penetrations,
+        plot.contact_forces,
+    ]  # fmt: skip
+    for draw in draws:
+        with plot.figure_style("paper", columns=columns):
+            figure = draw(scene, walk)
+        assert_is_drawn(figure)
+        assert_fits(figure)
+
+
+def assert_fits(figure):
+    """All axes with their labels and legends lie on the page, and no two axes' overlap."""
+    figure.canvas.draw()
+    renderer = figure.canvas.get_renderer()
+    boxes = [ax.get_tightbbox(renderer) for ax in figure.axes if ax.get_visible()]
+    page = figure.bbox
+    for box in boxes:
+        assert box.x0 >= page.x0 - 1.0
+        assert box.y0 >= page.y0 - 1.0
+        assert box.x1 <= page.x1 + 1.0
+        assert box.y1 <= page.y1 + 1.0
+    for k, box in enumerate(boxes):
+        for other in boxes[k + 1 :]:
+            across = min(box.x1, other.x1) - max(box.x0, other.x0)
+            up = min(box.y1, other.y1) - max(box.y0, other.y0)
+            assert min(across, up) < 1.0
