@@ -105,13 +105,14 @@ class Basin(options.Command):
         numbers = _basin_numbers(found, seconds) | {"engine": effort.engine}
         if isinstance(starts, jb.starts.GivenStarts):
             numbers["labels"] = _label_names(found)
-        report = Report(self.output.json)
+        report = Report(self.output.json, self.output.csv)
         _print(report, numbers)
         if self.output.out is not None:
             with stage("drawing the basin"):
                 paths = _write_results(found, known, starts, self.output.out)
             report.wrote(paths)
         numbers["wall_s"] = time.perf_counter() - _import_time.IMPORT_BEGAN
+        report.write_rows(lambda: jb.measure.to_csv(found, tuple(map(str, found.label.dims))))
         report.finish(numbers)
         return 0
 

@@ -12,7 +12,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._declarations import names
-from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._report import Report, csv_of, table
 from jaxbiped.cli._scene_options import SceneOptions, compliant_and_minimal
 from jaxbiped.cli._start_options import StartOptions
 
@@ -127,6 +127,7 @@ class Constraints(options.Command):
     out: Path | None = None
     """Folder for the picture."""
     json: options.Numbers = None
+    csv: options.Rows = None
 
     def run(self) -> int:
         """Runs the command; returns the exit code, 1 where Ctrl-C ended it."""
@@ -136,7 +137,7 @@ class Constraints(options.Command):
         assert isinstance(scene, jb.Scene)
         integrators = [Integrator.read(text) for text in self.integrators]
         options.make_folder(self.out)
-        report, runs = Report(self.json), list[ConstraintRun]()
+        report, runs = Report(self.json, self.csv), list[ConstraintRun]()
         many = len(integrators) * len(self.methods)
         with tqdm(total=many, smoothing=0.0, bar_format=_BAR, desc=f"0/{many} runs") as bar:
             try:
@@ -167,6 +168,7 @@ class Constraints(options.Command):
             path = self.out / "constraints.png"
             jb.plot.constraint_runs(numbers).savefig(path)
             report.wrote([path])
+        report.write_rows(lambda: csv_of(numbers))
         report.finish({"duration_s": self.duration, "complete": complete, "runs": numbers})
         return 0 if complete else 1
 

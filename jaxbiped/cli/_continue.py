@@ -53,13 +53,14 @@ class ContinueGait(options.Command, of=("continue_gait",)):
             progress=True,
             **self.arguments("continue_gait"),
         )
-        report, wall = Report(self.output.json), wall_times(imported)
+        report, wall = Report(self.output.json, self.output.csv), wall_times(imported)
         if len(branch):
             _print(report, branch, wall)
         else:
             report.say(branch.stops[0].cause)
         if len(branch) and self.output.out is not None:
             report.wrote(write_results(branch, self.output.out))
+        report.write_rows(branch.to_csv)
         report.finish(branch_numbers(branch) | {"wall_s": wall})
         return 0 if len(branch) else 1
 
@@ -98,7 +99,7 @@ def write_results(branch: "jb.continuation.Branch", out: Path) -> list[Path]:
     for name, measure in (("branch", "step_length"), ("spectral_radius", "spectral_radius")):
         paths.append(out / f"{name}.png")
         jb.plot.branch(branch, measure).savefig(paths[-1])
-    branch.dataset().to_netcdf(out / "branch.nc")
+    branch.to_dataset().to_netcdf(out / "branch.nc")
     return [*paths, out / "branch.nc"]
 
 

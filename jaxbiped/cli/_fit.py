@@ -34,6 +34,7 @@ class Fit(options.Command, of=("fit_gait",)):
     engine: options.Engine
     max_evaluations: options.Count
     json: options.Numbers = None
+    csv: options.Rows = None
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
@@ -42,7 +43,7 @@ class Fit(options.Command, of=("fit_gait",)):
         names = tuple(name.strip() for name in self.vary.split(",") if name.strip())
         measured, how = jb.identify.read_measured(self.file), self.arguments("fit_gait")
         fit = jb.fit_gait(scene, names, measured, progress=True, **how)
-        report, units = Report(self.json), jb.parameter_quantities(scene)
+        report, units = Report(self.json, self.csv), jb.parameter_quantities(scene)
         parts = (units, fit.estimates, fit.standard_errors, fit.intervals)
         report.say(columns(_ESTIMATE, [(name, *(part[name] for part in parts)) for name in names]))
         report.say(
@@ -53,7 +54,8 @@ class Fit(options.Command, of=("fit_gait",)):
             report.say(f"these data do not tell {', '.join(fit.undetermined)}")
         if fit.at_bounds:
             report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
-        numbers = fit._asdict() | {"ending": str(fit.ending)}
+        numbers = vars(fit) | {"ending": str(fit.ending)}
+        report.write_rows(fit.to_csv)
         numbers["intervals_95"] = numbers.pop("intervals")
         report.finish(numbers | {"chi_squared": fit.chi_squared, "p_value": fit.p_value})
         return 0 if fit.ending is jb.identify.FitEnding.CONVERGED else 1

@@ -55,6 +55,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
     other_engine: bool
     store: Path | None
     json: options.Numbers = None
+    csv: options.Rows = None
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
@@ -83,9 +84,10 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         sense = "minimise" if self.maximise is None else "maximise"
         goal = getattr(self, sense)
         numbers = _optimum_numbers(found, certificate, goal, sense)
-        report = Report(self.json)
+        report = Report(self.json, self.csv)
         _print(report, scene, found, goal)
         report.say(*_certificate_lines(certificate))
+        report.write_rows(found.to_csv)
         report.finish(numbers)
         ended = jb.optimise.Outcome
         good = (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE)

@@ -8,7 +8,7 @@ import jaxbiped as jb
 from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
 from jaxbiped.cli import _options as options
-from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._report import Report, csv_of, table
 from jaxbiped.cli._scene_options import SceneOptions, compliant_and_minimal
 from jaxbiped.cli._start_options import StartOptions
 
@@ -53,6 +53,7 @@ class Trade(options.Command):
     out: Path | None = None
     """Folder for the pictures."""
     json: options.Numbers = None
+    csv: options.Rows = None
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
@@ -62,7 +63,7 @@ class Trade(options.Command):
         assert isinstance(scene, jb.Scene)
         start = self.start.start(scene, self.scene.walker)
         options.make_folder(self.out)
-        report = Report(self.json)
+        report = Report(self.json, self.csv)
         trades: dict[str, Any] = {
             "walk": WalkTrade(scene, start, self.duration, self.repeats),
             "gait": GaitTrade(scene, 1),
@@ -80,6 +81,7 @@ class Trade(options.Command):
         if self.out is not None:
             for rows, truth in found.values():
                 report.wrote(_write_pictures(rows, truth, self.out))
+        report.write_rows(lambda: csv_of(numbers["rows"]))
         report.finish(numbers)
         return 0 if found["walk"][1] is not None else 1
 
