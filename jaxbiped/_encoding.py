@@ -48,8 +48,8 @@ class Encoder:
             return value if math.isfinite(value) else {"float": str(value)}
         if isinstance(value, complex):
             return {"complex": [self.encode(part, where) for part in (value.real, value.imag)]}
-        if hasattr(value, "_fields") and isinstance(value, tuple):
-            return self._fields(value, dict(zip(value._fields, value, strict=True)), where)
+        if hasattr(value, "_asdict") and not isinstance(value, type):
+            return self._fields(value, value._asdict(), where)
         if isinstance(value, list | tuple):
             items = [self.encode(each, f"{where}[{k}]") for k, each in enumerate(value)]
             return items if isinstance(value, list) else {"tuple": items}
@@ -96,8 +96,8 @@ class Encoder:
         name = f"{thing.__module__}:{thing.__qualname__}"
         if any(each in name for each in _NOWHERE):
             raise ArgumentError(
-                f"{where} is not allowed: {thing.__qualname__} has no import path; define it at the "
-                "top of a module."
+                f"{where} is not allowed: {thing.__qualname__} has no import path; define it at "
+                "the top of a module."
             )
         self.found[name] = thing
         return name
@@ -173,14 +173,15 @@ class Decoder:
         kind = self._import(name)
         values = {each: self.decode(tree) for each, tree in fields.items()}
         if dataclasses.is_dataclass(kind):
-            own = {field.name: field for field in dataclasses.fields(kind)}
-            factories = {n: f.default_factory for n, f in own.items() if _has_factory(f)}
-            values = {n: make() for n, make in factories.items() if n not in values} | values
-            needed = {n for n, f in own.items() if f.default is dataclasses.MISSING}
+            own: dict[str, Any] = {field.name: field for field in dataclasses.fields(kind)}
+            defaults = {name for name, field in own.items() if _has_default(field)}
+            for each in defaults - set(values):
+                factory = own[each].default_factory
+                values[each] = own[each].default if factory is dataclasses.MISSING else factory()
         else:
             own = dict.fromkeys(getattr(kind, "_fields", ()))
-            needed = set(own) - set(getattr(kind, "_field_defaults", own))
-        odd = sorted((needed - set(values)) | (set(values) - set(own)))
+            defaults = set(getattr(kind, "_field_defaults", own))
+        odd = sorted((set(own) - defaults - set(values)) | (set(values) - set(own)))
         if odd:
             raise ArgumentError(
                 f"{name.partition(':')[2]} has other fields here: {', '.join(odd)}{self._by(name)}."
@@ -201,5 +202,6 @@ class Decoder:
         return f" (written by jaxbiped {self._version}; this is {own})"
 
 
-def _has_factory(field: Any) -> bool:
-    return field.default_factory is not dataclasses.MISSING
+def _has_default(field: Any) -> bool:
+    missing = dataclasses.MISSING
+    return field.default is not missing or field.default_factory is not missing

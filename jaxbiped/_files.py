@@ -35,13 +35,22 @@ def user_path(path: str | Path, name: str = "path") -> Path:
         raise ArgumentError(f"{name} = {path!r} is not allowed: {error}.") from None
 
 
-def read_json(name: str, path: str | Path) -> Any:
-    """What a JSON file holds; raises `ArgumentError` for one that cannot be read or is no JSON."""
+def read_text(name: str, path: str | Path) -> str:
+    """What a text file holds; raises `ArgumentError` for one that cannot be read."""
     try:
-        return json.loads(user_path(path, name).read_text())
+        return user_path(path, name).read_text(encoding="utf-8-sig")
     except OSError as error:
         reason = (error.strerror or "unreadable").lower()
         raise ArgumentError(f"{name} = {str(path)!r} cannot be read ({reason}).") from None
+    except UnicodeDecodeError:
+        raise ArgumentError(f"{name} = {str(path)!r} is not a text in UTF-8.") from None
+
+
+def read_json(name: str, path: str | Path) -> Any:
+    """What a JSON file holds; raises `ArgumentError` for one that cannot be read or is no JSON."""
+    text = read_text(name, path)
+    try:
+        return json.loads(text)
     except ValueError as error:
         raise ArgumentError(f"{name} = {str(path)!r} is not JSON ({error}).") from None
 

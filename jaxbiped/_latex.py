@@ -31,10 +31,13 @@ def escape_latex(text: str) -> str:
 
 
 def latex_unit(unit: str) -> str:
-    r"""A unit for siunitx, `\unit{N.s/m^2}`; another text as text, nothing for a pure number."""
-    if unit in ("", "1"):
+    r"""A unit for siunitx, `\unit{N.s/m^2}`; another text as text, nothing for a pure number.
+
+    "SI" is what has another unit in each row.
+    """
+    if unit in ("", "1", "SI"):
         return ""
-    if not _UNIT.fullmatch(unit) or " per " in unit or unit == "SI":
+    if not _UNIT.fullmatch(unit) or " per " in unit:
         return escape_latex(unit)
     return rf"\unit{{{unit.replace(' ', '.')}}}"
 

@@ -102,7 +102,7 @@ def load(path: str | Path) -> Any:
         if isinstance(error, ArgumentError):
             raise ArgumentError(f"path = {str(path)!r} is not allowed here: {error}") from None
         raise ArgumentError(
-            f"path = {str(path)!r} is not allowed: it must be a whole file that jaxbiped.save wrote."
+            f"path = {str(path)!r} is not allowed: it must be a whole file of jaxbiped.save."
         ) from error
     before, now = own.get("user_code", {}), source_digests(read.found.values())
     changed = sorted(name for name in now if before.get(name) != now[name])

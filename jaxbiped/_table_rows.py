@@ -5,6 +5,7 @@ The one way from any dataset with units to a table: of results, trajectories and
 
 import csv
 import io
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
@@ -81,14 +82,15 @@ def _rows(
     """Of a variable, shape (n, places of one more dimension); codes in words."""
     own = dataset[name]
     missing = {each: dataset.sizes[each] for each in dims if each not in own.dims}
-    rows = int(np.prod([dataset.sizes[each] for each in dims]))
-    table = own.expand_dims(missing).transpose(*dims, *more).values.reshape(rows, -1)
+    shape = [math.prod(dataset.sizes[each] for each in group) for group in (dims, more)]
+    table = own.expand_dims(missing).transpose(*dims, *more).values.reshape(shape)
     meanings = str(own.attrs.get("flag_meanings", "")).split()
     if not meanings or "flag_values" not in own.attrs:
         return np.asarray(table)
     codes = np.atleast_1d(own.attrs["flag_values"]).tolist()
     known = dict(zip(codes, (each.replace("_", " ") for each in meanings), strict=True))
-    return np.array([[known.get(code, "") for code in row] for row in table.tolist()], object)
+    words = [[known.get(code, "") for code in row] for row in table.tolist()]
+    return np.array(words, object).reshape(shape)
 
 
 def to_dataframe(dataset: "xarray.Dataset", along: Along) -> "pandas.DataFrame":
@@ -132,7 +134,7 @@ def to_csv(dataset: "xarray.Dataset", along: Along, path: str | Path | None = No
         path: file to write; none if omitted.
 
     Returns:
-        The text.
+        The text; cells of numbers that are not known are empty.
 
     Raises:
         ArgumentError: a file that cannot be written, or a dimension that the dataset does not have.
@@ -141,8 +143,15 @@ def to_csv(dataset: "xarray.Dataset", along: Along, path: str | Path | None = No
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(n if unit is None else f"{n} [{unit or 1}]" for n, (unit, _) in flat.items())
-    writer.writerows(zip(*(values.tolist() for _, values in flat.values()), strict=True))
+    writer.writerows(
+        zip(*(map(_known, values.tolist()) for _, values in flat.values()), strict=True)
+    )
     return _written(text.getvalue(), path)
+
+
+def _known(value: Any) -> Any:
+    """Nothing for a number that is not known."""
+    return "" if isinstance(value, float) and math.isnan(value) else value
 
 
 def to_latex(

@@ -24,7 +24,7 @@ class Report:
         self._is_quiet = "-" in (str(json_path), str(csv_path))
 
     def say(self, *lines: str) -> None:
-        """Prints lines, one that is empty where none is given, unless a program reads the output."""
+        """Prints lines, one that is empty where none is given, unless a program reads them."""
         if not self._is_quiet:
             _write("\n".join(lines) + "\n")
 

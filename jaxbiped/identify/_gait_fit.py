@@ -151,7 +151,7 @@ class GaitFit(Tabular):
         yes = {0: "no", 1: "yes"}
 
         def column(values: object, words: str, **more: object) -> Entry:
-            return Entry(("parameter",), values, Quantity(words, unit=""), **more)  # type: ignore[arg-type]
+            return Entry(("parameter",), values, Quantity(words, unit="SI"), **more)  # type: ignore[arg-type]
 
         def among(chosen: tuple[str, ...], words: str) -> Entry:
             return column(np.isin(names, chosen).astype(np.int8), words, flags=yes)

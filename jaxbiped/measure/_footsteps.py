@@ -172,7 +172,8 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     structure = scene.mechanism.structure
     leg = np.array(structure.legs)[strikes.foot[1:] - 1]
     if count == 0:
-        return Footsteps(*[np.zeros(0)] * (len(dataclasses.fields(Footsteps)) - 1), leg=leg[:0])
+        nothing = {field.name: np.zeros(0) for field in dataclasses.fields(Footsteps)}
+        return Footsteps(**nothing | {"leg": leg[:0]})
     time = strikes.time_s
     period, length = np.diff(time), np.diff(strike_places(scene, trajectory, strikes))
     loads = sample(scene, trajectory, contacts, time)

@@ -112,8 +112,8 @@ class Optimum(Tabular):
         Returns:
             Along `variable` the best design's parameters; along `measure` all measures that play a
             part, with their errors; along `iteration` every iterate: the objective, by how much the
-            worst requirement is missed (`excess`), the design (`of_variable`, along `variable`,
-            too) and its measures. `to_dataset()` of the gait has the gait.
+            worst requirement is missed (`excess`), the design (`design_…`) and its measures
+            (`measure_…`). `gait.to_dataset()` has the gait.
         """
         import xarray
 
@@ -121,25 +121,22 @@ class Optimum(Tabular):
         names = list(self.variables)
         measures = [name for name in self.known.values if name in OBJECTIVES]
         quantities = [OBJECTIVES[name].quantity for name in measures]
-
-        def iterates(values: list[list[float]], width: int) -> np.ndarray:
-            return np.array(values, float).reshape(len(self.history), width)
-
-        design = [[each.variables[name] for name in names] for each in self.history]
-        seen = [[each.measures.get(n, np.nan) for n in measures] for each in self.history]
-        values = [self.known.values[name] for name in measures]
-        errors = [self.known.errors[name] for name in measures]
-        at = "iteration"
+        at, value = ("iteration",), Quantity("value", unit="SI")
+        values, errors = (
+            [part[name] for name in measures] for part in (self.known.values, self.known.errors)
+        )
         entries = {
-            "value": Entry(("variable",), list(self.variables.values()), Quantity("value")),
-            "measured": Entry(("measure",), values, Quantity("value"), errors),
-            "objective": Entry(
-                (at,), [each.objective for each in self.history], Quantity("objective")
-            ),
-            "excess": Entry((at,), [each.excess for each in self.history], Quantity("excess")),
-            "of_variable": Entry((at, "variable"), iterates(design, len(names))),
-            "of_measure": Entry((at, "measure"), iterates(seen, len(measures))),
+            "value": Entry(("variable",), list(self.variables.values()), value),
+            "measured": Entry(("measure",), values, value, errors),
+            "objective": Entry(at, [each.objective for each in self.history], value),
+            "excess": Entry(at, [each.excess for each in self.history], Quantity("excess")),
         }
+        for name in names:
+            column = [each.variables[name] for each in self.history]
+            entries[f"design_{name}"] = Entry(at, column, units[name])
+        for name, quantity in zip(measures, quantities, strict=True):
+            column = [each.measures.get(name, np.nan) for each in self.history]
+            entries[f"measure_{name}"] = Entry(at, column, quantity)
         coordinates = {
             "variable": np.array(names, object),
             "unit": ("variable", np.array([units[name].unit for name in names], object)),
