@@ -4,9 +4,9 @@ Classes and functions stand there by their import paths, the instances of classe
 their fields.
 """
 
-import contextlib
 import dataclasses
 import enum
+import functools
 import importlib
 import math
 import sys
@@ -154,13 +154,7 @@ class Decoder:
 
     def _import(self, name: str, *kinds: type) -> Any:
         module, _, inner = name.partition(":")
-        thing: Any = None
-        # Nothing that can be saved lies in the standard library, and a file may come from anybody.
-        if module.partition(".")[0] not in sys.stdlib_module_names:
-            with contextlib.suppress(ImportError, AttributeError):
-                thing = importlib.import_module(module)
-                for part in [inner] if hasattr(thing, inner) else inner.split("."):
-                    thing = getattr(thing, part)
+        thing = _imported(module, inner)
         if thing is None or (kinds and not (isinstance(thing, type) and issubclass(thing, kinds))):
             raise ArgumentError(
                 f"it needs {inner} of the module {module}, which is not found{self._by(module)}; "
@@ -200,6 +194,19 @@ class Decoder:
         if not module.startswith("jaxbiped") or own == self._version:
             return ""
         return f" (written by jaxbiped {self._version}; this is {own})"
+
+
+def _imported(module: str, name: str) -> Any:
+    """What lies in a module by this name; None where it is not found."""
+    # Nothing that can be saved lies in the standard library, and a file may come from anybody.
+    if module.partition(".")[0] in sys.stdlib_module_names:
+        return None
+    try:
+        thing: Any = importlib.import_module(module)
+        # Types of states are found by one name, which has no points.
+        return functools.reduce(getattr, name.split("."), thing)
+    except (ImportError, AttributeError):
+        return None
 
 
 def _has_default(field: Any) -> bool:

@@ -19,7 +19,10 @@ _WRONG_PATH = ("EACCES", "EPERM", "EROFS", "ENOENT", "EEXIST", "ENOTDIR", "EISDI
 
 def failure_kind(error: OSError) -> type[ArgumentError] | type[ResourceError]:
     """Whether a path that cannot be written is to blame itself, or what it lies on."""
-    wrong = errno.errorcode.get(error.errno or 0) in _WRONG_PATH
+    # Clients of object stores give the kind alone, without a number.
+    wrong = errno.errorcode.get(error.errno or 0) in _WRONG_PATH or (
+        error.errno is None and isinstance(error, FileNotFoundError | PermissionError)
+    )
     return ArgumentError if wrong else ResourceError
 
 

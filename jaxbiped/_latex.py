@@ -87,9 +87,13 @@ def _column(cells: Sequence[str]) -> str:
     return f"S[table-format={room}{uncertain}]"
 
 
+def _is_number(column: Any) -> bool:
+    return column.values.dtype.kind in "fiu"
+
+
 def _cells(column: Any) -> list[str]:
     """A column's cells; numbers bare, all else as text."""
-    if column.values.dtype.kind not in "fiu":
+    if not _is_number(column):
         text = latex_unit if column.name.endswith("unit") else escape_latex
         return [text(str(each)) for each in column.values.tolist()]
     errors = [None] * len(column.values) if column.errors is None else column.errors.tolist()
@@ -109,13 +113,13 @@ def latex_table(columns: Sequence[Any], headings: Mapping[str, str], *, upright:
     units = [latex_unit(each.unit) for each in columns]
     cells = [_cells(each) for each in columns]
     if upright:
-        values = [own[0] if own else "{--}" for own in cells]
+        pairs = zip(columns, cells, strict=True)
+        values = [own[0] if _is_number(each) else f"{{{own[0]}}}" for each, own in pairs]
         kinds = ["l", _column(values), "l"]
-        is_number = [_NUMBER.fullmatch(each) or each.startswith("{") for each in values]
-        values = [v if plain else f"{{{v}}}" for v, plain in zip(values, is_number, strict=True)]
         heads, cells = ["quantity", "{value}", "unit"], [heads, values, units]
     else:
-        kinds = [_column(own) for own in cells]
+        pairs = zip(columns, cells, strict=True)
+        kinds = [_column(own) if _is_number(each) else "l" for each, own in pairs]
         full = [f"{h} ({u})" if u else h for h, u in zip(heads, units, strict=True)]
         heads = [f"{{{head}}}" for head in full]
     rows = [" & ".join(row) + r" \\" for row in zip(*cells, strict=True)]

@@ -135,7 +135,7 @@ def open_gait_grid(
         settings,
         writer,
         any_version=any_version,
-        create=lambda half: dataset.to_zarr(half, consolidated=False, zarr_format=3),
+        create=lambda half: dataset.to_zarr(str(half), consolidated=False, zarr_format=3),
     )
     return GaitGrid(dataset if new else _load(path, dataset), state, path)
 
