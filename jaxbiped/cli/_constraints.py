@@ -24,8 +24,6 @@ _ASTRAY = 0.05
 # Their steps solve no equations, so that their programs are small and soon compiled.
 _EXPLICIT = ("bosh3", "tsit5", "dopri5", "dopri8", "euler", "runge2")
 _MOST_STEPS = 1 << 25
-_LONG = 1.0
-"""Time of runs after which none is repeated [s]."""
 _COLUMNS = {
     "method": (9, "{0.method}"),
     "integrator": (10, "{0.integrator}"),
@@ -293,7 +291,7 @@ def time_run(request: Callable[[], Any], repeats: int) -> tuple[Any, float]:
     import jax
 
     seconds: list[float] = []
-    while not seconds or (len(seconds) < repeats and sum(seconds) < _LONG):
+    while not seconds or (len(seconds) < repeats and sum(seconds) < 1.0):
         begin = time.perf_counter()
         found = jax.block_until_ready(request())
         seconds.append(time.perf_counter() - begin)
