@@ -97,7 +97,7 @@ def _returns(args, start, **how):
 
     def run(x, by):
         accuracy = "balanced" if by.accuracy == "draft" else by.accuracy
-        gradient = jb.Forward() if by.forward else jb.Reverse()
+        gradient = jb.gait.Forward() if by.forward else jb.gait.Reverse()
         given = {"accuracy": accuracy, "engine": by.engine, "gradient": gradient} | how
         state = start._replace(omega_1=x) if start else (jnp.zeros_like(x), x)
         found = jb.return_map(args, state, **given)

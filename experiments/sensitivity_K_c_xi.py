@@ -64,7 +64,7 @@ def point(name, value, gait):
     parameters = np.asarray(list((SEED | {name: value}).values()))
 
     def error(key):
-        return gait[f"sensitivity_error_{key}"].data * parameters / abs(float(gait[key]))
+        return gait[f"sensitivity_{key}_error"].data * parameters / abs(float(gait[key]))
 
     return {
         "value": value,

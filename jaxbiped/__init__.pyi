@@ -24,6 +24,10 @@ from jaxbiped.sweep import starts as starts
 from jaxbiped.caching._caches import cache_info as cache_info
 from jaxbiped.caching._caches import clear_caches as clear_caches
 
+# Files of scenes and results.
+from jaxbiped._saving import load as load
+from jaxbiped._saving import save as save
+
 # What is modelled.
 from jaxbiped.scene._bodies import Body as Body
 from jaxbiped.scene._bodies import Foot as Foot
@@ -80,9 +84,6 @@ from jaxbiped.gait._find_gait import find_gait as find_gait
 from jaxbiped.gait._find_gaits import find_gaits as find_gaits
 from jaxbiped.gait._gait import Gait as Gait
 from jaxbiped.gait._gait_measures import gait_measures as gait_measures
-from jaxbiped.gait._gradient_modes import Forward as Forward
-from jaxbiped.gait._gradient_modes import Implicit as Implicit
-from jaxbiped.gait._gradient_modes import Reverse as Reverse
 from jaxbiped.gait._return_map import return_map as return_map
 
 # Branches of gaits.

@@ -19,7 +19,10 @@ _WRONG_PATH = ("EACCES", "EPERM", "EROFS", "ENOENT", "EEXIST", "ENOTDIR", "EISDI
 
 def failure_kind(error: OSError) -> type[ArgumentError] | type[ResourceError]:
     """Whether a path that cannot be written is to blame itself, or what it lies on."""
-    wrong = errno.errorcode.get(error.errno or 0) in _WRONG_PATH
+    # Clients of object stores give the kind alone, without a number.
+    wrong = errno.errorcode.get(error.errno or 0) in _WRONG_PATH or (
+        error.errno is None and isinstance(error, FileNotFoundError | PermissionError)
+    )
     return ArgumentError if wrong else ResourceError
 
 
@@ -35,13 +38,22 @@ def user_path(path: str | Path, name: str = "path") -> Path:
         raise ArgumentError(f"{name} = {path!r} is not allowed: {error}.") from None
 
 
-def read_json(name: str, path: str | Path) -> Any:
-    """What a JSON file holds; raises `ArgumentError` for one that cannot be read or is no JSON."""
+def read_text(name: str, path: str | Path) -> str:
+    """What a text file holds; raises `ArgumentError` for one that cannot be read."""
     try:
-        return json.loads(user_path(path, name).read_text())
+        return user_path(path, name).read_text(encoding="utf-8-sig")
     except OSError as error:
         reason = (error.strerror or "unreadable").lower()
         raise ArgumentError(f"{name} = {str(path)!r} cannot be read ({reason}).") from None
+    except UnicodeDecodeError:
+        raise ArgumentError(f"{name} = {str(path)!r} is not a text in UTF-8.") from None
+
+
+def read_json(name: str, path: str | Path) -> Any:
+    """What a JSON file holds; raises `ArgumentError` for one that cannot be read or is no JSON."""
+    text = read_text(name, path)
+    try:
+        return json.loads(text)
     except ValueError as error:
         raise ArgumentError(f"{name} = {str(path)!r} is not JSON ({error}).") from None
 

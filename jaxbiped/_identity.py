@@ -13,7 +13,7 @@ import platform
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,10 @@ import numpy as np
 
 from jaxbiped.caching._caches import bounded_cache
 
-_KNOWN = ("jaxbiped", "equinox", "diffrax", "builtins", "abc", "collections", "typing")
+_KNOWN = (
+    *("jaxbiped", "equinox", "diffrax", "jax", "numpy"),
+    *("builtins", "abc", "collections", "enum", "typing"),
+)
 """Packages whose code is no user's own."""
 _OWN_MODULE = re.compile(r"^jaxbiped\.(?:[a-z]\w*\.)*_\w+\.")
 
@@ -130,8 +133,17 @@ def code_digests(*values: object) -> dict[str, str]:
 
     By qualified name; "unknown" for source that cannot be read, as of an interactive session.
     """
+    return source_digests(_own_code(values))
+
+
+def source_digests(things: Iterable[Any]) -> dict[str, str]:
+    """Digests of the source of those of these classes and functions that are a user's own.
+
+    By qualified name, of classes also of those that they inherit from.
+    """
     found: dict[str, str] = {}
-    for own in _own_code(values):
+    parts = (base for each in things for base in getattr(each, "__mro__", (each,)))
+    for own in (part for part in parts if not _is_known(part)):
         try:
             digest = hashlib.sha256(inspect.getsource(own).encode()).hexdigest()[:16]
         except (OSError, TypeError):
@@ -157,10 +169,9 @@ def _own_code(value: object) -> Iterator[Any]:
     elif isinstance(value, functools.partial):
         yield from _own_code(value.func)
     elif inspect.isfunction(value):
-        if not _is_known(value):
-            yield value
+        yield value
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-        yield from (base for base in type(value).__mro__ if not _is_known(base))
+        yield type(value)
         for field in dataclasses.fields(value):
             yield from _own_code(getattr(value, field.name))
 

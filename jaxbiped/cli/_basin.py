@@ -45,8 +45,9 @@ class SweepOptions(options.Options, of=("labelling", "sweep")):
     """How accurately to solve: draft, balanced or tight; or the fraction of the labels that may
     be wrong, such as 1e-4."""
     engine: options.Engine
-    store: Path | None
-    """Zarr store for the results, from which an interrupted run continues."""
+    store: str | None
+    """Zarr store for the results (a directory, or an address such as s3://bucket/basin.zarr), from
+    which an interrupted run continues."""
     any_version: bool
     """Continue a store that another version or revision of jaxbiped wrote."""
     chunk: options.Count
@@ -74,7 +75,7 @@ class Basin(options.Command):
         """Runs the command; returns the exit code."""
         from jaxbiped.solve._accuracy import accuracy_told
         from jaxbiped.sweep._labelling_preparation import effort_of
-        from jaxbiped.sweep._store_files import check_store
+        from jaxbiped.sweep._store_files import store_path
 
         scene: Any = self.scene.scene()
         starts = self.starts.chosen(scene)
@@ -82,8 +83,7 @@ class Basin(options.Command):
         how["accuracy"] = accuracy_told(self.sweep.accuracy)
         effort = effort_of(scene, **how)
         self.output.make_folder()
-        if self.sweep.store is not None:
-            check_store(self.sweep.store)
+        store_path(self.sweep.store)
         executor, workers = self.sweep.executor()
         with stage("finding the gaits that starts are labelled by"):
             known = jb.labelling(scene, parameters=starts.parameters, **how)
@@ -104,13 +104,14 @@ class Basin(options.Command):
         numbers = _basin_numbers(found, seconds) | {"engine": effort.engine}
         if isinstance(starts, jb.starts.GivenStarts):
             numbers["labels"] = _label_names(found)
-        report = Report(self.output.json)
+        report = Report(self.output.json, self.output.csv)
         _print(report, numbers)
         if self.output.out is not None:
             with stage("drawing the basin"):
                 paths = _write_results(found, starts, self.output)
             report.wrote(paths)
         numbers["wall_s"] = time.perf_counter() - _import_time.IMPORT_BEGAN
+        report.write_rows(lambda: jb.measure.to_csv(found, tuple(map(str, found.label.dims))))
         report.finish(numbers)
         return 0
 

@@ -10,7 +10,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._declarations import names
-from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._report import Report, csv_of, table
 from jaxbiped.cli._scene_options import SceneOptions, compliant_and_minimal
 from jaxbiped.cli._start_options import StartOptions
 
@@ -22,8 +22,6 @@ _ASTRAY = 0.05
 # Their steps solve no equations, so that their programs are small and soon compiled.
 _EXPLICIT = ("bosh3", "tsit5", "dopri5", "dopri8", "euler", "runge2")
 _MOST_STEPS = 1 << 25
-_LONG = 1.0
-"""Time of runs after which none is repeated [s]."""
 _COLUMNS = {
     "method": (9, "{0.method}"),
     "integrator": (10, "{0.integrator}"),
@@ -129,7 +127,7 @@ class Constraints(options.Command):
         assert isinstance(scene, jb.Scene)
         integrators = [Integrator.read(text) for text in self.integrators]
         self.output.make_folder()
-        report, runs = Report(self.output.json), list[ConstraintRun]()
+        report, runs = Report(self.output.json, self.output.csv), list[ConstraintRun]()
         many = len(integrators) * len(self.methods)
         with stage("comparing", total=many, unit="runs") as now:
             try:
@@ -158,6 +156,7 @@ class Constraints(options.Command):
         if runs:
             draw = {"constraints": lambda: jb.plot.constraint_runs(numbers)}
             report.wrote(self.output.draw(draw))
+        report.write_rows(lambda: csv_of(numbers))
         report.finish({"duration_s": self.duration, "complete": complete, "runs": numbers})
         return 0 if complete else 1
 
@@ -282,7 +281,7 @@ def time_run(request: Callable[[], Any], repeats: int) -> tuple[Any, float]:
     import jax
 
     seconds: list[float] = []
-    while not seconds or (len(seconds) < repeats and sum(seconds) < _LONG):
+    while not seconds or (len(seconds) < repeats and sum(seconds) < 1.0):
         begin = time.perf_counter()
         found = jax.block_until_ready(request())
         seconds.append(time.perf_counter() - begin)

@@ -52,13 +52,14 @@ class ContinueGait(options.Command, of=("continue_gait",)):
             guess=guess,
             **self.arguments("continue_gait"),
         )
-        report, wall = Report(self.output.json), wall_times(imported)
+        report, wall = Report(self.output.json, self.output.csv), wall_times(imported)
         if len(branch):
             _print(report, branch, wall)
         else:
             report.say(branch.stops[0].cause)
         if len(branch) and self.output.out is not None:
             report.wrote(write_results(branch, self.output))
+        report.write_rows(branch.to_csv)
         report.finish(branch_numbers(branch) | {"wall_s": wall})
         return 0 if len(branch) else 1
 
@@ -95,7 +96,7 @@ def write_results(branch: "jb.continuation.Branch", output: options.OutputOption
     """Writes the dataset and the figures of a branch; returns their paths."""
     assert output.out is not None
     data = output.out / "branch.nc"
-    branch.dataset().to_netcdf(data)
+    branch.to_dataset().to_netcdf(data)
     figures = {
         "branch": lambda: jb.plot.branch(branch),
         "spectral_radius": lambda: jb.plot.branch(branch, "spectral_radius"),

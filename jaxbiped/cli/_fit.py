@@ -6,7 +6,7 @@ from typing import Annotated
 from tyro.conf import Positional
 
 import jaxbiped as jb
-from jaxbiped._files import read_json
+from jaxbiped._files import read_json, read_text
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._report import Report, columns
 from jaxbiped.cli._scene_options import SceneOptions, minimal
@@ -22,11 +22,17 @@ _ESTIMATE = {
 _REDUNDANT = 'formulation = "redundant" is not allowed here: it must be "minimal".'
 
 
+def _check_file(name: str, path: Path) -> None:
+    """Raises `ArgumentError` for a file that cannot be read."""
+    read = read_text if path.suffix.lower() == ".csv" else read_json
+    read(name, path)
+
+
 class Fit(options.Command, of=("fit_gait",)):
     """Fit parameters to measured gaits; print estimates, their errors and what data cannot tell."""
 
-    file: Annotated[Positional[Path], options.Check(read_json)]
-    """JSON file of measured gaits (see jaxbiped.identify.read_measured)."""
+    file: Annotated[Positional[Path], options.Check(_check_file)]
+    """File of measured gaits, CSV or JSON (see jaxbiped.identify.read_measured)."""
     vary: str
     """Names of the parameters to fit, separated by commas: K,c,mu_kinetic."""
     scene: Annotated[SceneOptions, minimal(_REDUNDANT)]
@@ -41,9 +47,10 @@ class Fit(options.Command, of=("fit_gait",)):
         assert not isinstance(scene, jb.RedundantScene)
         self.output.make_folder()
         names = tuple(name.strip() for name in self.vary.split(",") if name.strip())
-        measured, how = jb.identify.read_measured(self.file), self.arguments("fit_gait")
+        measured, how = jb.identify.read_measured(self.file, scene), self.arguments("fit_gait")
         fit = jb.fit_gait(scene, names, measured, **how)
-        report, units = Report(self.output.json), jb.parameter_quantities(scene)
+        report = Report(self.output.json, self.output.csv)
+        units = jb.parameter_quantities(scene)
         parts = (units, fit.estimates, fit.standard_errors, fit.intervals)
         report.say(columns(_ESTIMATE, [(name, *(part[name] for part in parts)) for name in names]))
         report.say(
@@ -55,7 +62,8 @@ class Fit(options.Command, of=("fit_gait",)):
         if fit.at_bounds:
             report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
         report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
-        numbers = fit._asdict() | {"ending": str(fit.ending)}
+        report.write_rows(fit.to_csv)
+        numbers = vars(fit) | {"ending": str(fit.ending)}
         numbers["intervals_95"] = numbers.pop("intervals")
         report.finish(numbers | {"chi_squared": fit.chi_squared, "p_value": fit.p_value})
         return 0 if fit.ending is jb.identify.FitEnding.CONVERGED else 1

@@ -84,7 +84,7 @@ class FindGait(options.Command, of=("find_gait",)):
             numbers["assumptions"] = _assumptions(scene, gait)
         if found and scene.actuation is not None:
             numbers |= _gait_cost(scene, gait)
-        report = Report(self.output.json)
+        report = Report(self.output.json, self.output.csv)
         if found:
             _print(report, numbers, gait)
         else:
@@ -93,6 +93,7 @@ class FindGait(options.Command, of=("find_gait",)):
             report.say(error_sentence(gait.error))
         if found:
             report.wrote(self.output.draw(gait_figures(scene, gait)))
+        report.write_rows(gait.to_csv)
         report.finish(numbers)
         return 0 if found else 1
 

@@ -83,11 +83,12 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         sense = "minimise" if self.maximise is None else "maximise"
         goal = getattr(self, sense)
         numbers = _optimum_numbers(found, certificate, goal, sense)
-        report = Report(self.output.json)
+        report = Report(self.output.json, self.output.csv)
         _print(report, scene, found, goal)
         report.say(*_certificate_lines(certificate))
         figures = {"optimisation": lambda: jb.plot.optimisation(found)}
         report.wrote(self.output.draw(figures | gait_figures(found.scene, found.gait)))
+        report.write_rows(found.to_csv)
         report.finish(numbers)
         ended = jb.optimise.Outcome
         good = (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE)

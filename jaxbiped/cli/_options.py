@@ -8,7 +8,13 @@ from typing import Annotated, Any, NamedTuple, dataclass_transform, get_args
 
 from tyro.conf import OmitArgPrefixes, arg
 
-from jaxbiped._checks import check_choice, check_count, check_not_negative, check_positive
+from jaxbiped._checks import (
+    ArgumentError,
+    check_choice,
+    check_count,
+    check_not_negative,
+    check_positive,
+)
 from jaxbiped._files import check_writable_directory, check_writable_file
 from jaxbiped.cli._declarations import Argument, documentation, names, signature
 
@@ -70,6 +76,9 @@ class Options:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
+        both = [name for name in ("json", "csv") if str(getattr(self, name, None)) == "-"]
+        if len(both) > 1:
+            raise ArgumentError("--json - and --csv - both print: give one of them a file.")
         for field in dataclasses.fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
             if isinstance(value, Options):
@@ -156,6 +165,9 @@ JsonPath = Annotated[Path | None, Check(_check_json)]
 Numbers = Annotated[
     JsonPath, arg(help="File for the numbers in SI units; - prints only the numbers.")
 ]
+Rows = Annotated[
+    JsonPath, arg(help="File for the table (CSV), units in its header; - prints only the table.")
+]
 
 
 class OutputOptions(Options):
@@ -170,6 +182,7 @@ class OutputOptions(Options):
     columns: Annotated[int, among(1, 2)] = 1
     """Number of columns of a paper that a figure spans: 1 or 2."""
     json: Numbers = None
+    csv: Rows = None
 
     def make_folder(self) -> None:
         """Makes the folder, where one is asked for; raises where it cannot be written."""

@@ -1,12 +1,14 @@
 """Reports for people and for programs."""
 
+import csv
 import enum
+import io
 import math
 import os
 import string
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +17,15 @@ from jaxbiped.caching import _import_time
 
 
 class Report:
-    """Prints for people, and writes the same numbers for programs where `--json` says so."""
+    """Prints for people, and writes the same numbers for programs: by `--json` and `--csv`."""
 
-    def __init__(self, json_path: Path | None) -> None:
-        self._path = json_path
-        self._only_json = str(json_path) == "-"
+    def __init__(self, json_path: Path | None, csv_path: Path | None = None) -> None:
+        self._json, self._csv = json_path, csv_path
+        self._is_quiet = "-" in (str(json_path), str(csv_path))
 
     def say(self, *lines: str) -> None:
-        """Prints lines, one that is empty where none is given, unless JSON has the output."""
-        if not self._only_json:
+        """Prints lines, one that is empty where none is given, unless a program reads them."""
+        if not self._is_quiet:
             _write("\n".join(lines) + "\n")
 
     def wrote(self, paths: Iterable[Path]) -> None:
@@ -33,11 +35,36 @@ class Report:
 
     def finish(self, numbers: JsonObject) -> None:
         """Writes the numbers."""
-        text = strict_json(numbers, indent=2) + "\n"
-        if self._only_json:
-            _write(text)
-        elif self._path is not None:
-            self._path.write_text(text)
+        _write_to(self._json, lambda: strict_json(numbers, indent=2) + "\n")
+
+    def write_rows(self, rows: Callable[[], str]) -> None:
+        """Writes the table, whose text `rows` makes."""
+        _write_to(self._csv, rows)
+
+
+def _write_to(path: Path | None, text: Callable[[], str]) -> None:
+    if str(path) == "-":
+        _write(text())
+    elif path is not None:
+        path.write_text(text())
+
+
+def csv_of(rows: Iterable[Mapping[str, Any]]) -> str:
+    """Rows of numbers as comma-separated values, under their names; those within as NAME.inner."""
+    text = io.StringIO()
+    known = [
+        {
+            f"{name}.{inner}" if inner else name: number
+            for name, value in each.items()
+            for inner, number in (value if isinstance(value, Mapping) else {"": value}).items()
+        }
+        for each in rows
+    ]
+    names = dict.fromkeys(name for each in known for name in each)
+    writer = csv.DictWriter(text, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(known)
+    return text.getvalue()
 
 
 def _write(text: str) -> None:

@@ -8,7 +8,7 @@ import jaxbiped as jb
 from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
 from jaxbiped.cli import _options as options
-from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._report import Report, csv_of, table
 from jaxbiped.cli._scene_options import SceneOptions, compliant_and_minimal
 from jaxbiped.cli._start_options import StartOptions
 
@@ -60,7 +60,7 @@ class Trade(options.Command):
         assert isinstance(scene, jb.Scene)
         start = self.start.start(scene, self.scene.walker)
         self.output.make_folder()
-        report = Report(self.output.json)
+        report = Report(self.output.json, self.output.csv)
         trades: dict[str, Any] = {
             "walk": WalkTrade(scene, start, self.duration, self.repeats),
             "gait": GaitTrade(scene, 1),
@@ -77,6 +77,7 @@ class Trade(options.Command):
         }  # fmt: skip
         for rows, truth in found.values():
             report.wrote(self.output.draw(_figures(rows, truth)))
+        report.write_rows(lambda: csv_of(numbers["rows"]))
         report.finish(numbers)
         return 0 if found["walk"][1] is not None else 1
 

@@ -20,6 +20,7 @@ from jaxbiped.cli._walk_warnings import (
     walk_warnings,
 )
 from jaxbiped.constraints._constraint_methods import name_of
+from jaxbiped.measure._footsteps import footstep_dataset
 from jaxbiped.measure._samples import from_start, places_of_standing
 from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 
@@ -34,6 +35,8 @@ _FOOTSTEP = {
     "length m": "{0[length_m]:.4f}",
     "speed m/s": "{0[speed_m_s]:.4f}",
 }
+_AT_LEAST = ("time_s", "period_s", "length_m", "speed_m_s")
+"""What is known of footsteps on any feet."""
 _FORCES = {
     "peak N": "{0[peak_normal_N]:.1f}",
     "depth mm": "{0[depth_mm]:.3f}",
@@ -88,7 +91,7 @@ def report_walk(
         numbers |= walk_cost(scene, walk)
     warnings_of = rigid_warnings if rolls else walk_warnings
     numbers["warnings"] = warnings_of(scene, numbers, rtol=settings["rtol"])
-    report = Report(output.json)
+    report = Report(output.json, output.csv)
     _say(report, numbers, walk)
     if output.out is not None:
         with stage("drawing the figures and the animation"):
@@ -97,6 +100,7 @@ def report_walk(
             else:
                 paths = write_outputs(scene, walk, output)
         report.wrote(paths)
+    report.write_rows(lambda: footstep_csv(numbers["steps"]))
     report.finish(numbers)
     return 1 if walk.outcome is jb.Ending.SOLVER_FAILED else 0
 
@@ -163,6 +167,13 @@ def footstep_rows(steps: Any) -> list[dict[str, float]]:
     names = ("time_s", "period_s", "length_m", "speed_m_s", "peak_normal_N", "max_penetration_m",
              "double_support_s")  # fmt: skip
     return _rows({name: np.asarray(getattr(steps, name)) for name in names})
+
+
+def footstep_csv(rows: list[dict[str, Any]]) -> str:
+    """Footsteps of a walk on any feet as comma-separated values."""
+    names = rows[0] if rows else _AT_LEAST
+    found = footstep_dataset({name: [row[name] for row in rows] for name in names})
+    return jb.measure.to_csv(found, "footstep")
 
 
 def _rows(found: dict[str, np.ndarray]) -> list[dict[str, float]]:

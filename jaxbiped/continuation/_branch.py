@@ -1,7 +1,7 @@
 """Branch of gaits along a parameter: its points, bifurcations and ends, also as a dataset."""
 
 import json
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import equinox as eqx
 import jax.tree_util as jtu
@@ -11,6 +11,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
 from jaxbiped._identity import difference_of
 from jaxbiped._summary import notebook_html
+from jaxbiped._tables import Tabular
 from jaxbiped._types import as_float
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch_point import Axis, BranchPoint
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-class Branch(eqx.Module):
+class Branch(eqx.Module, Tabular):
     """A branch of periodic gaits along a parameter, n points in the order of its arclength.
 
     Attributes:
@@ -43,6 +44,7 @@ class Branch(eqx.Module):
         accuracy, engine: by which it was followed.
     """
 
+    rows: ClassVar[str] = "point"
     scene: Scene | RigidScene
     points: tuple[BranchPoint, ...]
     bifurcations: tuple[BifurcationPoint, ...]
@@ -107,7 +109,7 @@ class Branch(eqx.Module):
         value = self.points[point].value if isinstance(point, int) else point.value
         return with_parameters(self.scene, {self.axis.name: value})
 
-    def dataset(self) -> "xarray.Dataset":
+    def to_dataset(self) -> "xarray.Dataset":
         """The branch as a dataset for `to_netcdf` or `to_zarr`; `open_branch` takes it back.
 
         Returns:
@@ -131,7 +133,7 @@ _EVENT_NUMBERS = ("multiplier_real", "multiplier_imag", "error", "value_error", 
 
 
 def branch_dataset(branch: Branch) -> "xarray.Dataset":
-    """A branch as a dataset; see `Branch.dataset`."""
+    """A branch as a dataset; see `Branch.to_dataset`."""
     import xarray
 
     names = recurring_names(branch.state_type)
@@ -193,8 +195,10 @@ def _columns(
         columns[f"state_{name}"] = (along, recurring[:, k], {"units": unit})
     values = table("multipliers", m - 1, complex)
     errors = table("multiplier_errors", m - 1, float)
+    bars = {"ancillary_variables": f"{before}multipliers_error"}
     for name, array in (("real", values.real), ("imag", values.imag), ("error", errors)):
-        columns[f"multipliers_{name}"] = ((along, "multiplier"), array, {"units": ""})
+        own = {"units": ""} | ({} if name == "error" else bars)
+        columns[f"multipliers_{name}"] = ((along, "multiplier"), array, own)
     stable = np.array([_STABLE[point.stable] for point in points], np.int8)
     words = ("undecided", "unstable", "stable")
     columns["stable"] = (along, stable, _flags(words, (-1, 0, 1)))
@@ -209,7 +213,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
     """The branch that a dataset holds, to be drawn, or followed on by `resume_branch`.
 
     Args:
-        dataset: from `Branch.dataset`, also one that was stored and opened again.
+        dataset: from `Branch.to_dataset`, also one that was stored and opened again.
         scene: the walker that it was made with.
 
     Returns:

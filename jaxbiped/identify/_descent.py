@@ -1,5 +1,6 @@
 """Descent of a fit: from predictions of measured gaits to estimates and their intervals."""
 
+import dataclasses
 from typing import TypeAlias
 
 import numpy as np
@@ -17,7 +18,11 @@ from jaxbiped.identify._gait_fit import (
 )
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
-from jaxbiped.scene._parameter_access import parameter_values, with_parameters
+from jaxbiped.scene._parameter_access import (
+    parameter_quantities,
+    parameter_values,
+    with_parameters,
+)
 
 _WITHIN = 1.959963984540054
 """Standard errors to each end of a 95 % interval."""
@@ -50,6 +55,7 @@ class Descent:
         """`guess` is a state near the gait of the scene's own parameters; None to search it."""
         own = parameter_values(scene)
         self.scene, self.measured, self.now, self.guess = scene, measured, now, guess
+        self.units = {name: each.unit for name, each in parameter_quantities(scene).items()}
         self.names, self.first = tuple(bounds), np.array([float(own[name]) for name in bounds])
         self.limits = np.array(list(bounds.values())).T
         self.widths = np.where(self.first == 0.0, self.limits[1] - self.limits[0], 1.0)
@@ -79,8 +85,8 @@ class Descent:
             now = self.summary(FitEnding.INTERRUPTED)
             if fit is None or now.chi_squared < fit.chi_squared:
                 fit = now
-            fit = fit._replace(ending=FitEnding.INTERRUPTED)
-        return fit._replace(evaluations=self.evaluations)
+            fit = dataclasses.replace(fit, ending=FitEnding.INTERRUPTED)
+        return dataclasses.replace(fit, evaluations=self.evaluations)
 
     def fit_from(self, begin: np.ndarray, most: int) -> GaitFit:
         """The fit from a start on; a better one that an interval comes upon is gone on from."""
@@ -244,6 +250,7 @@ class Descent:
             residuals=residuals,
             freedom=freedom,
             evaluations=self.evaluations,
+            units={name: self.units[name] for name in self.names},
         )
 
     def _at_bounds(self, at: np.ndarray, residuals: np.ndarray, slopes: np.ndarray) -> np.ndarray:

@@ -5,12 +5,19 @@ grown by a given amount (Venzon and Moolgavkar 1988). For a linear model that is
 standard error of the joint fit; where the model bends, it is followed there.
 """
 
+import dataclasses
 import enum
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
+
+from jaxbiped._quantity import Quantity
+from jaxbiped._tables import Entry, Tabular, variables_of
+
+if TYPE_CHECKING:
+    import xarray
 
 LOOSE = 1.0
 """Standard error, in units of a parameter's own size, from which data do not tell it."""
@@ -83,7 +90,8 @@ def information(slopes: np.ndarray, slope_errors: np.ndarray) -> Information:
     return Information(covariance, undetermined, resolved, int(np.sum(~null)))
 
 
-class GaitFit(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class GaitFit(Tabular):
     """Parameters fitted to measured gaits; n numbers measured, k parameters.
 
     Attributes:
@@ -101,8 +109,10 @@ class GaitFit(NamedTuple):
         freedom: degrees of freedom: numbers measured less combinations of parameters, and clocks of
             angles, that are told by them.
         evaluations: how many scenes were searched for gaits.
+        units: SI units of the parameters by name.
     """
 
+    rows: ClassVar[str] = "parameter"
     ending: FitEnding
     estimates: dict[str, float]
     standard_errors: dict[str, float]
@@ -113,6 +123,7 @@ class GaitFit(NamedTuple):
     residuals: np.ndarray
     freedom: int
     evaluations: int
+    units: dict[str, str]
 
     @property
     def chi_squared(self) -> float:
@@ -125,6 +136,49 @@ class GaitFit(NamedTuple):
         from scipy.stats import chi2
 
         return float(chi2.sf(self.chi_squared, self.freedom)) if self.freedom > 0 else math.nan
+
+    def to_dataset(self) -> "xarray.Dataset":
+        """The fit as a labelled dataset, for `to_netcdf` or `to_zarr`.
+
+        Returns:
+            Along `parameter` the estimates with their standard errors, the ends of the 95 %
+            intervals, units, and whether a parameter is undetermined or at a bound; the correlation
+            along `parameter` and `other`; residuals along `measurement`.
+        """
+        import xarray
+
+        names, (low, high) = list(self.estimates), zip(*self.intervals.values(), strict=True)
+        yes = {0: "no", 1: "yes"}
+
+        def column(values: object, words: str, **more: object) -> Entry:
+            return Entry(("parameter",), values, Quantity(words, unit="SI"), **more)  # type: ignore[arg-type]
+
+        def among(chosen: tuple[str, ...], words: str) -> Entry:
+            return column(np.isin(names, chosen).astype(np.int8), words, flags=yes)
+
+        bars = list(self.standard_errors.values())
+        entries = {
+            "estimate": column(list(self.estimates.values()), "estimate", errors=bars),
+            "low": column(low, "lower end of 95 %"),
+            "high": column(high, "upper end of 95 %"),
+            "undetermined": among(self.undetermined, "undetermined"),
+            "at_bound": among(self.at_bounds, "at a bound"),
+            "correlation": Entry(("parameter", "other"), self.correlation, Quantity("correlation")),
+            "residual": Entry(("measurement",), self.residuals, Quantity("residual")),
+        }
+        coordinates = {
+            "parameter": np.array(names, object),
+            "unit": ("parameter", np.array([self.units[name] for name in names], object)),
+            "other": np.array(names, object),
+        }
+        attributes = {
+            "ending": str(self.ending),
+            "chi_squared": self.chi_squared,
+            "freedom": self.freedom,
+            "p_value": self.p_value,
+            "evaluations": self.evaluations,
+        }
+        return xarray.Dataset(variables_of(entries), coordinates, attributes)
 
 
 _MOST = 15

@@ -1,10 +1,7 @@
-"""Measured gait: what was observed of a walker, with standard deviations; from a file, too."""
+"""Measured gait: what was observed of a walker, with standard deviations."""
 
 import dataclasses
-import re
-from collections.abc import Iterable, Mapping
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +16,6 @@ from jaxbiped._checks import (
     check_type,
     holds_somewhere,
 )
-from jaxbiped._files import read_json
-from jaxbiped._types import JsonObject
 
 MEASURES = ("period", "step_length", "speed", "peak_normal")
 """Measures of a gait that may be given, as in `Measures`."""
@@ -215,73 +210,3 @@ def _is_masked(pair: object) -> bool:
     """Whether a value or its deviation is masked."""
     entries = pair if isinstance(pair, tuple | list | np.ndarray) else (pair,)
     return any(np.ma.is_masked(each) for each in (pair, *entries))
-
-
-_UNITS = {"period": "s", "step_length": "m", "speed": "m_s", "peak_normal": "N"}
-_KEYS = {f"{name}_{_UNITS[name]}": name for name in MEASURES}
-_ANGLES = {"times_s": "times", "deviation_rad": "deviation", "since": "since"}
-_ANGLE = re.compile(r"(theta_\w+)_rad")
-
-
-def read_measured(path: str | Path) -> list[MeasuredGait]:
-    """Reads measured gaits from a JSON file.
-
-    The file holds `{"gaits": [{"conditions": {"slope": 0.02}, "period_s": [0.441, 0.001],
-    "step_length_m": …, "speed_m_s": …, "peak_normal_N": …, "angles": {"times_s": […],
-    "theta_1_rad": […], "theta_2_rad": […], "deviation_rad": 0.001, "since": "mid-stance"},
-    "footsteps": 1}, …]}`, the angle of a body NAME as "theta_NAME_rad": of each measure its value
-    and its standard deviation; what was not measured is left out, single angles are null.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        The gaits, in the file's order.
-
-    Raises:
-        ArgumentError: a file that cannot be read, that is no JSON, or that holds something else.
-    """
-    held = read_json("file", path)
-    gaits = held.get("gaits") if isinstance(held, dict) else None
-    if not isinstance(gaits, list) or not gaits or not all(isinstance(g, dict) for g in gaits):
-        raise ArgumentError(
-            f'file = {str(path)!r} is not allowed: it must hold {{"gaits": [{{…}}, …]}}, at least '
-            "one."
-        )
-    return [_gait(each) for each in gaits]
-
-
-def _gait(held: JsonObject) -> MeasuredGait:
-    measures: dict[str, Any] = {}
-    options: dict[str, Any] = {}
-    for key, value in held.items():
-        if key in _KEYS:
-            measures[_KEYS[key]] = tuple(value) if isinstance(value, list) else value
-        elif key == "angles" and isinstance(value, dict):
-            named = {key: found[1] for key in value if (found := _ANGLE.fullmatch(key))}
-            _check_keys("angles", value, [*_ANGLES, *named, "theta_BODY_rad"])
-            angles: dict[str, Any] = {
-                name: _masked_array(value.get(own)) for own, name in (_ANGLES | named).items()
-            }
-            options["angles"] = MeasuredAngles(**angles)
-        elif (key == "conditions" and isinstance(value, dict)) or key == "footsteps":
-            options[key] = value
-        else:
-            _check_keys("a gait", [key], [*_KEYS, "angles", "conditions", "footsteps"])
-            raise ArgumentError(f"{key} = {value!r} is not allowed: it must be an object.")
-    return MeasuredGait(measures, **options)
-
-
-def _masked_array(value: Any) -> Any:
-    """A list with its nulls masked; anything else as it is."""
-    if not isinstance(value, list) or None not in value:
-        return value
-    lost = [each is None for each in value]
-    return np.ma.array([0.0 if each is None else each for each in value], mask=lost)
-
-
-def _check_keys(where: str, keys: Iterable[str], allowed: Iterable[str]) -> None:
-    for key in keys:
-        if key not in allowed:
-            names = ", ".join(allowed)
-            raise ArgumentError(f"{key!r} is not known in {where}: choose from {names}.")

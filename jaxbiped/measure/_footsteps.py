@@ -1,13 +1,16 @@
 """Footsteps: what a walk is counted and measured in."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import jax
 import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import check_type
+from jaxbiped._quantity import Quantity
+from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped._types import Numbers
 from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._footfalls import landings, standing_leg
@@ -17,6 +20,23 @@ from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene._structure import Structure
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import xarray
+
+QUANTITIES = {
+    "leg": Quantity("leg that strikes"),
+    "time": Quantity("time of the strike", "$t$", "s"),
+    "period": Quantity("period", "$T$", "s"),
+    "length": Quantity("step length", "$L$", "m"),
+    "speed": Quantity("speed", "$v$", "m/s"),
+    "peak_normal": Quantity("peak normal force", "$F$", "N"),
+    "max_penetration": Quantity("largest penetration", "$\\delta$", "m"),
+    "double_support": Quantity("double support", "", "s"),
+    "cost_of_transport": Quantity("cost of transport", "$C$"),
+    "energy_residual": Quantity("energy left open", "", "J"),
+}
+"""Variables of the dataset of footsteps."""
 
 
 class HeelStrikes(NamedTuple):
@@ -31,7 +51,8 @@ class HeelStrikes(NamedTuple):
     foot: np.ndarray
 
 
-class Footsteps(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class Footsteps(Tabular):
     """Footsteps of a walk, each from one heel strike to the next; leaves of shape (n,).
 
     Attributes:
@@ -48,6 +69,7 @@ class Footsteps(NamedTuple):
         leg: name of the leg that strikes.
     """
 
+    rows: ClassVar[str] = "footstep"
     time_s: np.ndarray
     period_s: np.ndarray
     length_m: np.ndarray
@@ -58,6 +80,28 @@ class Footsteps(NamedTuple):
     cost_of_transport: np.ndarray
     energy_residual_J: np.ndarray  # noqa: N815 (joule)
     leg: np.ndarray
+
+    def to_dataset(self) -> "xarray.Dataset":
+        """The footsteps as a labelled dataset, for `to_netcdf` or `to_zarr`.
+
+        Returns:
+            Along `footstep` what the fields hold, named without their units, SI units.
+        """
+        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return footstep_dataset(fields)
+
+
+def footstep_dataset(fields: Mapping[str, Any]) -> "xarray.Dataset":
+    """Footsteps as a dataset: columns by names that end with their units, as "period_s"."""
+    import xarray
+
+    entries = {}
+    for name, quantity in QUANTITIES.items():
+        unit = quantity.unit.replace("/", "_")
+        own = f"{name}_{unit}" if unit else name
+        if own in fields:
+            entries[name] = Entry((Footsteps.rows,), fields[own], quantity)
+    return xarray.Dataset(variables_of(entries))
 
 
 def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
@@ -128,8 +172,8 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     structure = scene.mechanism.structure
     leg = np.array(structure.legs)[strikes.foot[1:] - 1]
     if count == 0:
-        nothing = Footsteps(*[np.zeros(0)] * len(Footsteps._fields))
-        return nothing._replace(leg=leg[:0])
+        nothing = {field.name: np.zeros(0) for field in dataclasses.fields(Footsteps)}
+        return Footsteps(**nothing | {"leg": leg[:0]})
     time = strikes.time_s
     period, length = np.diff(time), np.diff(strike_places(scene, trajectory, strikes))
     loads = sample(scene, trajectory, contacts, time)

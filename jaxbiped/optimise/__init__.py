@@ -13,6 +13,6 @@ from jaxbiped.optimise._optimality import Optimality as Optimality
 from jaxbiped.optimise._optimise_gait import ParetoFront as ParetoFront
 from jaxbiped.optimise._optimise_gait import pareto_front as pareto_front
 from jaxbiped.optimise._optimisers import OPTIMISERS as OPTIMISERS
-from jaxbiped.optimise._runs import Iteration as Iteration
-from jaxbiped.optimise._runs import Optimum as Optimum
-from jaxbiped.optimise._runs import Outcome as Outcome
+from jaxbiped.optimise._optimum import Iteration as Iteration
+from jaxbiped.optimise._optimum import Optimum as Optimum
+from jaxbiped.optimise._optimum import Outcome as Outcome

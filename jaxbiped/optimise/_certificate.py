@@ -25,7 +25,7 @@ from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._optimality import Optimality
-from jaxbiped.optimise._runs import Optimum
+from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.scene._parameter_access import parameter_names
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState

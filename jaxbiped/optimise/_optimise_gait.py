@@ -33,7 +33,8 @@ from jaxbiped.optimise._design_variables import (
 from jaxbiped.optimise._objective_values import Evaluations
 from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
-from jaxbiped.optimise._runs import Optimum, Runs, optimum_of, scattered_designs
+from jaxbiped.optimise._optimum import Optimum
+from jaxbiped.optimise._runs import Runs, optimum_of, scattered_designs
 from jaxbiped.scene._parameter_access import scene_identity
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene

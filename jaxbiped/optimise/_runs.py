@@ -1,9 +1,8 @@
 """Runs of an optimiser over a design problem, restarts among them, and the best design of all."""
 
-import enum
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +10,9 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage
 from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.dynamics._state_quantities import recurring_leaves
-from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
-from jaxbiped.optimise._objective_values import Evaluation
-from jaxbiped.optimise._optimality import OPTIMAL, Optimality, optimality_of
+from jaxbiped.optimise._optimality import OPTIMAL, optimality_of
 from jaxbiped.optimise._optimisers import (
     Callback,
     Functions,
@@ -24,8 +21,8 @@ from jaxbiped.optimise._optimisers import (
     run_slsqp,
     run_trust_constr,
 )
+from jaxbiped.optimise._optimum import Iteration, Optimum, Outcome
 from jaxbiped.optimise._trust_region import run_trust_region
-from jaxbiped.scene._scene import RigidScene, Scene
 
 if TYPE_CHECKING:
     import optax
@@ -42,51 +39,6 @@ _BY_NAME: dict[str, Callable[[Functions, np.ndarray, int, Callback], RunEnding]]
     "trust-constr": run_trust_constr,
     "optax": run_optax,
 }
-
-
-class Outcome(enum.IntEnum):
-    """How an optimisation ended. `str(outcome)` is its name in words.
-
-    - converged: the optimiser's own test is met, and every requirement kept, to
-      its measure's error bar.
-    - corner: no better design was found nearby, but the derivatives do not balance: as at corners
-      of the spectral radius, where multipliers meet.
-    - unfinished: the iterations were used up, or the optimiser could not go on.
-    - interrupted: by Ctrl-C; the best so far is kept.
-    - infeasible: no design was found that keeps the requirements; the nearest to them is told.
-    - beyond range: the best design has a gait whose fold or doubling, the distance of which was to
-      be optimised, does not lie in the range that is followed. There that distance has no
-      derivatives, so that no better design can be told.
-    """
-
-    CONVERGED = 0
-    CORNER = 1
-    UNFINISHED = 2
-    INTERRUPTED = 3
-    INFEASIBLE = 4
-    BEYOND_RANGE = 5
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
-
-
-class Iteration(NamedTuple):
-    """An iterate.
-
-    Attributes:
-        variables: parameters by name.
-        objective: the sum that was asked for.
-        excess: by how much the worst requirement is missed, relative to its bound.
-        measures: those that play a part, by name.
-        beyond_range: those of them whose bifurcation does not lie in the range that is followed:
-            the value stands for more than that.
-    """
-
-    variables: dict[str, float]
-    objective: float
-    excess: float
-    measures: dict[str, float]
-    beyond_range: tuple[str, ...] = ()
 
 
 class Runs:
@@ -166,47 +118,6 @@ def rank_of(problem: DesignProblem, design: Design) -> tuple[float, float]:
     """Designs nearer to the requirements come first, and of those that keep them the better."""
     excess = problem.excess(design.known)
     return 0.0 if excess <= KEPT else excess, problem.objective(design.known).value
-
-
-class Optimum(NamedTuple):
-    """The best design that an optimisation came to.
-
-    Attributes:
-        outcome: how it ended.
-        message: the optimiser's own words; and which fold or doubling does not lie in its range.
-        scene: of the best design.
-        gait: its gait, with the sensitivities to all parameters.
-        variables: its parameters by name.
-        objective: the sum that was asked for.
-        error: its estimated error.
-        known: all measures that play a part, with gradients and errors.
-        optimality: what the conditions of optimality say.
-        history: every iterate, of all runs one behind the other.
-        evaluations: designs whose gait was found.
-        lost: how often none was, or a measure of it was not finite.
-        unmeasured: gaits of the latter kind.
-    """
-
-    outcome: Outcome
-    message: str
-    scene: Scene | RigidScene
-    gait: Gait
-    variables: dict[str, float]
-    objective: float
-    error: float
-    known: Evaluation
-    optimality: Optimality
-    history: list[Iteration]
-    evaluations: int
-    lost: int
-    unmeasured: int
-
-    def __repr__(self) -> str:
-        variables = ", ".join(f"{name}={value:.6g}" for name, value in self.variables.items())
-        return (
-            f"Optimum({self.outcome}, objective={self.objective:.6g}, {variables}, "
-            f"engine={self.gait.engine}, {self.evaluations} gaits)"
-        )
 
 
 def _message(problem: DesignProblem, best: Design, ended: RunEnding) -> str:

@@ -4,40 +4,25 @@ import contextlib
 import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jax.tree_util as jtu
 import numpy as np
-import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
+from jaxbiped._tables import variables_of
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._state_quantities import recurring_names, unit_of
-from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.dynamics._state_quantities import recurring_names
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._homotopy import BranchEnd
-from jaxbiped.gait._search_provenance import FoundBy
+from jaxbiped.gait._gait_table import gait_coordinates, gait_entries
 from jaxbiped.sweep._store_files import SETTINGS, continue_store, open_store, writing
 
 if TYPE_CHECKING:
     import xarray
 
 _DONE = "done"
-_CODES: dict[str, type[IntEnum]] = {
-    "ending": Search,
-    "found_by": FoundBy,
-    "branch_end": BranchEnd,
-}
-_MEASURES = {
-    "period": "s",
-    "step_length": "m",
-    "speed": "m/s",
-    "peak_normal": "N",
-    "spectral_radius": "",
-}
 _PAUSE = 2.0
 """Seconds between two writes of a store, at least."""
 _SHARE = 20.0
@@ -71,7 +56,7 @@ class GaitGrid:
     def write_each(self, places: Sequence[tuple[int, ...]], gaits: Gait) -> None:
         """`write` of several, whose arrays have a first axis."""
         at = tuple(np.transpose(places))
-        for name, (_, values, _) in _variables(gaits).items():
+        for name, (_, values, _) in variables_of(gait_entries(gaits)).items():
             self._dataset[name].data[at] = values
         self._dataset[_DONE].data[at] = True
         if self._path is not None and time.monotonic() - self._written > self._pause:
@@ -150,7 +135,7 @@ def open_gait_grid(
         settings,
         writer,
         any_version=any_version,
-        create=lambda half: dataset.to_zarr(half, consolidated=False, zarr_format=3),
+        create=lambda half: dataset.to_zarr(str(half), consolidated=False, zarr_format=3),
     )
     return GaitGrid(dataset if new else _load(path, dataset), state, path)
 
@@ -194,51 +179,11 @@ def _empty(
 
     dims, shape = tuple(values), tuple(map(len, values.values()))
     variables: dict[str, Any] = {_DONE: (dims, np.zeros(shape, bool))}
-    for name, (own, value, attributes) in _variables(gait).items():
+    for name, (own, value, attributes) in variables_of(gait_entries(gait)).items():
         whole = value.dtype.kind in "ib"
         empty = np.full((*shape, *value.shape), -1 if whole else np.nan, value.dtype)
         variables[name] = ((*dims, *own), empty, attributes)
     coordinates: dict[str, Any] = {
         name: (name, column, {"units": units[name]}) for name, column in values.items()
     }
-    coordinates["parameter"] = np.array(gait.parameters, object)
-    return xarray.Dataset(variables, coordinates)
-
-
-def _variables(gait: Gait) -> dict[str, tuple[tuple[str, ...], np.ndarray, JsonObject]]:
-    """Of each variable its own dimensions, its value, and its attributes.
-
-    Arrays of a gait, or of several, keep their first axis.
-    """
-    found = np.asarray(gait.ending) == int(Search.FOUND)
-    rows: dict[str, tuple[tuple[str, ...], np.ndarray, JsonObject]] = {}
-
-    def add(name: str, value: npt.ArrayLike, unit: str, *own: str) -> None:
-        number = np.asarray(value, dtype=np.float64)
-        known = found.reshape(found.shape + (1,) * (number.ndim - found.ndim))
-        rows[name] = (own, np.where(known, number, np.nan), {"units": unit})
-
-    codes = {
-        "ending": gait.ending,
-        "found_by": gait.origin.found_by,
-        "branch_end": gait.origin.branch_end,
-    }
-    for name, code in codes.items():
-        meanings = " ".join(str(each).replace(" ", "_") for each in _CODES[name])
-        flags = {"flag_values": [int(k) for k in _CODES[name]], "flag_meanings": meanings}
-        rows[name] = ((), np.asarray(code, dtype=np.int8), flags)
-    for name, unit in _MEASURES.items():
-        add(name, getattr(gait.measures, name), unit)
-        per = f"{unit} per unit of the parameter".strip()
-        add(f"sensitivity_{name}", getattr(gait.sensitivities, name), per, "parameter")
-        error = getattr(gait.sensitivity_errors, name)
-        add(f"sensitivity_error_{name}", error, per, "parameter")
-        add(f"elasticity_{name}", getattr(gait.elasticities, name), "", "parameter")
-    for name in recurring_names(gait.measures.state):
-        add(f"state_{name}", getattr(gait.measures.state, name), unit_of(name))
-    add("multiplier_real", np.real(gait.multipliers), "", "multiplier")
-    add("multiplier_imag", np.imag(gait.multipliers), "", "multiplier")
-    add("unit_multiplier_error", gait.unit_multiplier_error, "")
-    add("residual", gait.residual, "SI")
-    add("grazes", gait.grazes, "")
-    return rows
+    return xarray.Dataset(variables, coordinates | gait_coordinates(gait))

@@ -69,8 +69,8 @@ def gait_sweep(
         scene: the walker; parameters that are not swept keep its values.
         over: values of each swept parameter by name (see `parameter_names`), shape (k,) each.
         parameters, footsteps, accuracy, radius_sensitivities, engine: as for `find_gait`.
-        store: directory of a Zarr store; in memory unless given. A run that was killed continues
-            where it was.
+        store: directory or address of a Zarr store (see `sweep`); in memory unless given. A run
+            that was killed continues where it was.
         progress: whether to show on stderr what is being done, how far it is and what was found; by
             default (None) after two seconds, in a terminal, a notebook or a command.
         any_version: whether to continue a store that another version of jaxbiped wrote.

@@ -30,8 +30,8 @@ _DONE = "done"
 class Store:
     """Fields of all starts, written and read a chunk at a time, and attributes of the whole.
 
-    On a disk it is what `xarray.open_zarr` opens: an array for each field, a coordinate for each
-    axis, and `done`, which says how far each chunk is. In memory no chunk is ever complete
+    At an address it is what `xarray.open_zarr` opens: an array for each field, a coordinate for
+    each axis, and `done`, which says how far each chunk is. In memory no chunk is ever complete
     beforehand.
     """
 
@@ -82,11 +82,12 @@ class Store:
             self._done = np.asarray(self._data[_DONE][:])
         known = {_DONE, *self.layout.starts.axes}
         names = [name for name in map(str, self._data.array_keys()) if name not in known]
+        there = set(map(str, self.path.rglob("*")))
         lost = 0
         for chunk in map(int, np.flatnonzero(self._done)):
             place = [str(k) for k in self.layout.place(chunk)]
             files = [self.path.joinpath(name, "c", *place) for name in names]
-            whole = all(file.exists() for file in files)
+            whole = all(str(file) in there for file in files)
             try:
                 self.read(chunk, tuple(names) if whole else ())
             except Exception:  # as above

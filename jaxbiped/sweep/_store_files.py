@@ -3,8 +3,6 @@
 import contextlib
 import glob
 import json
-import os
-import shutil
 import time
 import uuid
 import warnings
@@ -12,11 +10,19 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jaxbiped._checks import ArgumentError
-from jaxbiped._files import failure_kind, strict_json, user_path
+from jaxbiped._checks import ArgumentError, ResourceError
+from jaxbiped._files import failure_kind, strict_json
 from jaxbiped._identity import DECISIVE, difference_of
 from jaxbiped._types import JsonObject
 from jaxbiped.caching._disk_cache import ABANDONED
+from jaxbiped.sweep._store_address import (
+    is_of_service,
+    is_remote,
+    is_writable,
+    move_store,
+    remove_store,
+    store_address,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -119,9 +125,9 @@ def store_path(store: str | Path | None) -> Path | None:
     """The path that a user gives for a store, None for one in memory; raises as `check_store`."""
     if store is None:
         return None
-    path = user_path(store, "store")
+    path = store_address(store)
     check_store(path)
-    return path.absolute()
+    return path
 
 
 def what_is_kept(path: Path | None) -> str:
@@ -133,9 +139,9 @@ def what_is_kept(path: Path | None) -> str:
 
 def check_store(path: Path) -> None:
     """Raises `ArgumentError` where no store can be made or continued at this path."""
-    is_new(path)
-    home = next(each for each in [path, *path.absolute().parents] if each.is_dir())
-    if not os.access(home, os.W_OK | os.X_OK):
+    with writing(path):
+        is_new(path)
+    if not is_writable(path):
         raise ArgumentError(
             f"store = {str(path)!r} cannot be written: its folder must be writable."
         )
@@ -145,7 +151,7 @@ def open_store(path: Path) -> "xarray.Dataset":
     """The dataset of a store, read as it is needed."""
     import xarray
 
-    return xarray.open_zarr(path, chunks=None)
+    return xarray.open_zarr(str(path), chunks=None)
 
 
 @contextlib.contextmanager
@@ -162,11 +168,15 @@ def writing(path: Path) -> Iterator[None]:
     try:
         with zarr.config.set({"array.write_empty_chunks": True}):
             yield
-    except OSError as error:
-        why = (error.strerror or str(error)).lower()
-        raise failure_kind(error)(
-            f"store = {str(path)!r} cannot be written ({why}): it must be a directory on a disk "
-            "with room; the chunks that are complete stay."
+    except Exception as error:
+        if not isinstance(error, OSError) and not (is_remote(path) and is_of_service(error)):
+            raise
+        why = (getattr(error, "strerror", None) or str(error)).lower().rstrip(".")
+        kind = failure_kind(error) if isinstance(error, OSError) else ResourceError
+        where = "an address that may be written" if is_remote(path) else "a directory on a disk"
+        raise kind(
+            f"store = {str(path)!r} cannot be written ({why}): it must be {where} with room; the "
+            "chunks that are complete stay."
         ) from None
 
 
@@ -176,22 +186,24 @@ def create_store(path: Path, write: Callable[[Path], object]) -> None:
     Where another client makes the same one meanwhile, that one stays.
     """
     half = path.with_name(f".{path.name}.{uuid.uuid4().hex}.unfinished")
-    for left in path.parent.glob(f".{glob.escape(path.name)}.*unfinished"):
+    unfinished = f".{glob.escape(path.name)}.*unfinished"
+    for left in () if is_remote(path) else path.parent.glob(unfinished):
         if left.stat().st_mtime < time.time() - ABANDONED:
-            shutil.rmtree(left, ignore_errors=True)
+            remove_store(left)
     try:
-        half.parent.mkdir(parents=True, exist_ok=True)
+        if not is_remote(half):  # else a bucket would be made
+            half.parent.mkdir(parents=True, exist_ok=True)
         write(half)
         consolidate(half)
         with contextlib.suppress(OSError):
             path.rmdir()  # where it is there and empty
         try:
-            half.rename(path)
+            move_store(half, path)
         except OSError:
             if is_new(path):
                 raise
     finally:
-        shutil.rmtree(half, ignore_errors=True)
+        remove_store(half)
 
 
 def note(path: Path, attributes: Mapping[str, str | float]) -> None:

@@ -73,7 +73,8 @@ def sweep(
     Args:
         labelling: see there.
         starts: a `grid`, a `sample`, or `GivenStarts`.
-        store: directory of a Zarr store, for `xarray.open_zarr`; in memory unless given.
+        store: directory of a Zarr store, for `xarray.open_zarr`, or an address such as
+            "s3://bucket/basin.zarr" (with `jaxbiped[s3]`); in memory unless given.
         chunk: maximum number of starts that are labelled and written at once.
         executor: what runs the chunks, any of `concurrent.futures`' kind, such as
             `distributed.Client(...).get_executor()`; this process unless given.

@@ -1,5 +1,6 @@
 """What commands tell of gaits and walks, against numbers that are written down."""
 
+import dataclasses
 import json
 from types import SimpleNamespace
 
@@ -17,8 +18,8 @@ from jaxbiped.cli._walk_warnings import (
     relative_residual,
     walk_warnings,
 )
-from jaxbiped.gait._gait import Measures
 from jaxbiped.gait._homotopy import BranchEnd
+from jaxbiped.gait._measures import Measures
 from jaxbiped.measure._energy_ledger import EnergyLedger
 from jaxbiped.measure._footsteps import Footsteps
 
@@ -141,11 +142,12 @@ def test_what_overflowed_is_no_accurate_walk():
 
 
 def test_rows_of_a_table_of_footsteps_are_footsteps():
-    steps = Footsteps(*[np.array([k, k + 0.5]) for k in range(len(Footsteps._fields))])
+    fields = dataclasses.fields(Footsteps)
+    steps = Footsteps(*[np.array([k, k + 0.5]) for k in range(len(fields))])
     rows = footstep_rows(steps)
     assert len(rows) == 2
     for name, value in rows[1].items():
-        assert value == Footsteps._fields.index(name) + 0.5
+        assert value == [field.name for field in fields].index(name) + 0.5
 
 
 HEAD = "hip_x,hip_z,theta_1,theta_2,hip_vx,hip_vz,omega_1,omega_2"

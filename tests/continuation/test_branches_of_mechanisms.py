@@ -33,7 +33,7 @@ def test_a_branch_along_a_spring_has_the_gaits_own_slope():
     periods = np.array([point.period for point in branch.points])
     slope = np.polynomial.Polynomial.fit(values - 8.0, periods, 4).deriv()(0.0)
     assert slope == pytest.approx(float(gait.sensitivities.period[0]), rel=1e-5)
-    again = jb.continuation.open_branch(branch.dataset(), TORSO)
+    again = jb.continuation.open_branch(branch.to_dataset(), TORSO)
     assert again.state_type is type(gait.measures.state)
     for name in again.state_type._fields:
         assert float(getattr(again.state(0), name)) == float(getattr(branch.state(0), name))

@@ -164,8 +164,8 @@ def test_a_stored_branch_is_resumed(rigid, tmp_path):
     short = jb.continue_gait(
         rigid_seed(), "slope", bounds=(0.01, 0.11), accuracy="tight", max_points=20
     )
-    short.dataset().to_netcdf(tmp_path / "branch.nc")
-    short.dataset().to_zarr(tmp_path / "branch.zarr", consolidated=False)
+    short.to_dataset().to_netcdf(tmp_path / "branch.nc")
+    short.to_dataset().to_zarr(tmp_path / "branch.zarr", consolidated=False)
     for stored in (
         xarray.open_dataset(tmp_path / "branch.nc"),
         xarray.open_zarr(tmp_path / "branch.zarr", consolidated=False),
@@ -188,7 +188,7 @@ def test_a_stored_branch_is_resumed(rigid, tmp_path):
 
 
 def test_a_dataset_says_what_is_in_it(rigid):
-    data = rigid.dataset()
+    data = rigid.to_dataset()
     assert data["slope"].attrs["units"] == "rad"
     assert data["state_omega_2"].attrs["units"] == "rad/s"
     assert data["speed"].values == pytest.approx(data["step_length"] / data["period"])

@@ -26,15 +26,15 @@ def gradients(which):
 
     def implicitly(point):
         # Value and derivative of one solve, which compiles sooner than one for each.
-        both = lambda p: (measured(p, jb.Implicit()),) * 2
+        both = lambda p: (measured(p, jb.gait.Implicit()),) * 2
         jacobian, value = jax.jacrev(both, has_aux=True)(point)
         return value, jacobian
 
     def forwards(point, direction):
-        return jax.jvp(lambda p: measured(p, jb.Forward()), (point,), (direction,))
+        return jax.jvp(lambda p: measured(p, jb.gait.Forward()), (point,), (direction,))
 
     def in_reverse(point):
-        return jax.jacrev(lambda p: measured(p, jb.Reverse()))(point)
+        return jax.jacrev(lambda p: measured(p, jb.gait.Reverse()))(point)
 
     return tuple(map(jax.jit, (implicitly, forwards, in_reverse)))
 

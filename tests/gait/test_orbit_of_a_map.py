@@ -13,8 +13,9 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait import _orbit_derivatives
 from jaxbiped.gait._accurate_gait import judge_gait
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, is_sound, walks_only
-from jaxbiped.gait._gait import Gait, Measures, _by_parameter, _elasticities, _measure_errors
+from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._gait_measures import _by_correction
+from jaxbiped.gait._measures import Measures, by_parameter, elasticities, measure_errors
 from jaxbiped.gait._newton import Method, Stage, initial_progress, newton_iteration
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn
@@ -113,9 +114,9 @@ def test_sensitivities_are_differences_of_fixed_points(linear, monkeypatch):
         radius, terms = _orbit_derivatives._radius_slopes(problem, (last, None))
         measured = Measures(last.period, length, length / last.period, last.peak, None, zero)
         seven = slopes._replace(recurring=jnp.concatenate([slopes.recurring, jnp.zeros((4, 2))]))
-        found = _by_parameter(SimpleNamespace(), measured, seven, radius)
+        found = by_parameter(SimpleNamespace(), measured, seven, radius)
         values = Measures(2.0, *[4.0] * 4, jnp.asarray(8.0))
-        relative = _elasticities((1.0, 0.0), (0, 1), values, found._replace(state=found.period))
+        relative = elasticities((1.0, 0.0), (0, 1), values, found._replace(state=found.period))
         return slopes.recurring, found, relative, terms
 
     last = linearised(linear, x, P)
@@ -165,7 +166,7 @@ def test_errors_of_measures_hold_what_the_looser_solve_and_the_last_correction_c
         )
         length, period = last.advance[0], last.period
         told = Measures(period, length, length / period, last.peak, 0.5, orbit.state)
-        return _measure_errors(told, orbit)
+        return measure_errors(told, orbit)
 
     errors = errors_of(last, coarse)
     true = measures(TURN, P)

@@ -69,7 +69,7 @@ class Ball(Smooth):
 
 DOWN = jb.Section(lambda args, y: -y[0])
 TURNING_POINT = jb.Section(lambda args, y: y[1])
-MODES = {"forward": jb.Forward(), "reverse": jb.Reverse()}
+MODES = {"forward": jb.gait.Forward(), "reverse": jb.gait.Reverse()}
 
 
 def derivative(function, mode):
@@ -164,7 +164,7 @@ def test_damped_oscillator_over_a_turn(mode):
 def test_every_solver_carries_derivatives(solver, engine):
     def turned(v):
         start = (jnp.asarray(0.0), v)
-        how = dict(section=DOWN, system=Oscillator(), gradient=jb.Forward())
+        how = dict(section=DOWN, system=Oscillator(), gradient=jb.gait.Forward())
         args = (jnp.asarray(OMEGA), jnp.asarray(ZETA))
         r = jb.return_map(args, start, solver=solver, engine=engine, **how)
         return r.state[1]
@@ -270,11 +270,11 @@ def test_modes_that_do_not_fit_are_refused():
         return jb.return_map(args, start, gradient=gradient, **how).time
 
     with pytest.raises(jb.ArgumentError, match="Implicit"):
-        bounce(state[1], jb.Implicit())
+        bounce(state[1], jb.gait.Implicit())
     with pytest.raises(RuntimeError, match="no reverse mode"):
-        jax.eval_shape(jax.grad(lambda v: bounce(v, jb.Forward())), state[1])
+        jax.eval_shape(jax.grad(lambda v: bounce(v, jb.gait.Forward())), state[1])
     for engine in ("xla", "lanes"):
-        reversible = functools.partial(bounce, gradient=jb.Reverse(), engine=engine)
+        reversible = functools.partial(bounce, gradient=jb.gait.Reverse(), engine=engine)
         with pytest.raises(TypeError, match="forward-mode"):
             jax.jvp(reversible, (state[1],), (state[1],))
 
@@ -333,9 +333,9 @@ def test_what_systems_and_sections_hold_is_refused_where_it_would_not_be_seen():
     with pytest.raises(jb.ArgumentError, match='"lanes" is not allowed here: the system Held'):
         _swung(omega, zeta, engine="lanes")
     with pytest.raises(jb.ArgumentError, match="Held holds arrays, which belong in args"):
-        _swung(omega, zeta, gradient=jb.Reverse())
+        _swung(omega, zeta, gradient=jb.gait.Reverse())
     with pytest.raises(jb.ArgumentError, match="Level holds arrays, which belong in args"):
-        _swung(2.0, zeta, section=Level(omega), gradient=jb.Reverse())
+        _swung(2.0, zeta, section=Level(omega), gradient=jb.gait.Reverse())
     with pytest.raises(jb.ArgumentError, match=r"Held or .* must be among args"):
         jax.jacfwd(lambda held: _swung(held, zeta))(omega)
     with pytest.raises(jb.ArgumentError, match=r"or Level holds .* must be among args"):

@@ -8,7 +8,7 @@ import jaxbiped as jb
 from jaxbiped.optimise._design_variables import variables_of
 from jaxbiped.optimise._multiplier_cluster import conditions, radius_of
 from jaxbiped.optimise._optimality import optimality_of
-from jaxbiped.optimise._runs import Outcome
+from jaxbiped.optimise._optimum import Outcome
 from tests.optimise.drawn_designs import SCENE, difference, drawn, solved
 
 BOX = {"d": (0.05, 0.2), "J": (0.003, 0.02), "r": (0.04, 0.12), "m": (1.0, 3.0), "g": (9.0, 10.0)}

@@ -87,7 +87,7 @@ def value_and_derivatives(function, depths, transform=jax.jacfwd):
     [("lanes", "forward"), ("xla", "forward"), ("lanes", "reverse"), ("xla", "reverse")],
 )
 def test_contacts_between_two_steps_are_felt_or_told(engine, mode):
-    gradient = jb.Forward() if mode == "forward" else jb.Reverse()
+    gradient = jb.gait.Forward() if mode == "forward" else jb.gait.Reverse()
     transform = jax.jacfwd if mode == "forward" else jax.jacrev
 
     def ours(*numbers):

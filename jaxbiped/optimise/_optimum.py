@@ -1,0 +1,153 @@
+"""Optimum: the best design that an optimisation came to, how it ended, and every iterate."""
+
+import dataclasses
+import enum
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+import numpy as np
+
+from jaxbiped._quantity import Quantity
+from jaxbiped._tables import Entry, Tabular, variables_of
+from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._objective_values import Evaluation
+from jaxbiped.optimise._objectives import OBJECTIVES
+from jaxbiped.optimise._optimality import Optimality
+from jaxbiped.scene._parameter_access import parameter_quantities
+from jaxbiped.scene._scene import RigidScene, Scene
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class Outcome(enum.IntEnum):
+    """How an optimisation ended. `str(outcome)` is its name in words.
+
+    - converged: the optimiser's own test is met, and every requirement kept, to
+      its measure's error bar.
+    - corner: no better design was found nearby, but the derivatives do not balance: as at corners
+      of the spectral radius, where multipliers meet.
+    - unfinished: the iterations were used up, or the optimiser could not go on.
+    - interrupted: by Ctrl-C; the best so far is kept.
+    - infeasible: no design was found that keeps the requirements; the nearest to them is told.
+    - beyond range: the best design has a gait whose fold or doubling, the distance of which was to
+      be optimised, does not lie in the range that is followed. There that distance has no
+      derivatives, so that no better design can be told.
+    """
+
+    CONVERGED = 0
+    CORNER = 1
+    UNFINISHED = 2
+    INTERRUPTED = 3
+    INFEASIBLE = 4
+    BEYOND_RANGE = 5
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+
+class Iteration(NamedTuple):
+    """An iterate.
+
+    Attributes:
+        variables: parameters by name.
+        objective: the sum that was asked for.
+        excess: by how much the worst requirement is missed, relative to its bound.
+        measures: those that play a part, by name.
+        beyond_range: those of them whose bifurcation does not lie in the range that is followed:
+            the value stands for more than that.
+    """
+
+    variables: dict[str, float]
+    objective: float
+    excess: float
+    measures: dict[str, float]
+    beyond_range: tuple[str, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class Optimum(Tabular):
+    """The best design that an optimisation came to.
+
+    Attributes:
+        outcome: how it ended.
+        message: the optimiser's own words; and which fold or doubling does not lie in its range.
+        scene: of the best design.
+        gait: its gait, with the sensitivities to all parameters.
+        variables: its parameters by name.
+        objective: the sum that was asked for.
+        error: its estimated error.
+        known: all measures that play a part, with gradients and errors.
+        optimality: what the conditions of optimality say.
+        history: every iterate, of all runs one behind the other.
+        evaluations: designs whose gait was found.
+        lost: how often none was, or a measure of it was not finite.
+        unmeasured: gaits of the latter kind.
+    """
+
+    rows: ClassVar[str] = "variable"
+    outcome: Outcome
+    message: str
+    scene: Scene | RigidScene
+    gait: Gait
+    variables: dict[str, float]
+    objective: float
+    error: float
+    known: Evaluation
+    optimality: Optimality
+    history: list[Iteration]
+    evaluations: int
+    lost: int
+    unmeasured: int
+
+    def __repr__(self) -> str:
+        variables = ", ".join(f"{name}={value:.6g}" for name, value in self.variables.items())
+        return (
+            f"Optimum({self.outcome}, objective={self.objective:.6g}, {variables}, "
+            f"engine={self.gait.engine}, {self.evaluations} gaits)"
+        )
+
+    def to_dataset(self) -> "xarray.Dataset":
+        """The optimum as a labelled dataset, for `to_netcdf` or `to_zarr`.
+
+        Returns:
+            Along `variable` the best design's parameters; along `measure` all measures that play a
+            part, with their errors; along `iteration` every iterate: the objective, by how much the
+            worst requirement is missed (`excess`), the design (`design_…`) and its measures
+            (`measure_…`). `gait.to_dataset()` has the gait.
+        """
+        import xarray
+
+        units = parameter_quantities(self.scene)
+        names = list(self.variables)
+        measures = [name for name in self.known.values if name in OBJECTIVES]
+        quantities = [OBJECTIVES[name].quantity for name in measures]
+        at, value = ("iteration",), Quantity("value", unit="SI")
+        values, errors = (
+            [part[name] for name in measures] for part in (self.known.values, self.known.errors)
+        )
+        entries = {
+            "value": Entry(("variable",), list(self.variables.values()), value),
+            "measured": Entry(("measure",), values, value, errors),
+            "objective": Entry(at, [each.objective for each in self.history], value),
+            "excess": Entry(at, [each.excess for each in self.history], Quantity("excess")),
+        }
+        for name in names:
+            column = [each.variables[name] for each in self.history]
+            entries[f"design_{name}"] = Entry(at, column, units[name])
+        for name, quantity in zip(measures, quantities, strict=True):
+            column = [each.measures.get(name, np.nan) for each in self.history]
+            entries[f"measure_{name}"] = Entry(at, column, quantity)
+        coordinates = {
+            "variable": np.array(names, object),
+            "unit": ("variable", np.array([units[name].unit for name in names], object)),
+            "measure": np.array(measures, object),
+            "measure_unit": ("measure", np.array([each.unit for each in quantities], object)),
+        }
+        attributes = {
+            "outcome": str(self.outcome),
+            "objective": self.objective,
+            "objective_error": self.error,
+            "message": self.message,
+            "evaluations": self.evaluations,
+        }
+        return xarray.Dataset(variables_of(entries), coordinates, attributes)

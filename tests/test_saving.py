@@ -1,0 +1,241 @@
+"""Saved scenes and results, against what was saved, bit by bit."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+import zipfile
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.models._catalogue import MODELS
+from tests import mechanisms, saved_parts
+from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
+
+SCENES = {
+    **jb.ladder(),
+    **{f"model {name}": model.make() for name, model in MODELS.items()},
+    **{name: mechanisms.scene_of(name) for name in mechanisms.WALKERS},
+    "redundant": jb.RedundantScene(jb.seed_scene(), "augmented", "euler"),
+    "bristles": dataclasses.replace(
+        jb.seed_scene(),
+        friction=jb.laws.friction_law_like("lugre", mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1e3),
+    ),
+    "driven": jb.Scene(
+        jb.seed_scene().walker, jb.seed_scene().ground, jb.seed_scene().normal,
+        jb.seed_scene().friction, actuation=jb.actuation.HipTorque(torque=0.1),
+    ),
+    "own law": dataclasses.replace(jb.seed_scene(), friction=saved_parts.Grip(5000.0)),
+    "linkage": jb.walker_linkage(jb.seed_scene().walker),
+}  # fmt: skip
+
+
+def same(one, other):
+    """Whether two values have the same structure, types, and bits."""
+    leaves, others = jax.tree.leaves(one), jax.tree.leaves(other)
+    assert jax.tree.structure(one) == jax.tree.structure(other)
+    for leaf, again in zip(leaves, others, strict=True):
+        assert type(leaf) is type(again)
+        own, there = np.asarray(leaf), np.asarray(again)
+        assert (own.dtype, own.shape) == (there.dtype, there.shape)
+        assert own.tobytes() == there.tobytes()
+    return True
+
+
+def again(path, value):
+    jb.save(path / "it.npz", value)
+    return jb.load(path / "it.npz")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_is_the_same(tmp_path, name):
+    scene = SCENES[name]
+    assert same(again(tmp_path, scene), scene)
+
+
+def test_a_walk_is_the_same_between_its_steps_too_and_belongs_to_its_scene(seed_walk, tmp_path):
+    scene, walk = seed_walk
+    held = again(tmp_path, {"scene": scene, "walk": walk})
+    assert same(held["walk"], walk)
+    times = np.linspace(0.0, float(walk.t[-1]), 7)
+    assert same(held["walk"].at(times), walk.at(times))
+    before, now = jb.footsteps(scene, walk), jb.footsteps(held["scene"], held["walk"])
+    assert dataclasses.asdict(before).keys() == dataclasses.asdict(now).keys()
+    np.testing.assert_array_equal(now.period_s, before.period_s)
+    kept = again(tmp_path, now)
+    np.testing.assert_array_equal(kept.period_s, now.period_s)
+    assert kept.leg.tolist() == now.leg.tolist()
+    dataset = jb.trajectory_dataset(scene, walk)
+    assert again(tmp_path, dataset).identical(dataset)
+
+
+def test_a_walk_through_modes_is_the_same(tmp_path):
+    model = MODELS["hsu-chen"]
+    scene = model.make()
+    start = scene.state(**next(iter(model.starts.values())))
+    walk = jb.rigid_walk(scene, start, footsteps=2, max_arrivals=2, engine="lanes")
+    read = again(tmp_path, walk)
+    assert same(read, walk)
+    assert read.modes == walk.modes
+
+
+_READ = """
+import sys, jaxbiped as jb, numpy as np
+held = jb.load(sys.argv[1])
+found = jb.find_gait(held["scene"], held["start"], parameters=("slope",))
+assert found.measures.period == held["gait"].measures.period
+print(held["gait"].to_csv(), end="")
+"""
+
+
+@pytest.mark.slow
+def test_another_process_reads_the_same_numbers(tmp_path):
+    scene, path = simplest_walker(0.009), tmp_path / "gait.npz"
+    start = simplest_state(*STABLE)
+    gait = jb.find_gait(scene, start, parameters=("slope",))
+    jb.save(path, {"scene": scene, "start": start, "gait": gait})
+    read = subprocess.run(
+        [sys.executable, "-c", _READ, str(path)], capture_output=True, text=True, check=True
+    )
+    assert read.stdout == gait.to_csv()
+    assert same(jb.load(path)["gait"], gait)
+
+
+def test_what_else_values_are_made_of(tmp_path):
+    value = {
+        "numbers": [1, 1.5, float("nan"), -float("inf"), 1 + 2j, True, None, "words"],
+        ("a", 1): (np.float32(2.5), np.int8(-3), np.array(["ä", "b"]), jnp.arange(3)),
+        "note": saved_parts.Note(saved_parts.Side.LEFT, saved_parts.half),
+        "ending": jb.Ending.STUMBLED,
+        "kind": jb.State,
+        "objects": np.array([["a", None]], object),
+        "empty": {},
+    }
+    read = again(tmp_path, value)
+    assert list(read) == list(value)
+    assert repr(read) == repr(value)
+    assert isinstance(read["numbers"][5], bool)
+    assert read["note"].side is saved_parts.Side.LEFT
+    assert read["note"].numbers is saved_parts.half
+    masked = again(tmp_path, np.ma.array([1.0, 2.0], mask=[True, False]))
+    assert masked.mask.tolist() == [True, False]
+    assert masked[1] == 2.0
+
+
+def test_the_arrays_are_open_to_numpy_and_equal_contents_are_equal_files(tmp_path):
+    for name in "ab":
+        jb.save(tmp_path / name, [np.arange(3.0), jb.seed_scene()])
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+    with np.load(tmp_path / "a") as arrays:
+        np.testing.assert_array_equal(arrays["0"], np.arange(3.0))
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ([0, lambda: 1], r"value\[1\] is not allowed: .*<lambda> has no import path"),
+        ({"a": object()}, r"value\['a'\] is not allowed: a object cannot be saved"),
+        (saved_parts.Note(saved_parts.Side.LEFT, {1, 2}), "value.numbers is not allowed: a set"),
+    ],
+)
+def test_what_is_no_data_is_refused_by_its_place(tmp_path, value, said):
+    with pytest.raises(jb.ArgumentError, match=said):
+        jb.save(tmp_path / "it.npz", value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_traced_is_refused(tmp_path):
+    with pytest.raises(jb.ArgumentError, match="value is traced"):
+        jax.jit(lambda x: jb.save(tmp_path / "it.npz", x))(1.0)
+
+
+def rewritten(path, change):
+    """A file with other contents."""
+    with zipfile.ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    text = json.dumps(change(json.loads(parts["contents.json"])))
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, part in (parts | {"contents.json": text}).items():
+            archive.writestr(name, part)
+
+
+def replace(old, new):
+    return lambda contents: json.loads(json.dumps(contents).replace(old, new))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            lambda held: held | {"jaxbiped": 2},
+            "the file has format 2 of jaxbiped .* reads format 1",
+        ),
+        (replace("saved_parts:Grip", "saved_parts:Lost"), "needs Lost of the module tests.saved_p"),
+        (
+            replace("tests.saved_parts:", "no_such_module:"),
+            "of the module no_such_module, which is",
+        ),
+        (replace("tests.saved_parts:Grip", "os:system"), "needs system of the module os, which is"),
+        (replace('"grip"', '"grasp"'), "Grip has other fields here: grasp, grip"),
+        (
+            replace("jaxbiped.scene._ground:Ground", "jaxbiped.scene._ground:Floor"),
+            "needs Floor of",
+        ),
+        (lambda held: {"value": 1}, "must be a whole file of"),
+        (replace('"jax": 0', '"jax": 99'), "must be a whole file of"),
+        (replace('"jax": 0', '"pickle": 0'), "must be a whole file of"),
+    ],
+)
+def test_another_file_is_one_sentence(tmp_path, change, said):
+    path = tmp_path / "it.npz"
+    jb.save(path, SCENES["own law"])
+    rewritten(path, change)
+    with pytest.raises(jb.ArgumentError, match=said):
+        jb.load(path)
+
+
+def test_another_version_is_named_where_it_made_other_classes(tmp_path):
+    path = tmp_path / "it.npz"
+    jb.save(path, jb.seed_scene())
+    rewritten(path, replace("_ground:Ground", "_ground:Floor"))
+    rewritten(path, lambda held: held | {
+        "written_by": held["written_by"] | {"version_jaxbiped": "9.0"}
+    })  # fmt: skip
+    with pytest.raises(jb.ArgumentError, match=r"written by jaxbiped 9.0; this is \d"):
+        jb.load(path)
+
+
+def test_a_file_that_is_none_of_ours_is_one_sentence(tmp_path):
+    path = tmp_path / "it.npz"
+    with pytest.raises(jb.ArgumentError, match="cannot be read"):
+        jb.load(path)
+    path.write_text("words")
+    with pytest.raises(jb.ArgumentError, match="must be a whole file of"):
+        jb.load(path)
+    np.savez(path, a=np.arange(2))
+    with pytest.raises(jb.ArgumentError, match="must be a whole file of"):
+        jb.load(path)
+    jb.save(path, np.arange(1000.0))
+    path.write_bytes(path.read_bytes()[:500])
+    with pytest.raises(jb.ArgumentError, match="must be a whole file of"):
+        jb.load(path)
+    with pytest.raises(jb.ArgumentError, match="cannot be written"):
+        jb.save(tmp_path / "none" / "it.npz", 1)
+
+
+def test_code_that_has_changed_is_told_and_the_numbers_are_the_same(tmp_path):
+    path = tmp_path / "it.npz"
+    jb.save(path, SCENES["own law"])
+
+    def other(held):
+        held["written_by"]["user_code"]["tests.saved_parts.Grip"] = "another"
+        return held
+
+    rewritten(path, other)
+    with pytest.warns(RuntimeWarning, match=r"another source of tests\.saved_parts\.Grip: the num"):
+        assert same(jb.load(path), SCENES["own law"])
