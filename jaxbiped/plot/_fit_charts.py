@@ -13,7 +13,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._quantity import Quantity
 from jaxbiped.identify._gait_fit import GaitFit
 from jaxbiped.optimise._objectives import OBJECTIVES
-from jaxbiped.optimise._runs import Optimum
+from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import quantity_of
 from jaxbiped.scene._parameter_access import parameter_quantities

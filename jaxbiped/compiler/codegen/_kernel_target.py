@@ -159,7 +159,9 @@ def select_instruction(
         name = target.library + op.removeprefix("libm ")
         return _per_lane(text, name, operands, width, target.architecture)
     if op == "ldexp":
-        return (_scale if target.scales else _scale_by_halves)(text, *operands, width, target)
+        x, exponent = operands
+        scale = _scale if target.scales else _scale_by_halves
+        return scale(text, x, exponent, width, target)
     if op == "to_int":
         return _to_int(text, kinds[1], kind, operands[0], width, target)
     return _convert(text, op, kinds[1], kind, operands[0], width)

@@ -147,7 +147,7 @@ class CompiledProgram:
         Raises:
             KeyboardInterrupt: the user interrupts; the simulations end within a tenth of a second.
         """
-        count, signature = table.count, self.kernel.signature
+        count, signature = table.simulations, self.kernel.signature
         outputs = np.full((count, signature.outputs), np.nan)
         times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
         streams = input_streams_of(stream, count, signature.row, backwards=signature.backwards)

@@ -108,4 +108,4 @@ def _part(launch: Launch, place: slice) -> Launch:
         stream_lengths=arrays["stream_lengths"][place],
     )
     every = np.concatenate([each.ravel() for each in rows]) if rows else np.zeros(0)
-    return Launch(taken, {**launch.numbers, "count": table.count}, [every], table)
+    return Launch(taken, {**launch.numbers, "count": table.simulations}, [every], table)

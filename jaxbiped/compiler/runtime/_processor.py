@@ -16,13 +16,13 @@ _MANY = 8
 
 
 class InputTable(NamedTuple):
-    """Inputs of `count` simulations: number k of simulation i is `places[k] + i steps[k]`.
+    """Inputs of some `simulations`: number k of simulation i is `places[k] + i steps[k]`.
 
     Attributes:
         numbers: the `shared` ones of all simulations, and behind them those of each, one by one.
     """
 
-    count: int
+    simulations: int
     shared: int
     numbers: np.ndarray
     places: np.ndarray
@@ -39,7 +39,7 @@ class InputTable(NamedTuple):
     def of_leaves(leaves: Sequence[np.ndarray]) -> "InputTable":
         """Of arrays (n, …); those that repeat one entry in memory are shared."""
         count = leaves[0].shape[0]
-        shared, own, is_own = [], [], []
+        shared, own, is_own = list[np.ndarray](), list[np.ndarray](), list[bool]()
         for leaf in leaves:
             varies = count > 1 and leaf.strides[0] != 0
             rows = (leaf if varies else leaf[:1]).reshape(count if varies else 1, -1)
@@ -57,9 +57,9 @@ class InputTable(NamedTuple):
 
     def part(self, place: slice) -> "InputTable":
         """Of some simulations, one behind the other."""
-        own = self.numbers[self.shared :].reshape(self.count, -1)[place]
+        own = self.numbers[self.shared :].reshape(self.simulations, -1)[place]
         numbers = np.concatenate([self.numbers[: self.shared], own.reshape(-1)])
-        return self._replace(count=len(own), numbers=numbers)
+        return self._replace(simulations=len(own), numbers=numbers)
 
 
 class InputStreams(NamedTuple):

@@ -62,7 +62,7 @@ def runs(powers, monkeypatch):
 
     def counted(program, table, **options):
         if program == powers:
-            counts.append(table.count)
+            counts.append(table.simulations)
         return run_table(program, table, **options)
 
     monkeypatch.setattr(CompiledProgram, "run_table", counted)
