@@ -109,7 +109,7 @@ def test_objectives_of_the_seed_as_a_mechanism_are_the_seeds():
     ("scene", "guess"),
     [
         pytest.param(TORSO, None, id="torso"),
-        pytest.param(UNLIKE, None, id="unlike"),
+        pytest.param(UNLIKE, None, id="unlike", marks=pytest.mark.nightly),
         pytest.param(KNEED, BENT, id="kneed", marks=pytest.mark.nightly),
     ],
 )

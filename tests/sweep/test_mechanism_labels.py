@@ -76,7 +76,7 @@ def test_a_torsos_gait_draws_in_what_walks():
     _check_one_by_one(labelling, states, flat, range(0, 16, 3))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("ignore:.*stride")
 def test_cycles_of_unlike_legs_are_strides():
     """Of two footsteps; near equal legs they last twice a step, and draw in what walks."""

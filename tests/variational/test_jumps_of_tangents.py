@@ -139,6 +139,20 @@ def test_a_step_behind_a_jump_carries_the_columns_of_the_exact_motion():
     np.testing.assert_allclose(ours.state, exact(*start, level, fall + 0.01), rtol=1e-9)
 
 
+@pytest.mark.parametrize(("height", "moves"), [(1e-11, False), (1e-9, True)])
+def test_the_short_step_across_a_switch_moves_no_column(height, moves):
+    """At 3 m/s downwards for 10 ps: behind the level saltation is all that counts."""
+    columns = jnp.array([[1.0, 0.3, 0.0], [0.0, 1.0, 0.0]])
+    y0 = Tangents((jnp.asarray(0.5 + height), jnp.asarray(-3.0)), columns)
+    solver = TangentSolver(WATCH, jb.solvers.Rodas4())
+    term = diffrax.ODETerm(VariationalField(field))
+    step = jax.jit(lambda y: solver.step(term, 0.0, 1e-11, y, seeded(3), None, jnp.asarray(False)))
+    new, error, *_ = step(y0)
+    assert float(new.state[0]) == pytest.approx(0.5 + height - 3e-11, abs=1e-15)
+    assert np.array_equal(new.columns, columns) is not moves
+    assert moves or not np.any(error.columns)
+
+
 def _beside_a_switch(power):
     """A Jacobian whose first entry goes as this power of the time since a switch, the others not.
 
