@@ -5,6 +5,7 @@ import math
 
 import pytest
 import quote
+from _mechanism_cells import CAPABILITIES
 from _mechanism_table import table
 from _mechanisms import PRESSED, cases
 
@@ -47,6 +48,7 @@ def test_a_start_stands_on_one_body_alone(name):
 
 
 def test_no_cell_is_empty():
+    assert list(ROWS) == list(CAPABILITIES)
     assert all(list(cells) == list(cases()) for cells in ROWS.values())
     for cells in ROWS.values():
         assert all(
@@ -65,9 +67,15 @@ def test_cells_agree_with_what_is_known_of_them():
     assert max(NUMBERS["multipliers"].values()) < 1.0
     # The penalty method's own error, larger for light bodies; the other six are within 1e-9.
     assert all(gap < 1e-8 for gap in NUMBERS["redundant coordinates"].values())
-    for name, elasticity in NUMBERS.get("gradient", {}).items():
+    for name, period in NUMBERS["rigid feet"].items():
+        assert period == pytest.approx(NUMBERS["gait"][name], rel=0.02)
+    assert set(NUMBERS["gait_sweep"].values()) == {3}
+    assert min(NUMBERS["optimum"].values()) > 0.0
+    assert max(map(abs, NUMBERS["fit"].values())) < 1e-6
+    assert max(NUMBERS["both engines"].values()) < 1e-4
+    for name, elasticity in NUMBERS["gradient"].items():
         assert elasticity == pytest.approx(NUMBERS["sensitivities"][name], rel=1e-4)
-    for name, period in NUMBERS.get("gait without a guess", {}).items():
+    for name, period in NUMBERS["gait without a guess"].items():
         assert period == pytest.approx(NUMBERS["gait"][name], abs=1e-6)
 
 
