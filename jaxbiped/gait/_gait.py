@@ -1,9 +1,6 @@
 """Periodic gait: its state, measures, stability and sensitivities, found or not."""
 
-from typing import NamedTuple
-
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
@@ -14,49 +11,27 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._summary import summary
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
     Search,
-    crossings_of,
     minimal_cycle,
     search_by_lanes,
 )
 from jaxbiped.gait._gait_path import nodes_of, step_lengths
-from jaxbiped.gait._orbit_derivatives import Orbit, Slopes, orbit_of, with_parameter_columns
-from jaxbiped.gait._poincare_map import LinearisedReturn
+from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
+from jaxbiped.gait._orbit_measures import (
+    Measures,
+    elasticities_of,
+    measure_errors,
+    measure_slopes,
+    speed_backwards,
+)
 from jaxbiped.gait._search_provenance import FoundBy, Origin, OtherGait
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.scene._parameter_access import parameter_quantities
 from jaxbiped.solve._error_estimate import ErrorEstimate
-
-_NOTHING = 1e-9
-"""A measure (SI units) that is zero but for the solve's error has no elasticity."""
-
-
-class Measures(NamedTuple):
-    """What is measured of a gait, or its derivatives; leaves of one shape.
-
-    A rigid walker's peak force is that of single support: its impacts have impulses.
-
-    Attributes:
-        period: duration of the cycle [s].
-        step_length: advance along the slope in a cycle [m].
-        speed: mean speed along the slope [m/s].
-        peak_normal: largest normal force on a foot [N]; None where the gradient mode has none.
-        spectral_radius: largest absolute value of a Floquet multiplier, the trivial one left out;
-            None where the gradient mode has none.
-        state: the state on the section, a `State` or a `RigidState`, hip_x zero.
-    """
-
-    period: Scalar
-    step_length: Scalar
-    speed: Scalar
-    peak_normal: PyTree
-    spectral_radius: PyTree
-    state: PyTree
 
 
 class Gait(eqx.Module):
@@ -211,11 +186,10 @@ def summarise_gait(
         state=orbit.state,
     )
     measures = known(measures)._replace(state=orbit.state)
-    slopes = _by_parameter(orbit, measures, orbit.slopes, orbit.radius_slopes)
-    # Errors of length and period add up in the speed's, whatever their signs.
-    backwards = measures._replace(speed=-jnp.abs(measures.speed))
-    slope_errors = _by_parameter(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
-    errors = _measure_errors(measures, orbit)
+    slopes = measure_slopes(orbit, measures, orbit.slopes, orbit.radius_slopes)
+    backwards = speed_backwards(measures)
+    slope_errors = measure_slopes(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
+    errors = measure_errors(measures, orbit)
     rows = jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])
     told = dict(
         measure_errors=errors,
@@ -228,7 +202,7 @@ def summarise_gait(
         unit_multiplier_error=stability.unit_error,
         sensitivities=jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes),
         sensitivity_errors=jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors),
-        elasticities=_elasticities(problem.args, problem.active, measures, slopes),
+        elasticities=elasticities_of(problem.args, problem.active, measures, slopes),
     )
     off = jnp.stack(recurring_leaves(errors.state))
     is_found = found.ending == int(Search.FOUND)
@@ -253,46 +227,3 @@ def summarise_gait(
         cycle="stride" if len(structure.namings) == 1 else "step",
         quantities=tuple(map(parameter_quantities(problem.args).__getitem__, names)),
     )
-
-
-def _measure_errors(measures: Measures, orbit: Orbit) -> Measures:
-    """What Newton's last correction and a looser solve change in the measures."""
-    fine, coarse = (_at_fixed_point(each, orbit) for each in (orbit.found.last, orbit.found.coarse))
-
-    def change(told: Scalar, fine: Scalar, coarse: Scalar) -> Scalar:
-        return 2.0 * (jnp.abs(told - fine) + jnp.abs(fine - coarse))
-
-    errors = jtu.tree_map(change, measures, fine, coarse)
-    return errors._replace(spectral_radius=orbit.stability.errors[0])
-
-
-def _at_fixed_point(once: LinearisedReturn, orbit: Orbit) -> Measures:
-    """Measures of a return, linearly extrapolated to its own fixed point."""
-    m = orbit.found.recurring.shape[0]
-    begun = crossings_of(once)[0]
-    correction = solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - begun)
-    period = once.period + once.period_row[:m] @ correction
-    length = once.advance[0] + once.advance_rows[0, :m] @ correction
-    peak = once.peak + once.peak_row[:m] @ correction
-    state = state_of_recurring(type(orbit.state), begun + correction, jnp.zeros_like(period))
-    return Measures(period, length, length / period, peak, orbit.stability.spectral_radius, state)
-
-
-def _by_parameter(orbit: Orbit, measures: Measures, slopes: Slopes, radius: Scalar) -> Measures:
-    """Derivatives of the measures with respect to parameters in their own sizes, shape (p,)."""
-    length, period = slopes.advance[0], slopes.period
-    speed = (length - measures.speed * period) / measures.period
-    state = state_of_recurring(type(measures.state), slopes.recurring, jnp.zeros_like(period))
-    return Measures(period, length, speed, slopes.peak, radius, state)
-
-
-def _elasticities(
-    scene: PyTree, active: tuple[int, ...], measures: Measures, slopes: Measures
-) -> Measures:
-    leaves = jtu.tree_leaves(scene)
-    zero = (jnp.stack([leaves[i] for i in active]) if active else jnp.zeros(0)) == 0.0
-
-    def relative(value: Scalar, slope: Scalar) -> Scalar:
-        return jnp.where(zero, 0.0, jnp.where(jnp.abs(value) < _NOTHING, jnp.nan, slope / value))
-
-    return jax.tree.map(relative, measures, slopes)

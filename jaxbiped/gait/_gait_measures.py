@@ -13,8 +13,9 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state_quantities import recurring_names
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.gait._gait import Gait, Measures
+from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._gradient_modes import AbstractGradient, Implicit
+from jaxbiped.gait._orbit_measures import Measures
 from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.linalg._elimination import solution
 from jaxbiped.scene._parameter_access import select_parameters

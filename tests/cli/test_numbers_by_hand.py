@@ -17,8 +17,8 @@ from jaxbiped.cli._walk_warnings import (
     relative_residual,
     walk_warnings,
 )
-from jaxbiped.gait._gait import Measures
 from jaxbiped.gait._homotopy import BranchEnd
+from jaxbiped.gait._orbit_measures import Measures
 from jaxbiped.measure._energy_ledger import EnergyLedger
 from jaxbiped.measure._footsteps import Footsteps
 
