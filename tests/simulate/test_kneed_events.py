@@ -16,6 +16,7 @@ COUNT, END = 200, 6.0
 AHEAD = 1e-3
 """How far ahead a foot strikes at least [m], for the feet of legs side by side are level, too."""
 FALL = np.cos(1.0)
+LEG = (0.5, 0.5, 0.325), (0.05, 0.5, 0.125)
 KNEE, STRIKE, FALLS, NEVER = range(4)
 
 
@@ -78,7 +79,7 @@ def test_strikes_and_falls_are_those_of_a_dense_solve():
         omega_thigh_1=rate, omega_shank_1=rate - shank, omega_thigh_2=standing,
         omega_shank_2=standing, held="shank_2",
     )  # fmt: skip
-    walker = Knees((0.5, 0.5, 0.325), (0.05, 0.5, 0.125), hip_mass=0.5, slope=0.0504, g=9.81)
+    walker = Knees(*LEG, hip_mass=0.5, slope=0.0504, g=9.81)
     angles = swing, swing - bend, stance, stance
     rows = np.stack([*angles, rate, rate - shank, standing, standing], axis=1)
     true = [first_footstep(walker, row) for row in rows]
@@ -96,3 +97,38 @@ def test_strikes_and_falls_are_those_of_a_dense_solve():
         same = ((strikes > 0) == struck) & (off < most)
         assert np.all(same | (grazes > 0))
         assert np.sum(grazes > 0) <= 2
+
+
+STRAIGHT = dict(theta_thigh_1=-0.24, theta_shank_1=-0.24, theta_thigh_2=0.24, theta_shank_2=0.24)
+RATES = dict(omega_thigh_1=-0.05, omega_shank_1=-0.05, omega_thigh_2=-1.1, omega_shank_2=-1.1)
+
+
+@pytest.mark.parametrize(("swing", "stance"), [(0.0, 0.0), (1.0, 0.0), (0.0, 0.5), (0.7, 0.5)])
+def test_a_straight_knee_that_moves_into_its_stop_hits_it_at_once(swing, stance):
+    walker, scene = Knees(*LEG, hip_mass=0.5, slope=0.0504, g=9.81), hsu_chen()
+    rates = RATES | dict(omega_shank_1=-0.05 + swing, omega_shank_2=-1.1 + stance)
+    y = np.array([*STRAIGHT.values(), *rates.values()])
+    y = np.concatenate([y[:4], walker.kept(y, walker.leg, walker.free)])
+    which, t, _ = first_event(walker, y, 0.0, False)
+    walk = jb.simulate(scene, scene.state(**STRAIGHT, **rates), footsteps=1, accuracy="tight")
+    assert which == STRIKE
+    assert float(walk.t[-1]) == pytest.approx(t, abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    "changed", [dict(omega_shank_1=0.95), dict(theta_shank_1=-0.4), dict(theta_shank_1=0.1)]
+)
+def test_a_knee_that_is_moved_while_it_is_held_is_refused(changed):
+    """Also in a batch, where its lane fails alone."""
+    scene = hsu_chen()
+    good = scene.state(**STRAIGHT, **RATES)
+    with pytest.raises(jb.ArgumentError, match=r"state.mode = 3.0 .* 'shank_1'"):
+        jb.simulate(scene, good._replace(**changed), footsteps=1)
+    ((name, value),) = changed.items()
+
+    def walked(each):
+        walk = jb.simulate(scene, good._replace(**{name: each}), footsteps=1)
+        return walk.ending, walk.t[-1]
+
+    endings, _ = jax.vmap(walked)(np.array([getattr(good, name), value]))
+    assert endings.tolist() == [int(jb.Ending.WALKING), int(jb.Ending.SOLVER_FAILED)]
