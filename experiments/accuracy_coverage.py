@@ -22,8 +22,8 @@ from tqdm import tqdm
 import jaxbiped as jb
 from jaxbiped.plot.style import new_figure
 
-SCENES = {"walks": 1000, "gaits": 1000, "rigid": 300, "named": 100}
-QUICK_SCENES = {"walks": 6, "gaits": 1, "rigid": 20, "named": 1}
+SCENES = {"walks": 1000, "gaits": 1000, "rigid": 300, "named": 100, "named_rigid": 100}
+QUICK_SCENES = {"walks": 6, "gaits": 1, "rigid": 20, "named": 1, "named_rigid": 2}
 DURATION = 1.0
 PARAMETERS = ("K", "c", "xi")
 FINEST = 1e-11
@@ -116,11 +116,16 @@ def _walk(random):
     return _record(met, same, pairs if met and same else {})
 
 
-def _rigid(random):
-    """True errors and bars of time and state at the end of a rigid walk."""
+def _rigid_scene(random):
+    """The seed's masses and lengths, and the slope, larger or smaller."""
     spreads = {"m": (1.0, 2.0), "J": (0.0096, 1.5), "d": (0.1, 1.2), "r": (0.08, 1.3)}
     walker = jb.Walker(l=0.4, **{name: _around(random, *each) for name, each in spreads.items()})
-    scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=_around(random, 0.02, 1.3)))
+    return jb.RigidScene(walker=walker, ground=jb.Ground(slope=_around(random, 0.02, 1.3)))
+
+
+def _rigid(random):
+    """True errors and bars of time and state at the end of a rigid walk."""
+    scene = _rigid_scene(random)
     start = jb.dynamics.rigid_state(jb.seed_state())
     start = start._replace(
         omega_1=start.omega_1 + random.uniform(-0.3, 0.3),
@@ -173,7 +178,15 @@ def _gait(random):
 
 def _named(random):
     """True errors and bars of derivatives by all parameters of a gait at "balanced"."""
-    scene = _scene(random, 2.0)
+    return _named_gait(_scene(random, 2.0), "")
+
+
+def _named_rigid(random):
+    """The same of a rigid gait."""
+    return _named_gait(_rigid_scene(random), "rigid ")
+
+
+def _named_gait(scene, kind):
     gait = _quietly(jb.find_gait, scene)
     exact, checked = (
         jb.find_gait(scene, gait.measures.state, solver=solver, accuracy="tight")
@@ -188,7 +201,12 @@ def _named(random):
         for name in (*MEASURES, "spectral_radius")
         for row in _points(*(getattr(each, name) for each in slopes))
     ]
-    return _record(True, True, {"sensitivities by name": points})
+    multipliers = (each.multipliers for each in three)
+    pairs = {
+        f"{kind}sensitivities by name": points,
+        f"{kind}multipliers by name": _points(*multipliers, gait.multiplier_errors),
+    }
+    return _record(True, True, pairs)
 
 
 def _record(met, same, pairs):
@@ -252,7 +270,13 @@ def _draw(options, pairs):
     return options.save(figure, "accuracy_coverage.png")
 
 
-KINDS = {"walks": _walk, "gaits": _gait, "rigid": _rigid, "named": _named}
+KINDS = {
+    "walks": _walk,
+    "gaits": _gait,
+    "rigid": _rigid,
+    "named": _named,
+    "named_rigid": _named_rigid,
+}
 
 
 if __name__ == "__main__":

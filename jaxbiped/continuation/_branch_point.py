@@ -8,7 +8,8 @@ from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_po
 from jaxbiped.continuation._cycle import Cycle
 from jaxbiped.gait._orbit_derivatives import CLOSENESS
 from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint
-from jaxbiped.gait._stability import critical_bifurcation
+from jaxbiped.gait._stability import critical_bifurcation, eigenvalue_errors
+from jaxbiped.linalg._small_matrices import Eigensystem
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameter_access import (
     parameter_names,
@@ -156,9 +157,11 @@ def change_of(seen: Cycle, point: np.ndarray, slope: float) -> Change:
 def branch_point(curve: Curve, axis: Axis, found: CurvePoint) -> BranchPoint:
     """What is told of a point of the curve of gaits."""
     cycle: Cycle = found.change.seen
-    values = multipliers_of(found.change)
-    looser = _leading_eigenvalues(np.asarray(cycle.jacobian[1]))
-    errors = np.min(np.abs(values[:, None] - looser[None, :]), axis=1)
+    m = len(found.place) - 1
+    jacobian, looser = np.asarray(cycle.jacobian)[:, :, :m]
+    system = _leading_eigensystem(jacobian)
+    values = system.values
+    errors = np.asarray(eigenvalue_errors(system, looser - jacobian, np.linalg.eigvals(looser)))
     return BranchPoint(
         value=axis.value(float(found.place[-1])),
         recurring=found.place[:-1] * curve.sizes[:-1],
@@ -181,13 +184,20 @@ def multipliers_of(change: Change) -> np.ndarray:
     Not from that at a fixed time: there the trivial one is 1 instead of 0, and at a fold, where
     another comes to 1, both have the square root of the derivative's error.
     """
-    return _leading_eigenvalues(np.asarray(change.seen.jacobian[0]))
+    jacobian = np.asarray(change.seen.jacobian[0])
+    return np.asarray(_leading_eigensystem(jacobian[:, : len(jacobian)]).values)
 
 
-def _leading_eigenvalues(jacobian: np.ndarray) -> np.ndarray:
-    """All but the smallest, largest first."""
-    values = np.linalg.eigvals(jacobian[:, : len(jacobian)]).astype(complex)
-    return values[np.argsort(-np.abs(values), kind="stable")][:-1]
+def _leading_eigensystem(matrix: np.ndarray) -> Eigensystem:
+    """All but the smallest eigenvalue, largest first."""
+    import scipy.linalg
+
+    values, left, right = scipy.linalg.eig(matrix, left=True)
+    order = np.argsort(-np.abs(values), kind="stable")[:-1]
+    left = np.conj(left[:, order]).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left = left / np.sum(left.T * right[:, order], axis=0)[:, None]
+    return Eigensystem(values[order], right[:, order], left)
 
 
 def _unit_error(cycle: Cycle) -> float:

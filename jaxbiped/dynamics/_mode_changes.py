@@ -59,7 +59,7 @@ def mode_switches(scene: RigidScene, state: Any) -> tuple[Switch, ...]:
 
 
 def _falls(value: Scalar, live: Scalar) -> Switch:
-    return Switch(value, live, resets=True)
+    return Switch(value, live, resets=True, first_only=True)
 
 
 def _reactions(stance: Stance, turning: Turning) -> list[Scalar]:

@@ -11,6 +11,7 @@ from jaxbiped.dynamics._footfalls import FootMotion, touches
 from jaxbiped.dynamics._gaps import limits_of
 from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 
 class Switch(NamedTuple):
@@ -26,6 +27,9 @@ class Switch(NamedTuple):
             friction peaks: a touch of it changes no derivative. Known before anything runs.
         resets: whether the state itself jumps, and only where the value falls through zero. Known
             before anything runs.
+        first_only: whether of motions across it first derivatives alone are followed: the force
+            jumps there, or is infinitely steep. Second ones are differences. Known before
+            anything runs.
     """
 
     value: Scalar
@@ -33,6 +37,7 @@ class Switch(NamedTuple):
     force_jumps: bool = False
     corner: bool = False
     resets: bool = False
+    first_only: bool = False
 
 
 def switches(scene: CompliantScene, state: CompliantState) -> tuple[Switch, ...]:
@@ -56,9 +61,14 @@ def switches(scene: CompliantScene, state: CompliantState) -> tuple[Switch, ...]
         found += _foot_switches(scene, foot, legs[leg].rate)
     for law, limit in limits_of(scene, state):
         depth, rate = limit.penetration, limit.rate
-        found.append(Switch(depth, True, force_jumps=law.jumps_at_touchdown))
+        found.append(_touchdown(law, depth, True))
         found += [Switch(value, depth > 0.0, corner=True) for value in law.switches(depth, rate)]
     return tuple(found)
+
+
+def _touchdown(law: AbstractNormalLaw, depth: Scalar, live: Scalar | bool) -> Switch:
+    jumps = law.jumps_at_touchdown
+    return Switch(depth, live, force_jumps=jumps, first_only=jumps or law.steep_at_touchdown)
 
 
 def _foot_switches(scene: CompliantScene, foot: FootMotion, rate: Scalar) -> list[Switch]:
@@ -67,7 +77,7 @@ def _foot_switches(scene: CompliantScene, foot: FootMotion, rate: Scalar) -> lis
     below, touching = foot.penetration > 0.0, touches(foot)
     admitted = True if foot.admitted is None else foot.admitted
     carries = foot_force(scene, foot).normal > 0.0
-    found = [Switch(foot.penetration, admitted, force_jumps=scene.normal.jumps_at_touchdown)]
+    found = [_touchdown(scene.normal, foot.penetration, admitted)]
     reaction = scene.normal.switches(foot.penetration, foot.penetration_rate)
     found += [Switch(value, touching, corner=True) for value in reaction]
     slips = scene.friction.switches(foot.slip_speed)

@@ -68,8 +68,7 @@ class Found(NamedTuple):
         code: that of the `Ending` of the last return that did not return, 0 for none.
         recurring: the m recurring components.
         residual: largest of their changes over a cycle; infinite where nothing returned.
-        both: the return from there, and a looser one near there that is the witness of its error,
-            one behind the other.
+        both: the return from there, and behind it a looser one, the witness of its error.
         evaluations: how often the return map was evaluated.
         history: residual of each evaluation, shape (max_evaluations,), NaN beyond the last.
         sound: whether the orbit is a walk (see `is_sound`).
@@ -142,7 +141,7 @@ def search_by_lanes(problem: FixedPointProblem, *_: object, **__: object) -> boo
 
 
 def search(problem: FixedPointProblem, wanted: Scalar | bool = True) -> Found:
-    """Searches from the guess: roughly, then 10 times looser, then finely.
+    """Searches from the guess: roughly, then 10 times looser, then finely, and once more looser.
 
     Not at all where not `wanted`. Derivatives with respect to the active parameters are not carried
     (see `with_parameter_columns`), for which gait is found does not depend on what is asked of it:
@@ -196,7 +195,7 @@ def _runner(problem: FixedPointProblem, m: int) -> Run:
     def run(trial: Scalar, stage: Scalar, idle: Scalar) -> LinearisedReturn:
         wanted = Precision(
             *(
-                jnp.where(stage == Stage.FINE, a, jnp.where(stage == Stage.COARSE, b, c))
+                jnp.where(stage == Stage.FINE, a, jnp.where(stage >= Stage.COARSE, b, c))
                 for a, b, c in zip(problem.precision, coarse, ROUGH, strict=True)
             )
         )
@@ -224,7 +223,8 @@ def _iterate(run: Run, begin: Progress, method: Method) -> Progress:
     """Searches on until it has ended or the evaluations are used up."""
 
     def goes_on(now: Progress) -> Scalar:
-        return (now.stage < Stage.FOUND) & (now.evaluations < method.evaluations_allowed)
+        allowed = (now.stage == Stage.WITNESS) | (now.evaluations < method.evaluations_allowed)
+        return (now.stage < Stage.FOUND) & allowed
 
     def advance(now: Progress) -> Progress:
         on = goes_on(now)

@@ -25,7 +25,13 @@ from jaxbiped.gait._fixed_point_search import (
 )
 from jaxbiped.gait._gait_path import nodes_of, step_lengths
 from jaxbiped.gait._gait_table import gait_coordinates, gait_entries
-from jaxbiped.gait._measures import Measures, by_parameter, elasticities, measure_errors
+from jaxbiped.gait._measures import (
+    Measures,
+    elasticities_of,
+    measure_errors,
+    measure_slopes,
+    speed_backwards,
+)
 from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
 from jaxbiped.gait._search_provenance import FoundBy, Origin, OtherGait
 from jaxbiped.gait._stability import Bifurcation
@@ -207,10 +213,9 @@ def summarise_gait(
         state=orbit.state,
     )
     measures = known(measures)._replace(state=orbit.state)
-    slopes = by_parameter(orbit, measures, orbit.slopes, orbit.radius_slopes)
-    # Errors of length and period add up in the speed's, whatever their signs.
-    backwards = measures._replace(speed=-jnp.abs(measures.speed))
-    slope_errors = by_parameter(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
+    slopes = measure_slopes(orbit, measures, orbit.slopes, orbit.radius_slopes)
+    backwards = speed_backwards(measures)
+    slope_errors = measure_slopes(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
     errors = measure_errors(measures, orbit)
     rows = jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])
     told = dict(
@@ -224,7 +229,7 @@ def summarise_gait(
         unit_multiplier_error=stability.unit_error,
         sensitivities=jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes),
         sensitivity_errors=jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors),
-        elasticities=elasticities(problem.args, problem.active, measures, slopes),
+        elasticities=elasticities_of(problem.args, problem.active, measures, slopes),
     )
     off = jnp.stack(recurring_leaves(errors.state))
     is_found = found.ending == int(Search.FOUND)

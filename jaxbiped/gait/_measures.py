@@ -1,4 +1,4 @@
-"""Measures of a gait: with their errors, their derivatives and their elasticities."""
+"""Measures of a periodic orbit: their values at its fixed point, derivatives and errors."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._state_quantities import state_of_recurring
 from jaxbiped.gait._fixed_point_search import crossings_of
-from jaxbiped.gait._orbit_derivatives import Orbit, Slopes
+from jaxbiped.gait._orbit_derivatives import Orbit, Slopes, change_terms
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.linalg._small_matrices import solve
 
@@ -25,6 +25,13 @@ QUANTITIES = {
     "spectral_radius": Quantity("spectral radius", "$\\rho$"),
 }
 """What is measured of a gait by the fields of its `Measures`, the state left out."""
+_CHANGE_SHARE, _TERMS_SHARE = 1.5, 0.12
+"""What a measure's error has of its change by a looser solve, and of that change's terms at least.
+
+With both, on 60 rigid gaits of random scenes all of 240 measures lay within their bars, and the
+median bar was 12 times the error. So did all of 25 compliant gaits', at 38 times."""
+_ROUNDING = 1e-15
+"""Relative error that no tolerance takes away."""
 
 
 class Measures(NamedTuple):
@@ -51,14 +58,27 @@ class Measures(NamedTuple):
 
 
 def measure_errors(measures: Measures, orbit: Orbit) -> Measures:
-    """What Newton's last correction and a looser solve change in the measures."""
-    fine, coarse = (_at_fixed_point(each, orbit) for each in (orbit.found.last, orbit.found.coarse))
+    """What Newton's last correction and a looser solve change in the measures.
 
-    def change(told: Scalar, fine: Scalar, coarse: Scalar) -> Scalar:
-        return 2.0 * (jnp.abs(told - fine) + jnp.abs(fine - coarse))
+    A looser solve may change a measure little by chance, but not the terms of that change, taken
+    without their signs.
+    """
+    last, coarse = orbit.found.last, orbit.found.coarse
+    fine, loose = (_at_fixed_point(each, orbit) for each in (last, coarse))
+    radius, backwards = orbit.stability.errors[0], speed_backwards(measures)
+    terms = measure_slopes(orbit, backwards, change_terms(last, coarse), radius)
 
-    errors = jtu.tree_map(change, measures, fine, coarse)
-    return errors._replace(spectral_radius=orbit.stability.errors[0])
+    def error(told: Scalar, fine: Scalar, loose: Scalar, terms: Scalar) -> Scalar:
+        change = _CHANGE_SHARE * (jnp.abs(told - fine) + jnp.abs(fine - loose))
+        return jnp.maximum(change, _TERMS_SHARE * terms) + _ROUNDING * jnp.abs(told)
+
+    errors = jtu.tree_map(error, measures, fine, loose, terms)
+    return errors._replace(spectral_radius=radius)
+
+
+def speed_backwards(measures: Measures) -> Measures:
+    """For errors: those of length and period add up in the speed's, whatever their signs."""
+    return measures._replace(speed=-jnp.abs(measures.speed))
 
 
 def _at_fixed_point(once: LinearisedReturn, orbit: Orbit) -> Measures:
@@ -73,7 +93,7 @@ def _at_fixed_point(once: LinearisedReturn, orbit: Orbit) -> Measures:
     return Measures(period, length, length / period, peak, orbit.stability.spectral_radius, state)
 
 
-def by_parameter(orbit: Orbit, measures: Measures, slopes: Slopes, radius: Scalar) -> Measures:
+def measure_slopes(orbit: Orbit, measures: Measures, slopes: Slopes, radius: Scalar) -> Measures:
     """Derivatives of the measures with respect to parameters in their own sizes, shape (p,)."""
     length, period = slopes.advance[0], slopes.period
     speed = (length - measures.speed * period) / measures.period
@@ -81,7 +101,7 @@ def by_parameter(orbit: Orbit, measures: Measures, slopes: Slopes, radius: Scala
     return Measures(period, length, speed, slopes.peak, radius, state)
 
 
-def elasticities(
+def elasticities_of(
     scene: PyTree, active: tuple[int, ...], measures: Measures, slopes: Measures
 ) -> Measures:
     leaves = jtu.tree_leaves(scene)

@@ -49,15 +49,19 @@ class Method(eqx.Module):
 
 
 class Stage(enum.IntEnum):
-    """Where a search is: on the way to the section, how exactly it solves, or how it ended."""
+    """Where a search is: on the way to the section, how exactly it solves, or how it ended.
+
+    As a witness of its error, what was found is solved once more, 10 times looser.
+    """
 
     APPROACH = 0
     ROUGH = 1
     COARSE = 2
     FINE = 3
-    FOUND = 4
-    NO_RETURN = 5
-    STUCK = 6
+    WITNESS = 4
+    FOUND = 5
+    NO_RETURN = 6
+    STUCK = 7
 
 
 class Progress(NamedTuple):
@@ -70,7 +74,7 @@ class Progress(NamedTuple):
             `slope` the derivatives of its changes with respect to the components (m, m), `step`
             Newton's correction of it.
         damping: share of the step that `trial` took.
-        coarse: the last looser return.
+        coarse: the witness, once there is one.
         optimiser: its state.
         code, evaluations, history: as in `Found`.
     """
@@ -121,15 +125,16 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
     returned = latest.code == 0
     change = latest.recurring - now.trial
     residual = jnp.where(returned, jnp.max(jnp.abs(change)), jnp.inf)
-    history = now.history.at[now.evaluations].set(residual)
-    approaching = now.stage == Stage.APPROACH
+    approaching, witness = now.stage == Stage.APPROACH, now.stage == Stage.WITNESS
+    place = jnp.where(witness, now.history.shape[0], now.evaluations)
+    history = now.history.at[place].set(residual, mode="drop")
     if method.optimiser is not None:
         forward = jnp.asarray(True)
         simplified = jnp.zeros_like(change)
     else:
         simplified = -solution(now.slope, change)
         forward = jnp.isinf(now.base_residual) | (_size(simplified) < _size(now.step))
-    better = returned & ~approaching & forward
+    better = returned & ~approaching & ~witness & forward
 
     base = jnp.where(better, now.trial, now.base)
     base = jnp.where(approaching & returned, latest.recurring, base)
@@ -156,11 +161,12 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
     stage = jnp.where(rough_done, int(Stage.COARSE), stage)
     stage = jnp.where(coarse_done, int(Stage.FINE), stage)
     stage = jnp.where(stuck, int(Stage.STUCK), stage)
-    stage = jnp.where(fine_done, int(Stage.FOUND), stage)
+    stage = jnp.where(fine_done, int(Stage.WITNESS), stage)
     stage = jnp.where(nowhere, int(Stage.NO_RETURN), stage)
+    stage = jnp.where(witness, int(Stage.FOUND), stage)
     return Progress(
         stage=stage,
-        trial=jnp.where(approaching, base, base + damping * step),
+        trial=jnp.where(approaching | fine_done, base, base + damping * step),
         base=base,
         # The finer solves begin afresh: their residuals are not the looser ones'.
         base_residual=jnp.where(refined, jnp.inf, base_residual),
@@ -168,10 +174,10 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
         step=step,
         base_return=base_return,
         damping=damping,
-        coarse=choose(coarse_done, base_return, now.coarse),
+        coarse=choose(witness & returned, latest, now.coarse),
         optimiser=optimiser,
-        code=jnp.where(returned, now.code, latest.code),
-        evaluations=now.evaluations + 1,
+        code=jnp.where(returned | witness, now.code, latest.code),
+        evaluations=now.evaluations + jnp.where(witness, 0, 1),
         history=history,
     )
 

@@ -18,7 +18,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, select
 from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, has_switches
 from jaxbiped.simulate._derivatives import first_derivatives_only
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
@@ -130,7 +130,7 @@ def _reverse_by_xla(
     seeded = Seeded(args, jnp.zeros((0, count)), STATE_FLOOR * inverse, ())
     found = _arrival(spec, precision, seeded, start, columns_only_choose_steps=True)
     known = (found.y.state, found.time)
-    smooth = not eqx.filter_eval_shape(spec.system.switches, args, state)
+    smooth = not has_switches(spec.system, args, state)
     y, time = _known_derivatives(smooth, found.undetermined, known, (args, state))
     return _reset_on_arrival(spec, args, y, time, found.code)
 

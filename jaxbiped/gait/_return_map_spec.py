@@ -71,16 +71,20 @@ class ReturnMapSpec(eqx.Module):
             section=_Arrival(system, self.section),
             ending=system.ending,
             peak=system.load if peak and loaded else None,
-            reset=system.reset_at_switch if resets(system, args, y) else None,
+            reset=system.reset_at_switch if has_switches(system, args, y, "resets") else None,
         )
 
 
-def resets(system: AbstractSystem, args: PyTree, y: PyTree) -> bool:
-    """Whether a system has switches that reset its state; known before anything runs."""
+def has_switches(system: AbstractSystem, args: PyTree, y: PyTree, kind: str = "value") -> bool:
+    """Whether a system has switches, all or those of a kind (`resets`, `first_only`).
+
+    Known before anything runs.
+    """
     found: list[bool] = []
 
     def look(args: PyTree, y: PyTree) -> None:
-        found.extend(switch.resets for switch in system.switches(args, y))
+        each = system.switches(args, y)
+        found.extend(kind == "value" or getattr(switch, kind) for switch in each)
 
     eqx.filter_eval_shape(look, args, y)
     return any(found)
@@ -130,7 +134,7 @@ def return_map_spec(
     elif holds_arrays(system):
         obstacle = f"the system {type(system).__name__} holds arrays, which belong in args"
     by = engine_for(engine, obstacle=obstacle, prefers_xla=system is not None)
-    if by == "xla" and resets(own, args, state):
+    if by == "xla" and has_switches(own, args, state, "resets"):
         raise ArgumentError(
             f"engine = {engine!r} is not allowed for a walker whose modes change: its gaits are "
             'found by lanes; give engine="lanes" and one of its solvers (rodas3p to rodas5p).'

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.compiler import LANES, XLA
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
@@ -20,7 +20,7 @@ from jaxbiped.gait._poincare_map import (
     recurring_indices,
     state_with,
 )
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, has_switches
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._adjoint_solve import Adjoints, carry_tangents, pull_back
 from jaxbiped.variational._flow import Flow, tangent_on_section
@@ -37,11 +37,13 @@ class SecondVariation(NamedTuple):
         slopes: the sums, shape (p,).
         by_point: what they have by each of the m recurring components, shape (m,).
         by_parameter: what they have by each parameter itself, moved by its size, shape (p,).
+        errors: of differences across a force that jumps or is steep, shape (p,); zero elsewhere.
     """
 
     slopes: Scalar
     by_point: Scalar
     by_parameter: Scalar
+    errors: RealScalarLike = 0.0
 
 
 def second_variation(
@@ -58,8 +60,9 @@ def second_variation(
     """Second derivatives of the return map along two sets of directions, as weighted sums.
 
     An adjoint: the leading tangents go along the cycle, the sum's derivatives with respect to what
-    it starts from come back, whatever the number of parameters. Where switches reset the state, of
-    which second derivatives are not followed, differences of first ones.
+    it starts from come back, whatever the number of parameters. Where second derivatives are not
+    followed, across a switch that resets the state or where the force jumps or is infinitely steep,
+    differences of first ones, by lanes alone. NaN where they are not known.
 
     Args:
         spec: of the return map.
@@ -80,11 +83,11 @@ def second_variation(
     engine = LANES if spec.engine == "lanes" else XLA
     watch = spec.watch(args.args, like)
     assert watch.section is not None
-    if watch.reset is not None:
-        along = _jacobian_slopes(spec, args, like, last, tangents, sizes, precision)
-        rows = along[:, -weights.shape[1] :]
-        slopes = jnp.einsum("vc,pcm,vm->p", weights, rows, leading)
-        return SecondVariation(slopes, jnp.zeros(len(tangents)), slopes)
+    if has_switches(spec.system, args.args, like, "first_only"):
+        if spec.engine == "xla":  # which would compile another solve, for minutes
+            unknown = jnp.full(len(sizes), jnp.nan)
+            return SecondVariation(unknown, jnp.zeros(len(tangents)), unknown)
+        return _by_differences(spec, args, like, last, leading, weights, tangents, sizes, precision)
     field = spec.system.vector_field
     flow = Flow(spec.system, watch.section, field, args, jtu.tree_structure(like))
     places = jnp.asarray(recurring_indices(spec.system, like))
@@ -103,7 +106,32 @@ def second_variation(
     for nodes, arrived, steps in reversed(carried):
         adjoints = pull_back(engine, flow, nodes, arrived, steps, adjoints)
     by_point, by_parameter = adjoints.family[places], adjoints.parameters * sizes
-    return SecondVariation(by_point @ tangents + by_parameter, by_point, by_parameter)
+    slopes = jnp.where(last.jumps > 0, jnp.nan, by_point @ tangents + by_parameter)
+    return SecondVariation(slopes, by_point, by_parameter)
+
+
+def _by_differences(
+    spec: ReturnMapSpec,
+    args: Seeded,
+    like: PyTree,
+    last: LinearisedReturn,
+    leading: Scalar,
+    weights: Scalar,
+    tangents: Scalar,
+    sizes: Scalar,
+    precision: Precision,
+) -> SecondVariation:
+    """The same from differences of Jacobians."""
+    pair, h = _jacobian_slopes(spec, args, like, last, tangents, sizes, precision)
+    rows, m = pair[:, :, -weights.shape[1] :], len(tangents)
+    slopes, rougher = jnp.einsum("vc,opcm,vm->op", weights, rows, leading)
+    errors: RealScalarLike = 0.0
+    if not has_switches(spec.system, args.args, like, "resets"):
+        # Between resets a motion is smooth; a force that jumps makes the Jacobians' errors rough.
+        own = jnp.concatenate([last.advance_rows, last.jacobian])[-weights.shape[1] :, :m]
+        size = jnp.einsum("vc,cm,vm->", *map(jnp.abs, (weights, own, leading)))
+        errors = jnp.abs(slopes - rougher) + precision.tangent_rtol * size / h
+    return SecondVariation(slopes, jnp.zeros(m), slopes, errors)
 
 
 def _jacobian_slopes(
@@ -114,10 +142,11 @@ def _jacobian_slopes(
     tangents: Scalar,
     sizes: Scalar,
     precision: Precision,
-) -> Scalar:
-    """Derivatives of the Jacobian's rows along p directions, shape (p, c, m).
+) -> tuple[Scalar, Scalar]:
+    """Derivatives of the Jacobian's rows along p directions, of two orders, shape (2, p, c, m), and
+    the steps of their differences, shape (p,).
 
-    Central differences of order four: the step balances their error and the solve's.
+    Central differences of order four, whose step balances their error and the solve's, and of two.
     """
     h = _STEP * jnp.power(precision.rtol, 0.2)
     m, parameters = len(tangents), jnp.stack([jnp.asarray(q) for q in active_leaves(args)])
@@ -134,7 +163,8 @@ def _jacobian_slopes(
     shares = h[:, None] * jnp.array([1.0, -1.0, 2.0, -2.0])
     each = jax.vmap(jax.vmap(rows, (None, None, 0)))
     near, back, far, farther = jnp.moveaxis(each(tangents.T, jnp.diag(sizes), shares), 1, 0)
-    return (8.0 * (near - back) - (far - farther)) / (12.0 * h[:, None, None])
+    pair = (8.0 * (near - back) - (far - farther)) / 12.0, (near - back) / 2.0
+    return jnp.stack(pair) / h[:, None, None], h
 
 
 def _behind_arrival(flow: Flow, arrival: Scalar, parameters: Scalar, leading: Scalar) -> Scalar:

@@ -176,8 +176,8 @@ class RigidScene(AbstractMinimalScene):
             standing: which feet stand, as in `Scene.state`: of the second of each pair, or without
                 a mirror of one leg, the last one unless told. The lowest of them stands, or both.
             held: the stops that are held, by their bodies or their own names, "NAME.upper" and
-                "NAME.lower" where they have both limits; `()` for none. None for those at a limit
-                that they do not move off.
+                "NAME.lower" where they have both limits; `()` for none. None for those that rest at
+                a limit: one that moves into it hits it as the motion begins.
             **values: angles [rad] and rates [rad/s] of bodies and place of the root point [m], as
                 `theta_BODY`, `omega_BODY`, `ROOT_x`: numbers, or arrays that broadcast to one
                 shape. What is not named is 0.

@@ -15,6 +15,8 @@ from jaxbiped.scene._structure import Indices
 
 AT_LIMIT = 1e-6
 """Distance from a limit [rad], and rate in rad/s, up to which a stop may be held."""
+_DRIFT = 1e-2
+"""The same of a state that a walk ended at."""
 _LEVEL = 1e-9
 """Difference of height of two feet, in units of the walker's height, up to which both stand."""
 
@@ -35,7 +37,8 @@ def starting_mode(
         slope: angle of the vertical [rad].
         state: scalars by name.
         standing: feet of one leg that may stand: the lowest of them does, or both.
-        held: names of stops that are held; None for those at a limit that they do not move off.
+        held: names of stops that are held; None for those that rest at a limit. One that moves
+            into its limit hits it as the motion begins.
 
     Raises:
         ArgumentError: a stop that is passed, or one that is held off its limit.
@@ -52,7 +55,7 @@ def starting_mode(
         closing = [limit.gap.of(rates) for limit in modes.limits]
         if named is None:
             stay = [
-                (numpy.abs(gap) <= AT_LIMIT) & (rate <= AT_LIMIT)
+                (numpy.abs(gap) <= AT_LIMIT) & (numpy.abs(rate) <= AT_LIMIT)
                 for gap, rate in zip(gaps, closing, strict=True)
             ]
         else:
@@ -79,6 +82,40 @@ def starting_mode(
                 f"moves at {rate} rad/s, where it must be at rest there."
             )
     return number
+
+
+def check_mode(mechanism: Mechanism, modes: Modes, slope: Parameter, state: Any) -> None:
+    """Refuses a state that passes a stop, or whose mode holds one that it is off or moves on.
+
+    Such states come from `_replace`, not from a scene's `state`. Less than a walk's own error is
+    allowed, so that a walk may go on from where another ended.
+
+    Raises:
+        ArgumentError: such a state, where it is known.
+    """
+    leaves, tree = jtu.tree_flatten(mechanism)
+    names, known = list(state._fields), len(state)
+
+    def found(numpy: Any, slope: Any, *numbers: Any) -> tuple[Any, ...]:
+        values = dict(zip(names, numbers[:known], strict=True))
+        placed: Mechanism = jtu.tree_unflatten(tree, numbers[known:])
+        angles, rates = angles_and_rates_named(placed, slope, values)
+        held = modes.decoded(numpy, values["mode"]).held
+        gaps = [limit.distance(placed, angles, slope) for limit in modes.limits]
+        closing = [limit.gap.of(rates) for limit in modes.limits]
+        return (*held, *gaps, *closing)
+
+    parts = by_numpy(found, as_float(slope), *state, *leaves)
+    count = len(modes.limits)
+    held, gaps, closing = (parts[k * count : (k + 1) * count] for k in range(3))
+    for limit, stays, gap, rate in zip(modes.limits, held, gaps, closing, strict=True):
+        off = stays & ((abs(gap) > _DRIFT) | (abs(rate) > _DRIFT))
+        if holds_somewhere(off | (gap < -_DRIFT)):
+            raise ArgumentError(
+                f"state.mode = {state.mode} is not allowed: the stop {limit.name!r} is {gap} rad "
+                f"off its limit and moves at {rate} rad/s, so that it is passed or cannot be held; "
+                "make the state with scene.state(...)."
+            )
 
 
 def _height(numpy: Any, mechanism: Mechanism, foot: int, angles: Any, rates: Any) -> Any:

@@ -26,6 +26,7 @@ from jaxbiped.dynamics._state import check_state, state_type, without_whole_turn
 from jaxbiped.scene._rigid_feet import rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
+from jaxbiped.scene._starting_mode import check_mode
 from jaxbiped.simulate._derivatives import with_derivatives
 from jaxbiped.simulate._slopes import Slopes, rigid_slopes_of
 from jaxbiped.simulate._start import (
@@ -101,6 +102,8 @@ class RigidSimulation(eqx.Module):
             state = in_one_precision(without_whole_turns(scene, state))
             check_single_scene(scene)
             check_unbatched("state", state, "one start")
+            if (modes := rigid_modes(scene.mechanism)).any:
+                check_mode(scene.mechanism, modes, scene.ground.slope, state)
             if duration is not None:
                 check_positive("duration", duration, "s")
             usual = ACCURACIES[asked.accuracy].rigid_walk

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from jaxbiped.gait._stability import Bifurcation, stability_of
+from jaxbiped.gait._stability import Bifurcation, eigenvalue_errors, stability_of
+from jaxbiped.linalg._small_matrices import eigensystem
 
 ROTATION = [[0.6, -0.8], [0.8, 0.6]]
 
@@ -44,3 +45,21 @@ def test_the_trivial_multiplier_is_left_out_though_another_is_larger():
     assert np.asarray(found.multipliers) == pytest.approx([-1.7, 0.4])
     assert float(found.spectral_radius) == pytest.approx(1.7)
     assert float(found.unit_error) < 1e-12
+
+
+def test_an_error_that_vanishes_by_chance_has_its_terms():
+    """Changes of a matrix under which no eigenvalue moves, of one on the diagonal, and of a pair
+    that meets: eigenvalues part as the root of a change."""
+
+    def errors(matrix, change):
+        found = eigensystem(jnp.asarray(matrix))
+        looser = np.linalg.eigvals(np.asarray(matrix) + change)
+        return np.asarray(eigenvalue_errors(found, jnp.asarray(change), jnp.asarray(looser)))
+
+    turn = np.array([[0.8, 0.6], [-0.6, 0.8]])
+    matrix = turn @ np.diag([0.5, -0.2]) @ turn.T
+    unseen = turn @ np.array([[0.0, 1e-6], [0.0, 0.0]]) @ turn.T
+    assert np.all(errors(matrix, unseen) > 1e-7)
+    np.testing.assert_allclose(errors(np.diag([0.5, 0.2]), np.diag([1e-6, 0.0])), [1e-6, 0.0])
+    near = errors([[0.5, 1.0], [0.0, 0.5 + 1e-9]], np.array([[0.0, 0.0], [1e-8, 0.0]]))
+    assert np.all((near >= 0.99e-4) & (near < 1e-3))

@@ -47,8 +47,30 @@ def test_sensitivities_equal_differences(gait, name):
     assert ours == pytest.approx(expected, rel=1e-4)
 
 
-def test_what_would_need_more_is_not_a_number(gait):
-    """The peak lies right behind the jump, and the radius takes second derivatives."""
+@pytest.mark.parametrize("law", ["kelvin-voigt", "tsuji", "kuwabara-kono"])
+def test_sensitivities_of_the_radius_are_differences_of_gaits(law):
+    """Also where the force is infinitely steep at touchdown."""
+    normal = jb.laws.normal_law_like(law, K=1e6, c=1e7, n=1.5, mass=2.0)
+    scene = dataclasses.replace(SCENE, normal=normal)
+    gait = jb.find_gait(scene, parameters=("slope", "m", "mu_kinetic"))
+
+    def radius(name, value):
+        moved = jb.with_parameters(scene, {name: value})
+        how = dict(accuracy="tight", parameters=())
+        return float(jb.find_gait(moved, gait.measures.state, **how).measures.spectral_radius)
+
+    values = 0.02, 1.0, float(scene.friction.mu_kinetic)
+    slopes, errors = (
+        each.spectral_radius for each in (gait.sensitivities, gait.sensitivity_errors)
+    )
+    for name, value, slope, error in zip(gait.parameters, values, slopes, errors, strict=True):
+        h = 1e-3 * value
+        expected = (radius(name, value + h) - radius(name, value - h)) / (2.0 * h)
+        assert abs(float(slope) - expected) <= float(error) + 1e-4 * abs(expected)
+        assert float(error) <= 0.1 * abs(expected)
+
+
+def test_what_lies_right_behind_the_jump_is_not_a_number(gait):
     assert np.all(np.isnan(gait.sensitivities.peak_normal))
-    assert np.all(np.isnan(gait.sensitivities.spectral_radius))
+    assert np.all(np.isfinite(gait.sensitivities.spectral_radius))
     assert np.isfinite(float(gait.measures.peak_normal))

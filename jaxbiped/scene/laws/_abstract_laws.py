@@ -24,11 +24,13 @@ class AbstractNormalLaw(AbstractNamedPart):
     Attributes:
         jumps_at_touchdown: whether the force itself, not its derivatives alone, jumps where a
             foot that comes down begins to touch. A property of the class.
+        steep_at_touchdown: whether it is infinitely steep there, in the depth or in its rate.
     """
 
     catalogue: ClassVar[dict[str, Any]] = NORMAL_LAWS
     needed: ClassVar[tuple[str, ...]] = ("like_seed",)
     jumps_at_touchdown: ClassVar[bool] = False
+    steep_at_touchdown: ClassVar[bool] = False
 
     @abc.abstractmethod
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:

@@ -75,6 +75,7 @@ class KuwabaraKono(AbstractHertzianLaw):
     """
 
     name: ClassVar[str] = "kuwabara-kono"
+    steep_at_touchdown: ClassVar[bool] = True
     K: Parameter = parameter("contact stiffness", "$K$", "N/m^1.5", positive=True)
     gamma: Parameter = parameter("contact damping", r"$\gamma$", "N s/m^1.5", minimum=0.0)
 
@@ -114,6 +115,7 @@ class Tsuji(AbstractHertzianLaw):
     """
 
     name: ClassVar[str] = "tsuji"
+    steep_at_touchdown: ClassVar[bool] = True
     K: Parameter = parameter("contact stiffness", "$K$", "N/m^1.5", positive=True)
     gamma: Parameter = parameter("contact damping", r"$\gamma$", "N s/m^1.25", minimum=0.0)
 
