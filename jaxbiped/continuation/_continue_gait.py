@@ -1,6 +1,7 @@
 """Continuation of a gait in a parameter of its scene, from the gait or on from a branch's point."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax.tree_util as jtu
 import numpy as np
@@ -104,7 +105,9 @@ def continue_gait(
             radius = abs(point.multipliers[0])
             now.update(found=f"radius {radius:.4g} at {along} = {point.value:.6g}")
 
-        steps = dict(largest_step=float(largest_step), max_points=int(max_points), tell=tell)
+        steps: dict[str, Any] = dict(
+            largest_step=largest_step, max_points=max_points, tell=tell, interruptible=True
+        )
         before = setup.trace(begin._replace(tangent=-begin.tangent), **steps)
         known = before.reversed()
         if before.stop.end in (BranchEnd.CLOSED, BranchEnd.INTERRUPTED):
@@ -202,7 +205,11 @@ def resume_branch(
     known = Trace(points, events, branch.stops[0 if forward else 1])
     passed = (known if forward else known.reversed()).points[:-1]
     beyond = setup.trace(
-        begin.found, largest_step=largest_step, max_points=max_points, passed=passed
+        begin.found,
+        largest_step=largest_step,
+        max_points=max_points,
+        passed=passed,
+        interruptible=True,
     )
     return setup.branch(known, beyond) if forward else setup.branch(beyond.reversed(), known)
 
