@@ -106,7 +106,10 @@ def continue_gait(
             now.update(found=f"radius {radius:.4g} at {along} = {point.value:.6g}")
 
         steps: dict[str, Any] = dict(
-            largest_step=largest_step, max_points=max_points, tell=tell, interruptible=True
+            largest_step=float(largest_step),
+            max_points=int(max_points),
+            tell=tell,
+            interruptible=True,
         )
         before = setup.trace(begin._replace(tangent=-begin.tangent), **steps)
         known = before.reversed()
