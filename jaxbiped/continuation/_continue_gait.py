@@ -105,7 +105,12 @@ def continue_gait(
             radius = abs(point.multipliers[0])
             now.update(found=f"radius {radius:.4g} at {along} = {point.value:.6g}")
 
-        steps = dict(largest_step=float(largest_step), max_points=int(max_points), tell=tell)
+        steps: dict[str, Any] = dict(
+            largest_step=float(largest_step),
+            max_points=int(max_points),
+            tell=tell,
+            interruptible=True,
+        )
         before, after = traces_from(setup, begin, **steps)
     before, after = map(setup.with_cause, (before, after))
     return setup.branch(before.reversed(), after)
@@ -210,7 +215,11 @@ def resume_branch(
     known = Trace(points, events, branch.stops[0 if forward else 1])
     passed = (known if forward else known.reversed()).points[:-1]
     beyond = setup.trace(
-        begin.found, largest_step=largest_step, max_points=max_points, passed=passed
+        begin.found,
+        largest_step=largest_step,
+        max_points=max_points,
+        passed=passed,
+        interruptible=True,
     )
     return setup.branch(known, beyond) if forward else setup.branch(beyond.reversed(), known)
 

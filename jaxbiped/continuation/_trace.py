@@ -170,6 +170,7 @@ def trace(
     until: Collection[BranchEvent] = (),
     passed: Sequence[BranchPoint] = (),
     tell: Callable[[BranchPoint], object] = lambda point: None,
+    interruptible: bool = False,
 ) -> Trace:
     """Follows a curve of gaits onwards along a point's tangent; that point is the first.
 
@@ -181,6 +182,7 @@ def trace(
         until: kinds of bifurcations at the first of which to stop.
         passed: points of the same branch before the first, in their order.
         tell: is called with each point.
+        interruptible: whether an interrupt ends the trace with its points so far; else it passes.
     """
     points = [branch_point(curve, axis, begin)]
     events: list[BifurcationPoint] = []
@@ -231,6 +233,8 @@ def trace(
                 return stopped(BranchEnd.CLOSED, "the branch is closed")
             here = there
     except KeyboardInterrupt:
+        if not interruptible:
+            raise
         return stopped(BranchEnd.INTERRUPTED, "interrupted by Ctrl-C")
     return stopped(BranchEnd.UNFINISHED, f"{max_points} points were followed")
 

@@ -155,7 +155,7 @@ def _both_ways(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> list[
     begin = setup.at_value(setup.recurring(gait.measures.state), own).found
     if begin is None:
         return []
-    both = [
+    return [
         setup.trace(
             begin._replace(tangent=way * begin.tangent),
             largest_step=_LARGEST_STEP,
@@ -164,9 +164,6 @@ def _both_ways(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> list[
         )
         for way in (-1.0, 1.0)
     ]
-    if any(part.stop.end is BranchEnd.INTERRUPTED for part in both):
-        raise KeyboardInterrupt  # half a branch has no distance
-    return both
 
 
 def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> Functional | None:

@@ -4,6 +4,7 @@ import pytest
 import xarray
 
 import jaxbiped as jb
+from jaxbiped import _progress
 from tests.cli.commands import numbers_of, outputs_of, run
 from tests.drawn import assert_is_drawn
 
@@ -48,10 +49,11 @@ def test_figures_and_dataset(followed):
     assert len(branch.bifurcations) == 1
 
 
-def test_what_is_printed(capsys):
+def test_what_is_printed(capsys, monkeypatch):
+    monkeypatch.setattr(_progress, "_PATIENCE", 0.0)
     assert run("continue", "--model", "rigid", "--from", "0.018", "--to", "0.022") == 0
     printed = capsys.readouterr()
-    assert "gaits" in printed.err
+    assert "following the gait along slope" in printed.err
     said = printed.out
     assert "slope rad" in said
     assert "last end at slope = 0.022: reached (the range ends)" in said

@@ -7,6 +7,7 @@ import importlib
 import pytest
 
 import jaxbiped as jb
+from jaxbiped._progress import Stage
 from jaxbiped.cli import main
 
 WALK = "walk --duration 0.05"
@@ -34,9 +35,9 @@ def test_the_slow_part_is_named(arguments, module, slow, word, monkeypatch, tmp_
     active = []
 
     @contextlib.contextmanager
-    def recorded(message):
+    def recorded(message, *, total=None, unit=""):
         active.append(message)
-        yield
+        yield Stage(message, total, unit, 0)
         active.pop()
 
     def stop(*_, **__):
@@ -48,5 +49,5 @@ def test_the_slow_part_is_named(arguments, module, slow, word, monkeypatch, tmp_
     monkeypatch.setattr(functools.reduce(getattr, parts, jb), name, stop)
     with pytest.raises(_ReachedError):
         main(arguments.replace("OUT", str(tmp_path)).split())
-    (message,) = active
+    *_, message = active
     assert word in message

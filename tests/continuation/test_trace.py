@@ -229,7 +229,10 @@ def test_ctrl_c_ends_a_branch_with_the_points_so_far():
             raise KeyboardInterrupt
 
     whole = traced(*logistic((2.0, 4.0)), [0.5], 2.0)
-    part = traced(*logistic((2.0, 4.0)), [0.5], 2.0, tell=tell)
+    part = traced(*logistic((2.0, 4.0)), [0.5], 2.0, tell=tell, interruptible=True)
     assert part.stop.end is BranchEnd.INTERRUPTED
     assert [p.value for p in part.points] == [p.value for p in whole.points[: len(part.points)]]
     assert part.points[-1].value == told[-1].value
+    told.clear()
+    with pytest.raises(KeyboardInterrupt):
+        traced(*logistic((2.0, 4.0)), [0.5], 2.0, tell=tell)
