@@ -53,7 +53,7 @@ FIGURE_STYLES = {
 }
 """By name; a paper's widths are those of the American Physical Society's columns."""
 
-_EMBEDDED: dict[str, Any] = {
+_EMBEDDED: Any = {
     # TrueType, which publishers ask for; letters of an SVG are curves, so no font need be there.
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
@@ -75,7 +75,7 @@ class _Chosen(NamedTuple):
         """Width of figures [inches]; their own if None."""
         return self.style.widths and self.style.widths[self.columns - 1]
 
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> Any:
         """Matplotlib's settings for it."""
         if self.style is FIGURE_STYLES["screen"]:
             return {}
@@ -225,7 +225,7 @@ def save_figure(
         check_choice("formats", each, FIGURE_FORMATS)
         where = check_writable_file("path", stem.with_name(f"{stem.name}.{each}"))
         with mpl.rc_context(_EMBEDDED):
-            own = {} if dpi is None else {"dpi": dpi}
+            own: dict[str, Any] = {} if dpi is None else {"dpi": dpi}
             figure.savefig(where, metadata=_UNDATED.get(each), **own)
         written.append(where)
     return written

@@ -79,7 +79,7 @@ def _draw_estimates(ax: Axes, fitted: GaitFit, names: list[str]) -> None:
             text += ", undetermined"
         elif name in fitted.at_bounds:
             text += ", at a bound"
-        style.label_point(ax, text, (0.0, place), (0, 6), ha="center", va="bottom")
+        style.label_point(ax, text, (0.0, float(place)), (0, 6), ha="center", va="bottom")
     style.dress(ax, "", "interval relative to the estimate (%)", "")
     ax.spines["left"].set_visible(False)
     ax.tick_params(axis="y", length=0)

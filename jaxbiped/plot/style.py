@@ -10,7 +10,8 @@ from matplotlib.transforms import ScaledTranslation
 
 from jaxbiped.basins._labels import Label
 from jaxbiped.plot._figure_style import has_titles as has_titles
-from jaxbiped.plot._figure_style import is_narrow, letter_size, make_room
+from jaxbiped.plot._figure_style import is_narrow as is_narrow
+from jaxbiped.plot._figure_style import letter_size, make_room
 from jaxbiped.plot._figure_style import new_figure as new_figure
 from jaxbiped.plot._figure_style import panels_abreast as panels_abreast
 

@@ -1,12 +1,14 @@
 """Figures of contact laws, against the laws themselves."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 import jaxbiped as jb
 from jaxbiped import plot
-from tests.drawn import assert_is_drawn, legend_of
+from tests.drawn import assert_is_drawn, legend_of, points_of
 from tests.scene.laws.drop import restitutions
 
 SEED = dict(K=1e6, c=2e5, n=1.5, mass=2.0)
@@ -122,3 +124,28 @@ def test_bristles_make_a_loop(name):
         plot.bristle_law(law, slip_speed=0.0)
     with pytest.raises(jb.ArgumentError, match="law = Viscous"):
         plot.bristle_law(jb.laws.Viscous(k=1.0))
+
+
+def test_laws_of_friction_side_by_side():
+    """Each curve is its law's own; laws of one kind are named by what differs."""
+    own = jb.seed_scene().friction
+    laws = (own, dataclasses.replace(own, mu_kinetic=0.1), jb.laws.BrownMcPhee.like_seed(own))
+    (ax,) = plot.friction_law(*laws).axes
+    names = legend_of(ax)
+    assert names == [
+        r"Bengisu and Akay, $\mu$ = 0.4",
+        r"Bengisu and Akay, $\mu$ = 0.1",
+        "Brown and McPhee",
+    ]
+    for law, name in zip(laws, names, strict=True):
+        slip, force = points_of(ax, name)[0].T
+        expected = law.force(np.full(slip.shape, 20.0), slip) / 20.0
+        np.testing.assert_allclose(force, expected, atol=1e-12)
+    curves = [line for line in ax.lines if line.get_label() in names]
+    assert len({str(line._dash_pattern) for line in curves}) == 3
+    assert len({line.get_color() for line in curves}) == 3
+
+
+def test_no_law_is_refused():
+    with pytest.raises(jb.ArgumentError, match="laws is empty"):
+        plot.friction_law()

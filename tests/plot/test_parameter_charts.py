@@ -120,3 +120,26 @@ def test_measures_are_of_a_footstep_and_have_their_units():
         assert_is_drawn(figure)
         assert figure.axes[0].get_xscale() == "log"
         assert points_of(figure.axes[0])[0] == pytest.approx(np.array([[0.02, value]])), name
+
+
+def test_the_radius_has_its_errors_and_the_line_of_one():
+    points = [branch_point(0.02 * k, 0.3 * k, error=0.01 * k) for k in (1, 2, 3)]
+    (ax,) = branch(_branch(points), "spectral_radius").axes
+    (band,) = ax.collections
+    corners = band.get_paths()[0].vertices
+    for k in (1, 2, 3):
+        heights = corners[np.isclose(corners[:, 0], 0.02 * k), 1]
+        assert (heights.min(), heights.max()) == pytest.approx((0.29 * k, 0.31 * k))
+    (line,) = (each for each in ax.lines if each.get_label() == "radius 1")
+    assert set(line.get_ydata()) == {1.0}
+    assert ax.get_ylim()[1] > 1.0
+    assert "radius 1" in legend_of(ax)
+    # An error that is not known, where the gait grazes, has no band.
+    grazing = branch(_branch([branch_point(0.02, 0.3, error=np.inf), *points]), "spectral_radius")
+    assert np.isfinite(grazing.axes[0].get_ylim()).all()
+
+
+def test_cycles_of_more_footsteps_have_thinner_lines():
+    found = [_branch(POINTS, footsteps=count) for count in (1, 2)]
+    (ax,) = branch(found).axes
+    assert len({line.get_linewidth() for line in ax.lines if len(line.get_xdata()) > 1}) == 2

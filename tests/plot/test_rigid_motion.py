@@ -5,6 +5,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.plot._rigid_motion import rigid_motion
+from jaxbiped.plot._samples import DrawnMotion
 from jaxbiped.plot._skeleton import poses
 
 pytestmark = pytest.mark.slow
@@ -72,3 +73,19 @@ def test_figures_draw_rigid_walks(wheel):
     none = jb.simulate(scene, walk.final, duration=0.1)
     with pytest.raises(jb.ArgumentError, match="no heel strikes"):
         jb.plot.leg_angles(scene, none)
+
+
+def test_no_turn_of_a_long_rigid_walk_is_passed_over():
+    """Each footstep's largest rate, against that of the gait's first footsteps drawn finely."""
+    scene = jb.ladder()["rigid"]
+    gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
+    walk = jb.simulate(scene, gait.measures.state, footsteps=300, save=jb.HeelStrike())
+    drawn = DrawnMotion(scene, walk)
+    t, motion = drawn.sampled()
+    began = rigid_motion(scene, walk).began
+    rows = np.searchsorted(began, t, side="right") - 1
+    finely = drawn.at(np.linspace(began[0], began[2], 4001)[:-1])
+    truth = max(np.max(finely[name]) for name in ("omega_1", "omega_2"))
+    rates = np.maximum(motion["omega_1"], motion["omega_2"])
+    largest = [rates[rows == row].max() for row in range(len(began) - 1)]
+    np.testing.assert_allclose(largest, truth, rtol=1e-4)
