@@ -60,7 +60,7 @@ def latex_number(value: float, error: float | None = None) -> str:
     power = whole if whole >= _LARGE or whole < _SMALL or last > 0 else 0
     decimals = power - last
     bar = round(Decimal(error).scaleb(-last))
-    text = f"{Decimal(value).scaleb(-power):.{decimals}f}({bar})"
+    text = f"{Decimal(value).scaleb(-power):z.{decimals}f}({bar})"
     return f"{text}e{power}" if power else text
 
 
