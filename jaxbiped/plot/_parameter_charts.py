@@ -138,7 +138,7 @@ def _value(measure: str, each: Branch, point: BranchPoint) -> float:
 
 def _look(k: int) -> dict[str, Any]:
     """Of the lines of the k-th number of footsteps: thinner ones for more of them."""
-    return {"color": style.colour_of(k), "linewidth": 1.6 * 0.65**k}
+    return {"color": style.colour_of(k), "linewidth": max(0.8, 1.6 * 0.75**k)}
 
 
 def _draw_errors(ax: Axes, each: Branch, colour: str) -> None:
