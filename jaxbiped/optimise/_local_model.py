@@ -6,7 +6,6 @@ designs' linearisations bound the sum from below, as in bundle methods; they are
 best design has, for functions that are not convex (Kiwiel 1985).
 """
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -205,9 +204,7 @@ class Model(NamedTuple):
             matrix[-1][size - 2] = -1.0 / here.bound
         rows, values = np.stack(matrix), np.asarray(right)
 
-        @functools.lru_cache(maxsize=1)  # values and derivatives are asked for one after the other
-        def spare(numbers: bytes) -> tuple[np.ndarray, np.ndarray]:
-            x = np.frombuffer(numbers)
+        def spare(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             found, jacobians = [rows @ x + values], [rows]
             for each in every if here.has_radius else ():
                 move = here.u + reach * x[:k] - each.u
@@ -239,9 +236,7 @@ class Model(NamedTuple):
             method="SLSQP",
             bounds=scipy.optimize.Bounds(least, most),
             constraints={
-                "type": "ineq",
-                "fun": lambda x: spare(x.tobytes())[0],
-                "jac": lambda x: spare(x.tobytes())[1],
+                "type": "ineq", "fun": lambda x: spare(x)[0], "jac": lambda x: spare(x)[1]
             },
             options={"maxiter": 100, "ftol": 1e-13},
         ).x  # fmt: skip
