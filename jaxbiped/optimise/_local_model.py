@@ -217,16 +217,6 @@ class Model(NamedTuple):
                 jacobians.append(by_x)
             return np.concatenate(found), np.concatenate(jacobians)
 
-        # Values and derivatives are asked for one after the other, at the same place.
-        last: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
-
-        def known(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            key = x.tobytes()
-            if key not in last:
-                last.clear()
-                last[key] = spare(x)
-            return last[key]
-
         lower, upper = np.maximum(-here.u / reach, -1.0), np.minimum((1.0 - here.u) / reach, 1.0)
         least, most = np.zeros(size), np.full(size, np.inf)
         least[:k], most[:k], least[k] = lower, upper, -np.inf
@@ -246,9 +236,7 @@ class Model(NamedTuple):
             method="SLSQP",
             bounds=scipy.optimize.Bounds(least, most),
             constraints={
-                "type": "ineq",
-                "fun": lambda x: known(x)[0],
-                "jac": lambda x: known(x)[1],
+                "type": "ineq", "fun": lambda x: spare(x)[0], "jac": lambda x: spare(x)[1]
             },
             options={"maxiter": 100, "ftol": 1e-13},
         ).x  # fmt: skip
