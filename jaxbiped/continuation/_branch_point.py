@@ -9,7 +9,6 @@ from jaxbiped.continuation._cycle import Cycle
 from jaxbiped.gait._orbit_derivatives import CLOSENESS
 from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint
 from jaxbiped.gait._stability import critical_bifurcation, eigenvalue_errors
-from jaxbiped.linalg._small_matrices import Eigensystem
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameter_access import (
     parameter_names,
@@ -160,7 +159,7 @@ def branch_point(curve: Curve, axis: Axis, found: CurvePoint) -> BranchPoint:
     m = len(found.place) - 1
     jacobian, looser = np.asarray(cycle.jacobian)[:, :, :m]
     system = _leading_eigensystem(jacobian)
-    values = system.values
+    values = system[0]
     errors = np.asarray(eigenvalue_errors(system, looser - jacobian, np.linalg.eigvals(looser)))
     return BranchPoint(
         value=axis.value(float(found.place[-1])),
@@ -185,11 +184,11 @@ def multipliers_of(change: Change) -> np.ndarray:
     another comes to 1, both have the square root of the derivative's error.
     """
     jacobian = np.asarray(change.seen.jacobian[0])
-    return np.asarray(_leading_eigensystem(jacobian[:, : len(jacobian)]).values)
+    return _leading_eigensystem(jacobian[:, : len(jacobian)])[0]
 
 
-def _leading_eigensystem(matrix: np.ndarray) -> Eigensystem:
-    """All but the smallest eigenvalue, largest first."""
+def _leading_eigensystem(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All but the smallest eigenvalue, largest first, with right and left eigenvectors."""
     import scipy.linalg
 
     values, left, right = scipy.linalg.eig(matrix, left=True)
@@ -197,7 +196,7 @@ def _leading_eigensystem(matrix: np.ndarray) -> Eigensystem:
     left = np.conj(left[:, order]).T
     with np.errstate(divide="ignore", invalid="ignore"):
         left = left / np.sum(left.T * right[:, order], axis=0)[:, None]
-    return Eigensystem(values[order], right[:, order], left)
+    return values[order], right[:, order], left
 
 
 def _unit_error(cycle: Cycle) -> float:

@@ -101,7 +101,9 @@ def critical_bifurcation(values: Numbers, errors: Numbers, closeness: float) -> 
     return found
 
 
-def eigenvalue_errors(found: Eigensystem, change: Numbers, looser: Numbers) -> Scalar:
+def eigenvalue_errors(
+    found: tuple[Numbers, Numbers, Numbers], change: Numbers, looser: Numbers
+) -> Scalar:
     """Errors of eigenvalues λ = wᵀ A v, of a change of the matrix of which only the size is known.
 
     No less than the distance to the changed matrix's own eigenvalues, `looser`. That alone is no
