@@ -260,7 +260,7 @@ def _radius_slopes(
         problem.spec, seeds, problem.guess, last, leading, weights, family, sizes, precision
     )
     terms = jnp.abs(found.by_point) @ _term_sizes(last) + jnp.abs(found.by_parameter)
-    return found.slopes, terms, found.errors + jnp.zeros_like(found.slopes)
+    return found.slopes, terms, jnp.broadcast_to(found.errors, found.slopes.shape)
 
 
 def _term_sizes(last: LinearisedReturn) -> Scalar:
