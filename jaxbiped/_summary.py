@@ -6,6 +6,7 @@ first asked for, as this lies below all that draws.
 
 import collections
 import enum
+import importlib
 
 import equinox as eqx
 import jax
@@ -39,9 +40,9 @@ def summary(
 
 def notebook_html(shown: object) -> str:
     """HTML of a result or a scene, see `jaxbiped.plot.notebook_html`."""
-    import jaxbiped as jb
-
-    return jb.plot.notebook_html(shown)
+    # By its name: an import would make the keys of kept programs depend on all that draws.
+    html: str = importlib.import_module("jaxbiped.plot").notebook_html(shown)
+    return html
 
 
 def _outcomes(code: ArrayLike, names: type[enum.IntEnum]) -> str:

@@ -31,6 +31,10 @@ def _rolled():
     return jb.rigid_walk(RIGID, ROLLING, footsteps=2, max_arrivals=2)
 
 
+def _numbers_of(steps):
+    return {name: column for name, column in vars(steps).items() if column.dtype == float}
+
+
 def _many(state):
     return jax.tree.map(lambda leaf: np.full(2, float(leaf)), state)
 
@@ -66,7 +70,7 @@ CALLS = {
     "a lane that fails": lambda: jax.vmap(lambda K: _of_stiffness(K).ending)(
         jnp.asarray([1e6, -1.0])
     ),
-    "footsteps": lambda: jb.footsteps(SCENE, _walk()),
+    "footsteps": lambda: _numbers_of(jb.footsteps(SCENE, _walk())),
     "energy_ledger": lambda: jb.energy_ledger(SCENE, _walk()),
     "trajectory_dataset": lambda: jb.trajectory_dataset(SCENE, _walk()).hip_x.values,
     "view": lambda: len(jb.plot.view(SCENE, _walk()).html()) > 0,

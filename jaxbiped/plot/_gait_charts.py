@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import jax.tree_util as jtu
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -47,14 +48,11 @@ def multipliers(gait: Gait | BranchPoint, *, ax: Axes | None = None) -> Figure:
         ValueError: no gait was found, or this is a batch.
     """
     if isinstance(gait, BranchPoint):
-        errors, stable, critical = (
-            gait.multiplier_errors,
-            gait.stable,
-            Bifurcation(gait.bifurcation),
-        )
+        errors, stable = np.asarray(gait.multiplier_errors), gait.stable
+        critical = Bifurcation(gait.bifurcation)
     else:
         check_drawable(gait)
-        errors = error_bars(gait, "multipliers")
+        errors = np.asarray(error_bars(gait, "multipliers"))
         stable, critical = bool(gait.stable), gait.critical
     values = np.asarray(gait.multipliers)
     ax = style.axes_or_new(ax, 5.6, 5.6)
@@ -105,19 +103,21 @@ def elasticity_errors(gait: Gait, name: str) -> np.ndarray:
     An elasticity is a sensitivity times the parameter over the measure, and has their relative
     errors.
     """
-    slopes, bars = gait.sensitivities, error_bars(gait, "sensitivities")
-    value = np.asarray(getattr(gait.measures, name))
-    own = np.asarray(getattr(gait.elasticities, name))
+    parts = gait.sensitivities, gait.measures, gait.elasticities, gait.measure_errors
+    # By NumPy: JAX would compile a program for each of what follows.
+    slopes, measures, relative_slopes, errors = jtu.tree_map(np.asarray, parts)
+    bars = np.asarray(getattr(error_bars(gait, "sensitivities"), name))
+    value, own = getattr(measures, name), getattr(relative_slopes, name)
     with np.errstate(divide="ignore", invalid="ignore"):
         # The parameter itself, from any measure that it changes.
         sizes = [
-            np.abs(getattr(gait.elasticities, each) * getattr(gait.measures, each))
+            np.abs(getattr(relative_slopes, each) * getattr(measures, each))
             / np.abs(getattr(slopes, each))
             for each in MEASURES
         ]
         parameter = np.nanmax(np.where(np.isfinite(sizes), sizes, 0.0), axis=0)
-        relative = np.abs(getattr(gait.measure_errors, name) / value)
-        found = parameter * getattr(bars, name) / np.abs(value) + np.abs(own) * relative
+        relative = np.abs(getattr(errors, name) / value)
+        found = parameter * bars / np.abs(value) + np.abs(own) * relative
     return np.where(np.isfinite(own) & np.isfinite(found), found, np.nan)
 
 

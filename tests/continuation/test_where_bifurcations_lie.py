@@ -49,16 +49,15 @@ GAIT = SimpleNamespace(
 )
 
 
-def follows(monkeypatch, own, before, after, *others):
-    """Branches through the gait at a value, between events in their order along them."""
+def follows(monkeypatch, before, after):
+    """Branches through a gait: events to both sides, in their order away from it."""
     asked = {}
-    middle = SimpleNamespace(value=own, place=np.array([-1.0]), recurring=np.ones(4))
-    again = [
-        SimpleNamespace(value=x, place=np.array([-2.0]), recurring=np.zeros(4)) for x in others
-    ]
-    points = (*(e.point for e in before), middle, *(e.point for e in after), *again)
-    found = SimpleNamespace(bifurcations=[*before, *after], points=points)
-    monkeypatch.setattr(nearest, "continue_gait", lambda *_, **how: asked.update(how) or found)
+    parts = [SimpleNamespace(bifurcations=events) for events in (before, after)]
+    monkeypatch.setattr(nearest, "axis_of", lambda *given: asked.update(bounds=given[2]))
+    monkeypatch.setattr(nearest, "continuation_setup", lambda *_, **__: None)
+    monkeypatch.setattr(nearest, "state_of_guess", lambda *_: None)
+    monkeypatch.setattr(nearest, "first_gait", lambda *_: SimpleNamespace())
+    monkeypatch.setattr(nearest, "traces_from", lambda *_, **how: asked.update(how) or parts)
     return asked
 
 
@@ -67,9 +66,10 @@ def follows(monkeypatch, own, before, after, *others):
     [(0.02, 0.005, 0.05, 0.05), (0.02, 0.01, 0.05, 0.01), (0.0, -0.01, 0.005, 0.005)],
 )
 def test_the_nearest_is_that_of_the_smallest_factor(slope, before, after, first, monkeypatch):
-    asked = follows(monkeypatch, slope, [event(before)], [event(after)])
+    asked = follows(monkeypatch, [event(before)], [event(after)])
     scene = jb.with_parameters(SCENE, {"slope": slope})
     found = nearest.nearest_bifurcation(scene, GAIT)
+    assert set(asked["until"]) == set(BranchEvent)
     assert found.value == first
     assert (found.kind, found.error) == (BranchEvent.FOLD, 0.01)
     if slope:
@@ -81,9 +81,9 @@ def test_the_nearest_is_that_of_the_smallest_factor(slope, before, after, first,
 
 
 def test_what_lies_beyond_a_fold_is_another_gaits(monkeypatch):
-    """The branch turns back at 0.05 and passes the gait's own value again, with another gait."""
+    """The branch turns back at 0.05, and doubles near the gait's own value, but not that gait."""
     doubling = event(0.021, BranchEvent.PERIOD_DOUBLING)
-    follows(monkeypatch, 0.02, [event(0.004)], [event(0.05), doubling], 0.02)
+    follows(monkeypatch, [event(0.004)], [event(0.05), doubling])
     found = nearest.nearest_bifurcation(jb.with_parameters(SCENE, {"slope": 0.02}), GAIT)
     assert (found.kind, found.value) == (BranchEvent.FOLD, 0.05)
 
@@ -91,7 +91,7 @@ def test_what_lies_beyond_a_fold_is_another_gaits(monkeypatch):
 def test_where_one_was_not_located_the_nearer_end_counts(monkeypatch):
     later = event(0.08, BranchEvent.NOT_LOCATED)
     later.beyond = 0.025
-    follows(monkeypatch, 0.02, [event(0.01)], [later])
+    follows(monkeypatch, [event(0.01)], [later])
     scene = jb.with_parameters(SCENE, {"slope": 0.02})
     assert nearest.nearest_bifurcation(scene, GAIT).kind is BranchEvent.NOT_LOCATED
 

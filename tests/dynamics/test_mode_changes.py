@@ -99,8 +99,9 @@ def test_heights_of_feet_are_those_of_their_lowest_points():
     assert abs(float(stance.height(1))) < 1e-15
 
 
-@pytest.mark.parametrize(("rate", "holds"), [(-0.3, False), (0.0, True), (0.3, True)])
-def test_a_start_holds_the_stops_at_whose_limit_it_stays(rate, holds):
+@pytest.mark.parametrize(("rate", "holds"), [(-0.3, False), (0.0, True), (0.3, False)])
+def test_a_start_holds_the_stops_at_whose_limit_it_rests(rate, holds):
+    """One that moves into its limit hits it."""
     scene = hsu_chen()
     state = scene.state(**ANGLES, **RATES, omega_shank_1=rate)
     assert mode_of(scene, state)[1] == [holds, True]

@@ -68,7 +68,7 @@ def test_strike_times_equal_the_independent_integrators(seed_walk, reference):
 def test_a_short_walk_has_no_complete_footstep():
     scene = jb.seed_scene()
     steps = jb.footsteps(scene, jb.simulate(scene, jb.seed_state(), duration=0.5))
-    assert all(column.shape == (0,) for column in steps)
+    assert all(column.shape == (0,) for column in vars(steps).values())
 
 
 def test_a_trajectory_without_its_continuous_solution_is_refused():

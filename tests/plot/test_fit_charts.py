@@ -1,5 +1,7 @@
 """Charts of fits and of optimisations, against results made by hand: nothing is compiled."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ import jaxbiped as jb
 from jaxbiped import plot
 from jaxbiped.optimise._objective_values import Evaluation
 from jaxbiped.optimise._optimality import Held, Optimality
-from jaxbiped.optimise._runs import Iteration
+from jaxbiped.optimise._optimum import Iteration
 from tests.drawn import assert_is_drawn, points_of
 from tests.plot.test_figure_style import assert_fits
 
@@ -24,6 +26,7 @@ def _fit(**changes):
         "residuals": np.array([0.5, -1.0, 2.0, 0.0]),
         "freedom": 2,
         "evaluations": 9,
+        "units": {"K": "N/m", "J": "kg m^2", "d": "m"},
     }
     return jb.identify.GaitFit(**known | changes)
 
@@ -104,14 +107,14 @@ def test_each_quantity_of_an_optimisation_has_a_panel_with_its_own_unit():
 def test_an_objective_of_several_measures_has_no_unit_of_theirs():
     found = _optimum()
     sums = [each._replace(objective=2.0) for each in found.history]
-    figure = plot.optimisation(found._replace(history=sums))
+    figure = plot.optimisation(dataclasses.replace(found, history=sums))
     assert figure.axes[0].get_ylabel() == "objective (SI)"
     assert [ax.get_ylabel() for ax in figure.axes[1:4]] == ["$v$ (m/s)", "$L$ (m)", "$d$ (m)"]
 
 
 def test_without_an_iterate_nothing_is_drawn():
     with pytest.raises(jb.ArgumentError, match="no history"):
-        plot.optimisation(_optimum()._replace(history=[]))
+        plot.optimisation(dataclasses.replace(_optimum(), history=[]))
 
 
 @pytest.mark.parametrize("columns", [1, 2])
