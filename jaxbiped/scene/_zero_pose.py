@@ -46,7 +46,9 @@ def check_zero_pose(mechanism: "Mechanism") -> None:
     values, vectors = np.linalg.eigh(scaled)
     if np.any(values[..., 0] < _SINGULAR):
         worst = np.reshape(vectors[..., 2:, 0], (-1, len(structure.free)))
-        most = int(np.argmax(np.max(np.abs(worst), axis=0)))
+        sizes = np.max(np.abs(worst), axis=0)
+        # Of those that turn as much as the first one does, whatever the rounding.
+        most = int(np.argmax(sizes > (1.0 - 1e-6) * np.max(sizes)))
         _refuse(mechanism, structure.free[most])
 
 
