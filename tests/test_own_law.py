@@ -8,20 +8,8 @@ from matplotlib.figure import Figure
 
 import jaxbiped as jb
 from jaxbiped.plot import basin, elasticities
+from tests.saved_parts import Grip
 from tests.sweep.walkers import gaitless
-
-
-class Grip(jb.laws.AbstractFrictionLaw):
-    """F = grip F_N V_T, opposing V_T."""
-
-    grip: float = jb.laws.parameter("grip per slip", "$G$", "s/m", minimum=0.0)
-
-    def force(self, normal_force, slip_speed):
-        return -self.grip * normal_force * slip_speed
-
-    def switches(self, slip_speed):
-        return ()
-
 
 SCENE = dataclasses.replace(jb.seed_scene(), friction=Grip(5000.0))
 

@@ -43,7 +43,7 @@ def _inputs(lengths):
     return lengths, np.linspace(0.1, 0.9, len(lengths))
 
 
-def _run(engine, lengths, room=5):
+def run_counting(engine, lengths, room=5):
     found = engine.run(Request(COUNTING, _inputs(lengths), room=room, batch=True))
     return [*found.outputs, *found.records]
 
@@ -57,8 +57,8 @@ def _same(found, expected):
 def test_every_start_is_taken_once_and_gives_the_lanes_bits(monkeypatch, count):
     fake = install(monkeypatch, lanes=4, multiprocessors=1)
     lengths = 1 + np.random.default_rng(count).integers(0, 40, count)
-    found = _run(CUDA, lengths)
-    _same(found, _run(LANES, lengths))
+    found = run_counting(CUDA, lengths)
+    _same(found, run_counting(LANES, lengths))
     np.testing.assert_array_equal(found[1], lengths)
     assert fake.launches == [1]
     assert not fake.memory
@@ -86,7 +86,7 @@ def test_an_endless_or_poisoned_start_does_not_hold_up_the_others(monkeypatch):
 def test_several_devices_share_a_batch(monkeypatch):
     fake = install(monkeypatch, devices=3, lanes=2, multiprocessors=1)
     lengths = 1 + np.arange(300) % 17
-    _same(_run(CUDA, lengths), _run(LANES, lengths))
+    _same(run_counting(CUDA, lengths), run_counting(LANES, lengths))
     assert len(fake.launches) == 3
     assert not fake.memory
 
@@ -95,7 +95,7 @@ def test_parts_have_room_on_a_device(monkeypatch):
     fake = install(monkeypatch, lanes=2, multiprocessors=1)
     monkeypatch.setattr(_device_processor, "_MOST_BYTES", 4000)
     lengths = 1 + np.arange(200) % 17
-    _same(_run(CUDA, lengths), _run(LANES, lengths))
+    _same(run_counting(CUDA, lengths), run_counting(LANES, lengths))
     assert len(fake.launches) > 4
 
 
@@ -150,17 +150,17 @@ def test_under_jit_and_vmap(monkeypatch):
 def test_a_device_without_room_says_so_in_a_sentence(monkeypatch):
     fake = install(monkeypatch, room=100)
     with pytest.raises(ResourceError, match=r"out of memory.*smaller batches or chunks"):
-        _run(CUDA, [3.0] * 50)
+        run_counting(CUDA, [3.0] * 50)
     assert not fake.memory
 
 
 def test_an_interrupt_stops_the_kernel(monkeypatch):
     fake = install(monkeypatch, lanes=2, multiprocessors=1)
-    _run(CUDA, [1.0])
+    run_counting(CUDA, [1.0])
     stop = threading.Timer(0.3, lambda: ctypes.pythonapi.PyErr_SetInterrupt())
     stop.start()
     with pytest.raises(KeyboardInterrupt):
-        _run(CUDA, [1e15, 1e15])
+        run_counting(CUDA, [1e15, 1e15])
     assert not fake.memory
 
 

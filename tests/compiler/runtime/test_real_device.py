@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.compiler import CUDA, DEVICES, LANES, Request
+from jaxbiped.compiler import CUDA, DEVICES, LANES
 from jaxbiped.compiler.runtime import _device_processor
-from tests.compiler.runtime.test_cuda_device import COUNTING
+from tests.compiler.runtime.test_cuda_device import run_counting
 from tests.compiler.runtime.test_device_programs import CASES
 from tests.sweep.walkers import gaitless, same, with_attractor
 
@@ -21,12 +21,6 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(_MISSING is not None, reason=f"no device: {_MISSING}"),
 ]
-
-
-def _counted(engine, lengths):
-    lengths = np.asarray(lengths, dtype=float)
-    inputs = lengths, np.full(len(lengths), 0.999)
-    return engine.run(Request(COUNTING, inputs, room=5, batch=True))
 
 
 @pytest.mark.parametrize("name", list(CASES))
@@ -54,20 +48,20 @@ def test_many_starts_get_the_lanes_labels():
 
 def test_counts_of_unlike_lengths(monkeypatch):
     lengths = 1 + np.arange(100_000) % 1237
-    same(_counted(CUDA, lengths).outputs, _counted(LANES, lengths).outputs)
+    same(run_counting(CUDA, lengths), run_counting(LANES, lengths))
     monkeypatch.setattr(_device_processor, "_MOST_BYTES", 400_000)
-    same(_counted(CUDA, lengths[:20_000]).outputs, _counted(LANES, lengths[:20_000]).outputs)
+    same(run_counting(CUDA, lengths[:20_000]), run_counting(LANES, lengths[:20_000]))
 
 
 def test_an_interrupt_stops_the_kernel():
-    _counted(CUDA, [1.0])
+    run_counting(CUDA, [1.0])
     began = time.perf_counter()
     threading.Timer(0.3, lambda: ctypes.pythonapi.PyErr_SetInterrupt()).start()
     with pytest.raises(KeyboardInterrupt):
-        _counted(CUDA, [1e15, 1e15])
+        run_counting(CUDA, [1e15, 1e15])
     assert time.perf_counter() - began < 5.0
     lengths = [3.0, 5.0, 2.0]
-    same(_counted(CUDA, lengths).outputs, _counted(LANES, lengths).outputs)
+    same(run_counting(CUDA, lengths), run_counting(LANES, lengths))
 
 
 def test_under_jit():
