@@ -93,6 +93,14 @@ class Holds(NamedTuple):
         return held
 
 
+def foot_let_go(
+    flat: Scalar, loads: tuple[Scalar, Scalar], least: Scalar | float = 0.0
+) -> tuple[Scalar, Scalar]:
+    """Which of the two feet of a leg that lies flat would have to pull; of both the worse one."""
+    first, second = loads
+    return flat & (first < least) & (first <= second), flat & (second < least) & (second < first)
+
+
 def holds_of(stance: Stance, modes: Modes, factors: SparseFactors) -> Holds:
     """The rows of a stance.
 

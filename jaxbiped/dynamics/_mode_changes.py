@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import kept_alone
-from jaxbiped.dynamics._holds import ROUNDING
+from jaxbiped.dynamics._holds import ROUNDING, foot_let_go
 from jaxbiped.dynamics._plastic_impact import Grip, Struck, plastic_impact
 from jaxbiped.dynamics._rolling import Turning, ground_force, turning_of
 from jaxbiped.dynamics._stance import Stance, angles_and_rates, of_stance, stance_on
@@ -213,7 +213,7 @@ def settled(scene: RigidScene, state: Any, leg: int, least: Scalar | float = 0.0
         first, second = stance.stands
         loads = foot_loads(scene, stance, turning_of(scene, stance))
         bearing = least * (mechanism.total_mass * g)
-        pulls = [first & second & (load < bearing) for load in loads]
+        pulls = foot_let_go(first & second, loads, bearing)
         stands = modes.standing(leg, (first & ~pulls[0], second & ~pulls[1]), state.mode)
         state = with_mode(scene, state, stance.mode._replace(stands=stands))
         stance = stance_on(scene, state, leg)

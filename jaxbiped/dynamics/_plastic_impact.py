@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._holds import holds_of
+from jaxbiped.dynamics._holds import foot_let_go, holds_of
 from jaxbiped.dynamics._joint_loads import of_all_bodies
 from jaxbiped.dynamics._stance import Stance
 from jaxbiped.dynamics._standing_tree import Sole, either, sole_of
@@ -84,7 +84,7 @@ def plastic_impact(
     sole = either(stands[0], first, second)
     found = _on(old, sole, both, push_off, modes, grip)
     front = found.turning / (old.point(second).x - old.point(first).x)
-    pulls = both & (found.impulse.z < front), both & (front < 0.0)
+    pulls = foot_let_go(both, (found.impulse.z - front, front))
     stands = stands[0] & ~pulls[0], stands[1] & ~pulls[1]
     sole = either(stands[0], first, second)
     alone = _on(old, sole, jnp.zeros_like(both), push_off, modes, grip)
