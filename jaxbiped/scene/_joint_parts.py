@@ -1,6 +1,7 @@
 """What acts at the joints of a mechanism: springs, stops, latches, couplings and motors."""
 
 import dataclasses
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeAlias
@@ -242,6 +243,17 @@ def law_of(law: Any) -> Any:
     return FunctionLaw(law) if callable(law) and is_leaf else law
 
 
+def _takes_the_motion(law: Any) -> bool:
+    """Whether it can be called with one argument, as far as Python can tell."""
+    try:
+        inspect.signature(law).bind(None)
+    except TypeError:
+        return False
+    except ValueError:
+        return True  # of some built-in functions there is no signature
+    return True
+
+
 class Motor(AbstractJointPart):
     """A motor, whose torque is a law of the motion and of nothing else.
 
@@ -255,7 +267,8 @@ class Motor(AbstractJointPart):
         name: see `AbstractJointPart`.
 
     Raises:
-        ArgumentError: a law that cannot be called, a share below 0, or another word.
+        ArgumentError: a law that cannot be called with the motion alone, a share below 0, or
+            another word.
     """
 
     kind: ClassVar[str] = "motor"
@@ -267,9 +280,10 @@ class Motor(AbstractJointPart):
     name: str | None = eqx.field(static=True, default=None)
 
     def __check_init__(self) -> None:
-        if not callable(self.law):
+        given = self.law.function if isinstance(self.law, FunctionLaw) else self.law
+        if not _takes_the_motion(given):
             raise ArgumentError(
-                f"law = {self.law!r} is not allowed for Motor({self.angle!r}): give a function of "
-                "the motion."
+                f"law = {given!r} is not allowed for Motor({self.angle!r}): give a function of "
+                "the motion alone."
             )
         check_choice("by", self.by, SIDES)

@@ -176,6 +176,12 @@ def test_coupled_bodies_are_exchanged_with_the_others():
     assert [float(a) for a in swapped.angles] == [-0.2, 0.3, 0.1]
 
 
+@pytest.mark.parametrize("law", [lambda: 1.0, lambda motion, time: 1.0, 2.0])
+def test_a_law_takes_the_motion_alone(law):
+    with pytest.raises(jb.ArgumentError, match=r"Motor\('a'\): give a function of the motion alone"):
+        jb.Motor("a", law)
+
+
 def test_a_law_may_not_depend_on_time():
     with pytest.raises(jb.ArgumentError, match=r"motion\.time is not known, .* motion\.phase"):
         torque_of(with_motor(lambda motion: motion.time), leg=1)
