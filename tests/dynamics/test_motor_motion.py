@@ -178,7 +178,9 @@ def test_coupled_bodies_are_exchanged_with_the_others():
 
 @pytest.mark.parametrize("law", [lambda: 1.0, lambda motion, time: 1.0, 2.0])
 def test_a_law_takes_the_motion_alone(law):
-    with pytest.raises(jb.ArgumentError, match=r"Motor\('a'\): give a function of the motion alone"):
+    with pytest.raises(
+        jb.ArgumentError, match=r"Motor\('a'\): give a function of the motion alone"
+    ):
         jb.Motor("a", law)
 
 
