@@ -16,8 +16,6 @@ from jaxbiped import plot
 from jaxbiped.plot.style import new_figure
 
 PLAIN = dict(parameters=(), radius_sensitivities=False)
-PRESSED = 1e-6
-"""Depth of a compliant foot that stands at a start [m]."""
 SLOPES = {"garcia": (0.008, 0.0185), "goswami": (math.radians(2.8), math.radians(5.3))}
 """Where branches are followed; their first doublings are sought there."""
 DOUBLINGS = {"garcia": 1, "goswami": 3}
@@ -66,12 +64,8 @@ def found(name, gait="gait"):
     """A model's gait, from the start that the catalogue has."""
     model = jb.models.MODELS[name]
     scene = model.make()
-    if isinstance(scene, jb.RigidScene):
-        how = dict(guess=scene.state(**model.starts[gait]), accuracy="tight")
-    else:
-        start = scene.state(**model.starts[gait], standing=scene.mechanism.structure.legs[-1])
-        how = dict(guess=start._replace(hip_z=start.hip_z - PRESSED))
-    return jb.find_gait(scene, **how, **PLAIN)
+    accuracy = "tight" if isinstance(scene, jb.RigidScene) else "balanced"
+    return jb.find_gait(scene, scene.state(**model.starts[gait]), accuracy=accuracy, **PLAIN)
 
 
 def struck(gait):

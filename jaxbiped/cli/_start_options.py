@@ -96,8 +96,10 @@ class StartOptions(Options):
 
             named = default_guess(scene)._asdict().items()
             usual = {name: float(x) for name, x in named if name.startswith(("theta_", "omega_"))}
-        standing = self.standing or structure.legs[-1]
-        return scene.minimal.state(**{**usual, **given}, standing=standing)
+        whole: dict[str, Any] = {"standing": structure.legs[-1], **usual, **given}
+        if self.standing is not None:
+            whole["standing"] = self.standing
+        return scene.minimal.state(**whole)
 
 
 def default_start(scene: Any) -> Any:

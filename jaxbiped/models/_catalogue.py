@@ -18,7 +18,7 @@ class Model(NamedTuple):
         words: what it is, and after whom.
         make: its function in `jaxbiped.models`; without arguments, the paper's scene.
         starts: by names of gaits, arguments of `scene.state` for a state near each: angles [rad],
-            rates, and what is held.
+            rates, and what is held or stands.
         rigid: whether its scene is a `RigidScene`; else it is a `Scene`.
     """
 
@@ -43,6 +43,7 @@ _BENT = {
     "theta_shank_2": 0.118,
     "omega_thigh_2": -0.88,
     "omega_shank_2": -0.88,
+    "standing": "shank_2",
 }
 
 _KNEES_STRAIGHT = {

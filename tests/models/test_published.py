@@ -142,6 +142,15 @@ def test_a_walker_s_masses_are_the_paper_s_ratios():
     assert values["d"] / (1.0 - values["d"]) == pytest.approx(0.5)
 
 
+def test_the_kneed_walkers_start_leads_to_the_gait_of_a_search_without_it():
+    """Its feet are compliant: the gait was found without a guess, its period is 0.536145 s."""
+    model = MODELS["mcgeer-kneed"]
+    scene = model.make()
+    result = jb.find_gait(scene, scene.state(**model.starts["gait"]), **PLAIN)
+    assert result.outcome is jb.gait.Search.FOUND
+    assert float(result.measures.period) == pytest.approx(0.5361452, abs=1e-6)
+
+
 def test_slopes_are_given_and_refused():
     for name, model in MODELS.items():
         assert float(model.make(slope=0.02).ground.slope) == 0.02, name
