@@ -71,7 +71,7 @@ def placement(
         root = root_on_feet(numpy, placed, slope, state, tuple(feet), standing is not None)
         height = root[f"{structure.root}_z"]
         # Pressed by a few last digits, lest rounding tell whether the foot touches.
-        pressed = _LAST_DIGITS * float(np.finfo(np.result_type(height)).eps)
+        pressed = _LAST_DIGITS * float(np.finfo(height.dtype).eps)
         root[f"{structure.root}_z"] = height - pressed * numpy.abs(height)
         state |= {name: root[name] for name in root if name not in known}
         shape = np.broadcast_shapes(*map(np.shape, state.values()))
