@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-import jaxbiped as jb
 from jaxbiped import _progress
 from jaxbiped.cli import _constraints as command
 from jaxbiped.cli._constraints import ConstraintRun, time_run
@@ -81,12 +80,6 @@ def test_runs_that_take_long_are_not_repeated(monkeypatch):
     asked.clear()
     assert time_run(lambda: asked.append(1), repeats=100)[1] == pytest.approx(0.3)
     assert len(asked) == 4
-
-
-def test_the_comparison_is_the_commands_own():
-    """A benchmark is no part of the package's interface."""
-    for name in ("compare_constraints", "ConstraintRun", "Integrator"):
-        assert not hasattr(jb, name)
 
 
 @pytest.mark.slow
