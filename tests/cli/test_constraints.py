@@ -82,7 +82,7 @@ def test_runs_that_take_long_are_not_repeated(monkeypatch):
     assert len(asked) == 4
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_walk_tells_of_the_hip(tmp_path):
     flags = ("--formulation", "redundant", "--method", "described", "--duration", "1.3")
     outputs = outputs_of(tmp_path, "walk", *flags)
