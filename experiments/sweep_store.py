@@ -1,16 +1,20 @@
 """Sweeps into a Zarr store, some by processes that are killed on the way: time, memory, labels.
 
-Each run is a process of its own; what was complete when it was killed is not computed again. What a
-start costs is measured without the process's own start and its compiling.
+Then labelled starts a second by one worker process and by two, of one core each. Each run is a
+process of its own; what was complete when it was killed is not computed again. What a start costs
+is measured without the process's own start and its compiling.
 """
 
+import contextlib
 import dataclasses
 import json
+import os
 import resource
 import shutil
 import subprocess
 import sys
 import time
+from unittest import mock
 
 import _batches
 import numpy as np
@@ -46,11 +50,39 @@ JOBS = (
     *(Job("compliant", 10**power, ()) for power in range(3, 8)),
 )
 QUICK_JOBS = (Job("rigid", 10_000, (0.3,), chunk=100),)
+WORKED, QUICK_WORKED = (100_000, 2048, 5), (1024, 128, 1)
+"""Starts, chunk and rounds of sweeps by worker processes."""
 
 
 @experiment
 def main(options: Options):
-    return {"runs": [done(options, job) for job in options.sized(JOBS, QUICK_JOBS)]}
+    with mock.patch.dict(os.environ, JAXBIPED_THREADS="1"):  # of each worker
+        workers = by_workers(options, *options.sized(WORKED, QUICK_WORKED))
+    runs = [done(options, job) for job in options.sized(JOBS, QUICK_JOBS)]
+    return {"runs": runs, "workers": workers}
+
+
+def by_workers(options, count, chunk, rounds):
+    """Rates of one worker and of two, in turns: the best counts, for other work takes cores away.
+
+    The first round, in which workers start up and compile, does not count.
+    """
+    labelling, path = _batches.labelling_of("compliant"), options.path("workers.zarr")
+    rows = [{"workers": number, "starts": count, "starts_per_s": []} for number in (1, 2)]
+    with contextlib.ExitStack() as stack:
+        pools = [stack.enter_context(jb.local_executor(row["workers"])) for row in rows]
+        for turn in range(1 + rounds):
+            for row, pool in zip(rows, pools, strict=True):
+                size = count if turn else 2 * chunk * row["workers"]
+                shutil.rmtree(path, ignore_errors=True)
+                how = dict(chunk=chunk, store=path, executor=pool, workers=row["workers"])
+                found, seconds, _ = timed(_batches.swept(labelling, size, **how))
+                row["starts_per_s"] += [size / seconds] if turn else []
+                row["labels"] = np.asarray(found.label)
+    for row in rows[::-1]:
+        row["best"] = max(row["starts_per_s"])
+        row["labels_differ"] = int(np.sum(row["labels"] != rows[0]["labels"]))
+    return [{name: value for name, value in row.items() if name != "labels"} for row in rows]
 
 
 def done(options, job):

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-import jaxbiped as jb
 from jaxbiped import _progress
 from jaxbiped.cli import _constraints as command
 from jaxbiped.cli._constraints import ConstraintRun, time_run
@@ -83,13 +82,7 @@ def test_runs_that_take_long_are_not_repeated(monkeypatch):
     assert len(asked) == 4
 
 
-def test_the_comparison_is_the_commands_own():
-    """A benchmark is no part of the package's interface."""
-    for name in ("compare_constraints", "ConstraintRun", "Integrator"):
-        assert not hasattr(jb, name)
-
-
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_walk_tells_of_the_hip(tmp_path):
     flags = ("--formulation", "redundant", "--method", "described", "--duration", "1.3")
     outputs = outputs_of(tmp_path, "walk", *flags)

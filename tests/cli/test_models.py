@@ -56,9 +56,3 @@ def test_rigid_walk_and_gait(tmp_path, capsys):
     assert numbers["assumptions"]["needed_friction"] == pytest.approx(needed, rel=1e-9)
     said = f"a real foot needs a friction coefficient of {needed:.3f}"
     assert said in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_walk_with_other_laws(capsys):
-    flags = ("--normal", "hunt-crossley", "--friction", "viscous", "--duration", "1.2")
-    assert numbers_of(capsys, "walk", *flags)["ending"] == "walking"

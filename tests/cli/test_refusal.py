@@ -112,6 +112,14 @@ walk --model rigid --dt 1e-6 | dt = 1e-06 | rigid
 walk --J 0 | J = 0 | hip_mass = 0
 walk --set foo=3 | parameter = 'foo'
 walk --set v0=-1 | v0 = -1
+walk --walker kneed --m 2 | m = 2.0 is not allowed with walker = 'kneed'
+walk --walker kneed --theta-1 0.1 | theta_1' is not known: choose one of hip_x
+walk --walker kneed --state omega_nose=1 | omega_nose
+walk --walker with-torso --state theta_torso=1 | theta_torso
+walk --state theta_1=x | theta_1 must be a number
+walk --state theta_1=0.1 --theta-1 0.2 | theta_1 is given twice
+walk --clearance never | clearance = 'never'
+walk --model rigid --clearance always-touching | clearance = always-touching
 walk --normal hertz --c 1 | c = 1 | normal = hertz
 walk --out /dev/null/pictures | --out | /dev/null/pictures | directory
 walk --hip-z 0.2 | hip_z = 0.2 | 0.196 m below the ground | 0.3956

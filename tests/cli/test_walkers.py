@@ -67,27 +67,6 @@ def test_what_is_no_walker_is_refused(name, words, file, capsys):
     assert words in refused(f"walk --walker {file}:{name}", capsys)
 
 
-@pytest.mark.parametrize(
-    ("flags", "words"),
-    [
-        ("--walker three-legs", "one of seed, kneed, with-torso, garcia, "),
-        ("--walker nowhere.py:walker", "nowhere.py:walker' cannot be read"),
-        ("--walker kneed --m 2", "m = 2.0 is not allowed with walker = 'kneed'"),
-        ("--walker kneed --theta-1 0.1", "theta_1' is not known: choose one of hip_x"),
-        ("--walker kneed --state omega_nose=1", "omega_nose"),
-        ("--walker with-torso --state theta_torso=1", "theta_torso"),
-        ("--state theta_1", "write name=value"),
-        ("--state theta_1=x", "theta_1 must be a number"),
-        ("--state theta_1=0.1 --theta-1 0.2", "theta_1 is given twice"),
-        ("--standing 2", "standing = '2' is not allowed without state"),
-        ("--clearance never", "clearance = 'never'"),
-        ("--model rigid --clearance always-touching", "clearance = always-touching"),
-    ],
-)
-def test_what_does_not_go_together_is_refused(flags, words, capsys):
-    assert words in refused(f"walk {flags}", capsys)
-
-
 @pytest.mark.parametrize("name", WALKERS)
 def test_named_walkers_walk_on_the_usual_slope(name):
     scene = SceneOptions(walker=name).scene()

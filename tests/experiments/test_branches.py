@@ -15,19 +15,6 @@ def test_elasticities_of_a_critical_slope_are_those_of_differences(tmp_path):
     assert row["elasticity"] == pytest.approx(row["by_differences"], rel=1e-5)
 
 
-def test_branches_and_curves(tmp_path):
-    numbers, figures = drawn_run("k_c_xi_branches", tmp_path)
-    assert set(figures) == {"k_c_xi_branches.png", "k_c_xi_curves.png"}
-    assert all(numbers["branches"]["K"]["stable"])
-    for curve in numbers["curves"]["K"]:
-        assert max(curve["off"]) < 1e-6
-        assert len(curve["values"]) == 5
-    # The stiffer the ground, the flatter the slope that still keeps the gait.
-    fold = numbers["curves"]["K"][0]["values"]
-    assert fold == sorted(fold, key=lambda pair: -pair[0])
-    assert fold == sorted(fold, key=lambda pair: pair[1])
-
-
 def test_the_cascade_and_the_walks_beside_it(tmp_path):
     numbers, _ = drawn_run("period_doubling", tmp_path)
     assert 0.1 < numbers["rigid_seed"]["slope"] < 0.102

@@ -1,10 +1,9 @@
 """Speeds, at their quick size, against results that must be right and lanes' bits."""
 
-import numpy as np
 import pytest
 
 from tests.compiler.fake_driver import install
-from tests.drawn import labels_of, points_of
+from tests.drawn import points_of
 from tests.experiments.quick import drawn_run, quick_run
 
 pytestmark = pytest.mark.nightly
@@ -54,22 +53,3 @@ def test_what_lanes_are_timed_by_is_right(tmp_path):
     rows = [row for row in numbers["batches"] if row["way"] == "lanes"]
     assert shown == [row["simulations_per_s"] for row in rows]
     assert {line.get_label() for line in alone.lines} == ways
-
-
-def test_single_walks_agree_with_an_independent_solve(tmp_path):
-    numbers, figures = drawn_run("speed_single", tmp_path, alone=True)
-    assert numbers["reference_difference"] < 1e-8
-    errors = [point["error"] for point in numbers["points"]["rodas4"]]
-    assert min(errors) < 1e-7
-    shown = np.concatenate(points_of(figures["speed_single.png"].axes[0]))
-    assert set(errors) <= set(shown[:, 0])
-
-
-def test_the_default_has_the_smaller_error_in_about_as_many_steps(tmp_path):
-    label = "median error of the final state (SI units)"
-    numbers, figures = drawn_run("steps_tried", tmp_path, unitless={label}, alone=True)
-    old, new = ({row["way"]: row for row in numbers["rows"]}[way] for way in ("rodas4", "rodas4p"))
-    assert new["error_median"] < old["error_median"] < 1e-4
-    assert new["steps"] < 1.1 * old["steps"]
-    assert 0.0 < new["rejected"] < 0.3
-    assert label in labels_of(figures["steps_tried.png"])

@@ -34,18 +34,11 @@ def test_a_killed_sweep_is_resumed_to_the_same_labels(tmp_path):
         assert 0 < run["labelled_in_last_run"] < run["starts"]
         assert run["pending"] == 0
         assert run["differ_from_memory"] == 0
-
-
-def test_two_workers_find_the_labels_of_one(tmp_path):
-    bare = {"worker processes of one core each", "labelled starts a second"}
-    numbers, _ = drawn_run("process_scaling", tmp_path, unitless=bare, alone=True)
-    one, two = numbers["rows"]
-    assert (one["workers"], two["workers"]) == (1, 2)
-    for row in (one, two):
+    assert [row["workers"] for row in numbers["workers"]] == [1, 2]
+    for row in numbers["workers"]:
         assert row["starts"] == 1024
         assert row["labels_differ"] == 0
-        assert min(row["starts_per_s"]) > 0.0
-    assert numbers["efficiency"] == pytest.approx(two["best"] / one["best"] / 2.0)
+        assert row["best"] == max(row["starts_per_s"]) > 0.0
 
 
 def test_lanes_give_the_same_bits_and_xla_what_an_ulp_does(tmp_path):

@@ -84,7 +84,8 @@ def evaluation(scene, names, guess=None, accuracy="balanced"):
         pytest.param("rigid", marks=pytest.mark.nightly),
         pytest.param("stribeck", marks=pytest.mark.nightly),
         pytest.param("heavy hip", marks=pytest.mark.nightly),
-        *DRIVEN,
+        pytest.param("hip torque", marks=pytest.mark.nightly),
+        "push-off",
     ],
 )
 def test_gradients_are_those_of_central_differences(which):

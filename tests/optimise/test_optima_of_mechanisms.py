@@ -104,13 +104,13 @@ def test_objectives_of_the_seed_as_a_mechanism_are_the_seeds():
             assert off < bar + 1e-7 * abs(seeds.slopes[name][j])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("scene", "guess"),
     [
         pytest.param(TORSO, None, id="torso"),
-        pytest.param(UNLIKE, None, id="unlike", marks=pytest.mark.nightly),
-        pytest.param(KNEED, BENT, id="kneed", marks=pytest.mark.nightly),
+        pytest.param(UNLIKE, None, id="unlike"),
+        pytest.param(KNEED, BENT, id="kneed"),
     ],
 )
 def test_what_is_lost_is_the_slopes_sine(scene, guess):

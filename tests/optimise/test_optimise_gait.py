@@ -27,7 +27,7 @@ def test_an_optimum_of_two_variables_is_that_of_a_grid():
     """Peak force against speed: inside the bounds of one variable; constrained by the radius."""
     weights = {"peak_normal": 1.0, "impact_loss": 40.0, "speed": -20.0}
     vary = {"d": (0.05, 0.15), "J": (0.004, 0.03)}
-    count = 17
+    count = 9
     d, J = (np.linspace(*bounds, count) for bounds in vary.values())
     grid = jb.gait_sweep(RIGID, {"d": d, "J": J}, parameters=(), radius_sensitivities=False)
     weight = float(RIGID.walker.total_mass * RIGID.ground.g)
@@ -51,7 +51,7 @@ def test_an_optimum_of_two_variables_is_that_of_a_grid():
 
 
 def test_level_ground_is_walked_at_the_least_cost():
-    """From nothing, held by a grid of gaits at the speed that is asked for, and certified."""
+    """From nothing, held by a grid of gaits at the speed that is asked for."""
     walker, ground = RIGID.walker, jb.Ground(slope=0.0, g=RIGID.ground.g)
     level = jb.RigidScene(walker, ground, jb.actuation.PushOff(0.1))
     best = jb.optimise_gait(
@@ -75,9 +75,6 @@ def test_level_ground_is_walked_at_the_least_cost():
         gait = jb.find_gait(same, parameters=(), radius_sensitivities=False)
         walk = jb.rigid_walk(same, gait.measures.state, footsteps=2, max_arrivals=2)
         assert jb.measure.cost_of_transport(same, walk).cost[-1] > best.objective
-    certificate = jb.optimise.certify(best, starts=0, footsteps=40)
-    assert certificate.stable
-    assert certificate.walk.returned
 
 
 def test_optimisers_agree_and_the_conditions_of_optimality_hold():

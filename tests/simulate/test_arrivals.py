@@ -64,11 +64,9 @@ def test_any_function_is_a_section():
     np.testing.assert_allclose(found.state.hip_vz[:count], 0.0, atol=1e-10)
 
 
-@pytest.mark.parametrize("engine", ["lanes", "xla"])
-def test_extremes_are_those_of_the_steps(seed_walk, engine):
+def test_extremes_are_those_of_the_steps(seed_walk):
     _, whole = seed_walk
-    walk = _walk(save="end", extremes=_heights, engine=engine)
-    assert walk.engine == engine
+    walk = _walk(save="end", extremes=_heights)
     for found, reduce in ((walk.lowest, np.min), (walk.highest, np.max)):
         assert found["hip"] == pytest.approx(float(reduce(whole.state.hip_z)), abs=1e-6)
         assert found["speeds"][0] == pytest.approx(float(reduce(whole.state.hip_vx)), abs=1e-4)

@@ -76,7 +76,7 @@ def test_by_tolerances_nothing_is_counted():
     assert found.missed_contacts is None
 
 
-@pytest.mark.parametrize("dt", [1e-1, 1e-2, 1e-3])
+@pytest.mark.parametrize("dt", [1e-1, 1e-3])
 def test_steps_of_one_size_that_are_too_long_are_told(dt):
     with pytest.warns(RuntimeWarning, match=f"dt = {dt:g} is too long"):
         jb.simulate(SEED, STATE, duration=0.03, dt=dt, save="end")
@@ -96,11 +96,6 @@ def test_short_steps_of_one_size_are_not(recwarn):
     walk = jb.simulate(SEED, STATE, duration=3e-3, dt=1e-6, save="end")
     assert walk.outcome is jb.Ending.WALKING
     assert not [each for each in recwarn if each.category is RuntimeWarning]
-
-
-def test_an_implicit_solver_takes_steps_of_one_size():
-    walk = jb.simulate(SEED, STATE, duration=1e-5, dt=1e-6, solver="kvaerno3", save="end")
-    assert np.isfinite(float(walk.final.hip_z))
 
 
 def test_a_tolerance_far_too_coarse_for_the_slip_is_told(recwarn):

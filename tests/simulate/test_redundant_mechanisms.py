@@ -28,7 +28,7 @@ def _gap(name, method, orientation, engine):
     [
         pytest.param("torso", "standard", "angle", marks=pytest.mark.nightly),
         ("coupled", "index1", "angle"),
-        ("kneed", "described", "angle"),
+        pytest.param("kneed", "described", "angle", marks=pytest.mark.nightly),
         pytest.param("five", "index1aug", "angle", marks=pytest.mark.nightly),
         pytest.param("coupled", "index1", "euler", marks=pytest.mark.nightly),
     ],

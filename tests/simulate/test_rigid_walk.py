@@ -15,16 +15,10 @@ GAIT = jb.dynamics.RigidState(
 )
 
 
-ENGINES = ["lanes", pytest.param("xla", marks=pytest.mark.slow)]
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_the_gait_goes_on(engine):
-    walk = jb.rigid_walk(
-        rigid_seed(), GAIT, footsteps=5, max_arrivals=6, accuracy="tight", engine=engine
-    )
+def test_the_gait_goes_on():
+    walk = jb.rigid_walk(rigid_seed(), GAIT, footsteps=5, max_arrivals=6, accuracy="tight")
     assert walk.outcome is jb.Ending.WALKING
-    assert walk.engine == engine
+    assert walk.engine == "lanes"
     times, states = walk.arrivals.t, walk.arrivals.state
     np.testing.assert_allclose(np.diff(np.asarray(times)[:5]), 0.443780329, atol=1e-8)
     np.testing.assert_allclose(np.diff(np.asarray(states.hip_x)[:5]), 0.190414759, atol=1e-8)
@@ -40,11 +34,10 @@ def test_a_walk_begins_where_its_start_is():
     assert float(walk.final.hip_x) == pytest.approx(0.7 + 1e-6 * speed, abs=1e-11)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_endings(engine):
+def test_endings():
     def walk(omega, slope=0.02, **options):
         state = GAIT._replace(omega_2=jnp.asarray(omega))
-        return jb.rigid_walk(rigid_seed(slope), state, engine=engine, **options)
+        return jb.rigid_walk(rigid_seed(slope), state, **options)
 
     assert walk(-6.0, footsteps=5).outcome is jb.Ending.FELL_FORWARD
     assert walk(0.6, footsteps=5).outcome is jb.Ending.FELL_BACK
@@ -55,13 +48,12 @@ def test_endings(engine):
     assert (float(bounded.t[-1]), int(bounded.arrivals.total)) == (1.0, 2)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_walker_at_rest_waits_in_vain(engine):
+def test_a_walker_at_rest_waits_in_vain():
     """Upright on level ground, on feet that carry it there: no footstep comes in 50 √(l/g)."""
     walker = jb.Walker(m=1.0, J=0.01, l=0.4, d=0.3, r=0.35)
     scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=0.0))
     state = jb.dynamics.RigidState(*map(jnp.asarray, (0.0,) * 5))
-    walk = jb.rigid_walk(scene, state, footsteps=1, engine=engine)
+    walk = jb.rigid_walk(scene, state, footsteps=1)
     assert walk.outcome is jb.Ending.TIMED_OUT
     assert int(walk.arrivals.total) == 0
     assert float(walk.t[-1]) == pytest.approx(50.0 * np.sqrt(0.4 / 9.8), rel=1e-12)

@@ -55,6 +55,7 @@ def test_error_falls_with_the_tolerance_where_the_field_is_smooth(reference):
     assert errors[-1] < 1e-7
 
 
+@pytest.mark.nightly
 def test_other_solvers_stay_available(reference):
     """diffrax's implicit ones solve the walk; its explicit ones are there for soft scenes."""
     walk = _walk(duration=0.35, solver="kvaerno5")
@@ -138,20 +139,6 @@ def test_a_block_on_bengisu_akay_friction(law):
         assert speed == pytest.approx(creep, rel=1e-4)
     force = friction.force(jnp.asarray(9.8 * np.cos(0.1)), jnp.asarray(speed))
     assert float(force) == pytest.approx(-9.8 * np.sin(0.1), rel=1e-4)
-
-
-def test_saving_only_the_end_or_given_times_changes_nothing():
-    """By lanes; `test_engines` holds XLA's ends, times and steps against theirs."""
-    times = jnp.array([0.5, 1.0, 2.0])
-    walk, end, some = (
-        _walk(duration=2.0, accuracy="tight", engine="lanes", save=save)
-        for save in ("steps", "end", times)
-    )
-    np.testing.assert_allclose(np.array(end.final), np.array(walk.final), atol=1e-9)
-    np.testing.assert_allclose(np.array(some.state), np.array(walk.at(times)), atol=1e-9)
-    assert end.dense is None
-    with pytest.raises(ValueError, match="steps"):
-        end.at(0.1)
 
 
 @jax.jit

@@ -17,10 +17,8 @@ def _walk(slope, **options):
     ("slope", "ending"),
     [
         (0.005, Ending.STOPPED),
-        (0.010, Ending.WALKING),
         (0.030, Ending.WALKING),
         (0.035, Ending.FELL_FORWARD),
-        (0.040, Ending.FELL_FORWARD),
         (0.060, Ending.FELL_FORWARD),
     ],
 )
@@ -43,11 +41,10 @@ def test_out_of_steps():
     assert few.outcome == Ending.OUT_OF_STEPS
 
 
-@pytest.mark.parametrize("engine", ["lanes", pytest.param("xla", marks=pytest.mark.slow)])
-def test_waiting_in_vain_is_not_the_cap_on_steps(engine):
+def test_waiting_in_vain_is_not_the_cap_on_steps():
     """Let down on both feet, nothing ever comes down again."""
     scene, start = astride_at_rest()
-    options = {"save": "end", "watch": ("fall",), "engine": engine}
+    options = {"save": "end", "watch": ("fall",)}
     waiting = jb.simulate(scene, start, footsteps=1, **options)
     assert waiting.outcome is Ending.TIMED_OUT
     assert float(waiting.t[-1]) == 100.0

@@ -22,7 +22,7 @@ def swept():
     return jb.gait_sweep(jb.seed_scene(), OVER, **PLAIN)
 
 
-@pytest.mark.parametrize("place", [(0, 0), (7, 7), (3, 5)])
+@pytest.mark.parametrize("place", [(7, 7), (3, 5)])
 def test_gaits_are_those_of_single_searches(swept, place):
     point = {name: values[i] for (name, values), i in zip(OVER.items(), place, strict=True)}
     alone = jb.find_gait(jb.with_parameters(jb.seed_scene(), point), **PLAIN)

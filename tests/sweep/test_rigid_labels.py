@@ -11,10 +11,9 @@ from tests.rigid_walkers import rigid_seed
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("slope", [0.003, 0.006])
-def test_verdicts_about_a_weakly_stable_gait_are_those_of_tight_walks(slope):
+def test_verdicts_about_a_weakly_stable_gait_are_those_of_tight_walks():
     """Slow transients past an unstable gait are not taken for a gait, and no strike is missed."""
-    scene = rigid_seed(slope)
+    scene = rigid_seed(0.003)
     gait = jb.find_gait(scene).measures.state
     random, count = np.random.default_rng(3), 2000
     sizes = (0.0, 0.06, 0.06, 0.4, 0.4)

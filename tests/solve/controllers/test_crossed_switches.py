@@ -5,7 +5,6 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from reference.walks import reference_states
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import feet
@@ -78,9 +77,9 @@ def test_its_error_counts_as_often_as_told(slip, kept):
 
 
 @pytest.mark.slow
-def test_the_draft_is_near_an_independent_solution():
+def test_the_draft_is_near_an_independent_solution(reference):
     """Over four heel strikes; were such errors counted once it would be off by 9.5e-4."""
-    times, exact = reference_states()
+    times, exact = reference
     how = dict(duration=2.0, accuracy="draft", save=times, engine="lanes")
     found = np.stack(jb.simulate(SCENE, jb.seed_state(), **how).state, axis=1)
     np.testing.assert_allclose(found, exact, atol=2e-4)
