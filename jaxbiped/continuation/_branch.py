@@ -1,10 +1,9 @@
 """Branch of gaits along a parameter: its points, bifurcations and ends, also as a dataset."""
 
 import json
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import equinox as eqx
-import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
@@ -12,12 +11,12 @@ from jaxbiped._files import strict_json
 from jaxbiped._identity import difference_of
 from jaxbiped._summary import notebook_html
 from jaxbiped._tables import Tabular
-from jaxbiped._types import as_float
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch_point import Axis, BranchPoint
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import recurring_names, state_of_recurring, unit_of
+from jaxbiped.dynamics._state_quantities import recurring_names, unit_of
+from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
@@ -101,8 +100,7 @@ class Branch(eqx.Module, Tabular):
             point = self.points[point]
         if isinstance(point, BifurcationPoint):
             point = point.point
-        state = state_of_recurring(self.state_type, point.recurring.tolist())
-        return cast("WalkerState", jtu.tree_map(as_float, state))
+        return state_at(self.state_type, point.recurring)
 
     def scene_at(self, point: int | BranchPoint | BifurcationPoint) -> Scene | RigidScene:
         """The scene of a gait, of the point of that number or of the one given."""
@@ -118,11 +116,11 @@ class Branch(eqx.Module, Tabular):
             and `bifurcation`, SI units; the same of the special points along `event`, with kind,
             critical multiplier and its error; all else in the attributes.
         """
-        return branch_dataset(self)
+        return _branch_dataset(self)
 
 
 _STABLE = {True: 1, False: 0, None: -1}
-NUMBERS = {
+_NUMBERS = {
     "period": "s",
     "step_length": "m",
     "peak_normal": "N",
@@ -132,19 +130,13 @@ NUMBERS = {
 _EVENT_NUMBERS = ("multiplier_real", "multiplier_imag", "error", "value_error", "beyond")
 
 
-def branch_dataset(branch: Branch) -> "xarray.Dataset":
-    """A branch as a dataset; see `Branch.to_dataset`."""
+def _branch_dataset(branch: Branch) -> "xarray.Dataset":
     import xarray
 
-    names = recurring_names(branch.state_type)
-    units = {name: unit_of(name) for name in names}
+    units = {name: unit_of(name) for name in recurring_names(branch.state_type)}
     variables = _columns(branch, branch.points, "", "point", units)
-    kinds = [EVENTS.index(each.kind) for each in branch.bifurcations]
-    variables["event_kind"] = (
-        "event",
-        np.array(kinds, np.int8),
-        _flags(EVENTS, range(len(EVENTS))),
-    )
+    kinds = np.array([EVENTS.index(each.kind) for each in branch.bifurcations], np.int8)
+    variables["event_kind"] = ("event", kinds, _flags(EVENTS))
     special = [each.point for each in branch.bifurcations]
     variables |= _columns(branch, special, "event_", "event", units)
     rows = [
@@ -186,7 +178,7 @@ def _columns(
     columns: dict[str, Any] = {
         branch.along: (along, [point.value for point in points], {"units": branch.unit}),
     }
-    for name, unit in NUMBERS.items():
+    for name, unit in _NUMBERS.items():
         columns[name] = (along, [getattr(point, name) for point in points], {"units": unit})
     speeds = [point.step_length / point.period for point in points]
     columns["speed"] = (along, speeds, {"units": "m/s"})
@@ -272,7 +264,7 @@ def _points(dataset: "xarray.Dataset", kind: Any, along: str, before: str) -> li
     recurring = np.stack([column(f"state_{name}") for name in recurring_names(kind)], axis=1)
     values = column("multipliers_real") + 1j * column("multipliers_imag")
     errors, codes = column("multipliers_error"), column("bifurcation")
-    numbers = {name: column(name) for name in NUMBERS}
+    numbers = {name: column(name) for name in _NUMBERS}
     value, place, tangent = column(along), column("place"), column("tangent")
     return [
         BranchPoint(
@@ -283,7 +275,7 @@ def _points(dataset: "xarray.Dataset", kind: Any, along: str, before: str) -> li
             bifurcation=int(codes[k]),
             place=place[k],
             tangent=tangent[k],
-            **{name: float(numbers[name][k]) for name in NUMBERS},
+            **{name: float(each[k]) for name, each in numbers.items()},
         )
         for k in range(len(value))
     ]

@@ -1,17 +1,15 @@
 """Setup of a continuation: whose gaits are followed along which axis, and how exactly."""
 
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
-import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_unbatched
-from jaxbiped._types import as_float
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point, change_of
 from jaxbiped.continuation._cycle import Cycle, CycleProblem
 from jaxbiped.continuation._trace import Trace, limit_cause, trace
-from jaxbiped.dynamics._state_quantities import state_of_recurring
+from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Change, Curve, CurvePoint, correct
@@ -50,7 +48,6 @@ class ContinuationSetup(NamedTuple):
 
     @property
     def footsteps(self) -> int:
-        """Footsteps of a cycle."""
         each: int = self.scene.arrival_footsteps
         return self.arrivals * each
 
@@ -79,12 +76,9 @@ class ContinuationSetup(NamedTuple):
         return np.asarray(recurring_components(self.problem.spec.system, state))
 
     def state_of(self, recurring: np.ndarray) -> WalkerState:
-        """The state of these components."""
-        state = state_of_recurring(type(self.problem.like), recurring.tolist())
-        return cast("WalkerState", jtu.tree_map(as_float, state))
+        return state_at(type(self.problem.like), recurring)
 
     def point(self, found: CurvePoint) -> BranchPoint:
-        """What is told of a point of the curve."""
         return branch_point(self.curve, self.axis, found)
 
     def trace(self, begin: CurvePoint, **options: Any) -> Trace:

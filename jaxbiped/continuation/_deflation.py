@@ -23,7 +23,6 @@ from jaxbiped.dynamics._state import state_for
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._pseudo_arclength import Change
 from jaxbiped.gait._search_starts import rolling_starts
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -106,7 +105,7 @@ def find_isolated(
         for point in islice(filter(search.returns, drawn), int(starts)):
             while (found := search.from_start(point)) is not None:
                 search.learn(found)
-    return search.found()
+    return tuple(search.gaits)
 
 
 def _scattered_starts(
@@ -131,31 +130,27 @@ def _scattered_starts(
 
 
 class _DeflatedNewton:
-    """Deflated Newton's method, and the cycles that it knows."""
+    """Deflated Newton's method, the cycles that it knows, and the `gaits` that it found."""
 
     def __init__(self, setup: ContinuationSetup, value: float) -> None:
         self._setup, self._value = setup, value
         self._sizes = setup.curve.sizes[:-1]
         self._crossings: list[np.ndarray] = []
-        self._gaits: list[IsolatedGait] = []
-
-    def found(self) -> tuple[IsolatedGait, ...]:
-        """The gaits of as many footsteps as were asked for."""
-        return tuple(self._gaits)
+        self.gaits: list[IsolatedGait] = []
 
     def learn(self, point: np.ndarray, *, keep: bool = True) -> None:
         """Makes a cycle known, wherever it crosses the section."""
         crossings = [point]
         for _ in range(self._setup.arrivals - 1):
             after, code = self._walk(crossings[-1], 1)
-            if code or self._apart(after, point) < _SAME:
+            if code or np.linalg.norm((after - point) / self._sizes) < _SAME:
                 break
             crossings.append(after)
         self._crossings += [each / self._sizes for each in crossings]
         place = self._setup.at_value(point, self._value).found
         if keep and len(crossings) == self._setup.arrivals and place is not None:
             told = self._setup.point(place)
-            self._gaits.append(IsolatedGait(self._setup.state_of(told.recurring), told))
+            self.gaits.append(IsolatedGait(self._setup.state_of(told.recurring), told))
 
     def returns(self, start: np.ndarray) -> bool:
         """Whether the walk from a start comes through a cycle."""
@@ -165,7 +160,7 @@ class _DeflatedNewton:
         """A cycle that is not known yet, None where the search ends without."""
         point, code = self._walk(start, 1)  # onto the section
         for _ in range(_MOST_STEPS):
-            here = self._change(point)
+            here = self._setup.curve.change(point, self._setup.axis.place(self._value))
             if code or here.code:
                 return None
             try:
@@ -198,9 +193,3 @@ class _DeflatedNewton:
     def _walk(self, point: np.ndarray, arrivals: int) -> tuple[np.ndarray, int]:
         found = self._setup.cycle(point, self._value, arrivals)
         return np.asarray(found.recurring[0]), found.failure
-
-    def _change(self, point: np.ndarray) -> Change:
-        return self._setup.curve.change(point, self._setup.axis.place(self._value))
-
-    def _apart(self, a: np.ndarray, b: np.ndarray) -> float:
-        return float(np.linalg.norm((a - b) / self._sizes))

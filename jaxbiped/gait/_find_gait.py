@@ -19,6 +19,7 @@ from jaxbiped.dynamics._consistent_state import consistent_state
 from jaxbiped.dynamics._redundant_state import BodiesState, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._accurate_gait import accurate_gait
+from jaxbiped.gait._branch_along import search_along
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
@@ -29,15 +30,14 @@ from jaxbiped.gait._fixed_point_search import (
 )
 from jaxbiped.gait._gait import Gait, summarise_gait
 from jaxbiped.gait._guess_free_search import is_whole, origin_of, search_in_stages, spectral_radius
-from jaxbiped.gait._held_multipliers import without_held
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes
-from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._search_compilation import compile_once
 from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_unknown
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.scene._rigid_feet import held_count
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
@@ -202,7 +202,7 @@ def find_gait(
     if told is not origin:  # its scene may be of another structure, as of motors with a share
         gait = dataclasses.replace(gait, origin=jtu.tree_map(np.asarray, told))
     warn_of_unknown(gait)
-    return without_held(scene, gait)
+    return _without_held(scene, gait)
 
 
 def _is_stable(found: Found) -> bool:
@@ -240,6 +240,23 @@ def _check_start(
     if scene.redundant and not isinstance(guess, Gait):  # whose state is minimal
         start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
     return with_leg_names_of(section, scene.minimal, state_of_guess(scene.minimal, start))
+
+
+def _without_held(scene: AbstractWalkerScene, gait: Gait) -> Gait:
+    """A gait without the multipliers, all zero, of what is held where its cycle begins.
+
+    Those of a state's mode and of the angles and rates that a stop or a flat foot holds.
+    """
+    mode = float(getattr(gait.measures.state, "mode", np.nan))
+    if not np.isfinite(mode):
+        return gait
+    own = slice(np.shape(gait.multipliers)[-1] - 1 - 2 * held_count(scene.mechanism, mode))
+    return dataclasses.replace(
+        gait,
+        multipliers=gait.multipliers[own],
+        multiplier_errors=gait.multiplier_errors[own],
+        directions=gait.directions[:, own],
+    )
 
 
 @bounded_cache(1)  # the same object each time, so that nothing is compiled again

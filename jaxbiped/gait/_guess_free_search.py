@@ -110,7 +110,7 @@ def search_in_stages(
 
     def try_all(points: Sequence[np.ndarray] | np.ndarray, by: FoundBy) -> None:
         for point in points:
-            add(search(problem._replace(guess=state_at(start, point)), _TURNS), by)
+            add(search(problem._replace(guess=state_at(type(start), point)), _TURNS), by)
             now.update()
             if has_stable():
                 return

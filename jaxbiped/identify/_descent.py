@@ -120,7 +120,6 @@ class Descent:
         return sorted((each for each in found if each is not None), key=lambda each: each[0])
 
     def minimise(self, begin: np.ndarray, most: int) -> FitEnding:
-        """Descends."""
         from scipy.optimize import least_squares
 
         self.searching = True
@@ -137,12 +136,10 @@ class Descent:
         return FitEnding.CONVERGED if found.success else FitEnding.OUT_OF_EVALUATIONS
 
     def parameters(self, at: np.ndarray) -> dict[str, float]:
-        """The parameters' values at these variables."""
         values = np.where(self.first == 0.0, at * self.widths, self.first * np.exp(at))
         return dict(zip(self.names, values.tolist(), strict=True))
 
     def variables(self, values: np.ndarray) -> np.ndarray:
-        """The variables at these values."""
         zero = self.first == 0.0
         ratios = np.where(zero, 1.0, values) / np.where(zero, 1.0, self.first)
         with np.errstate(divide="ignore"):
@@ -195,7 +192,6 @@ class Descent:
         return np.full(len(self.values), np.inf) if found is None else self._scaled_misfits(found)
 
     def slopes(self, at: np.ndarray) -> np.ndarray:
-        """Derivatives of the residuals."""
         found = self.predictions(at)
         assert found is not None  # no step ends without its gaits
         return np.concatenate([each.slopes for each in found]) / self.deviations[:, None]
@@ -272,18 +268,16 @@ class Descent:
         """Both ends in the variable; by the linearised model, or followed where it bends."""
         limits = np.stack([self.variables(each) for each in self.limits])
         square = float(np.sum(residuals**2)) + _WITHIN**2
-
         known = residuals, slopes * used
-        if not follow:
-            low, high = (
-                linear_step(*known, square, which, sign, limits - at)[which] for sign in (-1.0, 1.0)
-            )
-            return at[which] + low, at[which] + high
 
         def model(variables: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
             if self.predictions(variables) is None:
                 return None
             return self.residuals(variables), self.slopes(variables) * used
 
-        low, high = (interval_end(model, at, known, square, which, s, limits) for s in (-1.0, 1.0))
-        return low, high
+        def end(sign: float) -> float:
+            if follow:
+                return interval_end(model, at, known, square, which, sign, limits)
+            return float(at[which] + linear_step(*known, square, which, sign, limits - at)[which])
+
+        return end(-1.0), end(1.0)

@@ -6,13 +6,13 @@ standard error of the joint fit; where the model bends, it is followed there.
 """
 
 import dataclasses
-import enum
 import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
+from jaxbiped._ending import NamedCode
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, Tabular, variables_of
 
@@ -25,7 +25,7 @@ _NULL = 1e-9
 """Singular value, as a share of the largest, that counts as none."""
 
 
-class FitEnding(enum.IntEnum):
+class FitEnding(NamedCode):
     """How a fit ended. `str(ending)` is its name in words.
 
     - converged: no step lowers the sum of squares any more.
@@ -38,9 +38,6 @@ class FitEnding(enum.IntEnum):
     OUT_OF_EVALUATIONS = 1
     NO_GAIT = 2
     INTERRUPTED = 3
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
 
 
 class Information(NamedTuple):

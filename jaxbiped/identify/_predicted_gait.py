@@ -200,9 +200,7 @@ def predict(
     names = tuple(parameters)
 
     def scene_at(values: dict[str, float]) -> AnyScene:
-        own = with_parameters(scene, {**values, **measured.conditions})
-        changed: AnyScene = jtu.tree_map(as_float, own)
-        return changed
+        return jtu.tree_map(as_float, with_parameters(scene, {**values, **measured.conditions}))
 
     def gait_at(values: dict[str, float], guess: PyTree | None, wanted: tuple[str, ...]) -> Gait:
         return find_gait(
@@ -223,27 +221,28 @@ def predict(
     )
     slopes, errors = (part.reshape(-1, len(names)) * sizes for part in (slopes, errors))
     found = found and bool(np.all(np.isfinite(slopes)))
-    if measured.angles is not None and found:
-        along, along_errors, at = _angles_along(
-            gait_at, scene_at, gait, measured, parameters, sizes
-        )
-        values = np.append(values, at)
-        slopes = np.concatenate([slopes, along])
-        errors = np.concatenate([errors, along_errors])
-    state = gait.measures.state
     state_slopes = jtu.tree_map(lambda leaf: np.asarray(leaf) * sizes, gait.sensitivities.state)
-    return Prediction(values, slopes, errors, state, state_slopes, found)
+    told = Prediction(values, slopes, errors, gait.measures.state, state_slopes, found)
+    if measured.angles is None or not found:
+        return told
+
+    def angles_near(values: dict[str, float], moved: np.ndarray) -> AnglesInTime:
+        return AnglesInTime.of(scene_at(values), gait_at(values, told.state_at(moved), ()))
+
+    here = AnglesInTime.of(scene_at(parameters), gait)
+    angles = _angles_along(here, angles_near, measured, parameters, sizes)
+    known = zip((values, slopes, errors), angles, strict=True)
+    return Prediction(*map(np.concatenate, known), *told[3:])
 
 
 def _angles_along(
-    gait_at: Callable[[dict[str, float], PyTree, tuple[str, ...]], Gait],
-    scene_at: Callable[[dict[str, float]], AnyScene],
-    gait: Gait,
+    here: AnglesInTime,
+    angles_near: Callable[[dict[str, float], np.ndarray], AnglesInTime],
     measured: MeasuredGait,
     parameters: dict[str, float],
     sizes: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives of the measured angles, these' errors, and the angles.
+    """The measured angles, their derivatives, and these' errors.
 
     Derivatives are central differences, one-sided where one of the two gaits is lost, with infinite
     errors where both are; errors are otherwise what the second differences make of them. A clock
@@ -252,11 +251,6 @@ def _angles_along(
     """
     seen = measured.angles
     assert seen is not None
-
-    def angles_of(values: dict[str, float], gait: Gait) -> AnglesInTime:
-        return AnglesInTime.of(scene_at(values), gait)
-
-    here = angles_of(parameters, gait)
     shift = clock_zero(here, seen)
     own, rates = here.at(seen, shift)
     slopes, errors = [], []
@@ -265,14 +259,8 @@ def _angles_along(
         for sign in (1.0, -1.0):
             moved = np.zeros(len(sizes))
             moved[k] = sign * _DIFFERENCE
-            ahead = jtu.tree_map(np.asarray, gait.sensitivities.state)
-            near = jtu.tree_map(
-                lambda leaf, slope, moved=moved: as_float(leaf + float(slope @ (sizes * moved))),
-                gait.measures.state,
-                ahead,
-            )
             values = parameters | {name: parameters[name] + sign * _DIFFERENCE * size}
-            there = angles_of(values, gait_at(values, near, ()))
+            there = angles_near(values, moved)
             ends.append(there.at(seen, shift if measured.clocks else there.mid_stance)[0])
         lost = [not np.all(np.isfinite(each)) for each in ends]
         up, down = (own if gone else each for each, gone in zip(ends, lost, strict=True))
@@ -282,4 +270,4 @@ def _angles_along(
     along = np.stack(slopes, axis=-1)
     if measured.clocks:
         along -= np.outer(rates, rates @ along) / (rates @ rates)
-    return along, np.stack(errors, axis=-1), own
+    return own, along, np.stack(errors, axis=-1)
