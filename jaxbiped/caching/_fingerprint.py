@@ -21,8 +21,8 @@ import jax
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped.caching import IMPORT_BEGAN_AT
 from jaxbiped.caching._caches import bounded_cache
-from jaxbiped.caching._import_time import IMPORT_BEGAN_AT
 from jaxbiped.caching._source_digest import SourceDigests
 
 _PACKAGE = "jaxbiped"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxbiped._files import JsonObject, strict_json
-from jaxbiped.caching import _import_time
+from jaxbiped.caching import IMPORT_BEGAN
 
 
 class Report:
@@ -78,8 +78,7 @@ def _write(text: str) -> None:
 
 def wall_times(imported: float) -> dict[str, float]:
     """How long the import took, which ended at `imported`, and all until now [s]."""
-    began = _import_time.IMPORT_BEGAN
-    return {"import": imported - began, "total": time.perf_counter() - began}
+    return {"import": imported - IMPORT_BEGAN, "total": time.perf_counter() - IMPORT_BEGAN}
 
 
 def records(result: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, TypeAlias
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
-from jaxbiped.caching import _import_time
+from jaxbiped.caching import IMPORT_BEGAN
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._scene_options import SceneOptions
 from jaxbiped.cli._start_options import StartOptions
@@ -110,7 +110,7 @@ class Walk(options.Command):
         state = self.start.start(scene, self.scene.walker)
         walked = self._roll if isinstance(scene, jb.RigidScene) else self._walk
         walk, settings, wall = walked(scene, state)
-        wall["import"] = imported - _import_time.IMPORT_BEGAN
+        wall["import"] = imported - IMPORT_BEGAN
         return report_walk(self.output, scene, state, walk, settings, wall)
 
     def _walk(self, scene: Any, state: Any) -> _Walked:

@@ -258,10 +258,7 @@ def _count(counts: Counter[str], block: Block, needed: Liveness) -> None:
     for value in block.values:
         if value in needed and value.op not in _NO_WORK:
             counts[value.op] += 1
+        lists = [arg for arg in value.args if isinstance(arg, list | tuple)]
+        inside = [v for each in lists for v in each if isinstance(v, Value)]
         for inner in (arg for arg in value.args if isinstance(arg, Block)):
-            _count(counts, inner, Liveness(_values_in(value)))
-
-
-def _values_in(value: Value) -> list[Value]:
-    lists = [arg for arg in value.args if isinstance(arg, list | tuple)]
-    return [v for each in lists for v in each if isinstance(v, Value)]
+            _count(counts, inner, Liveness(inside))
