@@ -68,7 +68,6 @@ class Skeleton(NamedTuple):
         return [leaf for leaf in self.leaves if isinstance(leaf, Leaf)]
 
     def filled(self, arrays: Sequence[Any]) -> Any:
-        """The tree with these arrays."""
         rest = iter(arrays)
         return self.structure.unflatten(
             [next(rest) if isinstance(leaf, Leaf) else leaf for leaf in self.leaves]

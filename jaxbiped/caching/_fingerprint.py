@@ -239,11 +239,9 @@ def _libraries() -> str:
 
 
 def as_leaves(tree: Any) -> Any:
-    """A tree of shapes as one of `Leaf`s."""
     return jtu.tree_map(leaf_of, tree)
 
 
 def leaf_of(array: Any) -> Leaf:
-    """Of an array."""
     weak = bool(getattr(array, "weak_type", False))
     return Leaf(tuple(array.shape), array.dtype, weak)

@@ -72,7 +72,6 @@ class Basin(options.Command):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         from jaxbiped.solve._accuracy import accuracy_told
         from jaxbiped.sweep._labelling_preparation import effort_of
         from jaxbiped.sweep._store_files import store_path

@@ -42,7 +42,6 @@ class Fit(options.Command, of=("fit_gait",)):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         scene = self.scene.scene()
         assert not isinstance(scene, jb.RedundantScene)
         self.output.make_folder()

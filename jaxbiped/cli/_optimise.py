@@ -57,7 +57,6 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         from jaxbiped.continuation._nearest_bifurcation import range_of
 
         scene = self.scene.scene()
@@ -154,7 +153,6 @@ def _optimum_numbers(
 
 
 def _certificate_numbers(certificate: "jb.optimise.Certificate") -> JsonObject:
-    """A certificate, for `strict_json`."""
     told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
     basin, push = certificate.basin, certificate.fatal_push
     numbers = {

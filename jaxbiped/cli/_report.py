@@ -34,7 +34,6 @@ class Report:
             self.say(f"wrote {path}")
 
     def finish(self, numbers: JsonObject) -> None:
-        """Writes the numbers."""
         _write_to(self._json, lambda: strict_json(numbers, indent=2) + "\n")
 
     def write_rows(self, rows: Callable[[], str]) -> None:

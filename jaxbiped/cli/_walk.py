@@ -43,7 +43,6 @@ class SolveOptions(options.Options, of=("simulate",)):
     engine: options.Engine
 
     def check(self) -> None:
-        """Raises `ArgumentError` for what is wrong in itself."""
         super().check()
         for name in ("accuracy", "dt") if self.rtol is not None else ():
             if getattr(self, name) is not None:
@@ -102,7 +101,6 @@ class Walk(options.Command):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         from jaxbiped.cli._walk_report import report_walk
 
         imported = time.perf_counter()
@@ -114,7 +112,6 @@ class Walk(options.Command):
         return report_walk(self.output, scene, state, walk, settings, wall)
 
     def _walk(self, scene: Any, state: Any) -> _Walked:
-        """Walks on compliant feet."""
         solve = self.solve
         with stage("preparing the start"):
             request = jb.Simulation.prepare(
@@ -136,7 +133,6 @@ class Walk(options.Command):
         return walk, {"name": solve.solver, "rtol": rtol, "dt": solve.dt}, wall
 
     def _roll(self, scene: Any, state: Any) -> _Walked:
-        """Walks on rigid feet."""
         solve = self.solve
         self.output.make_folder()
         solve.check_rolling()

@@ -18,14 +18,12 @@ Matrix: TypeAlias = list[list[Entry]]
 
 
 def plus(a: Entry, b: Entry) -> Entry:
-    """a + b."""
     if a is None:
         return b
     return a if b is None else a + b
 
 
 def times(a: Entry, b: Entry) -> Entry:
-    """a b."""
     return None if a is None or b is None else a * b
 
 

@@ -217,7 +217,6 @@ class AdaptiveSolve:
         return _has_begun(now) & functools.reduce(operator.or_, found)
 
     def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-        """See `Saved.record`."""
         assert now.last is not None
         return self.saved.record(
             solve.scene, now.last, now=(now.t, now.state), due=time, solver=self.solver
@@ -240,7 +239,6 @@ class AdaptiveSolve:
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
 def adaptive_program(steps: AdaptiveSolve) -> Program:
-    """The program of these functions."""
     record = steps.record if steps.saved.within else None
     return Program(
         steps.start, steps.attempt, steps.finish, record=record, scheduled=steps.saved.times

@@ -44,8 +44,8 @@ def lower_jaxpr(
     """
     known: dict[Var, Array] = {}
     for variable, const in zip(jaxpr.constvars, consts, strict=True):
-        is_lowered = isinstance(const, np.ndarray) and const.dtype == object
-        known[variable] = const if is_lowered else _constant(block, const)
+        lowered = isinstance(const, np.ndarray) and const.dtype == object
+        known[variable] = np.asarray(const) if lowered else _constant(block, const)
     known.update(zip(jaxpr.invars, args, strict=True))
 
     def read(atom: Atom) -> Array:
@@ -177,7 +177,7 @@ def _scan(block: Block, params: dict[str, Any], inputs: list[Array]) -> list[Arr
     if params["reverse"]:
         collected = [column[::-1] for column in collected]
     if not length:
-        shapes = [variable.aval.shape for variable in body.outvars[carried:]]  # type: ignore[attr-defined]
+        shapes = [variable.aval.shape for variable in body.outvars[carried:]]
         return [*carry, *(np.empty((0, *shape), dtype=object) for shape in shapes)]
     return [*carry, *(np.stack(column) for column in collected)]
 

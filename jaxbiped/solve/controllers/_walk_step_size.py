@@ -91,7 +91,6 @@ class ErrorControl(AbstractControl):
         return jnp.asarray(t0 + dt0), jnp.asarray(False)
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step."""
         t0, t1, rejected = attempt.t0, attempt.t1, attempt.memory
         span = jnp.asarray(t1 - t0)
         # A state that is no longer a number ends the solve in another way than by small steps.
