@@ -233,7 +233,13 @@ def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
     if walk is not None:
         back = "back to the gait" if walk.returned else "NOT back to the gait"
         yield f"walk from a push of {walk.push:g}: {walk.footsteps} footsteps, {back}"
-    yield from map(_bifurcation_line, certificate.nearest_bifurcations)
+    for nearest in certificate.nearest_bifurcations:
+        times = "" if math.isnan(nearest.ratio) else f" ({nearest.ratio:.3g} times its value)"
+        if nearest.kind is None:
+            yield f"no bifurcation along {nearest.along} in the range that was followed"
+        else:
+            place = f"{nearest.kind} at {nearest.value:.6g}{times}"
+            yield f"along {nearest.along} the nearest is {place}"
     for name, why in certificate.failed.items():
         yield f"{name}: not known ({why})"
     if (other := certificate.other_engine) is not None:
@@ -241,10 +247,3 @@ def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
             f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "
             f"{other.length_difference:.1e}, spectral radius by {other.radius_difference:.1e}"
         )
-
-
-def _bifurcation_line(nearest: "jb.continuation.NearestBifurcation") -> str:
-    if nearest.kind is None:
-        return f"no bifurcation along {nearest.along} in the range that was followed"
-    times = "" if math.isnan(nearest.ratio) else f" ({nearest.ratio:.3g} times its value)"
-    return f"along {nearest.along} the nearest is {nearest.kind} at {nearest.value:.6g}{times}"

@@ -140,19 +140,15 @@ def _quotients(numerators: Sequence[Scalar], denominators: Sequence[Scalar]) -> 
 def _inverses(numbers: Sequence[Scalar], over_all: Scalar | None = None) -> list[Scalar]:
     """One over each of some numbers, from one over the product of all, by which it divides once."""
     if over_all is None:
-        over_all = 1.0 / _product(numbers)
+        over_all = 1.0 / functools.reduce(operator.mul, numbers)
     if len(numbers) == 1:
         return [over_all]
     middle = len(numbers) // 2
     left, right = numbers[:middle], numbers[middle:]
     return [
-        *_inverses(left, over_all * _product(right)),
-        *_inverses(right, over_all * _product(left)),
+        *_inverses(left, over_all * functools.reduce(operator.mul, right)),
+        *_inverses(right, over_all * functools.reduce(operator.mul, left)),
     ]
-
-
-def _product(numbers: Sequence[Scalar]) -> Scalar:
-    return functools.reduce(operator.mul, numbers)
 
 
 def _root(square: Scalar, order: RealScalarLike | None) -> Scalar:
