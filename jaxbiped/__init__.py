@@ -8,7 +8,7 @@ Importing jaxbiped switches JAX to 64-bit floats: contact this stiff cannot do w
 is not imported yet, the environment variable JAX_ENABLE_X64 tells it, and child processes, too.
 """
 
-from jaxbiped.caching import _import_time as _import_time
+from jaxbiped import caching as caching  # its clock starts before anything slow
 
 import importlib as _importlib
 import os as _os

@@ -143,7 +143,7 @@ def source_digests(things: Iterable[Any]) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     parts = (base for each in things for base in getattr(each, "__mro__", (each,)))
-    for own in (part for part in parts if not _is_known(part)):
+    for own in (part for part in parts if part.__module__.partition(".")[0] not in _KNOWN):
         try:
             digest = hashlib.sha256(inspect.getsource(own).encode()).hexdigest()[:16]
         except (OSError, TypeError):
@@ -174,10 +174,6 @@ def _own_code(value: object) -> Iterator[Any]:
         yield type(value)
         for field in dataclasses.fields(value):
             yield from _own_code(getattr(value, field.name))
-
-
-def _is_known(thing: Any) -> bool:
-    return thing.__module__.partition(".")[0] in _KNOWN
 
 
 _PACKAGES = ("jaxbiped", "jax", "diffrax", "numpy", "llvmlite")

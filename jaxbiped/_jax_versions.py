@@ -2,13 +2,14 @@
 
 0.10 is the oldest version that is kept. Since 0.11 a scan gives trees of its operands instead of
 two counts. Since 0.12 `ClosedJaxpr` and `Jaxpr` are one class, and `eval_jaxpr` takes the place of
-`call` and `closed_call`.
+`call` and `closed_call`. Also JAX's debugging switches.
 """
 
 import contextlib
+import functools
 import weakref
-from collections.abc import Iterator, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -115,3 +116,36 @@ def tanh(x: Scalar) -> Scalar:
 def _tanh_jvp(primals: tuple[Scalar], tangents: tuple[Scalar]) -> tuple[Scalar, Scalar]:
     value = tanh(primals[0])
     return value, tangents[0] * ((1.0 - value) * (1.0 + value))
+
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+_USUAL = {
+    "debug_nans": False,
+    "debug_infs": False,
+    "numpy_rank_promotion": "allow",
+    "numpy_dtype_promotion": "standard",
+    "check_tracer_leaks": False,
+    "enable_checks": False,
+}
+
+
+def without_switches(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Decorator: a function in which JAX's debugging switches are as they usually are.
+
+    They are for the user's code. The package says "not known" by NaN and broadcasts as NumPy does,
+    so that under `jax_debug_nans` and its like its functions would raise where nothing is wrong.
+    """
+
+    @functools.wraps(function)
+    def called(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        config: Any = jax.config
+        changed = {n: x for n, x in _USUAL.items() if getattr(config, f"jax_{n}") != x}
+        if not changed:
+            return function(*args, **kwargs)
+        with contextlib.ExitStack() as usual:
+            for name, value in changed.items():
+                usual.enter_context(getattr(jax, name)(value))
+            return function(*args, **kwargs)
+
+    return called

@@ -52,7 +52,8 @@ def latex_number(value: float, error: float | None = None) -> str:
     if error is not None and math.isinf(error):
         return rf"{{${value:.6g} \pm \infty$}}"
     if error is None or math.isnan(error) or error == 0.0:
-        return _plain_number(value)
+        mantissa, _, exponent = f"{value:.6g}".partition("e")
+        return f"{mantissa}e{int(exponent)}" if exponent else mantissa
     # Powers of ten of the bar's second digit, after rounding, and of the whole.
     last = Decimal(f"{error:.1e}").adjusted() - 1
     whole = Decimal(value).adjusted() if value else last + 1
@@ -62,11 +63,6 @@ def latex_number(value: float, error: float | None = None) -> str:
     bar = round(Decimal(error).scaleb(-last))
     text = f"{Decimal(value).scaleb(-power):z.{decimals}f}({bar})"
     return f"{text}e{power}" if power else text
-
-
-def _plain_number(value: float) -> str:
-    mantissa, _, power = f"{value:.6g}".partition("e")
-    return f"{mantissa}e{int(power)}" if power else mantissa
 
 
 def _column(cells: Sequence[str]) -> str:

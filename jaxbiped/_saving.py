@@ -18,7 +18,6 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._encoding import Decoder, Encoder
 from jaxbiped._files import check_writable_file, failure_kind, user_path
 from jaxbiped._identity import provenance, source_digests
-from jaxbiped._types import JsonObject
 
 FORMAT = 1
 """Of files: another one is written where this version could not read what is in them."""
@@ -91,8 +90,12 @@ def load(path: str | Path) -> Any:
             contents = json.loads(archive.read(_CONTENTS))
             if not isinstance(contents, dict) or "jaxbiped" not in contents:
                 raise KeyError
-            _check_format(contents)
             own = contents["written_by"]
+            if contents["jaxbiped"] != FORMAT:
+                raise ArgumentError(
+                    f"the file has format {contents['jaxbiped']} of jaxbiped "
+                    f"{own['version_jaxbiped']}, and this version reads format {FORMAT}."
+                )
             read = Decoder(lambda number: _array(archive, number), own["version_jaxbiped"])
             value = read.decode(contents["value"])
     except OSError as error:
@@ -125,11 +128,3 @@ def _entry(name: str) -> zipfile.ZipInfo:
 def _array(archive: zipfile.ZipFile, number: int) -> np.ndarray:
     content = io.BytesIO(archive.read(f"{number:d}.npy"))
     return np.asarray(np.lib.format.read_array(content, allow_pickle=False))
-
-
-def _check_format(contents: JsonObject) -> None:
-    if contents["jaxbiped"] != FORMAT:
-        raise ArgumentError(
-            f"the file has format {contents['jaxbiped']} of jaxbiped "
-            f"{contents['written_by']['version_jaxbiped']}, and this version reads format {FORMAT}."
-        )

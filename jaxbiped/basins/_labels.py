@@ -6,13 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._ending import Ending
+from jaxbiped._ending import Ending, NamedCode
 
 WALKING_NAME = "walking period-{cycle_footsteps}"
 """What a start that walks is called, by the footsteps in a cycle of its gait."""
 
 
-class Label(enum.IntEnum):
+class Label(NamedCode):
     """What became of a start. `str(label)` is its name in words; every `Ending` of a walk is
     a label.
 
@@ -35,9 +35,6 @@ class Label(enum.IntEnum):
     UNRESOLVED = 8
     TIMED_OUT = Ending.TIMED_OUT.value
     PENDING = -1
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
 
 
 def label_name(label: int, cycle_footsteps: int = 0) -> str:

@@ -32,7 +32,6 @@ class Brackets(NamedTuple):
     labels: np.ndarray
 
     def take(self, which: np.ndarray) -> "Brackets":
-        """Some of the rays."""
         return Brackets(*(leaf[which] for leaf in self))
 
     def replaced(self, which: np.ndarray, by: "Brackets") -> "Brackets":

@@ -12,8 +12,7 @@ from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 import equinox as eqx
 import jax
 
-from jaxbiped._debug_switches import without_switches
-from jaxbiped._jax_versions import nothing_is_traced
+from jaxbiped._jax_versions import nothing_is_traced, without_switches
 from jaxbiped.caching import _caches
 from jaxbiped.caching._caches import Once, name_of, register_cache
 from jaxbiped.caching._compiled_store import (
@@ -98,7 +97,6 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
 
     @without_switches
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Runs the function, compiled."""
         arguments = arguments_of((args, kwargs))
         program = None if arguments is None else self._program(arguments, *self._others, _XLA)
         found: _T

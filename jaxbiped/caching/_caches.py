@@ -89,7 +89,6 @@ class Once(Generic[_T]):
 
     @property
     def done(self) -> bool:
-        """Whether it is made."""
         return bool(self._made)
 
     def __call__(self, make: Callable[[], _T]) -> _T:

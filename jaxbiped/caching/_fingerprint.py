@@ -21,8 +21,8 @@ import jax
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped.caching import IMPORT_BEGAN_AT
 from jaxbiped.caching._caches import bounded_cache
-from jaxbiped.caching._import_time import IMPORT_BEGAN_AT
 from jaxbiped.caching._source_digest import SourceDigests
 
 _PACKAGE = "jaxbiped"
@@ -86,22 +86,18 @@ def _parts(thing: Any, depth: int) -> Iterator[bytes]:
         yield thing.name.encode()
     elif isinstance(thing, np.dtype | np.generic):
         yield repr(thing).encode()
+    elif isinstance(thing, jax.core.Tracer):
+        raise UnknownMeaningError("a traced array")
     elif isinstance(thing, np.ndarray | jax.Array):
-        yield from _array_parts(thing)
+        values = np.asarray(thing)
+        yield f"{values.shape} {values.dtype}".encode()
+        yield values.tobytes()
     elif isinstance(thing, type):
         yield _class_name(thing).encode()
     else:
         for each in _members(thing):
             yield from _parts(each, depth + 1)
         yield b"end"
-
-
-def _array_parts(array: Any) -> Iterator[bytes]:
-    if isinstance(array, jax.core.Tracer):
-        raise UnknownMeaningError("a traced array")
-    values = np.asarray(array)
-    yield f"{values.shape} {values.dtype}".encode()
-    yield values.tobytes()
 
 
 def _members(thing: Any) -> Iterator[object]:
@@ -128,8 +124,8 @@ def _members(thing: Any) -> Iterator[object]:
         for field in dataclasses.fields(thing):
             yield field.name
             yield getattr(thing, field.name, None)
-    elif _is_wrapper(thing):
-        yield thing.__wrapped__
+    elif callable(thing) and callable(getattr(thing, "__wrapped__", None)):
+        yield thing.__wrapped__  # under a transformation such as `jax.jit`
     elif type(thing).__module__.split(".")[0] == _PACKAGE and hasattr(thing, "__dict__"):
         yield from sorted(_attributes(thing).items())
     else:
@@ -166,11 +162,6 @@ def _attributes(thing: object) -> dict[str, object]:
     found = vars(thing)
     later = functools.cached_property
     return {n: found[n] for n in found if not isinstance(getattr(type(thing), n, None), later)}
-
-
-def _is_wrapper(thing: object) -> bool:
-    """Whether it is a function under a transformation such as `jax.jit`."""
-    return callable(thing) and callable(getattr(thing, "__wrapped__", None))
 
 
 def _class_name(kind: type) -> str:
@@ -239,11 +230,9 @@ def _libraries() -> str:
 
 
 def as_leaves(tree: Any) -> Any:
-    """A tree of shapes as one of `Leaf`s."""
     return jtu.tree_map(leaf_of, tree)
 
 
 def leaf_of(array: Any) -> Leaf:
-    """Of an array."""
     weak = bool(getattr(array, "weak_type", False))
     return Leaf(tuple(array.shape), array.dtype, weak)

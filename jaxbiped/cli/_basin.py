@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import jaxbiped as jb
 from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
-from jaxbiped.caching import _import_time
+from jaxbiped.caching import IMPORT_BEGAN
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._basin_starts import StartsOptions
 from jaxbiped.cli._report import Report, columns
@@ -72,7 +72,6 @@ class Basin(options.Command):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         from jaxbiped.solve._accuracy import accuracy_told
         from jaxbiped.sweep._labelling_preparation import effort_of
         from jaxbiped.sweep._store_files import store_path
@@ -110,7 +109,7 @@ class Basin(options.Command):
             with stage("drawing the basin"):
                 paths = _write_results(found, starts, self.output)
             report.wrote(paths)
-        numbers["wall_s"] = time.perf_counter() - _import_time.IMPORT_BEGAN
+        numbers["wall_s"] = time.perf_counter() - IMPORT_BEGAN
         report.write_rows(lambda: jb.measure.to_csv(found, tuple(map(str, found.label.dims))))
         report.finish(numbers)
         return 0

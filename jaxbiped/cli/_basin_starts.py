@@ -68,7 +68,6 @@ class StartsOptions(options.Options, of=("starts.sample", "starts.grid")):
         return tuple(text for text in (*self.more, self.y, self.x) if text is not None)
 
     def check(self) -> None:
-        """Raises `ArgumentError` for what is wrong in itself."""
         if self.starts is not None and (self.axes or self.samples is not None):
             raise ArgumentError(
                 f"starts = {str(self.starts)!r} is not allowed with x, y, more or "

@@ -40,7 +40,6 @@ class ContinueGait(options.Command, of=("continue_gait",)):
     engine: options.Engine
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         continue_gait, imported = jb.continue_gait, time.perf_counter()
         scene = self.scene.scene()
         guess = self.start.guess(scene, self.scene.walker)

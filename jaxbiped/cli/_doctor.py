@@ -120,7 +120,6 @@ class Truth(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """The same in a word."""
         return "holds" if self.holds else "wrong"
 
 
@@ -183,7 +182,6 @@ class Cache(options.Command):
     """File for the same in JSON; - prints only the JSON."""
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         report, folder = Report(self.json), cache_folder()
         removed = clear_disk() if self.clear else None
         use = disk_use()

@@ -22,16 +22,15 @@ _ESTIMATE = {
 _REDUNDANT = 'formulation = "redundant" is not allowed here: it must be "minimal".'
 
 
-def _check_file(name: str, path: Path) -> None:
-    """Raises `ArgumentError` for a file that cannot be read."""
-    read = read_text if path.suffix.lower() == ".csv" else read_json
-    read(name, path)
+_IS_MEASURED = options.Check(
+    lambda name, path: (read_text if path.suffix.lower() == ".csv" else read_json)(name, path)
+)
 
 
 class Fit(options.Command, of=("fit_gait",)):
     """Fit parameters to measured gaits; print estimates, their errors and what data cannot tell."""
 
-    file: Annotated[Positional[Path], options.Check(_check_file)]
+    file: Annotated[Positional[Path], _IS_MEASURED]
     """File of measured gaits, CSV or JSON (see jaxbiped.identify.read_measured)."""
     vary: str
     """Names of the parameters to fit, separated by commas: K,c,mu_kinetic."""
@@ -42,7 +41,6 @@ class Fit(options.Command, of=("fit_gait",)):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         scene = self.scene.scene()
         assert not isinstance(scene, jb.RedundantScene)
         self.output.make_folder()

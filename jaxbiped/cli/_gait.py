@@ -61,7 +61,6 @@ class FindGait(options.Command, of=("find_gait",)):
     engine: options.Engine
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         from jaxbiped.solve._accuracy import accuracy_told
         from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 

@@ -31,7 +31,6 @@ class Models(options.Command):
     """File for the same in JSON; - prints only the JSON."""
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         from jaxbiped._parameter_declaration import parameter_infos
 
         seed = jb.seed_scene()

@@ -57,7 +57,6 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         from jaxbiped.continuation._nearest_bifurcation import range_of
 
         scene = self.scene.scene()
@@ -154,7 +153,6 @@ def _optimum_numbers(
 
 
 def _certificate_numbers(certificate: "jb.optimise.Certificate") -> JsonObject:
-    """A certificate, for `strict_json`."""
     told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
     basin, push = certificate.basin, certificate.fatal_push
     numbers = {
@@ -235,7 +233,13 @@ def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
     if walk is not None:
         back = "back to the gait" if walk.returned else "NOT back to the gait"
         yield f"walk from a push of {walk.push:g}: {walk.footsteps} footsteps, {back}"
-    yield from map(_bifurcation_line, certificate.nearest_bifurcations)
+    for nearest in certificate.nearest_bifurcations:
+        times = "" if math.isnan(nearest.ratio) else f" ({nearest.ratio:.3g} times its value)"
+        if nearest.kind is None:
+            yield f"no bifurcation along {nearest.along} in the range that was followed"
+        else:
+            place = f"{nearest.kind} at {nearest.value:.6g}{times}"
+            yield f"along {nearest.along} the nearest is {place}"
     for name, why in certificate.failed.items():
         yield f"{name}: not known ({why})"
     if (other := certificate.other_engine) is not None:
@@ -243,10 +247,3 @@ def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
             f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "
             f"{other.length_difference:.1e}, spectral radius by {other.radius_difference:.1e}"
         )
-
-
-def _bifurcation_line(nearest: "jb.continuation.NearestBifurcation") -> str:
-    if nearest.kind is None:
-        return f"no bifurcation along {nearest.along} in the range that was followed"
-    times = "" if math.isnan(nearest.ratio) else f" ({nearest.ratio:.3g} times its value)"
-    return f"along {nearest.along} the nearest is {nearest.kind} at {nearest.value:.6g}{times}"

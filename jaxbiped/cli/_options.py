@@ -137,11 +137,6 @@ def _check_accuracy(name: str, accuracy: str) -> None:
         check_positive(name, number)
 
 
-def _check_json(name: str, path: Path) -> None:
-    if str(path) != "-":
-        check_writable_file(f"--{name}", path)
-
-
 Count = Annotated[int, Check(check_count)]
 NotNegative = Annotated[int, Check(check_not_negative)]
 AnyAccuracy = Annotated[str, Check(_check_accuracy)]
@@ -161,7 +156,10 @@ Engine = Annotated[
 CycleFootsteps = Annotated[
     int | None, Check(check_count), arg(help="Number of footsteps in a cycle.")
 ]
-JsonPath = Annotated[Path | None, Check(_check_json)]
+JsonPath = Annotated[
+    Path | None,
+    Check(lambda name, path: str(path) == "-" or check_writable_file(f"--{name}", path)),
+]
 Numbers = Annotated[
     JsonPath, arg(help="File for the numbers in SI units; - prints only the numbers.")
 ]

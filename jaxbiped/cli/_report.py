@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxbiped._files import JsonObject, strict_json
-from jaxbiped.caching import _import_time
+from jaxbiped.caching import IMPORT_BEGAN
 
 
 class Report:
@@ -34,7 +34,6 @@ class Report:
             self.say(f"wrote {path}")
 
     def finish(self, numbers: JsonObject) -> None:
-        """Writes the numbers."""
         _write_to(self._json, lambda: strict_json(numbers, indent=2) + "\n")
 
     def write_rows(self, rows: Callable[[], str]) -> None:
@@ -78,8 +77,7 @@ def _write(text: str) -> None:
 
 def wall_times(imported: float) -> dict[str, float]:
     """How long the import took, which ended at `imported`, and all until now [s]."""
-    began = _import_time.IMPORT_BEGAN
-    return {"import": imported - began, "total": time.perf_counter() - began}
+    return {"import": imported - IMPORT_BEGAN, "total": time.perf_counter() - IMPORT_BEGAN}
 
 
 def records(result: Any) -> Any:

@@ -53,7 +53,6 @@ class Trade(options.Command):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         from jaxbiped.trade import GaitTrade, WalkTrade
 
         scene = self.scene.scene()

@@ -8,7 +8,7 @@ from typing import Annotated, Any, TypeAlias
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
-from jaxbiped.caching import _import_time
+from jaxbiped.caching import IMPORT_BEGAN
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._scene_options import SceneOptions
 from jaxbiped.cli._start_options import StartOptions
@@ -43,7 +43,6 @@ class SolveOptions(options.Options, of=("simulate",)):
     engine: options.Engine
 
     def check(self) -> None:
-        """Raises `ArgumentError` for what is wrong in itself."""
         super().check()
         for name in ("accuracy", "dt") if self.rtol is not None else ():
             if getattr(self, name) is not None:
@@ -102,7 +101,6 @@ class Walk(options.Command):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code."""
         from jaxbiped.cli._walk_report import report_walk
 
         imported = time.perf_counter()
@@ -110,11 +108,10 @@ class Walk(options.Command):
         state = self.start.start(scene, self.scene.walker)
         walked = self._roll if isinstance(scene, jb.RigidScene) else self._walk
         walk, settings, wall = walked(scene, state)
-        wall["import"] = imported - _import_time.IMPORT_BEGAN
+        wall["import"] = imported - IMPORT_BEGAN
         return report_walk(self.output, scene, state, walk, settings, wall)
 
     def _walk(self, scene: Any, state: Any) -> _Walked:
-        """Walks on compliant feet."""
         solve = self.solve
         with stage("preparing the start"):
             request = jb.Simulation.prepare(
@@ -136,7 +133,6 @@ class Walk(options.Command):
         return walk, {"name": solve.solver, "rtol": rtol, "dt": solve.dt}, wall
 
     def _roll(self, scene: Any, state: Any) -> _Walked:
-        """Walks on rigid feet."""
         solve = self.solve
         self.output.make_folder()
         solve.check_rolling()

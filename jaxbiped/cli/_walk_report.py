@@ -106,7 +106,6 @@ def report_walk(
 
 
 def _compliant_numbers(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
-    """What is known of a walk on compliant feet alone."""
     with stage("measuring the footsteps"):
         rows = footstep_rows(jb.footsteps(scene, walk))
         legs = scene.mechanism.structure.legs
@@ -128,7 +127,6 @@ def _compliant_numbers(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
 
 
 def _rigid_numbers(scene: "jb.RigidScene", walk: "jb.Trajectory[Any]") -> JsonObject:
-    """What is known of a walk on rigid feet alone."""
     assert walk.arrivals is not None
     return {
         "model": "rigid",
@@ -219,7 +217,6 @@ def write_outputs(scene: Any, walk: "jb.Trajectory[Any]", output: OutputOptions)
 def _write_rigid_outputs(
     scene: "jb.RigidScene", state: Any, walk: "jb.Trajectory[Any]", output: OutputOptions
 ) -> list[Path]:
-    """The same of a walk on rigid feet."""
     assert output.out is not None
     shown = from_start(scene, _rigid_beginning(walk), state)
     paths = output.draw(_motion_figures(scene, shown))
@@ -257,7 +254,6 @@ def walk_cost(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
 
 
 def cost_sentence(cost: JsonObject) -> str:
-    """The same in words."""
     return (
         f"cost of transport {cost['cost_of_transport']:.5f} over whole footsteps, with "
         f"{cost['motor_work_J']:.4g} J of the motors' positive work"

@@ -67,7 +67,6 @@ def walk_warnings(scene: Any, numbers: JsonObject, *, rtol: float | None) -> lis
 
 
 def rigid_warnings(scene: Any, numbers: JsonObject, *, rtol: float | None) -> list[str]:
-    """The same of a walk on rigid feet."""
     found, listed = cut_short(numbers["ending"], numbers["solver"]["attempted"]), numbers["steps"]
     if numbers["footsteps"] > len(listed):
         found.append(f"only the first {len(listed)} footsteps are listed")

@@ -1,5 +1,6 @@
 """Walkers of commands: named ones that walk as they are, and those of a user's own file."""
 
+import functools
 import importlib.util
 import symtable
 import sys
@@ -10,7 +11,7 @@ from typing import Any, NamedTuple
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
-from jaxbiped.models import MODELS, Model
+from jaxbiped.models import MODELS
 
 SEED = "seed"
 
@@ -29,11 +30,6 @@ class NamedWalker(NamedTuple):
     make: Callable[[Any], Any]
     own_parameters: bool = False
     start: Mapping[str, float] = MappingProxyType({})
-
-
-def _published(model: Model) -> NamedWalker:
-    start = next(iter(model.starts.values()))
-    return NamedWalker(model.words, lambda _: model.make().walker, True, start)
 
 
 WALKERS: dict[str, NamedWalker] = {
@@ -59,7 +55,9 @@ WALKERS: dict[str, NamedWalker] = {
         start={"theta_1": -0.281, "theta_2": 0.190, "omega_1": -0.036, "omega_2": -1.182},
     ),
 }
-WALKERS |= {name: _published(model) for name, model in MODELS.items()}
+for _name, _model in MODELS.items():
+    _make = functools.partial(lambda model, _: model.make().walker, _model)
+    WALKERS[_name] = NamedWalker(_model.words, _make, True, next(iter(_model.starts.values())))
 """By the name that --walker takes."""
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice, check_count, check_unbatched
-from jaxbiped._debug_switches import without_switches
+from jaxbiped._jax_versions import without_switches
 from jaxbiped._progress import Stage, stage
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit

@@ -8,7 +8,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._debug_switches import without_switches
+from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state_quantities import recurring_leaves

@@ -8,7 +8,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive, check_type
-from jaxbiped._debug_switches import without_switches
+from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Scalar, Time, as_float, select
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection

@@ -18,14 +18,12 @@ Matrix: TypeAlias = list[list[Entry]]
 
 
 def plus(a: Entry, b: Entry) -> Entry:
-    """a + b."""
     if a is None:
         return b
     return a if b is None else a + b
 
 
 def times(a: Entry, b: Entry) -> Entry:
-    """a b."""
     return None if a is None or b is None else a * b
 
 
@@ -37,10 +35,11 @@ def inverse(matrix: Matrix) -> list[list[Scalar]]:
     size = len(matrix)
     known = [entry for row in matrix for entry in row if entry is not None]
     zero = jnp.zeros_like(sum(known[1:], known[0]))
+    units = [[zero + 1.0 if j == i else zero for j in range(size)] for i in range(size)]
     # A row begins with the entries that are not eliminated yet.
     rows = [
-        jnp.stack([*(zero if e is None else e + zero for e in row), *_unit(zero, size, i)], axis=-1)
-        for i, row in enumerate(matrix)
+        jnp.stack([zero if e is None else e + zero for e in row] + unit, axis=-1)
+        for row, unit in zip(matrix, units, strict=True)
     ]
     for k in range(size):
         _largest_first(rows, k)
@@ -155,7 +154,3 @@ def matmul(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
     """A matrix times a vector, each a list of scalars."""
     products = [[a * b for a, b in zip(row, right, strict=True)] for row in matrix]
     return [sum(row[1:], row[0]) for row in products]
-
-
-def _unit(zero: Scalar, size: int, place: int) -> list[Scalar]:
-    return [zero + 1.0 if j == place else zero for j in range(size)]

@@ -230,7 +230,6 @@ def _depth(now: Contacts) -> np.ndarray:
 
 
 def _largest(values: np.ndarray, loads: Samples, time: np.ndarray) -> np.ndarray:
-    """The largest value in each footstep."""
     largest = np.zeros(len(time) - 1)
     step, inside = loads.stretches(time)
     np.maximum.at(largest, step[inside], values[inside].max(axis=1))

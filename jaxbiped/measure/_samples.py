@@ -234,7 +234,6 @@ def from_start(scene: RigidScene, walk: Trajectory[Any], start: Any) -> Trajecto
 
 
 def rows_of(states: Any, rows: slice | np.ndarray) -> Any:
-    """Some of several states."""
     return type(states)(*[np.asarray(leaf)[rows] for leaf in states])
 
 

@@ -12,6 +12,7 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._measures import QUANTITIES
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import row_label
@@ -113,7 +114,7 @@ def elasticity_errors(gait: Gait, name: str) -> np.ndarray:
         sizes = [
             np.abs(getattr(relative_slopes, each) * getattr(measures, each))
             / np.abs(getattr(slopes, each))
-            for each in MEASURES
+            for each in QUANTITIES
         ]
         parameter = np.nanmax(np.where(np.isfinite(sizes), sizes, 0.0), axis=0)
         relative = np.abs(getattr(errors, name) / value)
@@ -154,13 +155,6 @@ def _name(ax: Axes, values: np.ndarray) -> None:
         style.label_point(ax, text, (0.0, 0.0), (-8, -8), ha="right", va="top")
 
 
-MEASURES = {
-    "period": "period",
-    "step_length": "step length",
-    "speed": "speed",
-    "peak_normal": "peak normal force",
-    "spectral_radius": "spectral radius",
-}
 _LINEAR = 1e-4
 """Elasticities up to this are drawn to a linear scale, beyond to a logarithmic one."""
 
@@ -177,7 +171,7 @@ The scale is logarithmic beyond
 
 
 def elasticities(
-    gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES), *, ax: Axes | None = None
+    gait: Gait, measure: str | tuple[str, ...] = tuple(QUANTITIES), *, ax: Axes | None = None
 ) -> Figure:
     """Draws elasticities, d log measure / d log parameter, with error bars, the largest on top.
 
@@ -201,7 +195,7 @@ def elasticities(
     if not names:
         raise ArgumentError("measure = () is not allowed: it must name a measure at least.")
     for name in names:
-        check_choice("measure", name, MEASURES)
+        check_choice("measure", name, QUANTITIES)
     check_drawable(gait)
     if not gait.parameters:
         raise ArgumentError("this gait has no sensitivities: find it with parameters to vary.")
@@ -213,7 +207,7 @@ def elasticities(
     errors = [elasticity_errors(gait, name) for name in names]
     ends = np.abs(np.nan_to_num(found, posinf=0.0, neginf=0.0)) + np.nan_to_num(errors)
     for each, name, values, bars in zip(panels, names, found, errors, strict=False):
-        _panel(each, MEASURES[name], rows, values, bars)
+        _panel(each, QUANTITIES[name].words, rows, values, bars)
         _scale(each, float(np.max(ends)), short)
     spare = panels[len(names) :]
     for each in spare:

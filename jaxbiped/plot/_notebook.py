@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._measures import QUANTITIES
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.plot import style
 from jaxbiped.plot._gait_charts import multipliers
@@ -104,12 +105,13 @@ def _of_gait(gait: Gait) -> str:
         return _plain(gait)
     found = gait.outcome is Search.FOUND
     rows: list[tuple[str, ...]] = []
-    for name, unit in (("period", "s"), ("step_length", "m"), ("speed", "m/s"),
-                       ("peak_normal", "N"), ("spectral_radius", "")):  # fmt: skip
+    for name, quantity in QUANTITIES.items():
         value = getattr(gait.measures, name)
         if value is not None and found:
             error = getattr(gait.measure_errors, name)
-            rows.append((name.replace("_", " "), *_with_error(float(value), float(error)), unit))
+            rows.append(
+                (name.replace("_", " "), *_with_error(float(value), float(error)), quantity.unit)
+            )
     told = f"{gait.outcome} (jaxbiped.gait.explain_search(scene, gait) tells why)"
     if found:
         told = f"{_STABLE[bool(gait.stable)]}, found by {FoundBy(int(gait.origin.found_by))}"

@@ -1,17 +1,24 @@
-"""Samples of a trajectory on times fit for drawing: even ones and the solver's steps."""
+"""Motions to draw: trajectories sampled on times fit for that, and rigid walks."""
 
+import dataclasses
+import math
+from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias, cast
 
 import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
 
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._types import as_array
+from jaxbiped.dynamics._state import state_type, whole_state
 from jaxbiped.measure._footsteps import HeelStrikes, heel_strikes
-from jaxbiped.measure._samples import evaluate_along
-from jaxbiped.plot._rigid_motion import rigid_motion
+from jaxbiped.measure._samples import evaluate_along, states_after
 from jaxbiped.plot._skeleton import body_motion
+from jaxbiped.scene._rigid_feet import rigid_modes, standing_legs
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
+from jaxbiped.scene._structure import Structure
 from jaxbiped.solve._trajectory import Trajectory
 
 AnyScene: TypeAlias = Scene | RedundantScene | RigidScene
@@ -106,3 +113,143 @@ class DrawnMotion:
         if self._rigid is not None:
             return self._rigid.strikes()
         return heel_strikes(cast("Scene", self._scene), self._trajectory)
+
+
+BEFORE = 1e-7
+"""How long before and behind a jump of rates a motion is seen, in parts of its footstep."""
+_AT_ONCE = 1024
+"""Walks in one call: one size for all lengths."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RigidMotion:
+    """A rigid walk from its heel strikes, footstep by footstep.
+
+    At each heel strike a rigid walk exchanges the names of its sides, so that the same leg stands
+    in every state. Here bodies and feet keep the names that they have at its first state.
+
+    Attributes:
+        scene: what walks.
+        began: when each footstep begins [s], shape (n,).
+        starts: the states then.
+        end: when the last one ends [s].
+        changes: when the mode changes between heel strikes [s].
+    """
+
+    scene: RigidScene
+    began: np.ndarray
+    starts: Any
+    end: float
+    changes: np.ndarray
+
+    def rows(self, t: np.ndarray) -> np.ndarray:
+        """Which footstep each time [s] lies in."""
+        return np.maximum(np.searchsorted(self.began, t, side="right") - 1, 0)
+
+    def both_sides(self) -> np.ndarray:
+        """Times at once before and behind all jumps of rates [s], and both ends."""
+        jumps = np.concatenate([self.began[1:], self.changes])
+        near = BEFORE * np.diff([*self.began, self.end])
+        behind = np.concatenate([self.began[1:], self.changes + near[self.rows(self.changes)]])
+        before = jumps - near[self.rows(jumps - 1e-12 * self.end)]
+        return np.unique([self.began[0], *before, *behind, self.end])
+
+    def along(self, function: Callable[..., Any], t: np.ndarray) -> dict[str, np.ndarray]:
+        """What a function of (scene, state) has by name at times [s], sides exchanged back."""
+        rows = self.rows(t)
+        each = jtu.tree_map(lambda leaf: np.asarray(leaf)[rows], self.starts)
+        states = _states_of_walks(self.scene, each, t - self.began[rows])
+        found: Any = evaluate_along(self.scene, states, function)
+        return _exchanged_back(self.scene.mechanism.structure, found, rows)
+
+    def motion(self, t: np.ndarray) -> dict[str, np.ndarray]:
+        """Places, angles and rates of the root point and all bodies by name at times [s]."""
+        return self.along(_whole_motion, t)
+
+    def standing_legs(self) -> np.ndarray:
+        """Number of the leg that stands in each footstep, from 0 on."""
+        structure = self.scene.mechanism.structure
+        able = standing_legs(structure)
+        if len(able) > 1:
+            modes = rigid_modes(self.scene.mechanism)
+            mode = modes.decoded(np, np.asarray(self.starts.mode))
+            stands = [modes.stands_on(mode, leg) for leg in able]
+            return np.asarray(able)[np.argmax(stands, axis=0)]
+        return np.resize(structure.namings, len(self.began))
+
+    def strikes(self) -> HeelStrikes:
+        """Its heel strikes; a start is none."""
+        struck = self.began > 0.0
+        return HeelStrikes(self.began[struck], 1 + self.standing_legs()[struck])
+
+
+def rigid_motion(scene: RigidScene, walk: Trajectory[Any]) -> RigidMotion:
+    """The motion of a rigid walk from the first heel strike on that it kept.
+
+    What comes after the last heel strike that the walk kept (`max_arrivals`) is left out where
+    there were more. Raises `ArgumentError` for a walk without heel strikes.
+    """
+    check_type("trajectory.state", walk.state, state_type(scene))
+    times, states, end = np.zeros(0), walk.state, float(np.asarray(walk.t)[-1])
+    if walk.arrivals is not None:
+        kept = np.isfinite(np.asarray(walk.arrivals.t))
+        times = np.asarray(walk.arrivals.t)[kept]
+        states = jtu.tree_map(lambda leaf: np.asarray(leaf)[kept], walk.arrivals.state)
+        if times.size and int(walk.arrivals.total) > times.size:
+            end = float(times[-1])
+    if not times.size or (len(times) == 1 and end <= times[0]):
+        raise ArgumentError(
+            "trajectory kept no heel strikes, which is not allowed: walk further with "
+            "save=HeelStrike(), or give `view` its start."
+        )
+    if end <= times[-1]:  # with a heel strike: the motion is that before it
+        end = float(times[-1] - BEFORE * (times[-1] - times[-2]))
+        times, states = times[:-1], jtu.tree_map(lambda leaf: leaf[:-1], states)
+    history, changes = walk.mode_history, np.zeros(0)
+    if history is not None:
+        began = np.asarray(history.t)
+        inside = (began > times[0]) & (began < end) & ~np.isin(began, times)
+        changes = began[inside]
+    return RigidMotion(scene, times, states, end, changes)
+
+
+def _exchanged_back(
+    structure: Structure, found: dict[str, np.ndarray], rows: np.ndarray
+) -> dict[str, np.ndarray]:
+    """What bodies and feet have, under the names that they have in the first footstep."""
+    changed, odd = dict(found), rows % 2 == 1
+    for j, twin in enumerate(structure.body_twins or ()):
+        for word in ("theta", "omega"):
+            own, other = (f"{word}_{structure.bodies[k]}" for k in (j, twin))
+            changed[own] = np.where(odd, found[other], found[own])
+    if structure.turn is not None:
+        name = f"theta_{structure.bodies[structure.turn.body]}"
+        changed[name] = found[name] - 2.0 * np.pi / structure.turn.order * rows
+    for word in ("normal", "tangential"):
+        names = [f"{word}_{k + 1}" for k in range(len(structure.feet))]
+        if names[0] in found:
+            changed |= {name: np.zeros(len(rows)) for name in names}
+            for row in np.unique(rows):
+                for k, name in zip(structure.feet_renamed(-int(row)), names, strict=True):
+                    own = names[k]
+                    changed[own] = np.where(rows == row, found[name], changed[own])
+    return changed
+
+
+def _whole_motion(scene: RigidScene, state: Any) -> dict[str, Any]:
+    return body_motion(scene, whole_state(scene, state))
+
+
+def _states_of_walks(scene: RigidScene, starts: Any, durations: np.ndarray) -> Any:
+    found = []
+    # No time at all is not simulated.
+    shortest = 1e-12 * math.sqrt(float(scene.mechanism.height) / float(scene.ground.g))
+    for k in range(0, len(durations), _AT_ONCE):
+        rows = slice(k, k + _AT_ONCE)
+        missing = _AT_ONCE - len(durations[rows])
+        padded = [np.pad(leaf[rows], (0, missing), mode="edge") for leaf in (*starts, durations)]
+        part = type(starts)(*map(as_array, padded[:-1]))
+        states = states_after(scene, part, np.maximum(padded[-1], shortest))
+        found.append([np.asarray(leaf)[: _AT_ONCE - missing] for leaf in states])
+    whole = [as_array(np.concatenate(leaves)) for leaves in zip(*found, strict=True)]
+    return type(starts)(*whole)

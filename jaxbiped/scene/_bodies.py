@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import equinox as eqx
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._parameter_declaration import check_parameters, parameter
+from jaxbiped._parameter_declaration import AbstractPart, check_parameters, parameter
 from jaxbiped._types import Parameter
 
 _NAME = re.compile(r"[A-Za-z0-9_]+")
@@ -15,7 +15,7 @@ RESERVED = ("normal", "vertical")
 """Names that take a reaction and move nothing: the slope's normal and the vertical."""
 
 
-class Point(eqx.Module):
+class Point(AbstractPart):
     """A point of a body, in the body's own frame, whose origin is the body's hinge.
 
     At an angle θ of the body the first axis is (sin θ, −cos θ), down the hanging body, and the
@@ -28,9 +28,6 @@ class Point(eqx.Module):
 
     along: Parameter = parameter("along the body", "", "m")
     ahead: Parameter | None = parameter("ahead of the body", "", "m", default=None)
-
-    def __check_init__(self) -> None:
-        check_parameters(self)
 
 
 class OwnHinge(eqx.Module):

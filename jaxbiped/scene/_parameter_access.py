@@ -252,12 +252,9 @@ def _scene_names(scene: AbstractWalkerScene, paths: list[_Path]) -> list[str]:
     """Names of a scene's leaves, of which the walker's lengthen none."""
     of_walker = [path[0].name == "walker" for path in paths]
     others = _shortest_names([p for p, inner in zip(paths, of_walker, strict=True) if not inner])
-    rest, own = iter(others), iter(_walker_names(scene.walker))
-    return [_longer(next(own), others) if inner else next(rest) for inner in of_walker]
-
-
-def _longer(name: str, taken: list[str]) -> str:
-    return f"walker.{name}" if name in taken else name
+    rest = iter(others)
+    own = (f"walker.{name}" if name in others else name for name in _walker_names(scene.walker))
+    return [next(own) if inner else next(rest) for inner in of_walker]
 
 
 def _walker_names(walker: Any) -> list[str]:

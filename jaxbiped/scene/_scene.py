@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Any, ClassVar, Self, TypeAlias
 
 import equinox as eqx
@@ -210,6 +211,11 @@ class RigidScene(AbstractMinimalScene):
         return (*names, "mode") if rigid_modes(self.mechanism).any else names
 
 
+def _of_scene(words: str, name: str = "") -> Any:
+    """A part of the scene that a redundant one writes down."""
+    return property(attrgetter(f"scene.{name or words}"), doc=f"The scene's {words}.")
+
+
 class RedundantScene(AbstractWalkerScene):
     """A walker whose bodies have coordinates of their own, held together by a constraint method.
 
@@ -251,35 +257,12 @@ class RedundantScene(AbstractWalkerScene):
     def with_minimal(self, minimal: Scene) -> Self:
         return dataclasses.replace(self, scene=minimal)
 
-    @property
-    def walker(self) -> Any:
-        """The scene's walker."""
-        return self.scene.walker
-
-    @property
-    def ground(self) -> Ground:
-        """The scene's ground."""
-        return self.scene.ground
-
-    @property
-    def normal(self) -> AbstractNormalLaw:
-        """The scene's law of the normal force."""
-        return self.scene.normal
-
-    @property
-    def friction(self) -> AbstractFrictionLaw | AbstractBristleLaw:
-        """The scene's law of friction."""
-        return self.scene.friction
-
-    @property
-    def clearance(self) -> AbstractClearance:
-        """The scene's rule of clearance."""
-        return self.scene.clearance
-
-    @property
-    def actuation(self) -> Actuation:
-        """The scene's actuators."""
-        return self.scene.actuation
+    walker = _of_scene("walker")
+    ground = _of_scene("ground")
+    normal = _of_scene("law of the normal force", "normal")
+    friction = _of_scene("law of friction", "friction")
+    clearance = _of_scene("rule of clearance", "clearance")
+    actuation = _of_scene("actuators", "actuation")
 
     @property
     def linkage(self) -> Linkage:

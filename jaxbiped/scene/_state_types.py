@@ -191,15 +191,7 @@ def state_type_of(names: Sequence[str]) -> type[Any]:
 
 @bounded_cache(_KEPT)
 def _made(names: tuple[str, ...]) -> type[Any]:
-    for kind in (
-        State,
-        BristleState,
-        RigidState,
-        RedundantState,
-        EulerState,
-        Accelerations,
-        RollingMotion,
-    ):
+    for kind in _NAMED:
         if kind._fields == names:
             return kind
     made: Any = collections.namedtuple("State", names)  # type: ignore[misc]

@@ -8,7 +8,7 @@ import diffrax
 from jaxtyping import Array, PyTree
 
 from jaxbiped._checks import check_type
-from jaxbiped._debug_switches import without_switches
+from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Parameter
 from jaxbiped.dynamics._linkage_motion import LinkageState
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike

@@ -183,8 +183,4 @@ def accuracy_told(text: str) -> str | float:
 
 def check_accuracy_name(accuracy: object) -> None:
     """Raises `ArgumentError` unless `accuracy` is a name of `ACCURACIES`."""
-    if accuracy not in ACCURACIES:
-        raise ArgumentError(
-            f"accuracy = {accuracy!r} is not known: choose one of {', '.join(ACCURACIES)}, or a "
-            "relative error above 0."
-        )
+    check_choice("accuracy", accuracy, (*ACCURACIES, "or a relative error above 0"))

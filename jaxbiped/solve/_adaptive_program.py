@@ -142,7 +142,11 @@ class AdaptiveSolve:
         if self.solver.switch_weight != 1.0:
             # The last stage knows the contact there; at the new value it would cost as much again.
             error = weigh_crossed(solve.scene, self.solver.switch_weight, now.state, last, error)
-        ended = self._ended(solve.scene, now)
+        # Asked here and not where a step ends: of the state that a step starts from, the step
+        # itself needs what failures are told by.
+        events = ending_events(self.watch).values()
+        failed = [jnp.asarray(each(now.t, now.state, solve.scene)) for each in events]
+        ended = _has_begun(now) & functools.reduce(operator.or_, failed)
         errors, structure = jtu.tree_flatten(error)
         # One of them is enough for a step to be rejected.
         errors[0] = jnp.where(ended, jnp.inf, errors[0])
@@ -206,18 +210,7 @@ class AdaptiveSolve:
             none = none & ~happened[name]
         return happened
 
-    def _ended(self, scene: PyTree, now: _Now) -> Scalar:
-        """Whether a failure ended it before this attempt, which then changes nothing.
-
-        Asked here and not where a step ends: of the state that a step starts from, the step itself
-        needs what failures are told by.
-        """
-        events = ending_events(self.watch).values()
-        found = [jnp.asarray(each(now.t, now.state, scene)) for each in events]
-        return _has_begun(now) & functools.reduce(operator.or_, found)
-
     def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-        """See `Saved.record`."""
         assert now.last is not None
         return self.saved.record(
             solve.scene, now.last, now=(now.t, now.state), due=time, solver=self.solver
@@ -240,7 +233,6 @@ class AdaptiveSolve:
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
 def adaptive_program(steps: AdaptiveSolve) -> Program:
-    """The program of these functions."""
     record = steps.record if steps.saved.within else None
     return Program(
         steps.start, steps.attempt, steps.finish, record=record, scheduled=steps.saved.times

@@ -95,7 +95,6 @@ class Projected(diffrax.AbstractWrappedSolver):  # type: ignore[type-arg]
         solver_state: Any,
         made_jump: BoolScalarLike,
     ) -> tuple[PyTree, PyTree, dict[str, PyTree], Any, Any]:
-        """One step, as `diffrax.AbstractSolver.step` describes it."""
         anew = jnp.ones_like(jnp.asarray(made_jump))
         y1, error, dense, state, result = self.solver.step(
             terms, t0, t1, y0, args, solver_state, anew

@@ -173,7 +173,7 @@ def _rows(matrix: Scalar, order: Sequence[int]) -> Scalar:
 def stage_matrices(stages: Stages) -> tuple[Scalar, Scalar]:
     """What a stage's solution is of right sides: of the kept components in order, of the direct."""
     places = [stages.kept.index(i) for i in kept_in_order(stages)]
-    found = stages.lin.solution_matrices(stages.factors, stages.jacobian, stages.step)
+    found = stages.lin.solution_matrices(stages.step_matrix)
     by_kept, by_direct = (_rows(each, places) for each in found)
     return _rows(by_kept.T, places).T, by_direct
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.plot._rigid_motion import rigid_motion
-from jaxbiped.plot._samples import DrawnMotion
+from jaxbiped.plot._samples import DrawnMotion, rigid_motion
 from jaxbiped.plot._skeleton import poses
 
 pytestmark = pytest.mark.slow

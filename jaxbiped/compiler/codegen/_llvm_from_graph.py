@@ -47,7 +47,6 @@ class GraphWriter:
         return -(-length // step) * step
 
     def name(self, value: Value, text: str, width: int | None = None) -> None:
-        """Says what a value is called."""
         self._names[id(value)] = (text, self.width if width is None else width)
 
     def use(self, value: Value, width: int | None = None) -> str:

@@ -44,12 +44,10 @@ class FunctionBuilder:
         self._count = 0
 
     def fresh(self, stem: str = "v") -> str:
-        """A new name."""
         self._count += 1
         return f"{stem}{self._count}"
 
     def line(self, text: str) -> None:
-        """Adds an instruction."""
         self.lines.append(f"  {text}")
 
     def assign(self, text: str) -> str:
@@ -59,7 +57,6 @@ class FunctionBuilder:
         return name
 
     def begin(self, label: str) -> None:
-        """Begins a basic block."""
         self.lines.append(f"{label}:")
         self.label = label
 
@@ -104,7 +101,6 @@ class FunctionBuilder:
         return self.assign(f"getelementptr {_memory(kind)}, ptr {pointer}, i64 {offset}")
 
     def load(self, pointer: str, kind: Kind, width: int) -> str:
-        """Loads a vector."""
         align = _alignment(kind, width)
         if kind is not Kind.BOOL:
             return self.assign(f"load {vector(kind, width)}, ptr {pointer}, align {align}")
@@ -112,7 +108,6 @@ class FunctionBuilder:
         return self.assign(f"trunc {_bytes(width)} {raw} to {vector(kind, width)}")
 
     def store(self, text: str, pointer: str, kind: Kind, width: int) -> None:
-        """Stores a vector."""
         align = _alignment(kind, width)
         if kind is Kind.BOOL:
             text = self.assign(f"zext {vector(kind, width)} {text} to {_bytes(width)}")

@@ -4,8 +4,6 @@ A lane whose simulation is over takes the next one at once, so that a long simul
 up its neighbours.
 """
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from jaxbiped.compiler.codegen._kernel_target import (
@@ -18,7 +16,7 @@ from jaxbiped.compiler.codegen._lane_scheduler import LaneScheduler, Sizes
 from jaxbiped.compiler.codegen._llvm_from_graph import GraphWriter, Place
 from jaxbiped.compiler.codegen._llvm_function import BYTES, WEIGHTS, vector
 from jaxbiped.compiler.ir._elementwise_primitives import Array
-from jaxbiped.compiler.ir._graph import Block, Kind, Value
+from jaxbiped.compiler.ir._graph import Kind, Value
 from jaxbiped.compiler.ir._liveness import Liveness
 from jaxbiped.compiler.runtime._program import Graph
 
@@ -68,7 +66,10 @@ class _Kernel:
         for offset, value in enumerate(graph.row):
             w.homes[id(value)] = Place(rooms.row, offset)
         w.homes[id(graph.next_time)] = Place(rooms.next_time, 0)
-        for value in _values_to_compute(graph.prepare, self.needed):
+        for value in graph.prepare.values:
+            stored = value in self.needed and id(value) not in self.needed.absorbed
+            if not stored or value.op in ("const", "input", "if"):
+                continue
             self.kept.append((value, Place(self._zeroed_room(value.kind, 1), 0)))
         for array in graph.carried:
             self._carry_room(array)
@@ -210,10 +211,3 @@ class _Kernel:
     def _store(self, text: str, kind: Kind, place: Place) -> None:
         at = self.t.address(place.pointer, kind, place.offset * self.width)
         self.t.store(text, at, kind, self.width)
-
-
-def _values_to_compute(block: Block, needed: Liveness) -> Iterable[Value]:
-    for value in block.values:
-        stored = value in needed and id(value) not in needed.absorbed
-        if stored and value.op not in ("const", "input", "if"):
-            yield value

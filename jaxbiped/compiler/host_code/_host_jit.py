@@ -13,11 +13,9 @@ import jax
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._debug_switches import without_switches
-from jaxbiped._jax_versions import nothing_is_traced
+from jaxbiped._jax_versions import nothing_is_traced, without_switches
 from jaxbiped.caching._cached_jit import Form, cached_jit
-from jaxbiped.caching._collector_pause import long_trace
-from jaxbiped.caching._compiled_store import ArrayFunction, Skeleton, flattened
+from jaxbiped.caching._compiled_store import ArrayFunction, Skeleton, flattened, long_trace
 from jaxbiped.caching._disk_cache import read_object, write_object
 from jaxbiped.caching._fingerprint import fingerprint
 from jaxbiped.compiler.host_code._control_flow import CONTROL_FLOW

@@ -142,7 +142,6 @@ class HostWriter:
         return self._named[key]
 
     def text(self, value: Value) -> str:
-        """What holds a value in the text."""
         if value.form is not None:
             # Where it belongs, even if only a branch is written that needs it.
             form, base = value.form

@@ -3,7 +3,6 @@
 import dataclasses
 import itertools
 from collections.abc import Sequence
-from typing import Any
 
 from jaxbiped.compiler.host_code._host_writer import (
     HostWriter,
@@ -117,41 +116,27 @@ def _slice(w: HostWriter, op: Operation) -> list[Value]:
     return [part_of(w, value, parts, op.result()[0])]
 
 
-def _squeeze(w: HostWriter, op: Operation) -> list[Value]:
-    gone = op.params["dimensions"]
-    places = [0 if i in gone else slice(None) for i in range(len(op.inputs[0].shape))]
-    return [part_of(w, op.inputs[0], places, op.result()[0])]
-
-
-def _reverse(w: HostWriter, op: Operation) -> list[Value]:
-    gone = op.params["dimensions"]
-    parts = [
-        slice(None, None, -1) if i in gone else slice(None) for i in range(len(op.inputs[0].shape))
-    ]
-    return [part_of(w, op.inputs[0], parts, op.inputs[0].shape)]
-
-
-def _unstack(w: HostWriter, op: Operation) -> list[Any]:
-    axis, n = op.params["axis"], len(op.inputs[0].shape)
-    shape, _ = op.result()
+def _along(
+    w: HostWriter, op: Operation, axes: Sequence[int], parts: Sequence[slice | int]
+) -> list[Value | None]:
+    """Parts of an array along some axes, for the results that are needed."""
+    value = op.inputs[0]
     return [
-        part_of(w, op.inputs[0], [k if i == axis else slice(None) for i in range(n)], shape)
-        if wanted
+        part_of(
+            w,
+            value,
+            [part if i in axes else slice(None) for i in range(len(value.shape))],
+            op.result(k)[0],
+        )
+        if op.needs[k]
         else None
-        for k, wanted in enumerate(op.needs)
+        for k, part in enumerate(parts)
     ]
 
 
-def _split(w: HostWriter, op: Operation) -> list[Any]:
-    axis, sizes = op.params["axis"], op.params["sizes"]
-    ends = list(itertools.accumulate(sizes))
-    found: list[Any] = []
-    for k, (size, end) in enumerate(zip(sizes, ends, strict=True)):
-        parts = [slice(None)] * len(op.inputs[0].shape)
-        parts[axis] = slice(int(end - size), int(end))
-        shape, _ = op.result(k)
-        found.append(part_of(w, op.inputs[0], parts, shape) if op.needs[k] else None)
-    return found
+def _split(w: HostWriter, op: Operation) -> list[Value | None]:
+    ends = [0, *itertools.accumulate(map(int, op.params["sizes"]))]
+    return _along(w, op, [op.params["axis"]], [slice(*each) for each in itertools.pairwise(ends)])
 
 
 def _stack(w: HostWriter, op: Operation) -> list[Value]:
@@ -192,10 +177,10 @@ MOVES: dict[str, Rule] = {
     "reshape": _reshape,
     "expand_dims": _reshape,
     "slice": _slice,
-    "squeeze": _squeeze,
+    "squeeze": lambda w, op: _along(w, op, op.params["dimensions"], [0]),
     "transpose": lambda w, op: [transposed(w, op.inputs[0], op.params["permutation"])],
-    "rev": _reverse,
-    "unstack": _unstack,
+    "rev": lambda w, op: _along(w, op, op.params["dimensions"], [slice(None, None, -1)]),
+    "unstack": lambda w, op: _along(w, op, [op.params["axis"]], range(len(op.needs))),
     "split": _split,
     "stack": _stack,
     "concatenate": _concatenate,

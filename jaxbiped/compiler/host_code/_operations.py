@@ -80,10 +80,6 @@ def _divide(w: HostWriter, op: Operation) -> list[Value]:
     return [_entrywise(w, op, form, op.inputs)]
 
 
-def _same(w: HostWriter, op: Operation) -> list[Value]:
-    return op.inputs
-
-
 def _convert(w: HostWriter, op: Operation) -> list[Value]:
     _, dtype = op.result()
     if dtype == op.inputs[0].dtype:
@@ -96,10 +92,6 @@ def _round(w: HostWriter, op: Operation) -> list[Value]:
     if int(op.params["rounding_method"]) != 1:  # to the nearest, ties to even
         raise UnwrittenError("rounding other than to even")
     return [_entrywise(w, op, "rint({0})", op.inputs)]
-
-
-def _whole_power(w: HostWriter, op: Operation) -> list[Value]:
-    return [_entrywise(w, op, f"power_of({{0}}, {op.params['y']})", op.inputs)]
 
 
 def _polynomial(w: HostWriter, op: Operation) -> list[Value]:
@@ -172,14 +164,14 @@ def _sort(w: HostWriter, op: Operation) -> Sequence[Value]:
 
 OPERATIONS: dict[str, Rule] = (
     {name: _entrywise_rule(form) for name, form in _ENTRYWISE.items()}
-    | dict.fromkeys(_SAME, _same)
+    | dict.fromkeys(_SAME, lambda w, op: op.inputs)
     | {name: _reduce_rule(how) for name, how in _REDUCTIONS.items()}
     | {
         "div": _divide,
         "rem": _entrywise_rule("fmod({0}, {1})"),
         "convert_element_type": _convert,
         "round": _round,
-        "integer_pow": _whole_power,
+        "integer_pow": lambda w, op: _entrywise_rule(f"power_of({{0}}, {op.params['y']})")(w, op),
         "polynomial": _polynomial,
         "bitcast_convert_type": _bits,
         "select_n": _select,
@@ -209,11 +201,6 @@ def _product(w: HostWriter, op: Operation) -> list[Value]:
 
 def _others(value: Value, axes: Sequence[int]) -> list[int]:
     return [i for i in range(len(value.shape)) if i not in axes]
-
-
-def _factors(w: HostWriter, op: Operation) -> Sequence[Value]:
-    matrix = _square_matrix(w, op.inputs[0])
-    return w.emit_all("factors_of({0})", [matrix], op.results())
 
 
 def _triangular(w: HostWriter, op: Operation) -> list[Value]:
@@ -251,7 +238,9 @@ def _square_matrix(w: HostWriter, value: Value) -> Value:
 
 LINEAR_ALGEBRA: dict[str, Rule] = {
     "dot_general": _product,
-    "lu": _factors,
+    "lu": lambda w, op: w.emit_all(
+        "factors_of({0})", [_square_matrix(w, op.inputs[0])], op.results()
+    ),
     "triangular_solve": _triangular,
     "eig": _eigensystem,
     "svd": _singular_system,

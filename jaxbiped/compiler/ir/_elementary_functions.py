@@ -168,7 +168,6 @@ def normal_logarithm(m: Arithmetic, x: Value) -> Value:
 
 
 def logarithm(m: Arithmetic, x: Value) -> Value:
-    """The natural logarithm."""
     value = normal_logarithm(m, x)
     normal = m.both(m.compare("oge", x, TINIEST_NORMAL), m.compare("olt", x, math.inf))
     rare = m.block.add("not", normal)
@@ -233,7 +232,6 @@ _TANH_BELOW = (1.0, 1.12811678491632931402e2, 2.23548839060100448583e3, 4.844063
 
 
 def hyperbolic_tangent(m: Arithmetic, x: Value) -> Value:
-    """tanh x."""
     z = m.mul(x, x)
     ratio = m.div(m.series(z, _TANH_ABOVE), m.series(z, _TANH_BELOW))
     small = m.fma(m.mul(x, z), ratio, x)

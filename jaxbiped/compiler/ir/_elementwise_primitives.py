@@ -233,11 +233,6 @@ _OVER_LANES = ("unvmap_any", "unvmap_all", "unvmap_max")
 """Conditions over all lanes of a batch: here each is one over this lane."""
 
 
-def _same(block: Block, a: Value, **_: object) -> Value:
-    return a
-
-
-_SAME: dict[str, Rule] = dict.fromkeys((*_PASSED_ON, *_OVER_LANES), _same)
 ELEMENTWISE: dict[str, Rule] = {
     "add": _operation("fadd", "add"),
     "add_any": _operation("fadd", "add"),
@@ -278,5 +273,5 @@ ELEMENTWISE: dict[str, Rule] = {
     "select_n": _select,
     "clamp": _clamp,
     "convert_element_type": _convert,
-    **_SAME,
+    **dict.fromkeys((*_PASSED_ON, *_OVER_LANES), lambda block, a, **_: a),
 }

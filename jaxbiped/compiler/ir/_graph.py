@@ -93,7 +93,6 @@ class Block:
         return self._lineage
 
     def const(self, number: float, kind: Kind) -> Value:
-        """A number."""
         number = bool(number) if kind is Kind.BOOL else number
         number = float(number) if kind.is_float else int(number)
         if kind is Kind.F32:

@@ -3,8 +3,8 @@
 Arrays disappear here: each entry becomes a value of its own, which a lane can keep in a register.
 """
 
-from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias, TypeGuard
+from collections.abc import Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -44,12 +44,13 @@ def lower_jaxpr(
     """
     known: dict[Var, Array] = {}
     for variable, const in zip(jaxpr.constvars, consts, strict=True):
-        known[variable] = const if _is_array(const) else _constant(block, const)
+        lowered = isinstance(const, np.ndarray) and const.dtype == object
+        known[variable] = np.asarray(const) if lowered else _constant(block, const)
     known.update(zip(jaxpr.invars, args, strict=True))
 
     def read(atom: Atom) -> Array:
         if isinstance(atom, Literal):
-            return _constant(block, np.asarray(atom.val, dtype=_dtype(atom)))
+            return _constant(block, np.asarray(atom.val, dtype=atom.aval.dtype))  # type: ignore[attr-defined]
         return known[atom]
 
     for equation in jaxpr.eqns:
@@ -68,18 +69,6 @@ def lower_jaxpr(
     return [read(atom) for atom in jaxpr.outvars]
 
 
-def _dtype(atom: Any) -> np.dtype:
-    return atom.aval.dtype
-
-
-def _shape(atom: Any) -> tuple[int, ...]:
-    return tuple(atom.aval.shape)
-
-
-def _is_array(value: object) -> TypeGuard[Array]:
-    return isinstance(value, np.ndarray) and value.dtype == object
-
-
 def _constant(block: Block, value: npt.ArrayLike) -> Array:
     numbers = np.asarray(value)
     kind = KINDS[numbers.dtype]
@@ -93,7 +82,9 @@ def _apply(block: Block, equation: JaxprEqn, inputs: list[Array]) -> list[Array]
         called, consts = inner
         if consts:
             return lower_jaxpr(block, called, consts, inputs)
-        return _once(block, called, inputs, lambda: lower_jaxpr(block, called, (), inputs))
+        # Operations are shared one by one, too, but conditionals and loops inside a call are not.
+        key = called, *(id(v) for array in inputs for v in array.ravel())
+        return block.call(key, lambda: lower_jaxpr(block, called, (), inputs))
     if name in ELEMENTWISE:
         rule = ELEMENTWISE[name]
         if name == "select_n" and inputs[0].ndim == 0 and inputs[1].ndim > 0:
@@ -113,16 +104,6 @@ def _apply(block: Block, equation: JaxprEqn, inputs: list[Array]) -> list[Array]
     if name == "scan":
         return _scan(block, params, inputs)
     raise NotImplementedError
-
-
-def _once(
-    block: Block, called: Jaxpr, inputs: list[Array], lower: Callable[[], list[Array]]
-) -> list[Array]:
-    """A call's results: what an equal one gave that is known here.
-
-    Operations are shared one by one, too, but conditionals and loops inside of a call are not.
-    """
-    return block.call((called, *(id(v) for array in inputs for v in array.ravel())), lower)
 
 
 def _branches(block: Block, branches: Sequence[ClosedJaxpr], inputs: list[Array]) -> list[Array]:
@@ -196,7 +177,7 @@ def _scan(block: Block, params: dict[str, Any], inputs: list[Array]) -> list[Arr
     if params["reverse"]:
         collected = [column[::-1] for column in collected]
     if not length:
-        shapes = [_shape(variable) for variable in body.outvars[carried:]]
+        shapes = [variable.aval.shape for variable in body.outvars[carried:]]
         return [*carry, *(np.empty((0, *shape), dtype=object) for shape in shapes)]
     return [*carry, *(np.stack(column) for column in collected)]
 

@@ -13,7 +13,6 @@ from typing import Any, TypeAlias
 import jax
 import jax.numpy as jnp
 from jax.extend.core import Jaxpr, JaxprEqn, Literal, Var
-from jaxtyping import PyTree
 
 from jaxbiped._jax_versions import called_program
 from jaxbiped._types import Numbers, Scalar
@@ -49,21 +48,16 @@ def _rows(
     function: Callable[[list[Scalar]], list[Scalar]], inputs: list[Scalar]
 ) -> list[list[Weight]]:
     outputs, pushed = jax.linearize(function, inputs)
+    closed, graph = jax.make_jaxpr(pushed)(inputs), _Graph(len(inputs))
     try:
-        return _eliminate_all(pushed, inputs)
+        ends = _linear(graph, closed.jaxpr, closed.consts, list(range(len(inputs))))
     except _NoRuleError:
         pull = jax.linear_transpose(pushed, inputs)
         unit = jnp.eye(len(outputs))
         return [pull(list(row))[0] for row in unit]
-
-
-def _eliminate_all(pushed: Callable[..., PyTree], inputs: list[Scalar]) -> list[list[Weight]]:
-    closed = jax.make_jaxpr(pushed)(inputs)
-    graph = _Graph(len(inputs))
-    ends = _linear(graph, closed.jaxpr, closed.consts, list(range(len(inputs))))
-    outputs = [graph.output(end) for end in ends]
+    found = [graph.output(end) for end in ends]
     graph.eliminate()
-    return [[graph.weight(i, output) for i in range(len(inputs))] for output in outputs]
+    return [[graph.weight(i, output) for i in range(len(inputs))] for output in found]
 
 
 class _NoRuleError(NotImplementedError):
@@ -209,7 +203,8 @@ def _vertex(graph: _Graph, equation: JaxprEqn, given: list[Any]) -> int | _Zero:
     if name == "mul":
         (factor,) = (g.value for g in given if isinstance(g, _Known))
         (other,) = (g for g in given if not isinstance(g, _Known))
-        return graph.vertex(scaled(other, _as_number(factor)))
+        weight = factor if isinstance(factor, jax.core.Tracer) else float(factor)
+        return graph.vertex(scaled(other, weight))
     if name == "div":
         return graph.vertex(scaled(given[0], 1.0 / given[1].value))
     if name == "select_n":
@@ -220,11 +215,6 @@ def _vertex(graph: _Graph, equation: JaxprEqn, given: list[Any]) -> int | _Zero:
         chosen = scaled(yes, jax.lax.select_n(which, zero, one))
         return graph.vertex([*chosen, *scaled(no, jax.lax.select_n(which, one, zero))])
     raise _NoRuleError(name)
-
-
-def _as_number(value: Numbers) -> Weight:
-    """A constant as a plain number."""
-    return value if isinstance(value, jax.core.Tracer) else float(value)
 
 
 def _is(weight: Weight, number: float) -> bool:

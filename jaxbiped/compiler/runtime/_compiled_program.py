@@ -63,7 +63,6 @@ class CompiledProgram:
         return CompiledProgram.kept, (self.kernel.digest, self.processor)
 
     def __fingerprint__(self) -> object:
-        """See `jaxbiped.caching._fingerprint`."""
         digest = self.kernel.digest
         return object() if digest is None else (digest, self.processor.name)
 
@@ -85,11 +84,9 @@ class CompiledProgram:
         return self.processor.ready(self.kernel, self.width(count, default_threads()))
 
     def width(self, count: int, threads: int) -> int:
-        """Simulations in one vector; see `AbstractProcessor.width`."""
         return self.processor.width(self.kernel, count, threads)
 
     def prepare(self, width: int) -> None:
-        """Traces and compiles what vectors of this width need."""
         self.processor.prepare(self.kernel, width)
 
     def make_ready(self, count: int) -> None:

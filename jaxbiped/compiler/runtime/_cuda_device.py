@@ -93,23 +93,15 @@ class CudaDriver:
             self._functions["cuGetErrorString"](code, ctypes.byref(text))
             raise CudaError(name, code, (text.value or b"unknown").decode())
 
-    def handle(self, name: str, *args: Any) -> c_void_p:
-        """What a function writes to its first argument: a handle."""
-        found = c_void_p()
+    def written(self, kind: type[Any], name: str, *args: Any) -> Any:
+        """What a function writes to its first argument, of a type of `ctypes`."""
+        found = kind()
         self.call(name, ctypes.byref(found), *args)
         return found
 
     def number(self, name: str, *args: Any) -> int:
-        """What a function writes to its first argument: a number."""
-        found = c_int()
-        self.call(name, ctypes.byref(found), *args)
-        return found.value
-
-    def allocate(self, size: int) -> int:
-        """Address of so many bytes of the current device."""
-        found = c_uint64()
-        self.call("cuMemAlloc_v2", ctypes.byref(found), size)
-        return found.value
+        """The same of a number."""
+        return int(self.written(c_int, name, *args).value)
 
     def is_busy(self, stream: c_void_p) -> bool:
         """Whether a stream has something left to do."""
@@ -157,7 +149,7 @@ class CudaDevice:
         driver.call("cuDeviceGetName", name, len(name), device)
         self.name = name.value.decode()
         self.multiprocessors = driver.number("cuDeviceGetAttribute", _MULTIPROCESSORS, device)
-        self._context = driver.handle("cuDevicePrimaryCtxRetain", device)
+        self._context = driver.written(c_void_p, "cuDevicePrimaryCtxRetain", device)
         self._loaded: weakref.WeakKeyDictionary[Kernel, LoadedKernel] = weakref.WeakKeyDictionary()
         self._lock = threading.Lock()
 
@@ -172,8 +164,8 @@ class CudaDevice:
     def _load(self, ptx: str) -> LoadedKernel:
         driver = self._driver
         driver.call("cuCtxSetCurrent", self._context)
-        module = driver.handle("cuModuleLoadData", ptx.encode())
-        function = driver.handle("cuModuleGetFunction", module, ENTRY.encode())
+        module = driver.written(c_void_p, "cuModuleLoadData", ptx.encode())
+        function = driver.written(c_void_p, "cuModuleGetFunction", module, ENTRY.encode())
         blocks = driver.number("cuOccupancyMaxActiveBlocksPerMultiprocessor", function, THREADS, 0)
         return LoadedKernel(function, blocks)
 
@@ -241,7 +233,7 @@ class CudaDevice:
 
     @contextlib.contextmanager
     def _stream(self) -> Iterator[ctypes.c_void_p]:
-        stream = self._driver.handle("cuStreamCreate", _NON_BLOCKING)
+        stream = self._driver.written(c_void_p, "cuStreamCreate", _NON_BLOCKING)
         try:
             yield stream
         finally:
@@ -253,7 +245,7 @@ class CudaDevice:
         if not array.nbytes:
             yield 0
             return
-        address = self._driver.allocate(array.nbytes)
+        address = self._driver.written(c_uint64, "cuMemAlloc_v2", array.nbytes).value
         try:
             if not only_room:
                 self._driver.call("cuMemcpyHtoD_v2", address, array.ctypes.data, array.nbytes)

@@ -133,7 +133,8 @@ def machine_code(text: str, entry: str, host: Host, *, as_written: bool) -> Mach
 
 def code_name(text: str, entry: str, host: Host, *, as_written: bool) -> str:
     """By what the code of a module is found again."""
-    parts = [text, entry, str(as_written), *map(str, host), *_versions()]
+    versions = llvmlite.__version__, llvm.llvm_version_info
+    parts = [text, entry, *map(str, (as_written, *host, *versions))]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
@@ -159,10 +160,6 @@ def assembly(text: str, host: Host, *, as_written: bool) -> str:
     """A module as the host's assembly, to look at; see `machine_code`."""
     machine = _target_machine(host, as_written)
     return str(machine.emit_assembly(_module(text, machine, as_written)))
-
-
-def _versions() -> tuple[str, str]:
-    return str(llvmlite.__version__), str(llvm.llvm_version_info)
 
 
 def _target_machine(host: Host, as_written: bool) -> llvm.TargetMachine:

@@ -14,7 +14,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._debug_switches import without_switches
+from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.compiler.ir._elementwise_primitives import KINDS, Array, array_of, convert
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
@@ -258,10 +258,7 @@ def _count(counts: Counter[str], block: Block, needed: Liveness) -> None:
     for value in block.values:
         if value in needed and value.op not in _NO_WORK:
             counts[value.op] += 1
+        lists = [arg for arg in value.args if isinstance(arg, list | tuple)]
+        inside = [v for each in lists for v in each if isinstance(v, Value)]
         for inner in (arg for arg in value.args if isinstance(arg, Block)):
-            _count(counts, inner, Liveness(_values_in(value)))
-
-
-def _values_in(value: Value) -> list[Value]:
-    lists = [arg for arg in value.args if isinstance(arg, list | tuple)]
-    return [v for each in lists for v in each if isinstance(v, Value)]
+            _count(counts, inner, Liveness(inside))

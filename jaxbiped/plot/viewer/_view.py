@@ -15,8 +15,7 @@ from jaxbiped._files import check_writable_file
 from jaxbiped._types import JsonObject
 from jaxbiped.measure._samples import from_start
 from jaxbiped.plot.style import view_colours
-from jaxbiped.plot.viewer._recording import Recording, record_walk
-from jaxbiped.plot.viewer._rigid_recording import record_rigid_walk
+from jaxbiped.plot.viewer._recording import Recording, record_rigid_walk, record_walk
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState
 from jaxbiped.solve._scene_key import check_scene_of

@@ -14,7 +14,7 @@ from equinox import AbstractVar
 from jaxbiped._parameter_declaration import AbstractPart, parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene._joint_parts import Weights, angle_of
-from jaxbiped.scene.actuation._profiles import check_spline, cubic_spline, pulse
+from jaxbiped.scene.actuation._actuators import check_spline, cubic_spline, pulse
 
 
 class JointMotion(Protocol):

@@ -56,7 +56,6 @@ class ShallowContact(AbstractMemorylessControl):
     """Wraps a controller; a step in which a foot dips into the ground is tried again, to there."""
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does, but for shallow contacts."""
         adapted = attempt.by(self.controller)
         start, span = cast(Scalar, attempt.t0), cast(Scalar, attempt.t1 - attempt.t0)
         found = _touchdown(attempt.args, start, span, adapted.keep, attempt.y0, attempt.y1)
@@ -120,7 +119,6 @@ class TouchdownAhead(AbstractMemorylessControl):
     """Wraps a controller; what is tried after a rejected step may be longer than that says."""
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does; the next one's size differs."""
         adapted = attempt.by(self.controller)
         span = jnp.asarray(attempt.t1 - attempt.t0)
         target = jnp.asarray(attempt.t0) + _to_touchdown(attempt.args, span, attempt.y0)
@@ -154,7 +152,6 @@ class MissedContacts(AbstractWrappedControl):
         return first, (inner, jnp.zeros((), dtype=jnp.int32))
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does, and counts."""
         inner, count = attempt.memory
         adapted = attempt.by(self.controller, memory=inner)
         span = jnp.asarray(attempt.t1 - attempt.t0)

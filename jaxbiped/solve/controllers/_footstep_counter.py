@@ -37,7 +37,6 @@ class FootstepLimit(AbstractWrappedControl):
         return first, (inner, last, jnp.zeros_like(last))
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does, and counts."""
         inner, last, count = attempt.memory
         adapted = attempt.by(self.controller, memory=inner)
         structure = attempt.args.mechanism.structure

@@ -41,7 +41,6 @@ class LocatedEnding(AbstractMemorylessControl):
     probe: PyTree = None
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does, but for the last one."""
         adapted = attempt.by(self.controller)
         scene, y1, t1 = attempt.args, attempt.y1, attempt.t1
         start, span = jnp.asarray(attempt.t0), jnp.asarray(t1 - attempt.t0)

@@ -91,7 +91,6 @@ class ErrorControl(AbstractControl):
         return jnp.asarray(t0 + dt0), jnp.asarray(False)
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step."""
         t0, t1, rejected = attempt.t0, attempt.t1, attempt.memory
         span = jnp.asarray(t1 - t0)
         # A state that is no longer a number ends the solve in another way than by small steps.
@@ -141,19 +140,15 @@ def _quotients(numerators: Sequence[Scalar], denominators: Sequence[Scalar]) -> 
 def _inverses(numbers: Sequence[Scalar], over_all: Scalar | None = None) -> list[Scalar]:
     """One over each of some numbers, from one over the product of all, by which it divides once."""
     if over_all is None:
-        over_all = 1.0 / _product(numbers)
+        over_all = 1.0 / functools.reduce(operator.mul, numbers)
     if len(numbers) == 1:
         return [over_all]
     middle = len(numbers) // 2
     left, right = numbers[:middle], numbers[middle:]
     return [
-        *_inverses(left, over_all * _product(right)),
-        *_inverses(right, over_all * _product(left)),
+        *_inverses(left, over_all * functools.reduce(operator.mul, right)),
+        *_inverses(right, over_all * functools.reduce(operator.mul, left)),
     ]
-
-
-def _product(numbers: Sequence[Scalar]) -> Scalar:
-    return functools.reduce(operator.mul, numbers)
 
 
 def _root(square: Scalar, order: RealScalarLike | None) -> Scalar:

@@ -92,7 +92,6 @@ class AbstractControl(_Control):  # type: ignore[type-arg]
         return self
 
     def adapt_step_size(self, *step: Any) -> Adapted:
-        """Accepts or rejects a step, as diffrax asks."""
         return self.adapt(Attempt(*step))
 
 
@@ -162,7 +161,6 @@ class Extremes(AbstractWrappedControl):
         return first, (inner, value, value)
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does, and looks."""
         inner, *extremes = attempt.memory
         adapted = attempt.by(self.controller, memory=inner)
         value = self.function(attempt.args, attempt.y1)

@@ -79,6 +79,14 @@ def _is_copy(equation: JaxprEqn) -> bool:
     return bool(before.dtype == after.dtype)  # type: ignore[attr-defined]
 
 
+class StepMatrix(NamedTuple):
+    """I − step J of a step, with what its `factorise` made of it."""
+
+    jacobian: PyTree
+    step: Scalar
+    factors: PyTree
+
+
 class AbstractLinearisation(eqx.Module):
     """A vector field about one point, its state split into components.
 
@@ -103,12 +111,7 @@ class AbstractLinearisation(eqx.Module):
 
     @abc.abstractmethod
     def solve_kept(
-        self,
-        factors: PyTree,
-        jacobian: PyTree,
-        step: Scalar,
-        right: Components,
-        direct_right: dict[int, Scalar],
+        self, matrix: StepMatrix, right: Components, direct_right: dict[int, Scalar]
     ) -> Components:
         """The kept components of (I − step J)⁻¹ r.
 
@@ -116,9 +119,7 @@ class AbstractLinearisation(eqx.Module):
         """
 
     @abc.abstractmethod
-    def solution_matrices(
-        self, factors: PyTree, jacobian: PyTree, step: Scalar
-    ) -> tuple[Scalar, Scalar]:
+    def solution_matrices(self, matrix: StepMatrix) -> tuple[Scalar, Scalar]:
         """What `solve_kept` takes r to, as matrices: of the kept components (k, k), and of the d
         direct ones (k, d)."""
 

@@ -11,7 +11,11 @@ from jaxbiped.compiler import partial_derivatives
 from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
 from jaxbiped.linalg._elimination import Entry, plus, times
 from jaxbiped.linalg._sparse_lu import SparseFactors, SparseMatrix, factorise, product
-from jaxbiped.solve.rosenbrock._abstract_linearisation import AbstractLinearisation, Components
+from jaxbiped.solve.rosenbrock._abstract_linearisation import (
+    AbstractLinearisation,
+    Components,
+    StepMatrix,
+)
 
 
 class ImplicitForm(NamedTuple):
@@ -84,33 +88,26 @@ class ImplicitLinearisation(AbstractLinearisation):
         return factorise(matrix)
 
     def solve_kept(
-        self,
-        factors: SparseFactors,
-        jacobian: ImplicitJacobian,
-        step: Scalar,
-        right: Components,
-        direct_right: dict[int, Scalar],
+        self, matrix: StepMatrix, right: Components, direct_right: dict[int, Scalar]
     ) -> Components:
-        kept = self.kept()
+        kept, (jacobian, step, factors) = self.kept(), matrix
         total = product(jacobian.mass, dict(zip(kept, right, strict=True)))
         for i, value in product(jacobian.direct, direct_right).items():
             moved = times(step, value)
             total[i] = plus(total.get(i), moved)
         return _filled(factors.solve(total), kept, step)
 
-    def solution_matrices(
-        self, factors: SparseFactors, jacobian: ImplicitJacobian, step: Scalar
-    ) -> tuple[Scalar, Scalar]:
-        kept = self.kept()
+    def solution_matrices(self, matrix: StepMatrix) -> tuple[Scalar, Scalar]:
+        kept, (jacobian, step, factors) = self.kept(), matrix
 
-        def matrix(columns: list[dict[int, Entry]]) -> Scalar:
-            solved = [_filled(factors.solve(column), kept, step) for column in columns]
-            return jnp.stack([jnp.stack(column) for column in solved], axis=1)
+        def solved(columns: list[dict[int, Entry]]) -> Scalar:
+            found = [_filled(factors.solve(column), kept, step) for column in columns]
+            return jnp.stack([jnp.stack(column) for column in found], axis=1)
 
         mass, direct = jacobian.mass, jacobian.direct
         of_kept = [{i: mass.get((i, j)) for i in kept} for j in kept]
         of_direct = [{i: times(step, direct.get((i, p))) for i in kept} for p in self.direct()]
-        return matrix(of_kept), matrix(of_direct) if of_direct else jnp.zeros((len(kept), 0))
+        return solved(of_kept), solved(of_direct) if of_direct else jnp.zeros((len(kept), 0))
 
 
 def _filled(vector: dict[int, Entry], rows: list[int], like: Scalar) -> Components:

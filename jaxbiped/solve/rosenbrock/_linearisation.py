@@ -19,6 +19,7 @@ from jaxbiped.linalg._elimination import Entry, Matrix, inverse, matmul
 from jaxbiped.solve.rosenbrock._abstract_linearisation import (
     AbstractLinearisation,
     Components,
+    StepMatrix,
     structure_of,
 )
 from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, ImplicitLinearisation
@@ -80,20 +81,13 @@ class _DenseLinearisation(AbstractLinearisation):
         return jax.scipy.linalg.lu_factor(identity - step * jacobian)
 
     def solve_kept(
-        self,
-        factors: PyTree,
-        jacobian: PyTree,
-        step: Scalar,
-        right: Components,
-        direct_right: dict[int, Scalar],
+        self, matrix: StepMatrix, right: Components, direct_right: dict[int, Scalar]
     ) -> Components:
-        return [jax.scipy.linalg.lu_solve(factors, right[0])]
+        return [jax.scipy.linalg.lu_solve(matrix.factors, right[0])]
 
-    def solution_matrices(
-        self, factors: PyTree, jacobian: PyTree, step: Scalar
-    ) -> tuple[Scalar, Scalar]:
+    def solution_matrices(self, matrix: StepMatrix) -> tuple[Scalar, Scalar]:
         size = self.y[0].size
-        return jax.scipy.linalg.lu_solve(factors, jnp.eye(size)), jnp.zeros((size, 0))
+        return jax.scipy.linalg.lu_solve(matrix.factors, jnp.eye(size)), jnp.zeros((size, 0))
 
 
 class _ScalarLinearisation(AbstractLinearisation):
@@ -112,23 +106,17 @@ class _ScalarLinearisation(AbstractLinearisation):
         return inverse(_reduced_matrix(jacobian, self.direct(), self.kept(), step))
 
     def solve_kept(
-        self,
-        factors: list[list[Scalar]],
-        jacobian: Matrix,
-        step: Scalar,
-        right: Components,
-        direct_right: dict[int, Scalar],
+        self, matrix: StepMatrix, right: Components, direct_right: dict[int, Scalar]
     ) -> Components:
         reduced = []
         for i, own in zip(self.kept(), right, strict=True):
-            entries = [(jacobian[i][p], value) for p, value in direct_right.items()]
+            entries = [(matrix.jacobian[i][p], value) for p, value in direct_right.items()]
             terms = [entry * value for entry, value in entries if entry is not None]
-            reduced.append(own + step * sum(terms[1:], terms[0]) if terms else own)
-        return matmul(factors, reduced)
+            reduced.append(own + matrix.step * sum(terms[1:], terms[0]) if terms else own)
+        return matmul(matrix.factors, reduced)
 
-    def solution_matrices(
-        self, factors: list[list[Scalar]], jacobian: Matrix, step: Scalar
-    ) -> tuple[Scalar, Scalar]:
+    def solution_matrices(self, matrix: StepMatrix) -> tuple[Scalar, Scalar]:
+        jacobian, step, factors = matrix
         inverse = jnp.stack([jnp.stack(row) for row in factors])
         kept, direct = self.kept(), self.direct()
         if not direct:

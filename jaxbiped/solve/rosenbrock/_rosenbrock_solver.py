@@ -15,7 +15,11 @@ from jaxtyping import PyTree
 from jaxbiped._types import BoolScalarLike, Scalar, SomeTree, Time
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.solve.rosenbrock._abstract_linearisation import AbstractLinearisation, Components
+from jaxbiped.solve.rosenbrock._abstract_linearisation import (
+    AbstractLinearisation,
+    Components,
+    StepMatrix,
+)
 from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, implicit_form
 from jaxbiped.solve.rosenbrock._linearisation import linearise, split
 from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau, error_weights, last_stage
@@ -162,9 +166,8 @@ class Stages(NamedTuple):
 
     start: Components
     step: Scalar
+    step_matrix: StepMatrix
     lin: AbstractLinearisation
-    jacobian: PyTree
-    factors: PyTree
     direct: dict[int, int]
     kept: list[int]
     matrix: np.ndarray
@@ -233,10 +236,9 @@ def stages_of(
         lambda: (picked(lin.evaluate(t, start)), picked(lin.time_derivative()), lin.jacobian()),
     )
     factors = fusion_barrier(moves, lambda: lin.factorise(jacobian, step))
+    matrix = StepMatrix(jacobian, step, factors)
     recurrence = _recurrence(tableau)
-    stages = Stages(
-        start, step, lin, jacobian, factors, lin.direct(), kept, *recurrence, increments=[]
-    )
+    stages = Stages(start, step, matrix, lin, lin.direct(), kept, *recurrence, increments=[])
     last_rate = slope
 
     def stage(i: int) -> tuple[Components, PyTree]:
@@ -257,7 +259,7 @@ def stages_of(
         if tableau.gammas[i]:
             right = [r if d is None else r + weight * d for r, d in zip(right, f_t, strict=True)]
         kept_rate = rate if _repeats(tableau, i + 1) else None
-        return lin.solve_kept(factors, jacobian, step, right, stages.direct_right(i)), kept_rate
+        return lin.solve_kept(matrix, right, stages.direct_right(i)), kept_rate
 
     for i in range(len(tableau.alpha)):
         increment, last_rate = fusion_barrier(moves, functools.partial(stage, i))

@@ -12,6 +12,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.scene._state_types import BristleState
+from jaxbiped.solve.rosenbrock._abstract_linearisation import StepMatrix
 from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitLinearisation, implicit_form
 from jaxbiped.solve.rosenbrock._linearisation import linearise, split
 
@@ -99,9 +100,8 @@ def test_time_derivative():
 def _solve(lin, jacobian, g, right):
     """All components: the kept ones as the package solves them, the direct ones from those."""
     direct = {p: right[p] for p in lin.direct()}
-    kept = lin.solve_kept(
-        lin.factorise(jacobian, g), jacobian, g, [right[i] for i in lin.kept()], direct
-    )
+    matrix = StepMatrix(jacobian, g, lin.factorise(jacobian, g))
+    kept = lin.solve_kept(matrix, [right[i] for i in lin.kept()], direct)
     solution = dict(zip(lin.kept(), kept, strict=True))
     solution |= {p: right[p] + g * solution[s] for p, s in lin.direct().items()}
     return [solution[i] for i in range(len(right))]
@@ -163,7 +163,8 @@ def test_the_implicit_form_solves_the_dense_system(name):
         mine = _solve(lin, jacobian, g, jnp.asarray(right))
         whole = np.eye(len(dense)) - step * np.asarray(dense)
         np.testing.assert_allclose(mine, np.linalg.solve(whole, right), rtol=1e-9, atol=1e-10)
-        by_kept, by_direct = lin.solution_matrices(lin.factorise(jacobian, g), jacobian, g)
+        matrix = StepMatrix(jacobian, g, lin.factorise(jacobian, g))
+        by_kept, by_direct = lin.solution_matrices(matrix)
         again = by_kept @ right[lin.kept()] + by_direct @ direct
         np.testing.assert_allclose(again, [mine[i] for i in lin.kept()], rtol=1e-9, atol=1e-10)
 

@@ -11,7 +11,16 @@ from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
 from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, AbstractHertzianLaw
 
 
-class KelvinVoigt(AbstractDampedLaw):
+class AbstractMatchedLaw(AbstractDampedLaw):
+    """A damped law that is made like the seed's by how a mass stands on it."""
+
+    @classmethod
+    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
+        """The same penetration under the weight, with the same damping ratio about it."""
+        return cls.from_weight(**standing.arguments())
+
+
+class KelvinVoigt(AbstractMatchedLaw):
     """F_N = K δ + D δ̇ while δ > 0, never below zero (no adhesion).
 
     The damper acts at once, so the force jumps by D δ̇ at touchdown: `jumps_at_touchdown`. It
@@ -51,13 +60,8 @@ class KelvinVoigt(AbstractDampedLaw):
     def elastic_energy(self, penetration: Scalar) -> Scalar:
         return 0.5 * self.elastic_force(penetration) * penetration
 
-    @classmethod
-    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
-        """The same penetration under the weight, with the same damping ratio about it."""
-        return cls.from_weight(**standing.arguments())
 
-
-class KuwabaraKono(AbstractHertzianLaw):
+class KuwabaraKono(AbstractMatchedLaw, AbstractHertzianLaw):
     """F_N = K δ^{3/2} + gamma δ^{1/2} δ̇ while δ > 0, never below zero (no adhesion).
 
     Weakly damped, the restitution falls with the approach speed as 1 − e ∝ (v⁻)^{1/5}. The force
@@ -91,13 +95,8 @@ class KuwabaraKono(AbstractHertzianLaw):
         """The reaction over √δ; out of contact, its limit at touchdown."""
         return (self.K * jnp.where(penetration > 0.0, penetration, 0.0) + self.gamma * rate,)
 
-    @classmethod
-    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
-        """The same penetration under the weight, with the same damping ratio about it."""
-        return cls.from_weight(**standing.arguments())
 
-
-class Tsuji(AbstractHertzianLaw):
+class Tsuji(AbstractMatchedLaw, AbstractHertzianLaw):
     """F_N = K δ^{3/2} + gamma δ^{1/4} δ̇ while δ > 0, never below zero (no adhesion).
 
     A mass m that drops onto it leaves with a restitution that depends on gamma/√(m K) alone, not
@@ -133,11 +132,6 @@ class Tsuji(AbstractHertzianLaw):
         depth = depth_in_contact(penetration)
         held = jnp.where(penetration > 0.0, self.K * depth * _fourth_root(depth), 0.0)
         return (held + self.gamma * rate,)
-
-    @classmethod
-    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
-        """The same penetration under the weight, with the same damping ratio about it."""
-        return cls.from_weight(**standing.arguments())
 
 
 def _fourth_root(x: Scalar) -> Scalar:
