@@ -93,8 +93,9 @@ def slopes_of(
     if until is not None:
         last = jnp.arange(len(t)) == len(t) - 1
         by_clock = last & (t >= until)
-    like = jtu.tree_map(lambda leaf: jnp.broadcast_to(leaf[-1], t.shape), saved)
-    at = TangentsAtTimes(like, jnp.zeros((len(t), 0, len(like))))
+    arrived = len(t) - len(found.t)
+    there = jtu.tree_map(lambda leaf: jnp.pad(leaf, (arrived, 0), mode="edge"), saved)
+    at = TangentsAtTimes(there, jnp.zeros((len(t), 0, len(there))))
     time = jnp.zeros((len(t), 0))
     if places or active:
         how = motion_solve(_WATCH, solver, rtol)
@@ -113,7 +114,7 @@ def slopes_of(
         time=jnp.where(reached, time, 0.0),
         state=jnp.where(reached[..., None], columns, 0.0),
         clock=by_clock.astype(t.dtype),
-        rates=rates,
+        rates=jnp.where(reached, rates, 0.0),
     )
 
 

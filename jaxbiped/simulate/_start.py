@@ -18,6 +18,7 @@ from jaxbiped._checks import (
     check_unbatched,
     holds_somewhere,
 )
+from jaxbiped._jax_versions import untraced
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._projection import check_independent
@@ -174,6 +175,7 @@ def check_steps(
         )
 
 
+@untraced()
 def check_start_height(scene: Scene | RedundantScene, state: Any) -> None:
     """Refuses a start in minimal coordinates below the ground, where all values are known.
 
@@ -183,9 +185,10 @@ def check_start_height(scene: Scene | RedundantScene, state: Any) -> None:
     Raises:
         ArgumentError: a deeper start.
     """
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves((scene, state))):
+        return
     root = f"{scene.mechanism.structure.root}_z"
-    leaves = jtu.tree_leaves((scene, state))
-    if not hasattr(state, root) or any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+    if not hasattr(state, root):
         return
     # Plain numbers: operations of JAX by themselves would be compiled one by one.
     mechanism = scene.mechanism

@@ -86,6 +86,17 @@ def test_derivative_by_the_duration_is_the_rate():
     np.testing.assert_allclose(by_time, jnp.stack(rates), rtol=1e-12)
 
 
+@pytest.mark.parametrize("compiled", [lambda f: f, jax.jit], ids=["plain", "jit"])
+def test_each_saved_time_moves_at_the_rate_of_its_own_state(compiled):
+    saved = compiled(
+        lambda d: jb.simulate(STEEP, START, duration=9.0, save=jnp.array([0.1, 0.9, 8.0]) + d).state
+    )
+    states, by_time = jax.jvp(saved, (jnp.asarray(0.05),), (jnp.asarray(1.0),))
+    rates = jax.vmap(lambda y: jb.dynamics.vector_field(0.0, y, STEEP))(states)
+    np.testing.assert_allclose(jnp.stack(by_time)[:, :2], jnp.stack(rates)[:, :2], rtol=1e-9)
+    np.testing.assert_array_equal(jnp.stack(by_time)[:, 2], 0.0)  # it has fallen by then
+
+
 def test_gradients_under_vmap_and_jit():
     def gradient(log):
         return jax.grad(lambda log: _final({"K": log}, accuracy="balanced")[0])(log)
