@@ -65,7 +65,7 @@ def test_errors_costs_and_maps_of_constraint_methods(tmp_path):
     trade, constants = figures["trade.png"], figures["constants.png"]
     assert labels_of(trade) == {"time of a run (s)", "error of the state (SI)"}
     assert {"a (1/s)", "b (1/s)"} <= labels_of(constants)
-    runs = {(run["method"], run["rtol_or_dt"]): run for run in numbers["runs"]}
+    runs = {(run["method"], run["rtol"] or run["dt_s"]): run for run in numbers["runs"]}
     for method in ("standard", "index1"):
         own = [run for run in numbers["runs"] if run["method"] == method]
         shown = [(run["wall_s_run"], run["state_error"]) for run in own]
