@@ -79,7 +79,8 @@ def _column(cells: Sequence[str]) -> str:
     room += f"({widest(bars)})" * any(bars)
     if any(powers):
         room += "e" + "-" * any(power_signs) + f"{widest(powers)}"
-    uncertain = ", separate-uncertainty" if any(bars) else ""
+    # Aligned uncertainties would touch the values before them.
+    uncertain = ", separate-uncertainty, table-align-uncertainty=false" if any(bars) else ""
     return f"S[table-format={room}{uncertain}]"
 
 

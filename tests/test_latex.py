@@ -89,7 +89,7 @@ def test_columns_have_room_for_their_numbers():
     ]
     text = latex_table(columns, {"plain": "$x$"}, upright=False)
     assert (
-        text
+        text.replace(", table-align-uncertainty=false", "")
         == r"""% needs \usepackage{booktabs} and \usepackage{siunitx}
 \begin{tabular}{l S[table-format=-2.4(2), separate-uncertainty] S[table-format=1]}
 \toprule
@@ -106,5 +106,6 @@ def test_columns_have_room_for_their_numbers():
 def test_one_row_is_set_upright():
     columns = [column("ending", ["found"]), column("period", [0.44], [0.01], "s")]
     lines = latex_table(columns, {}, upright=True).splitlines()
-    assert lines[1] == r"\begin{tabular}{l S[table-format=1.3(2), separate-uncertainty] l}"
+    look = "table-format=1.3(2), separate-uncertainty, table-align-uncertainty=false"
+    assert lines[1] == rf"\begin{{tabular}}{{l S[{look}] l}}"
     assert lines[5:7] == [r"ending & {found} &  \\", r"period & 0.440(10) & \unit{s} \\"]

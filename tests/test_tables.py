@@ -122,6 +122,19 @@ def test_a_fit_has_rows_by_parameter():
     assert r"xi & 3 &  \\" in rows
 
 
+def test_a_fit_is_printed_in_a_line():
+    assert repr(fit()) == (
+        "GaitFit(converged, K=2e+06 ± 1e+04, xi=3 ± nan, chi squared 0.05 at 1 degrees of freedom, "
+        "undetermined: xi, 3 scenes)"
+    )
+
+
+def test_the_units_of_sensitivities_are_words_in_latex(gait):
+    table = gait.to_latex(along="parameter")
+    assert "spectral radius (1 per unit of the parameter)" in table
+    assert "per.unit" not in table
+
+
 def test_footsteps_have_rows_and_none_has_a_header(seed_walk):
     scene, walk = seed_walk
     steps = jb.footsteps(scene, walk)

@@ -144,6 +144,12 @@ def _with_home(options: Any) -> Any:
 
 def _parse(arguments: list[str]) -> Command | None:
     """The command; exits with 2 and one sentence where there is none."""
+    flags = [each.partition("=")[0] for each in arguments if each.startswith("--")]
+    if more := [flag for flag in flags if flags.count(flag) > 1]:
+        # The parser would keep the last one alone.
+        told = f"{more[0]} is given {flags.count(more[0])} times: give all its values after one."
+        print(f"jaxbiped: {told}", file=sys.stderr)
+        sys.exit(2)
     refusal = io.StringIO()
     try:
         with contextlib.redirect_stderr(refusal):

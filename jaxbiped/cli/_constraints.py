@@ -25,7 +25,7 @@ _MOST_STEPS = 1 << 25
 _COLUMNS = {
     "method": (9, "{0.method}"),
     "integrator": (10, "{0.integrator}"),
-    "by": (10, "{1} {0.rtol_or_dt:g}"),
+    "by": (10, "{1}"),
     "ending": (13, "{0.ending}"),
     "max |Phi| m": (11, "{0.max_violation_m:.1e}"),
     "rate m/s": (8, "{0.max_violation_rate:.1e}"),
@@ -77,8 +77,8 @@ class ConstraintRun(NamedTuple):
     Attributes:
         method: its name.
         integrator: the solver's name.
-        rtol_or_dt: tolerance, or step [s] where `fixed`.
-        fixed: whether steps have one size.
+        rtol: relative tolerance; None for steps of one size.
+        dt_s: size of the steps [s]; None for adaptive ones.
         ending: in words; "failed" where the state at the end is off by 0.05 or more.
         max_violation_m: largest ‖Φ‖ at the end of a step [m].
         max_violation_rate: largest ‖Φ̇‖ there [m/s].
@@ -90,8 +90,8 @@ class ConstraintRun(NamedTuple):
 
     method: str
     integrator: str
-    rtol_or_dt: float
-    fixed: bool
+    rtol: float | None
+    dt_s: float | None
     ending: str
     max_violation_m: float
     max_violation_rate: float
@@ -167,7 +167,8 @@ def _line(runs: Sequence[ConstraintRun]) -> str:
     # In units of the standard method's with the same integrator, if that has run.
     same = (each for each in runs if each[1:4] == run[1:4] and each.method == "standard")
     share = next((f"{run.wall_s_run / each.wall_s_run:.2f}" for each in same), "")
-    row = [text.format(run, "dt" if run.fixed else "rtol", share) for _, text in _COLUMNS.values()]
+    by = f"rtol {run.rtol:g}" if run.dt_s is None else f"dt {run.dt_s:g}"
+    row = [text.format(run, by, share) for _, text in _COLUMNS.values()]
     head = [word.rjust(width) for word, (width, _) in _COLUMNS.items()]
     return table(head, [row], most=1).split("\n", int(len(runs) > 1))[-1]
 
@@ -264,8 +265,8 @@ def _run(
     return ConstraintRun(
         method=name,
         integrator=integrator.solver,
-        rtol_or_dt=float(integrator.dt or integrator.rtol or 0.0),
-        fixed=integrator.dt is not None,
+        rtol=integrator.rtol,
+        dt_s=integrator.dt,
         ending="failed" if failed else str(found.outcome),
         max_violation_m=float(found.highest.position),
         max_violation_rate=float(found.highest.rate),

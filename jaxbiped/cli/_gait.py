@@ -91,18 +91,18 @@ class FindGait(options.Command, of=("find_gait",)):
         if gait.error is not None:
             report.say(error_sentence(gait.error))
         if found:
-            report.wrote(self.output.draw(gait_figures(scene, gait)))
+            report.wrote(self.output.draw(gait_figures(gait)))
         report.write_rows(gait.to_csv)
         report.finish(numbers)
         return 0 if found else 1
 
 
-def gait_figures(scene: Any, gait: "jb.Gait") -> dict[str, Callable[[], Any]]:
+def gait_figures(gait: "jb.Gait") -> dict[str, Callable[[], Any]]:
     """What draws the figures of a gait, by the names of their files."""
     return {
         "multipliers": lambda: jb.plot.multipliers(gait),
         "elasticities": lambda: jb.plot.elasticities(gait),
-        "orbit": lambda: jb.plot.gait_orbit(gait, scene=scene),
+        "orbit": lambda: jb.plot.gait_orbit(gait),
     }
 
 

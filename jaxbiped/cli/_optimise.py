@@ -86,7 +86,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         _print(report, scene, found, goal)
         report.say(*_certificate_lines(certificate))
         figures = {"optimisation": lambda: jb.plot.optimisation(found)}
-        report.wrote(self.output.draw(figures | gait_figures(found.scene, found.gait)))
+        report.wrote(self.output.draw(figures | gait_figures(found.gait)))
         report.write_rows(found.to_csv)
         report.finish(numbers)
         ended = jb.optimise.Outcome

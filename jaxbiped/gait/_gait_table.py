@@ -71,7 +71,7 @@ def gait_entries(gait: "Gait") -> dict[str, Entry]:
         )
         per = Quantity(
             f"sensitivity of the {quantity.words}",
-            unit=f"{quantity.unit} per unit of the parameter".strip(),
+            unit=f"{quantity.unit or 1} per unit of the parameter",
         )
         add(f"sensitivity_{name}", slope, per, slope_error, "parameter")
         with np.errstate(divide="ignore", invalid="ignore"):

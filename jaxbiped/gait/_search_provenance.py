@@ -117,9 +117,8 @@ def explain_search(scene: AbstractScene, gait: "Gait") -> str:
         One sentence, without a full stop.
     """
     if gait.outcome is not Search.FOUND:
-        return (
-            f"no gait found: {_search_sentence(gait)}{_branch(scene, gait)}{_scuffs(scene, gait)}"
-        )
+        told = _branch(scene, gait) + _what_to_try(scene, gait)
+        return f"no gait found: {_search_sentence(gait)}{told}"
     text = f"found by {gait.found_by}"
     asked, least = len(gait.step_lengths), int(gait.cycle_footsteps)
     if least < asked:
@@ -167,14 +166,21 @@ def _search_sentence(gait: "Gait") -> str:
     return "the search from the start does not converge"
 
 
-def _scuffs(scene: AbstractScene, gait: "Gait") -> str:
-    """What to try if straight legs scuff, after a semicolon; else nothing."""
+def _what_to_try(scene: AbstractScene, gait: "Gait") -> str:
+    """A clearance rule if legs of one body may scuff, a guess if no branch was followed."""
     always = isinstance(getattr(scene.minimal, "clearance", None), AlwaysTouching)
-    if not (always and gait.outcome is Search.NO_RETURN and gait.walk_outcome is Ending.STUMBLED):
+    stumbled = gait.outcome is Search.NO_RETURN and gait.walk_outcome is Ending.STUMBLED
+    structure = scene.mechanism.structure
+    if always and stumbled and all(structure.parents[body] < 0 for body in structure.feet):
+        return (
+            "; its feet touch whenever they reach the ground: if its legs scuff at mid-swing, give "
+            "the scene clearance=jaxbiped.laws.StanceRotation()"
+        )
+    if int(gait.origin.branch_end) != int(BranchEnd.NOT_FOLLOWED):
         return ""
     return (
-        "; its feet touch whenever they reach the ground: if its legs are straight and scuff at "
-        "mid-swing, give the scene clearance=jaxbiped.laws.StanceRotation()"
+        "; give a state near a gait as guess, or follow the gait of a similar walker (see "
+        "jaxbiped.models) to this one with continue_gait"
     )
 
 
@@ -203,7 +209,7 @@ def _branch(scene: AbstractScene, gait: "Gait") -> str:
         BranchEnd.BREAKS_OFF: ("breaks off at", "the return map is not smooth"),
     }.get(end, ("was followed as far as", ""))
     more = f": beyond, {beyond}" if beyond else ""
-    return f"; the branch of {begins} {verb} {place}, which has one{more}"
+    return f"; the branch of {begins} {verb} {place}, the nearest scene with a gait{more}"
 
 
 def _differing_parameters(scene: Any, nearest: Any) -> str:

@@ -122,6 +122,16 @@ class GaitFit(Tabular):
     evaluations: int
     units: dict[str, str]
 
+    def __repr__(self) -> str:
+        pairs = zip(self.estimates.items(), self.standard_errors.values(), strict=True)
+        estimates = ", ".join(f"{name}={value:.6g} ± {bar:.2g}" for (name, value), bar in pairs)
+        words = {"undetermined": self.undetermined, "at bounds": self.at_bounds}
+        held = (f", {said}: {', '.join(names)}" for said, names in words.items() if names)
+        return (
+            f"GaitFit({self.ending}, {estimates}, chi squared {self.chi_squared:.3g} at "
+            f"{self.freedom} degrees of freedom{''.join(held)}, {self.evaluations} scenes)"
+        )
+
     @property
     def chi_squared(self) -> float:
         """Sum of the squared residuals; about `freedom` where the model is right."""

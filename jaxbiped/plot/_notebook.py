@@ -28,7 +28,6 @@ from jaxbiped.plot._strobe import corners_of, draw_bodies
 from jaxbiped.plot._symbols import HEIGHT, HORIZONTAL
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import parameter_quantities, parameter_values
-from jaxbiped.scene._state_types import State
 
 Rows = Iterable[tuple[str, ...]]
 
@@ -117,14 +116,13 @@ def _of_gait(gait: Gait) -> str:
         told = f"{_STABLE[bool(gait.stable)]}, found by {FoundBy(int(gait.origin.found_by))}"
     caption = f"Gait: {told}; its cycle is a {gait.cycle}"
     table = _table(caption, ("measure", "value", "error", "unit"), rows)
-    return _beside(table, _gait_figure(gait) if found else None, "Multipliers of the gait")
+    return _beside(
+        table, _gait_figure(gait) if found else None, "Orbit and multipliers of the gait"
+    )
 
 
 def _gait_figure(gait: Gait) -> Figure:
-    """The multipliers; the orbit, too, where the state itself tells the walker."""
-    if not isinstance(gait.measures.state, State) or gait.orbit is None:
-        figure = style.new_figure(4.2, 4.2)
-        return multipliers(gait, ax=figure.add_subplot())
+    """The orbit and the multipliers."""
     figure = style.new_figure(8.0, 4.2)
     left, right = figure.subplots(1, 2)
     gait_orbit(gait, ax=left)

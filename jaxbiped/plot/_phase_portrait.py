@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
+import jax
+import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
@@ -16,7 +18,6 @@ from jaxbiped.plot._gait_charts import check_drawable
 from jaxbiped.plot._samples import AnyScene, DrawnMotion
 from jaxbiped.plot._skeleton import Part, Skeleton, skeleton_of
 from jaxbiped.plot._symbols import angle_of, rate_of
-from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -129,7 +130,7 @@ def _draw_body(
     ax.plot(angle[0], rate[0], "o", color=part.look.colour, markersize=5)
 
 
-def gait_orbit(gait: Gait, *, scene: Any = None, ax: Axes | None = None) -> Figure:
+def gait_orbit(gait: Gait, *, ax: Axes | None = None) -> Figure:
     """Draws the rates of all bodies [rad/s] over their angles from the slope's normal [rad].
 
     One cycle: where it is a step, mirrored bodies are exchanged at each footstep, so the two curves
@@ -137,25 +138,21 @@ def gait_orbit(gait: Gait, *, scene: Any = None, ax: Axes | None = None) -> Figu
     where the cycle begins. Arrows tell the direction.
 
     Args:
-        gait: a gait that was found.
-        scene: what walks, as names and pairs of bodies are its; the seed's walker unless given.
+        gait: a gait that was found, of any walker.
         ax: axes to draw into; a new figure unless given.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ValueError: no gait was found, this is a batch, or the scene is another walker's.
+        ArgumentError: no gait was found, or this is a batch.
     """
     check_drawable(gait)
-    mechanism = (seed_scene() if scene is None else scene).mechanism
+    # Of the scene that a gait keeps, all numbers may be unknown: the names count.
+    shapes = jax.eval_shape(lambda scene: scene.mechanism, gait.origin.nearest)
+    mechanism = jtu.tree_map(lambda leaf: np.ones(leaf.shape), shapes)
     structure, skeleton = mechanism.structure, skeleton_of(mechanism)
     start = gait.measures.state
-    if not set(structure.coordinates[2:]) <= set(start._fields):
-        raise ArgumentError(
-            f"scene is not allowed: the gait has the state {', '.join(start._fields)}; give the "
-            "scene that it was found in."
-        )
     ax = style.axes_or_new(ax, 5.6, 4.4)
     for body in structure.free:
         part, twin = skeleton.parts[body], (structure.body_twins or range(body + 1))[body]

@@ -117,8 +117,8 @@ def constraint_runs(runs: Sequence[Mapping[str, Any]]) -> Figure:
     edge of the panels of violation and error.
 
     Args:
-        runs: as `jaxbiped constraints --json` writes them: `method`, `integrator`, `rtol_or_dt`
-            (a step [s] where `fixed`), `ending`, `max_violation_m`, `state_error`, `wall_s_run`.
+        runs: as `jaxbiped constraints --json` writes them: `method`, `integrator`, its `rtol` or
+            `dt_s` (the other is None), `ending`, `max_violation_m`, `state_error`, `wall_s_run`.
 
     Returns:
         A new figure.
@@ -174,8 +174,9 @@ def _draw_way(
 
 
 def _integrator_label(run: Mapping[str, Any]) -> str:
-    by = f"{run['rtol_or_dt']:g}"
-    return f"{run['integrator']}, " + (f"steps of {by} s" if run["fixed"] else f"tolerance {by}")
+    step = run["dt_s"]
+    by = f"tolerance {run['rtol']:g}" if step is None else f"steps of {step:g} s"
+    return f"{run['integrator']}, {by}"
 
 
 def _has_failed(run: Mapping[str, Any]) -> bool:

@@ -24,7 +24,7 @@ def test_compares_methods_and_integrators(monkeypatch, capsys, tmp_path):
     assert "4 of 4 runs" in capsys.readouterr().err
     assert outputs.numbers["complete"]
     runs = outputs.numbers["runs"]
-    ran = [(run["method"], run["rtol_or_dt"]) for run in runs]
+    ran = [(run["method"], run["dt_s"]) for run in runs]
     assert ran == [(name, dt) for dt in (1e-5, 2e-3) for name in ("standard", "described")]
     marks = points_of(figure.axes[0], "euler, steps of 1e-05 s")[0]
     np.testing.assert_allclose(marks[0, 0], runs[0]["max_violation_m"])
@@ -41,8 +41,8 @@ def test_compares_methods_and_integrators(monkeypatch, capsys, tmp_path):
 
 def _done(method, integrator, seconds):
     return ConstraintRun(
-        method=method, integrator=integrator.solver, rtol_or_dt=integrator.dt or integrator.rtol,
-        fixed=integrator.dt is not None, ending="walking", max_violation_m=1e-9,
+        method=method, integrator=integrator.solver, rtol=integrator.rtol, dt_s=integrator.dt,
+        ending="walking", max_violation_m=1e-9,
         max_violation_rate=1e-8, state_error=1e-6, wall_s_run=seconds, steps=100, engine="lanes",
     )  # fmt: skip
 

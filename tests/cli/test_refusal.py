@@ -27,6 +27,7 @@ walk --hip-z abc | --hip-z = 'abc' is not a number.
 basin --samples 1.5 | --samples = '1.5' is not a whole number.
 basin --chunk many | --chunk = 'many' is not a whole number.
 walk --out | --out | missing value
+gait --format png --format pdf | --format is given 2 times: give all its values after one.
 wlak | wlak | walk, gait, continue, optimise, fit, basin
  | walk, gait, continue, optimise, fit, basin
 walk --duration inf | duration = inf | finite

@@ -165,7 +165,7 @@ def gait(outcome, *, end=BranchEnd.NOT_FOLLOWED, stable=True, others=(), grazes=
             gait(
                 jb.gait.Search.NOT_CONVERGED, end=BranchEnd.WALK_ENDS, walk=int(jb.Ending.STOPPED)
             ),
-            "ends at slope = 0.015, which has one: beyond, the walk stops",
+            "ends at slope = 0.015, the nearest scene with a gait: beyond, the walk stops",
         ),
         (gait(jb.gait.Search.NOT_CONVERGED, end=BranchEnd.BREAKS_OFF), "is not smooth"),
     ],

@@ -1,6 +1,7 @@
 """Figures of a periodic gait, against one made by hand: nothing is compiled."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -58,6 +59,7 @@ def _gait(*, passes=1, values=(0.35 + 0.29j, 0.35 - 0.29j, 0.42, 3e-4, 0, 0), **
         "sensitivity_errors": slope_errors,
         "measure_errors": jb.gait.Measures(*[np.asarray(1e-2)] * 5, state=None),
         "orbit": _orbit(passes),
+        "origin": SimpleNamespace(nearest=jb.seed_scene()),
         "parameters": PARAMETERS,
         "quantities": (),
     }

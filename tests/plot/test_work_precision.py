@@ -56,8 +56,8 @@ def _run(method="standard", integrator="rodas4", by=1e-6, **changes):
     known = dict(
         method=method,
         integrator=integrator,
-        rtol_or_dt=by,
-        fixed=integrator == "euler",
+        rtol=None if integrator == "euler" else by,
+        dt_s=by if integrator == "euler" else None,
         ending="walking",
         max_violation_m=1e-9,
         max_violation_rate=1e-8,
