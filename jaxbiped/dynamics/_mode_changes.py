@@ -202,7 +202,7 @@ def _changed(
 
 
 def settled(scene: RigidScene, state: Any, leg: int, least: Scalar | float = 0.0) -> Any:
-    """The state without what would have to pull: first a foot of two, then limits of stops.
+    """The state without what would have to pull: first one foot of two, then limits of stops.
 
     `leg`: the one that stands; `least`: as of `change_mode`.
     """
@@ -213,8 +213,10 @@ def settled(scene: RigidScene, state: Any, leg: int, least: Scalar | float = 0.0
         first, second = stance.stands
         loads = foot_loads(scene, stance, turning_of(scene, stance))
         bearing = least * (mechanism.total_mass * g)
-        pulls = [first & second & (load < bearing) for load in loads]
-        stands = modes.standing(leg, (first & ~pulls[0], second & ~pulls[1]), state.mode)
+        lifts = first & second & (jnp.minimum(*loads) < bearing)
+        less = loads[0] < loads[1]
+        stays = first & ~(lifts & less), second & ~(lifts & ~less)
+        stands = modes.standing(leg, stays, state.mode)
         state = with_mode(scene, state, stance.mode._replace(stands=stands))
         stance = stance_on(scene, state, leg)
     if not modes.limits:
