@@ -1,6 +1,7 @@
 """What acts at the joints of a mechanism: springs, stops, latches, couplings and motors."""
 
 import dataclasses
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeAlias
@@ -242,6 +243,18 @@ def law_of(law: Any) -> Any:
     return FunctionLaw(law) if callable(law) and is_leaf else law
 
 
+def _takes_a_motion(law: Any) -> bool:
+    """Whether it can be called with one argument."""
+    law = law.function if isinstance(law, FunctionLaw) else law
+    try:
+        inspect.signature(law).bind(None)
+    except ValueError:  # a built-in function, which has no signature
+        return True
+    except TypeError:
+        return False
+    return True
+
+
 class Motor(AbstractJointPart):
     """A motor, whose torque is a law of the motion and of nothing else.
 
@@ -255,7 +268,7 @@ class Motor(AbstractJointPart):
         name: see `AbstractJointPart`.
 
     Raises:
-        ArgumentError: a law that cannot be called, a share below 0, or another word.
+        ArgumentError: a law that cannot be called with one argument, a share below 0, or another word.
     """
 
     kind: ClassVar[str] = "motor"
@@ -267,9 +280,9 @@ class Motor(AbstractJointPart):
     name: str | None = eqx.field(static=True, default=None)
 
     def __check_init__(self) -> None:
-        if not callable(self.law):
+        if not _takes_a_motion(self.law):
             raise ArgumentError(
                 f"law = {self.law!r} is not allowed for Motor({self.angle!r}): give a function of "
-                "the motion."
+                "the motion alone."
             )
         check_choice("by", self.by, SIDES)
