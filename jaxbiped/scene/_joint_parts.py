@@ -268,7 +268,7 @@ class Motor(AbstractJointPart):
         name: see `AbstractJointPart`.
 
     Raises:
-        ArgumentError: a law that cannot be called with one argument, a share below 0, or another word.
+        ArgumentError: a law that does not take one argument, a share below 0, or another word.
     """
 
     kind: ClassVar[str] = "motor"
