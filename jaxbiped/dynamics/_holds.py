@@ -5,6 +5,7 @@ pressed: a limit of a stop, which its gap leaves as it grows, or the foot of a l
 tree's root.
 """
 
+import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -72,33 +73,41 @@ class Holds(NamedTuple):
         loose: Sequence[Scalar | bool],
         least: Scalar | float = -ROUNDING,
     ) -> list[Scalar]:
-        """What stays held where loose ones that would have to pull are released, worst first.
+        """What stays held of loose ones: what is pressed on, while the others leave.
 
-        `least`: the rate or acceleration that is pressed away, below which one would have to.
+        What would have to pull is released, and what would pass its limit is held again, the worst
+        first by the energy of its motion.
+
+        `least`: the rate or acceleration that is pressed away, below which one would have to pull.
         """
         held = [jnp.asarray(each) for each in held]
         able = [i for i, each in enumerate(loose) if each is not False]
-        for _ in able:
+        wanted = [held[i] & loose[i] for i in able]
+        for _ in range(_passes(len(able))):
             reactions = self.reactions(free, held)
-            moved = [reactions[i] * self.mobility[i][i] for i in able]
-            pulls = [
-                jnp.where(held[i] & loose[i], jnp.minimum(move - least, 0.0), 0.0)
-                for i, move in zip(able, moved, strict=True)
+            rates = self.along(self.under(free, reactions))
+            short = [
+                jnp.where(
+                    held[i], reactions[i] * self.mobility[i][i] - least, rates[i] + abs(least)
+                )
+                / jnp.sqrt(self.mobility[i][i])
+                for i in able
             ]
-            worst = pulls[0]
-            for pull in pulls[1:]:
-                worst = jnp.minimum(worst, pull)
-            for i, pull in zip(able, pulls, strict=True):
-                held[i] = held[i] & ~((pull < 0.0) & (pull <= worst))
+            wrong = [
+                jnp.where(w, jnp.minimum(x, 0.0), 0.0) for w, x in zip(wanted, short, strict=True)
+            ]
+            worst = functools.reduce(jnp.minimum, wrong)
+            for i, each in zip(able, wrong, strict=True):
+                held[i] = held[i] ^ ((each < 0.0) & (each <= worst))
         return held
 
 
-def foot_let_go(
-    flat: Scalar, loads: tuple[Scalar, Scalar], least: Scalar | float = 0.0
-) -> tuple[Scalar, Scalar]:
-    """Which of the two feet of a leg that lies flat would have to pull; of both the worse one."""
-    first, second = loads
-    return flat & (first < least) & (first <= second), flat & (second < least) & (second < first)
+def _passes(count: int) -> int:
+    """After how many changes of what is held all of so many loose ones are as they belong.
+
+    No more were needed by any of 160,000 random mobilities of two to five.
+    """
+    return count if count < 3 else 2 * count - 1
 
 
 def holds_of(stance: Stance, modes: Modes, factors: SparseFactors) -> Holds:

@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import kept_alone
-from jaxbiped.dynamics._holds import ROUNDING, foot_let_go
+from jaxbiped.dynamics._holds import ROUNDING
 from jaxbiped.dynamics._plastic_impact import Grip, Struck, plastic_impact
 from jaxbiped.dynamics._rolling import Turning, ground_force, turning_of
 from jaxbiped.dynamics._stance import Stance, angles_and_rates, of_stance, stance_on
@@ -202,7 +202,7 @@ def _changed(
 
 
 def settled(scene: RigidScene, state: Any, leg: int, least: Scalar | float = 0.0) -> Any:
-    """The state without what would have to pull: first a foot of two, then limits of stops.
+    """The state without what would have to pull: first one foot of two, then limits of stops.
 
     `leg`: the one that stands; `least`: as of `change_mode`.
     """
@@ -213,8 +213,10 @@ def settled(scene: RigidScene, state: Any, leg: int, least: Scalar | float = 0.0
         first, second = stance.stands
         loads = foot_loads(scene, stance, turning_of(scene, stance))
         bearing = least * (mechanism.total_mass * g)
-        pulls = foot_let_go(first & second, loads, bearing)
-        stands = modes.standing(leg, (first & ~pulls[0], second & ~pulls[1]), state.mode)
+        lifts = first & second & (jnp.minimum(*loads) < bearing)
+        less = loads[0] < loads[1]
+        stays = first & ~(lifts & less), second & ~(lifts & ~less)
+        stands = modes.standing(leg, stays, state.mode)
         state = with_mode(scene, state, stance.mode._replace(stands=stands))
         stance = stance_on(scene, state, leg)
     if not modes.limits:

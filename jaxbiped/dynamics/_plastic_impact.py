@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._holds import foot_let_go, holds_of
+from jaxbiped.dynamics._holds import holds_of
 from jaxbiped.dynamics._joint_loads import of_all_bodies
 from jaxbiped.dynamics._stance import Stance
 from jaxbiped.dynamics._standing_tree import Sole, either, sole_of
@@ -65,7 +65,8 @@ def plastic_impact(
 ) -> Struck:
     """Brings the soles of a leg to rest on the ground at once, and what is held to rest.
 
-    Of two feet and of loose limits those are released that would have to pull.
+    Of two feet and of loose limits those stay that are pressed on, while the others leave; of two
+    feet at least one.
 
     Args:
         old: the motion before.
@@ -80,15 +81,17 @@ def plastic_impact(
         found = _on(old, first, None, push_off, modes, grip)
         return Struck(old.on(first, found.rates), found.impulse, (), found.held)
     second = sole_of(old.mechanism, feet[1])
-    both = stands[0] & stands[1]
-    sole = either(stands[0], first, second)
-    found = _on(old, sole, both, push_off, modes, grip)
+    flat = stands[0] & stands[1]
+    found = _on(old, either(stands[0], first, second), flat, push_off, modes, grip)
     front = found.turning / (old.point(second).x - old.point(first).x)
-    pulls = foot_let_go(both, (found.impulse.z - front, front))
-    stands = stands[0] & ~pulls[0], stands[1] & ~pulls[1]
+    tips = flat & (jnp.minimum(front, found.impulse.z - front) < 0.0)
+    one, other = (_on(old, sole, ~flat & flat, push_off, modes, grip) for sole in (first, second))
+    rises = old.on(first, one.rates).point(second).vz >= 0.0
+    # Where neither presses alone the walker would have to fly: what pulls less stays.
+    stays = rises & ((one.impulse.z >= 0.0) | (one.impulse.z >= other.impulse.z))
+    found = select(tips, select(stays, one, other), found)
+    stands = stands[0] & ~(tips & ~stays), stands[1] & ~(tips & stays)
     sole = either(stands[0], first, second)
-    alone = _on(old, sole, jnp.zeros_like(both), push_off, modes, grip)
-    found = select(pulls[0] | pulls[1], alone, found)
     return Struck(old.on(sole, found.rates), found.impulse, stands, found.held)
 
 

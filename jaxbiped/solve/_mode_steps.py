@@ -32,12 +32,14 @@ class SurfaceCourse(NamedTuple):
         values, rates: of each, shape (k,), the rates in 1/s.
         live: whether it matters there (booleans), shape (k,).
         bends: second derivatives of the first h, the gaps of limits, shape (h,).
+        turning: angular accelerations there [rad/s²].
     """
 
     values: Scalar
     rates: Scalar
     live: Scalar
     bends: Scalar
+    turning: tuple[Scalar, ...] = ()
 
 
 def has_modes(scene: RigidScene) -> bool:
@@ -63,6 +65,7 @@ def course_of(scene: RigidScene, state: Any) -> SurfaceCourse:
         jnp.stack(slope),
         jnp.stack(live),
         jnp.stack(bends) if bends else jnp.zeros(0, value[0].dtype),
+        moves,
     )
 
 

@@ -101,7 +101,7 @@ def initial_progress(walk: RigidWalk) -> RigidProgress:
     if has_modes(walk.scene):
         state = change_mode(walk.scene, state)
         modes = ModeProgress(course_of(walk.scene, state), none, no, state.mode)
-    rates = rolling_rates(walk.scene, state)
+    rates = rolling_rates(walk.scene, state) if modes is None else modes.course.turning
     never = jnp.full_like(zero, jnp.inf)
     return RigidProgress(
         t=zero,

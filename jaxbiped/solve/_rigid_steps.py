@@ -77,13 +77,13 @@ def attempt_step(
         strike = jax.lax.cond(after.struck, lambda: _strike(walk, onto), lambda: onto.state)
     after = select(after.struck, _after_strike(walk, after, onto, strike), after)
     accepted = landing | kept
-    there = select(after.struck, strike, trial)
-    if now.modes is not None:
-        after = _after_change(walk, after, onto, select(accepted, course, now.modes.course))
-        there = after.state
     # The last stage is the first one of the next step, after an impact from the new state.
-    rates = rolling_rates(walk.scene, there)
-    rates = select(accepted, rates, now.rates)
+    if now.modes is None:
+        rates = rolling_rates(walk.scene, select(after.struck, strike, trial))
+        rates = select(accepted, rates, now.rates)
+    else:
+        after = _after_change(walk, after, onto, select(accepted, course, now.modes.course))
+        rates = after.modes.course.turning
     one = jnp.where(accepted, 1, 0)
     after = after._replace(
         rates=rates, accepted=now.accepted + one, rejected=now.rejected + (1 - one)

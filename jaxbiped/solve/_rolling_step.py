@@ -234,8 +234,9 @@ def euler_step_onto(
     near = jnp.abs(surface.value) <= NEAR * jnp.sqrt(rtol)
     near = near & (surface.rate < 0.0)
     near = near & (jnp.abs(surface.curvature) * rest * rest <= 0.4 * NEAR * rtol)
+    front = _along(scene, lead, trial, rates)
     there = advance(trial, rest, [1.0], [rates])
-    return StepOnto(near, rest, there, surface.rate, lead(scene, there) > 0.0)
+    return StepOnto(near, rest, there, surface.rate, front.value + rest * front.rate > 0.0)
 
 
 def _along(

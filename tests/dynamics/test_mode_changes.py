@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._holds import Holds, foot_let_go
+from jaxbiped.dynamics._holds import Holds
 from jaxbiped.dynamics._mode_changes import change_mode
 from jaxbiped.dynamics._stance import stance_on
 from jaxbiped.scene._bodies import Foot
@@ -65,24 +65,6 @@ def test_of_a_flat_foot_the_end_that_would_have_to_pull_is_let_go(angle, rate, s
     state = in_mode(scene, state, (), stands=(True, True))
     assert [float(load) > 0.0 for load in loads_of_feet(scene, state)] == stands
     assert mode_of(scene, change_mode(scene, state))[0] == stands
-
-
-@pytest.mark.parametrize(
-    ("loads", "let_go"),
-    [
-        ((1.0, 2.0), (False, False)),
-        ((-1.0, 2.0), (True, False)),
-        ((1.0, -2.0), (False, True)),
-        ((-2.0, -1.0), (True, False)),
-        ((-1.0, -2.0), (False, True)),
-        ((-1.0, -1.0), (True, False)),
-    ],
-)
-def test_a_flat_foot_never_lets_go_of_both_its_ends(loads, let_go):
-    """Contact conditions by hand; where both would pull, the leg stands on the better one."""
-    found = foot_let_go(np.True_, tuple(map(np.float64, loads)))
-    assert tuple(map(bool, found)) == let_go
-    assert not any(foot_let_go(np.False_, tuple(map(np.float64, loads))))
 
 
 def test_a_foot_that_comes_down_flat_turns_no_more():

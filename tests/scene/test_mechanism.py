@@ -125,6 +125,7 @@ REFUSED = {
     "no limit": lambda: Stop("leg_1", law=None),
     "it must be below": lambda: Stop("leg_1", upper=0.0, lower=0.1),
     "holds = 'always' is not known": lambda: Stop("leg_1", upper=0.0, holds="always"),
+    "function of the motion alone": lambda: Motor("leg_1", lambda angle, rate: 0.0),
     "width = 0": lambda: Latch("leg_1", at=0.0, width=0.0, torque=1.0),
     "has no parent": lambda: Body("a", mass=1, inertia=1, centre=0, at=0.1),
     "letters, digits and underscores": lambda: Body("a b", mass=1, inertia=1, centre=0),

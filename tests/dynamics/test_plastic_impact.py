@@ -1,0 +1,106 @@
+"""Plastic impacts, against an enumeration of all that may be held, in maximal coordinates."""
+
+import itertools
+
+import jax
+import numpy as np
+
+from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._plastic_impact import Grip, plastic_impact
+from jaxbiped.dynamics._stance import stance_on
+from jaxbiped.scene._joint_parts import Stop
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._rigid_feet import rigid_modes
+from tests.dynamics.test_modes import HEEL_TOE, couples
+from tests.dynamics.test_rolling_mechanisms import rigid, sole_of, whole
+from tests.mechanisms import SLOPE
+from tests.random_mechanisms import maximal_accelerations
+
+MIRROR = (("leg_1", "leg_2"), ("foot_1", "foot_2"))
+STOPS = (
+    *(Stop(f"foot_{i}", upper=3.0) for i in (1, 2)),
+    Stop({"leg_1": 1, "leg_2": -1}, upper=3.0, lower=-3.0),
+)
+PARTS = dict(root_mass=0.3, bodies=HEEL_TOE.bodies, feet=HEEL_TOE.feet, mirror=MIRROR)
+WALKER, BARE = Mechanism(**PARTS, joints=STOPS), Mechanism(**PARTS)
+SCENE = rigid(WALKER)
+TOLERANCE = 1e-9
+
+
+@host_jit()
+def struck(scene, state, held):
+    """Behind an impact of both ends of the foot that stands, with limits that may let go."""
+    grip, feet = Grip(held, (True,) * len(held)), WALKER.structure.feet_of_leg[1]
+    flat = (state.mode == state.mode,) * 2
+    found = plastic_impact(stance_on(scene, state, 1), feet, flat, None, rigid_modes(WALKER), grip)
+    motion = found.stance.pose.motion
+    return motion.rates, found.impulse, found.stands, found.held
+
+
+def drawn(seed):
+    """A state whose second foot lies flat, and limits that take part."""
+    random = np.random.default_rng(seed)
+    names = [f"{kind}_{body}" for kind in ("theta", "omega") for body in WALKER.structure.bodies]
+    numbers = dict(zip(names, random.uniform(-1.0, 1.0, len(names)), strict=True))
+    state = SCENE.state(**numbers | {"theta_foot_2": 0.0})
+    held = random.uniform(size=4) < 0.7
+    held[3] &= ~held[2]  # both limits of one stop are never reached at once
+    return jax.tree.map(np.float64, state), tuple(map(np.bool_, held))
+
+
+def allowed(state, held):
+    """Of all sets of contacts and limits those with no pull and no penetration: their rates."""
+    motion, limits = whole(SCENE, state), rigid_modes(WALKER).limits
+    count = 2 + len(motion.rates)
+    still = motion._replace(vx=0.0, vz=0.0, rates=(0.0,) * (count - 2))
+    free = maximal_accelerations(BARE, still, SLOPE, 0.0)
+
+    def moving(values):
+        return still._replace(vx=values[0], vz=values[1], rates=tuple(values[2:]))
+
+    rows, answers = {}, {}
+    for foot in (2, 3):
+        body, lowest, *_ = sole_of(SCENE, motion, foot)
+        speeds = np.array([sole_of(SCENE, moving(e), foot)[3] for e in np.eye(count)])
+        for k, force in enumerate(np.eye(2)):
+            rows[foot, k] = speeds[:, k]
+            given = [(body, lowest, *force)]
+            answers[foot, k] = maximal_accelerations(BARE, still, SLOPE, 0.0, given) - free
+    for i, limit in enumerate(limits):
+        rows[i] = np.array([0.0, 0.0, *(limit.gap.of(e) for e in np.eye(count - 2))])
+        given = couples(SCENE, still, [limit], [1.0])
+        answers[i] = maximal_accelerations(BARE, still, SLOPE, 0.0, given) - free
+    before = np.array([motion.vx, motion.vz, *motion.rates])
+    able = [i for i, each in enumerate(held) if each]
+    feet = [(2,), (3,), (2, 3)]
+    subsets = [s for n in range(len(able) + 1) for s in itertools.combinations(able, n)]
+    found = []
+    for stand, stay in itertools.product(feet, subsets):
+        presses = [(foot, 1) for foot in stand] + list(stay)
+        used = [(stand[0], 0), *presses]
+        matrix = np.array([[rows[a] @ answers[b] for b in used] for a in used])
+        impulses = np.linalg.solve(matrix, -np.array([rows[a] @ before for a in used]))
+        after = before + sum(p * answers[b] for p, b in zip(impulses, used, strict=True))
+        others = {(2, 1), (3, 1), *able} - set(presses)
+        leaves = [rows[each] @ after for each in others]
+        if min([*impulses[1:], *leaves]) >= -TOLERANCE:
+            found.append((stand, after[2:]))
+    return found
+
+
+def test_an_impact_holds_the_one_set_that_neither_pulls_nor_penetrates():
+    """Where there is none the walker would have to fly: one end of its foot stays all the same."""
+    sets = set()
+    for seed in range(150):
+        state, held = drawn(seed)
+        expected = allowed(state, held)
+        rates, impulse, stands, _ = struck(SCENE, state, held)
+        sets.add(expected[0][0] if expected else ())
+        if not expected:
+            assert any(stands)
+            continue
+        for stand, after in expected:
+            np.testing.assert_allclose(rates, after, atol=1e-8)
+            assert tuple(k for k, each in zip((2, 3), stands, strict=True) if each) == stand
+        assert float(impulse.z) > -TOLERANCE
+    assert sets == {(), (2,), (3,), (2, 3)}
