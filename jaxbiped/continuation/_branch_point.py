@@ -154,7 +154,6 @@ def change_of(seen: Cycle, point: np.ndarray, slope: float) -> Change:
 
 
 def branch_point(curve: Curve, axis: Axis, found: CurvePoint) -> BranchPoint:
-    """What is told of a point of the curve of gaits."""
     cycle: Cycle = found.change.seen
     m = len(found.place) - 1
     jacobian, looser = np.asarray(cycle.jacobian)[:, :, :m]

@@ -72,7 +72,6 @@ class ContinuationSetup(NamedTuple):
         return correct(curve, np.append(recurring, self.axis.place(value)) / curve.sizes)
 
     def recurring(self, state: WalkerState) -> np.ndarray:
-        """The components of a state that must return."""
         return np.asarray(recurring_components(self.problem.spec.system, state))
 
     def state_of(self, recurring: np.ndarray) -> WalkerState:

@@ -105,13 +105,14 @@ def continue_gait(
             radius = abs(point.multipliers[0])
             now.update(found=f"radius {radius:.4g} at {along} = {point.value:.6g}")
 
-        steps: dict[str, Any] = dict(
+        before, after = traces_from(
+            setup,
+            begin,
             largest_step=float(largest_step),
             max_points=int(max_points),
             tell=tell,
             interruptible=True,
         )
-        before, after = traces_from(setup, begin, **steps)
     before, after = map(setup.with_cause, (before, after))
     return setup.branch(before.reversed(), after)
 
@@ -150,7 +151,6 @@ def first_gait(
         guess,
         footsteps=setup.footsteps,
         parameters=(),
-        radius_sensitivities=False,
         accuracy=setup.accuracy,
         engine=engine,
     )
@@ -163,9 +163,6 @@ def first_gait(
             "lost when it is corrected"
         )
     return explain_search(scene, gait)
-
-
-_WAYS = ("forward", "backward")
 
 
 def resume_branch(
@@ -193,7 +190,7 @@ def resume_branch(
     Raises:
         ArgumentError: an argument that is not allowed, or a gait that does not return.
     """
-    check_choice("direction", direction, _WAYS)
+    check_choice("direction", direction, ("forward", "backward"))
     check_positive("largest_step", largest_step)
     check_count("max_points", max_points)
     if not -len(branch) <= at < len(branch):

@@ -116,9 +116,7 @@ def _scattered_starts(
     Rolling starts where it finds none.
     """
     scene = setup.scene
-    gait = find_gait(
-        scene, parameters=(), radius_sensitivities=False, accuracy=setup.accuracy, engine=engine
-    )
+    gait = find_gait(scene, parameters=(), accuracy=setup.accuracy, engine=engine)
     if gait.outcome is not Search.FOUND:
         rolling = rolling_starts(scene, _TRIALS * count, spread=max(_SPREADS), seed=seed)
         yield from np.stack(recurring_leaves(rolling), axis=1)

@@ -1,6 +1,7 @@
 """Nearest bifurcation of a gait in one of its scene's parameters."""
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from jaxbiped._checks import ArgumentError, check_choice
@@ -61,22 +62,24 @@ def range_of(scene: Scene | RigidScene, along: str, factor: float = FACTOR) -> t
     return low, high
 
 
+def allows(scene: Scene | RigidScene, values: Mapping[str, float]) -> bool:
+    """Whether a walker may have these parameters."""
+    try:
+        with_parameters(scene, values)
+    except ArgumentError:
+        return False
+    return True
+
+
 def farthest_allowed(scene: Scene | RigidScene, name: str, end: float) -> float:
     """The value of a parameter nearest to an end that the walker allows, seen from its own."""
-
-    def allowed(value: float) -> bool:
-        try:
-            with_parameters(scene, {name: value})
-        except ArgumentError:
-            return False
-        return True
-
-    if allowed(end):
+    if allows(scene, {name: end}):
         return end
     inside, outside = float(parameter_values(scene)[name]), end
     while abs(outside - inside) > _NEAR * abs(inside):
         middle = 0.5 * (inside + outside)
-        inside, outside = (middle, outside) if allowed(middle) else (inside, middle)
+        here = allows(scene, {name: middle})
+        inside, outside = (middle, outside) if here else (inside, middle)
     return inside
 
 

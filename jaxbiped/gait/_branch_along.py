@@ -88,8 +88,9 @@ def branch_along(
     ) -> FollowedBranch:
         def change(point: np.ndarray, s: float) -> Change:
             given: PyTree = point, np.float64(s), precision
-            *moved, code = map(np.asarray, _scene_along(problem.spec, line, like, *given))
-            return Change(*moved, int(code))
+            told = _scene_along(problem.spec, line, like, *given)
+            value, by_point, by_s, code = map(np.asarray, told)
+            return Change(value, by_point, by_s, int(code))
 
         scales = recurring_sizes(line.first, like)
         return follow_branch(change, point, s, scales=scales, smallest=smallest)

@@ -30,10 +30,9 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.variational._tangents import Seeded
 
-LOOSER = 10.0
-"""How much looser the search is solved before its end, and the witness of its error."""
 ROUGH = Precision(3e-6, 3e-4)
 """How exactly the search is solved until it is near."""
 _SHORTEST = 0.1
@@ -127,7 +126,6 @@ class FixedPointProblem(NamedTuple):
     method: Method | None = None
 
     def state(self, recurring: Scalar) -> PyTree:
-        """The state of these recurring components."""
         return state_with(self.spec.system, self.guess, recurring)
 
     def directions(self, m: int) -> tuple[Seeded, Scalar]:
@@ -206,7 +204,7 @@ def _runner(problem: FixedPointProblem, m: int) -> Run:
 
 
 def looser(precision: Precision) -> Precision:
-    """The precision of the witness of a return's error."""
+    """The precision before a search's end, and of the witness of a return's error."""
     return Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
 
 

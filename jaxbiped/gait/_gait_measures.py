@@ -1,7 +1,5 @@
 """Gait measures as a function of the scene that JAX can differentiate."""
 
-from collections.abc import Callable
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -75,18 +73,16 @@ def gait_measures(
     if implicit:
         return _by_theorem(scene, gait)
 
-    def once_from(state: PyTree) -> Return:
-        return return_map(
-            scene,
-            state,
-            section=section,
-            footsteps=footsteps,
-            gradient=gradient,
-            accuracy=accuracy,
-            engine=engine,
-        )
-
-    return _by_correction(gait, once_from)
+    once = return_map(
+        scene,
+        gait.measures.state,
+        section=section,
+        footsteps=footsteps,
+        gradient=gradient,
+        accuracy=accuracy,
+        engine=engine,
+    )
+    return _by_correction(gait, once)
 
 
 def _by_theorem(scene: Scene | RigidScene | RedundantScene, gait: Gait) -> Measures:
@@ -116,10 +112,9 @@ def _attach_derivatives_jvp(
     return values, jtu.tree_map(lambda slope: slope @ state_dot, slopes)
 
 
-def _by_correction(gait: Gait, once_from: Callable[[PyTree], Return]) -> Measures:
+def _by_correction(gait: Gait, once: Return) -> Measures:
     """Newton's correction at the gait changes nothing but has the gait's derivatives."""
     state = gait.measures.state
-    once = once_from(state)
     recurring = recurring_names(state)
     change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in recurring])
     size = len(recurring)

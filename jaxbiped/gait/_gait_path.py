@@ -37,15 +37,13 @@ def step_lengths(problem: FixedPointProblem, last: LinearisedReturn, states: PyT
         return _distances(last.nodes.start[:, 1], last.advance)
     scene = problem.args.minimal
     found = jax.vmap(jax.vmap(lambda y: feet(scene, y)))(states)
-    before, after = (jtu.tree_map(lambda x, s=s: x[:, s], found) for s in _NEIGHBOURS)
+    before = jtu.tree_map(lambda x: x[:, :-1], found)
+    after = jtu.tree_map(lambda x: x[:, 1:], found)
     lands = jnp.stack(landings(structure, before, after))
     places = jnp.stack([_place_of_strike([after[k] for k in leg]) for leg in structure.feet_of_leg])
     lands, places = (_in_names_of_start(structure, each) for each in (lands, places))
     stands = standing_leg(structure, jtu.tree_map(lambda x: x[0, 0], found))
     return _distances(_first_strikes(lands, places, stands - 1, count), last.advance)
-
-
-_NEIGHBOURS = slice(None, -1), slice(1, None)
 
 
 def _place_of_strike(feet_of_leg: list[FootMotion]) -> Scalar:

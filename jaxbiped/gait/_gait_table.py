@@ -17,12 +17,6 @@ from jaxbiped.gait._search_provenance import FoundBy
 if TYPE_CHECKING:
     from jaxbiped.gait._gait import Gait
 
-_CODES: dict[str, type[IntEnum]] = {
-    "ending": Search,
-    "found_by": FoundBy,
-    "branch_end": BranchEnd,
-}
-
 
 def gait_entries(gait: "Gait") -> dict[str, Entry]:
     """Variables of a dataset of a gait; NaN where none was found.
@@ -42,13 +36,13 @@ def gait_entries(gait: "Gait") -> dict[str, Entry]:
     def add(name: str, value: Any, quantity: Quantity, error: Any = None, *own: str) -> None:
         entries[name] = Entry(own, known(value), quantity, None if error is None else known(error))
 
-    codes = {
-        "ending": gait.ending,
-        "found_by": gait.origin.found_by,
-        "branch_end": gait.origin.branch_end,
+    codes: dict[str, tuple[Any, type[IntEnum]]] = {
+        "ending": (gait.ending, Search),
+        "found_by": (gait.origin.found_by, FoundBy),
+        "branch_end": (gait.origin.branch_end, BranchEnd),
     }
-    for name, code in codes.items():
-        flags = {int(each): str(each) for each in _CODES[name]}
+    for name, (code, kind) in codes.items():
+        flags = {int(each): str(each) for each in kind}
         words = Quantity(name.replace("_", " "))
         entries[name] = Entry((), np.asarray(code, dtype=np.int8), words, flags=flags)
     for name, quantity in QUANTITIES.items():

@@ -1,28 +1,12 @@
 """Gradient modes: how a derivative is taken, and where."""
 
-from typing import TYPE_CHECKING
-
 import equinox as eqx
 
 from jaxbiped._checks import ArgumentError
 
-if TYPE_CHECKING:
-    from typing import ClassVar
-    from typing import ClassVar as AbstractClassVar
-else:
-    from typing import ClassVar
-
-    from equinox import AbstractClassVar
-
 
 class AbstractGradient(eqx.Module):
-    """A way to take derivatives.
-
-    Attributes:
-        anywhere: whether it works off a periodic orbit.
-    """
-
-    anywhere: AbstractClassVar[bool]
+    """A way to take derivatives."""
 
 
 class Forward(AbstractGradient):
@@ -31,8 +15,6 @@ class Forward(AbstractGradient):
     Through XLA every direction is one solve of its own under `jax.jacfwd`, in lockstep; by lanes
     all share one.
     """
-
-    anywhere: ClassVar[bool] = True
 
 
 class Reverse(AbstractGradient):
@@ -44,16 +26,12 @@ class Reverse(AbstractGradient):
     carried along the motion, as `Forward` does, and transposed.
     """
 
-    anywhere: ClassVar[bool] = True
-
 
 class Implicit(AbstractGradient):
     """The implicit function theorem at a periodic orbit: every derivative, once, for both modes.
 
     First derivatives only: a second one is refused.
     """
-
-    anywhere: ClassVar[bool] = False
 
 
 def check_anywhere(gradient: AbstractGradient, what: str) -> None:
@@ -62,7 +40,7 @@ def check_anywhere(gradient: AbstractGradient, what: str) -> None:
         raise ArgumentError(
             f"gradient = {gradient!r} is not allowed: it must be Forward() or Reverse()."
         )
-    if not gradient.anywhere:
+    if isinstance(gradient, Implicit):
         raise ArgumentError(
             f"gradient = {type(gradient).__name__}() is not allowed for {what}, which need not be "
             "periodic: choose Forward() or Reverse()."

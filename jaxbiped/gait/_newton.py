@@ -44,7 +44,6 @@ class Method(eqx.Module):
 
     @property
     def evaluations_allowed(self) -> RealScalarLike:
-        """How many evaluations of the return map a search may take."""
         return self.max_evaluations if self.patience is None else self.patience
 
 

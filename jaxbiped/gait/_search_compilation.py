@@ -31,7 +31,6 @@ def compile_once(
 
 @bounded_cache(PROGRAMS)
 def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
-    """What one kind of search is compiled by."""
     return Once()
 
 
@@ -64,7 +63,6 @@ def _kind_of(tree: PyTree) -> tuple[object, ...]:
 
 
 def _empty_arrays(shape: PyTree) -> PyTree:
-    """Arrays of these shapes that hold nothing."""
     return jtu.tree_map(
         # Made by NumPy: JAX would compile a program for every shape.
         lambda leaf: np.full(leaf.shape, np.nan if leaf.dtype.kind == "f" else 0, leaf.dtype),

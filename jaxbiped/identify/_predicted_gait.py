@@ -231,8 +231,9 @@ def predict(
 
     here = AnglesInTime.of(scene_at(parameters), gait)
     angles = _angles_along(here, angles_near, measured, parameters, sizes)
-    known = zip((values, slopes, errors), angles, strict=True)
-    return Prediction(*map(np.concatenate, known), *told[3:])
+    parts = zip((values, slopes, errors), angles, strict=True)
+    values, slopes, errors = map(np.concatenate, parts)
+    return told._replace(values=values, slopes=slopes, slope_errors=errors)
 
 
 def _angles_along(

@@ -7,7 +7,7 @@ are those above the lower ground.
 """
 
 import dataclasses
-from typing import ClassVar, cast
+from typing import ClassVar, NamedTuple, cast
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,10 +15,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, select
 from jaxbiped.dynamics._contacts import feet
-from jaxbiped.dynamics._footfalls import FootMotion
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._strike_surfaces import clearance, clearance_rate, distance_ahead
-from jaxbiped.dynamics._switches import Switch
 from jaxbiped.dynamics._symmetry import exchange_legs
 from jaxbiped.optimise._augmented_system import (
     AbstractAugmentedSystem,
@@ -56,18 +54,9 @@ class DisturbedCycle(AbstractAugmentedSystem):
     recurring: ClassVar[int] = 1
 
     def vector_field(self, t: Time, y: PyTree, args: AbstractWalkerScene) -> PyTree:
-        rates = self.walker.vector_field(t, motion_of(y), self._scene(args, y))
+        rates = self.walker.vector_field(t, motion_of(y), self.scene_of(args, y))
         zero = jnp.zeros_like(y.clock)
         return join(y, rates, dict.fromkeys(self.coordinates, zero) | {"clock": zero + 1.0})
-
-    def switches(self, args: AbstractWalkerScene, y: PyTree) -> tuple[Switch, ...]:
-        return self.walker.switches(self._scene(args, y), motion_of(y))
-
-    def reset_at_switch(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
-        return super().reset_at_switch(self._scene(args, y), y)
-
-    def ending(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
-        return self.walker.ending(self._scene(args, y), motion_of(y))
 
     def reset_map(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
         after = self.walker.reset_map(args, motion_of(y))
@@ -80,30 +69,25 @@ class DisturbedCycle(AbstractAugmentedSystem):
                 after = after._replace(**{height: raised})
         return join(y, after, told)
 
-    def load(self, args: AbstractWalkerScene, y: PyTree) -> None:
-        return None
-
-    def _scene(self, scene: AbstractWalkerScene, y: PyTree) -> AbstractWalkerScene:
+    def scene_of(self, args: AbstractWalkerScene, y: PyTree) -> AbstractWalkerScene:
         """The scene as it is disturbed; the step of a rigid walker is its section's."""
         ground: Ground | SteppedGround
         if self.disturbance == PUSH:
-            ground = dataclasses.replace(scene.ground, slope=scene.ground.slope + y.push)
-        elif scene.compliant:
-            depth, leg = y.drop * scene.mechanism.height, scene.mechanism.structure.swing_leg
-            ground = SteppedGround(scene.ground.slope, scene.ground.g, depth, leg)
+            ground = dataclasses.replace(args.ground, slope=args.ground.slope + y.push)
+        elif args.compliant:
+            depth, leg = y.drop * args.mechanism.height, args.mechanism.structure.swing_leg
+            ground = SteppedGround(args.ground.slope, args.ground.g, depth, leg)
         else:
-            return scene
-        found: AbstractWalkerScene = eqx.tree_at(lambda each: each.ground, scene, ground)
+            return args
+        found: AbstractWalkerScene = eqx.tree_at(lambda each: each.ground, args, ground)
         return found
 
 
 def push_cycle(walker: AbstractSystem) -> DisturbedCycle:
-    """A walker that can be pushed."""
     return DisturbedCycle(walker, ("clock", PUSH), PUSH)
 
 
 def drop_cycle(walker: AbstractSystem) -> DisturbedCycle:
-    """A walker before which the ground can have a step."""
     return DisturbedCycle(walker, ("clock", "fallen", DROP), DROP)
 
 
@@ -147,25 +131,16 @@ class LowestSwing(AbstractAugmentedSystem):
         rates = self.walker.vector_field(t, motion_of(y), args)
         return join(y, rates, dict.fromkeys(self.coordinates, zero))
 
-    def switches(self, args: AbstractWalkerScene, y: PyTree) -> tuple[Switch, ...]:
-        return self.walker.switches(args, motion_of(y))
-
-    def ending(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
-        return self.walker.ending(args, motion_of(y))
-
     def reset_map(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
         motion, zero = motion_of(y), jnp.zeros_like(y.passed)
         lowered = zero
         if self.walker.disturbance == DROP and args.compliant:
             lowered = y.drop * args.mechanism.height
-        height = _swing_height(args, motion_of(motion)) + lowered
+        height = _swing_foot(args, motion_of(motion)).height + lowered
         told = {"clearance": y.clearance + height / args.mechanism.height, "passed": y.passed + 1.0}
         after = self.walker.reset_map(args, motion)
         at_section = join(y, after, {"clearance": y.clearance, "passed": zero})
         return select(y.passed < 0.5, join(y, motion, told), at_section)
-
-    def load(self, args: AbstractWalkerScene, y: PyTree) -> None:
-        return None
 
 
 class LowestSwingSection(AbstractSection):
@@ -179,40 +154,32 @@ class LowestSwingSection(AbstractSection):
 
     def value(self, args: PyTree, y: PyTree) -> Scalar:
         motion = motion_of(y)
-        rises = _swing_height_rate(args, motion_of(motion))
+        rises = _swing_foot(args, motion_of(motion)).rate
         return jnp.where(y.passed > 0.5, rises, self.section.value(args, motion))
 
     def counts(self, args: PyTree, y: PyTree) -> Scalar:
         motion = motion_of(y)
-        swings = _swings(args, motion_of(motion))
+        swings = _swing_foot(args, motion_of(motion)).swings
         return jnp.where(y.passed > 0.5, swings, self.section.counts(args, motion))
 
 
-def _swing_foot(args: AbstractWalkerScene, state: PyTree) -> FootMotion:
+class _SwingFoot(NamedTuple):
+    """Height above its ground [m], its rate, and whether the clearance rule lets it pass."""
+
+    height: Scalar
+    rate: Scalar
+    swings: Scalar
+
+
+def _swing_foot(args: AbstractWalkerScene, state: PyTree) -> _SwingFoot:
     """A compliant walker's stance leg's, the lower one of several: its cycle has the footstep
     before, and the exchange of legs behind."""
+    if not args.compliant:
+        rigid = cast("RigidScene", args)
+        return _SwingFoot(clearance(rigid, state), clearance_rate(rigid, state), jnp.asarray(True))
     structure, found = args.mechanism.structure, feet(cast("Scene", args), state)
     lowest, *others = (found[k] for k in structure.feet_of_leg[structure.stance_leg])
     for foot in others:
         lowest = select(foot.penetration > lowest.penetration, foot, lowest)
-    return lowest
-
-
-def _swing_height(args: AbstractWalkerScene, state: PyTree) -> Scalar:
-    """Of the foot that swings above its ground [m]."""
-    if not args.compliant:
-        return clearance(cast("RigidScene", args), state)
-    return -_swing_foot(args, state).penetration
-
-
-def _swing_height_rate(args: AbstractWalkerScene, state: PyTree) -> Scalar:
-    if not args.compliant:
-        return clearance_rate(cast("RigidScene", args), state)
-    return -_swing_foot(args, state).penetration_rate
-
-
-def _swings(args: AbstractWalkerScene, state: PyTree) -> Scalar:
-    """Whether the clearance rule lets that foot pass."""
-    if not args.compliant:
-        return jnp.asarray(True)
-    return jnp.logical_not(jnp.asarray(_swing_foot(args, state).admitted))
+    swings = jnp.logical_not(jnp.asarray(lowest.admitted))
+    return _SwingFoot(-lowest.penetration, -lowest.penetration_rate, swings)

@@ -18,7 +18,7 @@ from jaxbiped.continuation._branch_point import axis_of, start_of
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
 from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.continuation._trace import LIMITS, Trace
-from jaxbiped.gait._fixed_point_search import LOOSER
+from jaxbiped.gait._fixed_point_search import looser
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint
@@ -27,13 +27,11 @@ from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import MODULI
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
+from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 KINDS = (BranchEvent.FOLD, BranchEvent.PERIOD_DOUBLING)
 """Bifurcations whose distance is told."""
 _LARGEST_STEP, _MOST_POINTS = 0.02, 200
-
-
 _ENDS = (*LIMITS, BranchEnd.REACHED, BranchEnd.CLOSED)
 """Ends of a branch that was followed as far as it goes, or to the end of the range."""
 
@@ -170,8 +168,7 @@ def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> Function
     """By the return map itself, and by a looser one."""
     told = []
     problem = setup.problem
-    for factor in (1.0, LOOSER):
-        precision = Precision(*(factor * each for each in problem.precision))
+    for precision in (problem.precision, looser(problem.precision)):
         other = setup._replace(problem=problem._replace(precision=precision))
         fold = locate_near(other.curve, event.point.place, event.point.tangent, advance)
         slopes_there = None if fold is None else _fold_slopes(other, fold)

@@ -284,9 +284,7 @@ def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> Pus
 
 def _by_other(scene: Scene | RigidScene, gait: Gait) -> OtherEngine:
     other = next(name for name in ENGINES if name not in ("auto", gait.engine))
-    again = find_gait(
-        scene, gait.measures.state, parameters=(), radius_sensitivities=False, engine=other
-    )
+    again = find_gait(scene, gait.measures.state, parameters=(), engine=other)
     pairs = zip(again.measures[:2], gait.measures[:2], strict=True)
     period, length = (abs(float(a) / float(b) - 1.0) for a, b in pairs)
     radii = (float(each.measures.spectral_radius) for each in (again, gait))

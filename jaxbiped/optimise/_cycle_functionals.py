@@ -29,8 +29,7 @@ from jaxbiped.gait._return_map_spec import (
     runs_by_lanes,
 )
 from jaxbiped.linalg._small_matrices import solve
-from jaxbiped.optimise._augmented_system import MotionSection
-from jaxbiped.optimise._cycle_integrals import integrals_of
+from jaxbiped.optimise._augmented_system import MotionSection, integrals_of
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState

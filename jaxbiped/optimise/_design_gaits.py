@@ -41,13 +41,10 @@ class GaitSettings(NamedTuple):
         return find_gait(scene, start, radius_sensitivities=False, **self._asdict())
 
     def find_near(self, scene: Scene | RigidScene, point: np.ndarray) -> Gait:
-        """The gait of a scene near recurring components of a state, shape (m,)."""
         return self.find(scene, self.state_of(scene, point))
 
     def state_of(self, scene: Scene | RigidScene, point: np.ndarray) -> WalkerState:
-        """The state with these recurring components."""
-        found: WalkerState = state_of_recurring(state_type(scene), map(np.float64, point))
-        return jtu.tree_map(np.float64, found)
+        return jtu.tree_map(np.float64, state_of_recurring(state_type(scene), point))
 
 
 def are_walks(gaits: Gait) -> np.ndarray:

@@ -200,7 +200,6 @@ class DesignProblem:
         return None if np.any(np.abs(found - guess) > farthest) else self._keep(u, scene, gait)
 
     def gait_of(self, design: Design) -> Gait:
-        """The gait of a design that is known."""
         return self.settings.find_near(self.scene_at(design.u), design.known.state)
 
     def scene_at(self, u: np.ndarray) -> Scene | RigidScene:

@@ -37,7 +37,6 @@ class Variables(NamedTuple):
         return np.where(u <= 0.0, self.low, np.where(u >= 1.0, self.high, values))
 
     def rates(self, u: np.ndarray) -> np.ndarray:
-        """Derivatives of the parameters with respect to u, shape (k,)."""
         growth = self.values(u) * np.log(self._ratio(1.0))
         return np.where(self.logarithmic, growth, self.high - self.low)
 
@@ -55,7 +54,6 @@ class Variables(NamedTuple):
         return np.where(logarithmic, self.high, otherwise) / np.where(logarithmic, self.low, 1.0)
 
     def by_name(self, u: np.ndarray) -> dict[str, float]:
-        """The parameters at u by name."""
         return dict(zip(self.names, self.values(u).tolist(), strict=True))
 
 

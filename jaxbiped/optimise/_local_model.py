@@ -63,12 +63,10 @@ class Local(NamedTuple):
         return self.weight > 0.0 or bool(np.isfinite(self.bound))
 
     def merit(self, penalty: float) -> float:
-        """The objective with the requirements that are missed."""
         here = np.zeros_like(self.u)
         return Model(self, [], np.zeros((len(here), len(here)))).merit(here, penalty)
 
     def radius(self, move: np.ndarray) -> float:
-        """The spectral radius after a move."""
         inside = radius_of(self.cluster + self.cluster_gradients @ move, self.margin)
         return max(inside, float(self.next + self.next_gradient @ move))
 
@@ -85,7 +83,6 @@ class Local(NamedTuple):
 def local_of(
     problem: DesignProblem, rows: tuple[AnyRow, ...], scale: float, design: Design
 ) -> Local:
-    """Of a design that was evaluated."""
     u, known = design
     weights, weight = smooth_weights(problem)
     of_cluster = [row for row in rows if isinstance(row, ClusterRow)]
@@ -128,7 +125,6 @@ class Model(NamedTuple):
     curvature: np.ndarray
 
     def merit(self, step: np.ndarray, penalty: float) -> float:
-        """The merit there."""
         here, every = self.here, [self.here, *self.cuts]
         moves = [here.u + step - each.u for each in every]
         sums = [self._lower_sum(e) + e.gradient @ m for e, m in zip(every, moves, strict=True)]

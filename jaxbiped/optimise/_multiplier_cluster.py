@@ -92,7 +92,6 @@ class Cluster(NamedTuple):
 
 
 def cluster_of(known: Evaluation) -> Cluster:
-    """The cluster of a gait that was evaluated."""
     return Cluster(*(np.array([part[name] for name in SYMMETRIC]) for part in known[:4]))
 
 
@@ -134,15 +133,12 @@ class ClusterRow(NamedTuple):
         return float(np.clip(error, _LEAST, _MOST))
 
     def slopes(self, known: Evaluation) -> np.ndarray:
-        """Its derivatives with respect to all parameters."""
         return self._by_symmetric(known) @ cluster_of(known).slopes
 
     def slope_errors(self, known: Evaluation) -> np.ndarray:
-        """Their estimated errors."""
         return np.abs(self._by_symmetric(known)) @ cluster_of(known).slope_errors
 
     def by_bound(self, known: Evaluation) -> float:
-        """Its derivative with respect to the bound."""
         return float(self._conditions(known).by_radius[self.place])
 
     def _conditions(self, known: Evaluation) -> Conditions:

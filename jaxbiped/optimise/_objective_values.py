@@ -235,11 +235,9 @@ class Evaluations:
             self._append(None)  # what was cut off ends: the next line stands by itself
 
     def get(self, u: np.ndarray) -> Evaluation | None:
-        """What is known of a design."""
         return self._known.get(u.tobytes())
 
     def is_lost(self, u: np.ndarray) -> bool:
-        """Whether no gait was found there."""
         return self._known.get(u.tobytes(), ...) is None
 
     def add(self, u: np.ndarray, known: Evaluation | None) -> None:
@@ -249,7 +247,6 @@ class Evaluations:
         self._append({"u": u, "known": None if known is None else known._asdict()})
 
     def nearest(self, u: np.ndarray) -> tuple[np.ndarray, Evaluation]:
-        """Of the designs with a gait the nearest one."""
         found = [(np.frombuffer(key), e) for key, e in self._known.items() if e is not None]
         return min(found, key=lambda each: float(np.linalg.norm(each[0] - u)))
 

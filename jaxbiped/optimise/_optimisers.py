@@ -56,19 +56,15 @@ class Row(NamedTuple):
         return self.sign * (known.values[self.name] - self.bound) / scale_of(self.bound)
 
     def slopes(self, known: Evaluation) -> np.ndarray:
-        """Its derivatives with respect to all parameters."""
         return self.sign * known.slopes[self.name] / scale_of(self.bound)
 
     def slope_errors(self, known: Evaluation) -> np.ndarray:
-        """Their estimated errors."""
         return known.slope_errors[self.name] / scale_of(self.bound)
 
     def by_bound(self, known: Evaluation) -> float:
-        """Its derivative with respect to the bound."""
         return -self.sign / scale_of(self.bound)
 
     def is_active(self, known: Evaluation) -> bool:
-        """Whether it holds the design."""
         return self.equality or self.value(known) <= _ACTIVE
 
 
@@ -115,19 +111,16 @@ class Functions:
         self.scale = scale_of(problem.objective(problem.latest.known).value)
 
     def objective(self, u: np.ndarray) -> tuple[float, np.ndarray]:
-        """The scaled objective and its gradient."""
         known, raised = self._evaluation(u)
         found = self.problem.objective(known)
         gradient = self.problem.gradient(u, found.slopes)
         return found.value / self.scale + raised, gradient / self.scale
 
     def spare(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
-        """Values of the requirements."""
         known, _ = self._evaluation(u)
         return np.asarray([row.value(known) for row in rows])
 
     def spare_gradients(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
-        """Their gradients, one a row."""
         known, _ = self._evaluation(u)
         return np.stack([self.problem.gradient(u, row.slopes(known)) for row in rows])
 

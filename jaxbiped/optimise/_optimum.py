@@ -1,11 +1,11 @@
 """Optimum: the best design that an optimisation came to, how it ended, and every iterate."""
 
 import dataclasses
-import enum
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
+from jaxbiped._ending import NamedCode
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.gait._gait import Gait
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-class Outcome(enum.IntEnum):
+class Outcome(NamedCode):
     """How an optimisation ended. `str(outcome)` is its name in words.
 
     - converged: the optimiser's own test is met, and every requirement kept, to
@@ -40,9 +40,6 @@ class Outcome(enum.IntEnum):
     INTERRUPTED = 3
     INFEASIBLE = 4
     BEYOND_RANGE = 5
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
 
 
 class Iteration(NamedTuple):

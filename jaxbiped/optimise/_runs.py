@@ -1,14 +1,14 @@
 """Runs of an optimiser over a design problem, restarts among them, and the best design of all."""
 
+import dataclasses
 import functools
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage
-from jaxbiped.continuation._nearest_bifurcation import range_of
+from jaxbiped.continuation._nearest_bifurcation import allows, range_of
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
@@ -39,8 +39,10 @@ _BY_NAME: dict[str, Callable[[Functions, np.ndarray, int, Callback], RunEnding]]
     "trust-constr": run_trust_constr,
     "optax": run_optax,
 }
+_NOT_ENDED = RunEnding(False, "")
 
 
+@dataclasses.dataclass
 class Runs:
     """Runs of an optimiser from one design after the other.
 
@@ -52,25 +54,19 @@ class Runs:
         ended: how the run ended that came to it; `interrupted` by Ctrl-C.
     """
 
-    def __init__(
-        self,
-        problem: DesignProblem,
-        iterations: int,
-        optimiser: "str | optax.GradientTransformation",
-        now: Stage,
-    ) -> None:
-        self.problem, self.iterations, self.optimiser = problem, iterations, optimiser
-        self.now = now
-        self.history: list[Iteration] = []
-        self.ended, self.interrupted = RunEnding(False, ""), False
+    problem: DesignProblem
+    iterations: int
+    optimiser: "str | optax.GradientTransformation"
+    now: Stage
+    history: list[Iteration] = dataclasses.field(default_factory=list)
+    ended: RunEnding = _NOT_ENDED
+    interrupted: bool = False
 
     @property
     def best(self) -> Design:
-        """Of all designs that were asked for."""
         return min(self.problem.asked, key=functools.partial(rank_of, self.problem))
 
     def run(self, begin: Design) -> None:
-        """From a design whose gait is known."""
         self.problem.latest = begin
         self.note(begin.u)
         before = self.best
@@ -93,13 +89,11 @@ class Runs:
             return Outcome.INFEASIBLE
         if any(self.problem.weights.get(name) for name in self.best.known.beyond_range):
             return Outcome.BEYOND_RANGE
-        optimal = told.residual <= OPTIMAL
         if not self.ended.converged:
             return Outcome.UNFINISHED
-        return Outcome.CONVERGED if optimal else Outcome.CORNER
+        return Outcome.CONVERGED if told.residual <= OPTIMAL else Outcome.CORNER
 
     def note(self, u: np.ndarray) -> None:
-        """Notes an iterate."""
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
         known = self.problem.evaluations.get(u)
         if known is None:
@@ -185,10 +179,12 @@ def _gaits_of_designs(
     problem: DesignProblem, u: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gaits of designs near guesses, and their derivatives (n, m, p); NaN where there are none."""
-    columns, allowed = problem.variables.values(u), np.asarray([_is_allowed(problem, x) for x in u])
+    columns, names = problem.variables.values(u), problem.variables.names
+    every = [dict(zip(names, row, strict=True)) for row in columns.tolist()]
+    allowed = np.asarray([allows(problem.scene, values) for values in every])
     own = np.where(allowed[:, None], columns, columns[np.argmax(allowed)])
     known = np.isfinite(points)
-    values = dict(zip(problem.variables.names, own.T, strict=True))
+    values = dict(zip(names, own.T, strict=True))
     starts = np.where(known, points, 0.0)
     _, gaits, _ = gaits_near(problem.scene, values, starts, problem.settings)
     good = are_walks(gaits) & allowed & np.all(known, axis=1)
@@ -198,11 +194,3 @@ def _gaits_of_designs(
     )
     lost = ~good[:, None]
     return np.where(lost, np.nan, found), np.where(lost[:, None], np.nan, slopes)
-
-
-def _is_allowed(problem: DesignProblem, u: np.ndarray) -> bool:
-    try:
-        problem.scene_at(u)
-    except ArgumentError:
-        return False
-    return True

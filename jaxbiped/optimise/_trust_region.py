@@ -34,7 +34,6 @@ _DISTANCES = (1e-2, 1e-3, 1e-4)
 def run_trust_region(
     functions: Functions, u: np.ndarray, iterations: int, report: Callback
 ) -> RunEnding:
-    """Minimises from a design whose gait is known."""
     problem = functions.problem
     search = _Search(problem, u, iterations, report)
     while search.descend():

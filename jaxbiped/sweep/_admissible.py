@@ -58,8 +58,7 @@ def independent_names(scene: Any, state: Any) -> tuple[str, ...]:
     for k in range(len(projection)):
         if np.linalg.matrix_rank(projection[[*chosen, k]]) > len(chosen):
             chosen.append(k)
-    names = tuple(recurring_names(state))
-    return tuple(names[k] for k in chosen)
+    return tuple(tuple(recurring_names(state))[k] for k in chosen)
 
 
 def limit_motions(scene: Any, values: Mapping[str, Any]) -> list[tuple[Limit, Any, Any]]:
@@ -70,7 +69,7 @@ def limit_motions(scene: Any, values: Mapping[str, Any]) -> list[tuple[Limit, An
         values: scalars of its states by name, arrays of any common shape.
     """
     mechanism, slope = scene.mechanism, scene.ground.slope
-    nothing = 0.0 * np.asarray(values[_first_angle(scene)])
+    nothing = 0.0 * np.asarray(values[mechanism.structure.coordinates[2]])
     angles, rates = angles_and_rates_named(mechanism, slope, values, nothing)
     return [
         (limit, np.asarray(limit.distance(mechanism, angles, slope)), limit.gap.of(rates))
@@ -78,14 +77,10 @@ def limit_motions(scene: Any, values: Mapping[str, Any]) -> list[tuple[Limit, An
     ]
 
 
-def _first_angle(scene: Any) -> str:
-    name: str = scene.mechanism.structure.coordinates[2]
-    return name
-
-
 def passes_a_stop(scene: Any, values: Mapping[str, Any], *, by: float = SLACK) -> np.ndarray:
     """Whether states by name, arrays of shape (n,), lie beyond a stop by so much [rad]."""
-    passed = np.zeros(np.shape(values[_first_angle(scene)]), dtype=bool)
+    angle = scene.mechanism.structure.coordinates[2]
+    passed = np.zeros(np.shape(values[angle]), dtype=bool)
     if not scene.compliant:
         for _, off, _ in limit_motions(scene, values):
             passed = passed | (off < -by)

@@ -212,7 +212,9 @@ def _draws_in(
         reached = scipy.linalg.orth(attractor.metric @ own)
         directions = spread_directions(_DIRECTIONS, reached.shape[1]) @ reached.T
     offsets = (shells[:, None, None] * directions).reshape(-1, size - 1) @ back.T
-    count, starts = len(offsets), _displace(attractor.state, offsets)
+    count = len(offsets)
+    leaves = list((attractor.point + offsets).T)
+    starts = state_of_recurring(type(attractor.state), leaves, np.zeros(count))
     # Followed wherever they go: the linear model decides nothing.
     nothing = np.full_like(attractor.model, np.inf)
     aim = attractor._replace(model=nothing, contraction=1.0, radius=-1.0)
@@ -234,8 +236,3 @@ def _draws_in(
     impossible = passes_a_stop(scene, starts._asdict())
     nearer: np.ndarray = np.asarray(returned & (after <= allowed) | impossible)
     return np.asarray(nearer.reshape(len(shells), -1).all(axis=1))
-
-
-def _displace(state: PyTree, offsets: np.ndarray) -> PyTree:
-    leaves = [float(x) + off for x, off in zip(recurring_leaves(state), offsets.T, strict=True)]
-    return state_of_recurring(type(state), leaves, np.zeros(len(offsets)))

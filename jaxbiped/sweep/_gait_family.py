@@ -222,7 +222,6 @@ def _stable_gaits(
                 None if near is None else jtu.tree_map(as_float, near),
                 footsteps=count,
                 parameters=(),
-                radius_sensitivities=False,
             )
             least = int(gait.cycle_footsteps)
             if not bool(gait.stable) or least == count:

@@ -3,11 +3,10 @@
 import contextlib
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
@@ -41,7 +40,6 @@ class GaitGrid:
         return bool(self._dataset[_DONE].data[place])
 
     def is_stable(self, place: tuple[int, ...]) -> bool:
-        """Whether a point has a stable gait."""
         return bool(self._dataset["spectral_radius"].data[place] < 1.0)
 
     def states(self) -> np.ndarray:
@@ -49,12 +47,8 @@ class GaitGrid:
         names = recurring_names(self._state)
         return np.stack([self._dataset[f"state_{name}"].data for name in names], axis=-1)
 
-    def write(self, place: tuple[int, ...], gait: Gait) -> None:
-        """Keeps a gait, and what is new in the store every few seconds."""
-        self.write_each([place], jtu.tree_map(lambda leaf: np.asarray(leaf)[None], gait))
-
-    def write_each(self, places: Sequence[tuple[int, ...]], gaits: Gait) -> None:
-        """`write` of several, whose arrays have a first axis."""
+    def write(self, places: Sequence[tuple[int, ...]], gaits: Gait) -> None:
+        """Keeps gaits, whose arrays have a first axis; every few seconds in the store, too."""
         at = tuple(np.transpose(places))
         for name, (_, values, _) in variables_of(gait_entries(gaits)).items():
             self._dataset[name].data[at] = values
@@ -80,15 +74,6 @@ class GaitGrid:
                 RuntimeWarning,
                 stacklevel=3,
             )
-
-    @contextlib.contextmanager
-    def open(self) -> Iterator[None]:
-        """Within, what was found before an interrupt is not lost."""
-        try:
-            yield
-        except KeyboardInterrupt:
-            self.flush()
-            raise
 
     def flush(self) -> None:
         """Writes to the store, where there is one, what is not there yet."""

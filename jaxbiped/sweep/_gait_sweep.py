@@ -28,7 +28,7 @@ from jaxbiped.scene._parameter_access import (
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._gait_grid import open_gait_grid
-from jaxbiped.sweep._gait_waves import LARGE, GaitWaves, Place
+from jaxbiped.sweep._gait_waves import LARGE, GaitWaves, Place, rows_of
 from jaxbiped.sweep._store_files import store_path, what_is_kept
 from jaxbiped.sweep.starts._coordinates import parameter_axes
 
@@ -131,17 +131,20 @@ def gait_sweep(
             for k, (place, guess) in enumerate(zip(places, guesses, strict=True)):
                 start = jtu.tree_map(as_float, kind(0.0, *guess))
                 gait = find_gait(scene_at(place), start, engine=engine, **options)
-                yield slice(k, k + 1), jtu.tree_map(lambda leaf: np.asarray(leaf)[None], gait)
+                yield slice(k, k + 1), rows_of(gait, None)
 
         units = {name: parameter_quantities(scene)[name].unit for name in values}
         grid = open_gait_grid(
             first, values, units, settings, provenance(scene), path, any_version=any_version
         )
-        with grid.open():
+        try:
             GaitWaves(grid, (centre, first), find, search_alone, now).run()
             if at_once:
                 grid.warn_of_grazing()
             return grid.dataset()
+        except KeyboardInterrupt:
+            grid.flush()  # what was found is not lost
+            raise
 
 
 def find_each(
@@ -171,7 +174,7 @@ def find_each(
         begin = state(np.zeros(size), *np.ascontiguousarray(rows.T))
         gaits = _find_each(scene, columns, begin, dict(options))
         kept = part.stop - first
-        yield part, jtu.tree_map(lambda leaf, kept=kept: np.asarray(leaf)[:kept], gaits)
+        yield part, rows_of(gaits, slice(kept))
         first = part.stop
 
 

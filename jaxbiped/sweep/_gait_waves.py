@@ -178,7 +178,7 @@ class GaitWaves:
         self._tried: dict[Place, list[Place]] = {}
         if not grid.is_done(self._first):
             if bool(gait.stable):
-                grid.write(self._first, gait)
+                grid.write([self._first], rows_of(gait, None))
             else:
                 self._doubt(self._first, gait)
 
@@ -217,9 +217,9 @@ class GaitWaves:
             return
         for part, gaits in self._find_from(places, guesses):
             stable, here = np.asarray(gaits.stable), places[part]
-            self._keep([here[k] for k in map(int, np.flatnonzero(stable))], _rows(gaits, stable))
+            self._keep([here[k] for k in map(int, np.flatnonzero(stable))], rows_of(gaits, stable))
             for k in map(int, np.flatnonzero(~stable)):
-                self._doubt(here[k], _rows(gaits, k))
+                self._doubt(here[k], rows_of(gaits, k))
 
     def _keep(self, places: Sequence[Place], gaits: Gait) -> None:
         """Stable gaits are what was sought."""
@@ -230,7 +230,7 @@ class GaitWaves:
         self._stable[at] = True
         for place in places:
             self._doubtful.pop(place, None)
-        self._grid.write_each(places, gaits)
+        self._grid.write(places, gaits)
         self._count(len(places))
 
     def _count(self, points: int) -> None:
@@ -272,13 +272,13 @@ class GaitWaves:
         if alone or not _is_found(best):
             gait = self._search_alone(place)
             if bool(gait.stable):
-                self._keep([place], _rows(gait, None))
+                self._keep([place], rows_of(gait, None))
                 self._spread()
                 return
             best = best if _is_found(best) else gait
         assert best is not None
         self._doubtful.pop(place)
-        self._grid.write(place, best)
+        self._grid.write([place], rows_of(best, None))
         if _is_found(best):
             self._states[place] = np.stack(recurring_leaves(best.measures.state))
         self._count(1)
@@ -288,7 +288,7 @@ def _is_found(gait: Gait | None) -> bool:
     return gait is not None and int(gait.ending) == int(Search.FOUND)
 
 
-def _rows(gaits: Gait, which: Any) -> Gait:
-    """Some of several gaits."""
+def rows_of(gaits: Gait, which: Any) -> Gait:
+    """Some of several gaits; of a single one, by None, a batch."""
     rows: Gait = jtu.tree_map(lambda leaf: np.asarray(leaf)[which], gaits)
     return rows

@@ -180,7 +180,7 @@ class CompliantLabelling:
             code=solved.ending,
             footsteps=count,
             time=solved.t,
-            distance=_advance(start, solved.state),
+            distance=solved.state[0] - start.solve.state[0],
             attempted=solved.accepted + solved.rejected,
             grazes=now.grazes,
         )
@@ -247,15 +247,10 @@ class RigidLabelling:
             code=walked.code,
             footsteps=walked.footsteps,
             time=walked.t,
-            distance=_advance(start, state_with_hip(start.solve, walked)),
+            distance=state_with_hip(start.solve, walked)[0] - start.solve.state[0],
             attempted=walked.accepted + walked.rejected,
             grazes=walked.grazes if self.grazes else None,
         )
-
-
-def _advance(start: Start, state: PyTree) -> Scalar:
-    """Along the slope since the start [m]: states begin with the root point's place."""
-    return state[0] - start.solve.state[0]
 
 
 def _outcome(trace: ArrivalHistory, *, code: Scalar, **walked: Any) -> Labelled:

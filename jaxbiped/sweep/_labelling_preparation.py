@@ -201,7 +201,6 @@ def guesses_among(labelling: Labelling, starts: AbstractStarts, numbers: np.ndar
 
 
 def with_guesses(labelling: Labelling, guesses: Guesses) -> Labelling:
-    """The labelling that also knows the gaits to which these guesses lead."""
     if not guesses:
         return labelling
     more = with_gaits(labelling.scene, labelling.family, labelling.effort, guesses)

@@ -42,7 +42,6 @@ class Store:
 
     @staticmethod
     def in_memory(layout: Layout, settings: JsonObject, writer: Mapping[str, str]) -> "Store":
-        """A store without results."""
         dataset = empty_dataset(layout)
         dataset.attrs = {**writer, SETTINGS: strict_json(settings)}
         for name in dataset.data_vars:

@@ -1,28 +1,26 @@
-"""Files of a store: made whole or not at all, and compared with what would go on in them."""
+"""Files of a store: made whole or not at all, and compared with what would go on in them.
+
+A store lies in a directory, or at any address that zarr opens, such as s3://bucket/basin.zarr: a
+path of the package universal-pathlib, over fsspec, which has the methods of `pathlib.Path`.
+"""
 
 import contextlib
 import glob
 import json
+import os
+import shutil
 import time
 import uuid
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from jaxbiped._checks import ArgumentError, ResourceError
-from jaxbiped._files import failure_kind, strict_json
+from jaxbiped._files import failure_kind, strict_json, user_path
 from jaxbiped._identity import DECISIVE, difference_of
 from jaxbiped._types import JsonObject
 from jaxbiped.caching._disk_cache import ABANDONED
-from jaxbiped.sweep._store_address import (
-    is_of_service,
-    is_remote,
-    is_writable,
-    move_store,
-    remove_store,
-    store_address,
-)
 
 if TYPE_CHECKING:
     import xarray
@@ -141,7 +139,10 @@ def check_store(path: Path) -> None:
     """Raises `ArgumentError` where no store can be made or continued at this path."""
     with writing(path):
         is_new(path)
-    if not is_writable(path):
+    if is_remote(path):
+        return
+    home = next(each for each in [path, *path.absolute().parents] if each.is_dir())
+    if not os.access(home, os.W_OK | os.X_OK):
         raise ArgumentError(
             f"store = {str(path)!r} cannot be written: its folder must be writable."
         )
@@ -169,7 +170,8 @@ def writing(path: Path) -> Iterator[None]:
         with zarr.config.set({"array.write_empty_chunks": True}):
             yield
     except Exception as error:
-        if not isinstance(error, OSError) and not (is_remote(path) and is_of_service(error)):
+        of_service = is_remote(path) and type(error).__module__.partition(".")[0] in _CLIENTS
+        if not isinstance(error, OSError) and not of_service:
             raise
         why = (getattr(error, "strerror", None) or str(error)).lower().rstrip(".")
         kind = failure_kind(error) if isinstance(error, OSError) else ResourceError
@@ -207,7 +209,6 @@ def create_store(path: Path, write: Callable[[Path], object]) -> None:
 
 
 def note(path: Path, attributes: Mapping[str, str | float]) -> None:
-    """Sets attributes of a store."""
     import zarr
 
     if attributes:
@@ -234,3 +235,62 @@ def is_new(path: Path) -> bool:
     if path.exists() and not path.is_dir():
         raise ArgumentError(f"store = {str(path)!r} is a file: it must be a directory.")
     return not path.exists() or not any(path.iterdir())
+
+
+_CLIENTS = ("botocore", "aiobotocore", "aiohttp", "google", "gcsfs", "azure", "adlfs", "fsspec")
+"""Packages whose errors are those of a service."""
+
+
+def store_address(store: str | Path) -> Path:
+    """The path that a user gives for a store.
+
+    Raises:
+        ArgumentError: no path, or a kind of address that nothing here opens.
+        ResourceError: a package that is missing for it.
+    """
+    text = str(store)
+    if "://" not in text:
+        return user_path(store, "store").absolute()
+    try:
+        from upath import UPath
+
+        address: Any = UPath(text, use_listings_cache=False)
+        _ = address.fs  # imports its driver
+    except ImportError:
+        raise ResourceError(
+            f"store = {text!r} needs a package that is missing: pip install jaxbiped[s3], or the "
+            "package of fsspec for another kind of address."
+        ) from None
+    except ValueError:
+        raise ArgumentError(
+            f"store = {text!r} is not allowed: it must be a directory, or an address that fsspec "
+            "opens, such as s3://bucket/basin.zarr."
+        ) from None
+    return cast("Path", address)
+
+
+def is_remote(path: Path) -> bool:
+    return not isinstance(path, Path)
+
+
+def move_store(half: Path, path: Path) -> None:
+    """Moves a store that is complete; raises `OSError` where a directory is there already.
+
+    An object store has no rename: what makes a group of it, its own metadata, is copied last.
+    """
+    if not is_remote(half):
+        half.rename(path)
+        return
+    files = cast("Any", half).fs
+    found = files.find(str(half))
+    own = files._strip_protocol(str(half))
+    for file in sorted(found, key=lambda each: each == f"{own}/zarr.json"):
+        files.copy(file, files._strip_protocol(str(path)) + file.removeprefix(own))
+
+
+def remove_store(path: Path) -> None:
+    """Removes what is left of a store that was not completed, if anything is."""
+    if not is_remote(path):
+        shutil.rmtree(path, ignore_errors=True)
+    elif path.exists():
+        cast("Any", path).fs.rm(str(path), recursive=True)

@@ -85,7 +85,6 @@ class Layout(NamedTuple):
 
     @property
     def chunks(self) -> int:
-        """Number of chunks."""
         return math.prod(self._counts)
 
     def place(self, chunk: int) -> tuple[int, ...]:
@@ -98,7 +97,6 @@ class Layout(NamedTuple):
         return tuple(slice(k * part, min((k + 1) * part, size)) for k, part, size in sizes)
 
     def shape_of(self, chunk: int) -> tuple[int, ...]:
-        """Of a chunk."""
         return tuple(part.stop - part.start for part in self.region(chunk))
 
     def numbers(self, chunk: int) -> tuple[int, int]:

@@ -262,7 +262,6 @@ def tightened(
 
 
 def tally_results(layout: Layout, results: Store) -> Seen:
-    """What the witnesses saw of all starts, a chunk at a time."""
     total = Seen()
     for chunk in range(layout.chunks):
         fields = results.read(chunk, tuple(DOUBT_FIELDS))

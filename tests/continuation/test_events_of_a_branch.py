@@ -116,15 +116,13 @@ def test_deflated_newton_finds_the_roots_one_after_the_other():
 
     class Search(_DeflatedNewton):
         def __init__(self):
-            self._sizes, self._crossings = np.ones(2), []
-            curve = SimpleNamespace(converged=1e-9)
-            self._setup = SimpleNamespace(curve=curve, arrivals=1)
+            self._sizes, self._crossings, self._value = np.ones(2), [], 0.0
+            curve = SimpleNamespace(converged=1e-9, change=lambda point, s: change(point))
+            axis = SimpleNamespace(place=float)
+            self._setup = SimpleNamespace(curve=curve, axis=axis, arrivals=1)
 
         def _walk(self, point, arrivals):
             return np.asarray(point), 0
-
-        def _change(self, point):
-            return change(point)
 
     search, found = Search(), []
     while (root := search.from_start(np.array([0.7, 0.1]))) is not None:

@@ -330,7 +330,7 @@ def test_a_differentiable_correction_has_the_derivatives_of_the_fixed_point():
             measures=SimpleNamespace(state=state), return_jacobian=jacobian, ending=jnp.asarray(0)
         )
         once = SimpleNamespace(time=2.0 + state.theta_1, state=after)
-        found = _by_correction(gait, lambda _: once)
+        found = _by_correction(gait, once)
         return jnp.stack([found.state.theta_1, found.period, found.step_length])
 
     value, slope = jax.jit(lambda a: jax.jvp(measured, (a,), (jnp.ones(()),)))(0.6)

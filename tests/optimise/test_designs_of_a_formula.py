@@ -15,8 +15,8 @@ from jaxbiped.dynamics._actuation import actuator_powers, hip_torques
 from jaxbiped.dynamics._push_off import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
 from jaxbiped.optimise import _certificate, _design_gaits
+from jaxbiped.optimise._augmented_system import integrals_of
 from jaxbiped.optimise._cycle_functionals import Functional, _totals, with_errors
-from jaxbiped.optimise._cycle_integrals import integrals_of
 from jaxbiped.optimise._design_gaits import (
     Ensemble,
     GaitSettings,

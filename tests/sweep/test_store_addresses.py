@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import jaxbiped as jb
-from jaxbiped.sweep._store_address import store_address
+from jaxbiped.sweep._store_files import store_address
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results
 

@@ -120,7 +120,6 @@ def parameter_axes(
 def parameters_among(
     scene: AbstractWalkerScene, columns: Mapping[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
-    """Those of the coordinates that are parameters of the scene."""
     own = state_coordinates(scene)
     return {name: column for name, column in columns.items() if name not in own}
 
