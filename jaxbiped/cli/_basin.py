@@ -110,8 +110,7 @@ class Basin(options.Command):
                 paths = _write_results(found, starts, self.output)
             report.wrote(paths)
         numbers["wall_s"] = time.perf_counter() - IMPORT_BEGAN
-        report.write_rows(lambda: jb.measure.to_csv(found, tuple(map(str, found.label.dims))))
-        report.finish(numbers)
+        report.finish(numbers, lambda: jb.measure.to_csv(found, tuple(map(str, found.label.dims))))
         return 0
 
 

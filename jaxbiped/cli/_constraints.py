@@ -156,8 +156,10 @@ class Constraints(options.Command):
         if runs:
             draw = {"constraints": lambda: jb.plot.constraint_runs(numbers)}
             report.wrote(self.output.draw(draw))
-        report.write_rows(lambda: csv_of(numbers))
-        report.finish({"duration_s": self.duration, "complete": complete, "runs": numbers})
+        report.finish(
+            {"duration_s": self.duration, "complete": complete, "runs": numbers},
+            lambda: csv_of(numbers),
+        )
         return 0 if complete else 1
 
 

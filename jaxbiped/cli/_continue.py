@@ -58,8 +58,7 @@ class ContinueGait(options.Command, of=("continue_gait",)):
             report.say(branch.stops[0].cause)
         if len(branch) and self.output.out is not None:
             report.wrote(write_results(branch, self.output))
-        report.write_rows(branch.to_csv)
-        report.finish(branch_numbers(branch) | {"wall_s": wall})
+        report.finish(branch_numbers(branch) | {"wall_s": wall}, branch.to_csv)
         return 0 if len(branch) else 1
 
 

@@ -60,8 +60,9 @@ class Fit(options.Command, of=("fit_gait",)):
         if fit.at_bounds:
             report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
         report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
-        report.write_rows(fit.to_csv)
         numbers = vars(fit) | {"ending": str(fit.ending)}
         numbers["intervals_95"] = numbers.pop("intervals")
-        report.finish(numbers | {"chi_squared": fit.chi_squared, "p_value": fit.p_value})
+        report.finish(
+            numbers | {"chi_squared": fit.chi_squared, "p_value": fit.p_value}, fit.to_csv
+        )
         return 0 if fit.ending is jb.identify.FitEnding.CONVERGED else 1

@@ -92,8 +92,7 @@ class FindGait(options.Command, of=("find_gait",)):
             report.say(error_sentence(gait.error))
         if found:
             report.wrote(self.output.draw(gait_figures(gait)))
-        report.write_rows(gait.to_csv)
-        report.finish(numbers)
+        report.finish(numbers, gait.to_csv)
         return 0 if found else 1
 
 

@@ -87,8 +87,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         report.say(*_certificate_lines(certificate))
         figures = {"optimisation": lambda: jb.plot.optimisation(found)}
         report.wrote(self.output.draw(figures | gait_figures(found.gait)))
-        report.write_rows(found.to_csv)
-        report.finish(numbers)
+        report.finish(numbers, found.to_csv)
         ended = jb.optimise.Outcome
         good = (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE)
         return 0 if found.outcome in good else 1

@@ -33,12 +33,11 @@ class Report:
         for path in paths:
             self.say(f"wrote {path}")
 
-    def finish(self, numbers: JsonObject) -> None:
+    def finish(self, numbers: JsonObject, rows: Callable[[], str] | None = None) -> None:
+        """Writes the table, whose text `rows` makes, and the numbers."""
+        if rows is not None:
+            _write_to(self._csv, rows)
         _write_to(self._json, lambda: strict_json(numbers, indent=2) + "\n")
-
-    def write_rows(self, rows: Callable[[], str]) -> None:
-        """Writes the table, whose text `rows` makes."""
-        _write_to(self._csv, rows)
 
 
 def _write_to(path: Path | None, text: Callable[[], str]) -> None:

@@ -76,8 +76,7 @@ class Trade(options.Command):
         }  # fmt: skip
         for rows, truth in found.values():
             report.wrote(self.output.draw(_figures(rows, truth)))
-        report.write_rows(lambda: csv_of(numbers["rows"]))
-        report.finish(numbers)
+        report.finish(numbers, lambda: csv_of(numbers["rows"]))
         return 0 if found["walk"][1] is not None else 1
 
     def _measure(

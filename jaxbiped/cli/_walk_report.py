@@ -96,12 +96,13 @@ def report_walk(
     if output.out is not None:
         with stage("drawing the figures and the animation"):
             if rolls:
-                paths = _write_rigid_outputs(scene, state, walk, output)
+                shown = from_start(scene, _rigid_beginning(walk), state)
+                page = jb.plot.view(scene, shown).save(output.out / "walk.html")
+                paths = [*output.draw(_motion_figures(scene, shown)), page]
             else:
                 paths = write_outputs(scene, walk, output)
         report.wrote(paths)
-    report.write_rows(lambda: footstep_csv(numbers["steps"]))
-    report.finish(numbers)
+    report.finish(numbers, lambda: footstep_csv(numbers["steps"]))
     return 1 if walk.outcome is jb.Ending.SOLVER_FAILED else 0
 
 
@@ -208,26 +209,13 @@ def write_outputs(scene: Any, walk: "jb.Trajectory[Any]", output: OutputOptions)
         "penetrations": lambda: jb.plot.penetrations(scene, walk),
         "contact_forces": lambda: jb.plot.contact_forces(scene, walk),
     }
-    paths, shown = output.draw(figures), _beginning(walk)
+    paths, t = output.draw(figures), np.asarray(walk.t)
+    count = int(np.searchsorted(t, _SHOWN, side="right"))
+    t, state = jtu.tree_map(lambda leaf: leaf[:count], (walk.t, walk.state))
+    shown = dataclasses.replace(walk, t=t, state=state)
     page = jb.plot.view(scene, shown).save(output.out / "walk.html")
     played = jb.plot.save_animation(jb.plot.animate(scene, shown), output.out / "walk.gif")
     return [data, *paths, played, page]
-
-
-def _write_rigid_outputs(
-    scene: "jb.RigidScene", state: Any, walk: "jb.Trajectory[Any]", output: OutputOptions
-) -> list[Path]:
-    assert output.out is not None
-    shown = from_start(scene, _rigid_beginning(walk), state)
-    paths = output.draw(_motion_figures(scene, shown))
-    return [*paths, jb.plot.view(scene, shown).save(output.out / "walk.html")]
-
-
-def _beginning(walk: "jb.Trajectory[Any]") -> "jb.Trajectory[Any]":
-    """The part of a walk that is animated."""
-    count = int(np.searchsorted(np.asarray(walk.t), _SHOWN, side="right"))
-    t, state = jtu.tree_map(lambda leaf: leaf[:count], (walk.t, walk.state))
-    return dataclasses.replace(walk, t=t, state=state)
 
 
 def _rigid_beginning(walk: "jb.Trajectory[Any]") -> "jb.Trajectory[Any]":
