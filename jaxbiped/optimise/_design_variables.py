@@ -108,12 +108,6 @@ class Requirement(NamedTuple):
     low: float | None
     high: float | None
 
-    def __str__(self) -> str:
-        if self.low == self.high:
-            return f"{self.name} = {self.low:g}"
-        low = "" if self.low is None else f"{self.low:g} ≤ "
-        return low + self.name + ("" if self.high is None else f" ≤ {self.high:g}")
-
 
 def requirements_of(scene: Scene | RigidScene, subject_to: SubjectTo) -> tuple[Requirement, ...]:
     """What must hold, the bounds of each measure gathered.
