@@ -132,7 +132,6 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         return self._jitted.lower(*args, **kwargs)
 
     def clear(self) -> None:
-        """Forgets its programs and traces."""
         self._jitted._cached.clear_cache()
         with self._lock:
             self._programs.clear()

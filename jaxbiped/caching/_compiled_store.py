@@ -64,7 +64,6 @@ class Skeleton(NamedTuple):
 
     @property
     def places(self) -> list[Leaf]:
-        """Where arrays belong."""
         return [leaf for leaf in self.leaves if isinstance(leaf, Leaf)]
 
     def filled(self, arrays: Sequence[Any]) -> Any:

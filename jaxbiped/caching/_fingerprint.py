@@ -101,7 +101,6 @@ def _parts(thing: Any, depth: int) -> Iterator[bytes]:
 
 
 def _members(thing: Any) -> Iterator[object]:
-    """The parts of what has parts."""
     if isinstance(thing, Mapping):
         yield from thing.items()
     elif isinstance(thing, tuple | list):

@@ -115,7 +115,6 @@ class Truth(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether the machine is right."""
         return abs(self.found - self.known) <= self.allowed
 
     @property

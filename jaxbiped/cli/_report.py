@@ -29,7 +29,6 @@ class Report:
             _write("\n".join(lines) + "\n")
 
     def wrote(self, paths: Iterable[Path]) -> None:
-        """Says which files were written."""
         for path in paths:
             self.say(f"wrote {path}")
 

@@ -168,7 +168,6 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
 
     @property
     def rolls(self) -> bool:
-        """Whether feet are rigid."""
         if self.model is not None:
             return self.model == "rigid"
         own = MODELS.get(self.walker)

@@ -115,7 +115,6 @@ class Trade(options.Command):
 
 
 def _axes(rows: "list[Row]") -> dict[str, None]:
-    """The error axes of some rows, in their order."""
     return dict.fromkeys(axis for row in rows for axis in row.errors)
 
 

@@ -84,7 +84,6 @@ class SolveOptions(options.Options, of=("simulate",)):
         return 1e-6 if self.rtol is None else self.rtol
 
     def most_steps(self) -> int:
-        """The cap on the solver's steps."""
         if self.max_solver_steps is not None:
             return self.max_solver_steps
         if self.dt is not None:

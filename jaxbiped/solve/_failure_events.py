@@ -157,7 +157,6 @@ def _is_first(places: Sequence[Scalar], leg: int) -> Scalar:
 
 
 def _is_under(structure: Structure, found: Sequence[FootMotion], leg: int) -> Scalar:
-    """Whether a foot of a leg is under the ground (boolean)."""
     return any_of([found[k].penetration > 0.0 for k in structure.feet_of_leg[leg]])
 
 

@@ -43,7 +43,6 @@ class BasinView(AbstractPage):
         return {"basin": self.basin, "walks": walks, "colours": view_colours()}
 
     def _frame(self) -> tuple[str, int]:
-        """The picture's title, and the height of its frame [px]."""
         return self.basin["title"], 900
 
     def _repr_html_(self) -> str:

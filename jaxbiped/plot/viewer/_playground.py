@@ -156,7 +156,6 @@ class Playground(AbstractPage):
         }
 
     def _frame(self) -> tuple[str, int]:
-        """The page's title, and the height of its frame [px]."""
         return "A walk that simulates itself", 1000
 
     def _repr_html_(self) -> str:

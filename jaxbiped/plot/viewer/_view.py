@@ -136,7 +136,6 @@ class View(AbstractPage):
         }
 
     def _frame(self) -> tuple[str, int]:
-        """The names of the walks, and the height of their frame [px]."""
         names = ", ".join(each.name for each in self.recordings)
         return names, 620 * -(-len(self.recordings) // 2)
 
