@@ -243,11 +243,6 @@ def test_ctrl_c_keeps_the_best(monkeypatch):
     assert best.objective >= best.history[0].objective
 
 
-def test_a_start_outside_the_bounds_is_moved_onto_them():
-    best = best_of(vary={"d": (0.11, 0.12)}, iterations=1)
-    assert best.history[0].variables["d"] == pytest.approx(0.11)
-
-
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
