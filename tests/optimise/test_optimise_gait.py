@@ -50,6 +50,7 @@ def test_an_optimum_of_two_variables_is_that_of_a_grid():
     assert held.known.values["spectral_radius"] <= 0.45 * (1.0 + 1e-6)
 
 
+@pytest.mark.nightly
 def test_level_ground_is_walked_at_the_least_cost():
     """From nothing, held by a grid of gaits at the speed that is asked for."""
     walker, ground = RIGID.walker, jb.Ground(slope=0.0, g=RIGID.ground.g)
