@@ -12,7 +12,6 @@ import functools
 import itertools
 
 import _casadi
-import _lane_work
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -54,9 +53,6 @@ def main(options: Options):
     rows = batches(options.sized(SIZES, QUICK_SIZES), rounds, exact, options.sized(WAYS, LANES))
     alone = singles(options.sized(SINGLES, QUICK_SINGLES), rounds)
     gaits_s, periods_s = gaits(options.sized(("lanes", "xla"), ("lanes",)), rounds)
-    peak, used = _lane_work.peak_flops(), _lane_work.flops_per_step()
-    best = max(row["steps_per_s"] for row in rows if row["way"] == "lanes")
-    count = options.sized(4096, 64)
     return {
         "duration_s": DURATION,
         "batches": rows,
@@ -65,10 +61,6 @@ def main(options: Options):
         "gaits_s": gaits_s,
         "gait_periods_s": periods_s,
         "first_result_s": first_result(),
-        "peak_flops": peak,
-        "flops_per_step": used,
-        "share_of_peak": best * used / peak,
-        "scenes": _lane_work.scenes(count, 0.2 * DURATION, quick=options.quick),
         "picture": draw(options, rows, alone),
     }
 

@@ -1,4 +1,4 @@
-"""Labelled starts per second: sizes of batches, chunks, threads, models, engines, and peers.
+"""Labelled starts per second: sizes of batches, models, engines, and peers.
 
 Writes throughput.png. Runs that are compared take turns in one process, on two cores.
 """
@@ -9,8 +9,6 @@ import _cores
 CORES = _cores.settle(2)
 
 import functools
-import os
-from unittest import mock
 
 import _batches
 import numpy as np
@@ -23,7 +21,6 @@ import jaxbiped as jb
 from jaxbiped.plot.style import new_figure
 
 SIZES, QUICK_SIZES = (1000, 10_000, 100_000, 1_000_000), (500, 2000)
-CHUNKS, QUICK_CHUNKS = (1024, 4096, 16384, 65536), (512, 2048)
 COMPARED, QUICK_COMPARED = 4096, 256
 """Starts that peers label too."""
 FEW = 8
@@ -41,14 +38,9 @@ def main(options: Options):
     labellings = {model: _batches.labelling_of(model) for model in models}
     for labelling in labellings.values():
         _batches.swept(labelling, 256)()
-    chunks = options.sized(CHUNKS, QUICK_CHUNKS)
     numbers = {
         "threads": CORES,
         "sizes": [row for each in labellings.items() for row in by_size(*each, sizes, rounds)],
-        "chunks": [row for each in labellings.items() for row in by_chunk(*each, chunks, rounds)],
-        "by_threads": [
-            row for each in labellings.items() for row in by_threads(*each, sizes[1], rounds)
-        ],
         "peers": by_peer(labellings["compliant"], options.sized(COMPARED, QUICK_COMPARED), rounds),
         "engines": by_engine(*options.sized(("compliant", 512), ("rigid", 64))),
     }
@@ -74,38 +66,17 @@ def by_size(model, labelling, sizes, rounds):
         }
 
 
-def by_chunk(model, labelling, chunks, rounds):
-    size = chunks[-1]
-    work = {chunk: _batches.swept(labelling, size, chunk=chunk) for chunk in chunks}
-    for chunk, seconds in _batches.least_seconds(work, rounds).items():
-        yield {"model": model, "chunk": chunk, "starts_per_s": size / seconds}
-
-
-def by_threads(model, labelling, size, rounds):
-    run = _batches.swept(labelling, size)
-
-    def limited(threads):
-        with mock.patch.dict(os.environ, JAXBIPED_THREADS=str(threads)):
-            run()
-
-    work = {threads: functools.partial(limited, threads) for threads in (1, 2)}
-    for threads, seconds in _batches.least_seconds(work, rounds).items():
-        yield {"model": model, "threads": threads, "starts_per_s": size / seconds}
-
-
 def by_peer(labelling, count, rounds):
     """The same starts by us, numbalsoda and SciPy: how fast, and how often the labels are equal.
 
-    Of all the starts, then of those that walk, whose labels all ways are sure of equally soon, and
-    of those that fall. Starts that come to rest are left to numbalsoda: SciPy takes minutes.
+    Of all the starts, then of those that walk, whose labels all ways are sure of equally soon.
+    Starts that come to rest are left to numbalsoda: SciPy takes minutes.
     """
     batch = _batches.starts_of(labelling.scene, count).batch(labelling, 0, count)
     states = np.stack(list(map(np.asarray, batch.states)), axis=1)
-    codes = labelling(batch.states).label
-    walking, falling = states[codes == WALKING], states[codes == FELL_FORWARD]
+    walking = states[labelling(batch.states).label == WALKING]
     rows = peers_on(labelling, "all", states, rounds, scipy=False)
-    rows += peers_on(labelling, "that walk", walking, rounds, scipy=True)
-    return rows + peers_on(labelling, "that fall", falling, rounds, scipy=True)
+    return rows + peers_on(labelling, "that walk", walking, rounds, scipy=True)
 
 
 def peers_on(labelling, which, states, rounds, *, scipy):

@@ -115,6 +115,7 @@ def test_deflation_finds_both_gaits_of_the_pair():
     assert again == ()
 
 
+@pytest.mark.nightly
 def test_gaits_of_three_footsteps_are_found_without_a_guess():
     scene = simplest_walker(0.0155)
     gaits = find_isolated(scene, footsteps=3, starts=16, accuracy="tight")
@@ -302,6 +303,7 @@ def test_where_there_is_no_gait_the_branch_says_why():
     assert "no beginning" in repr(branch)
 
 
+@pytest.mark.nightly
 def test_slip_and_lost_touch_are_told_as_limits():
     slips = jb.continue_gait(
         jb.seed_scene(mu_kinetic=0.2), "mu_kinetic", bounds=(0.1, 0.2), largest_step=0.1

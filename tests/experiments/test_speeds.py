@@ -45,9 +45,6 @@ def test_what_lanes_are_timed_by_is_right(tmp_path):
     assert set(numbers["gaits_s"]) == set(numbers["gait_periods_s"]) == gaits
     for period in numbers["gait_periods_s"].values():
         assert period == pytest.approx(0.4408349, abs=1e-7)
-    more, less = numbers["scenes"]
-    assert more["instructions"] > less["instructions"] > 0
-    assert 0.0 < numbers["share_of_peak"] < 1.0
     batches, alone = figures["lanes_speed.png"].axes
     shown = points_of(batches, "lanes")[0][:, 1].tolist()
     rows = [row for row in numbers["batches"] if row["way"] == "lanes"]

@@ -1,14 +1,11 @@
 """The periodic gait in redundant coordinates, against the minimal one."""
 
-import json
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli import main
 from jaxbiped.gait import _gait_measures as measuring
 
 pytestmark = pytest.mark.slow
@@ -44,6 +41,9 @@ def test_gait_multipliers_and_sensitivities_agree(gaits):
         assert float(getattr(ours, name)) == pytest.approx(float(getattr(expected, name)), abs=1e-6)
     for a, b in zip(jax.tree.leaves(ours.state), jax.tree.leaves(expected.state), strict=True):
         assert abs(float(a - b)) < 1e-6
+    times, states = redundant.orbit
+    assert isinstance(states, jb.State)
+    assert np.isfinite(np.asarray(states.hip_x[0])[np.isfinite(np.asarray(times[0]))]).all()
     gaps = np.abs(np.asarray(redundant.multipliers) - np.asarray(minimal.multipliers))
     assert gaps.max() < 1e-6
     for name in ("sensitivities", "elasticities"):
@@ -51,15 +51,6 @@ def test_gait_multipliers_and_sensitivities_agree(gaits):
         np.testing.assert_allclose(ours, expected, atol=1e-6)
         # These are small numbers: to digits of their own as well.
         np.testing.assert_allclose(ours, expected, rtol=1e-5)
-
-
-@pytest.mark.nightly
-def test_orbit_is_told_in_minimal_coordinates(gaits):
-    _, redundant = gaits
-    times, states = redundant.orbit
-    assert isinstance(states, jb.State)
-    alive = np.isfinite(np.asarray(times[0]))
-    assert np.isfinite(np.asarray(states.hip_x[0])[alive]).all()
 
 
 @pytest.mark.nightly
@@ -85,23 +76,6 @@ def test_measures_differentiate_in_both_modes(gaits, monkeypatch):
             (jnp.asarray(1.0),),
         )
         assert float(along[1]) == pytest.approx(float(getattr(modelled, name)), rel=1e-9)
-
-
-@pytest.mark.nightly
-def test_the_command_finds_it_too(gaits, monkeypatch, tmp_path, capsys):
-    """From the seed's start; the same search, told and written as any gait is."""
-    minimal, _ = gaits
-    monkeypatch.setattr(jb, "find_gait", find_alike)
-    flags = ("--formulation", "redundant", "--method", "index1", "--accuracy", "tight")
-    with pytest.raises(SystemExit) as stopped:
-        main(["gait", *flags, "--json", str(tmp_path / "gait.json")])
-    assert stopped.value.code == 0
-    numbers = json.loads((tmp_path / "gait.json").read_text())
-    assert numbers["ending"] == "found"
-    assert numbers["engine"] == "xla"
-    assert numbers["period_s"] == pytest.approx(float(minimal.measures.period), abs=1e-6)
-    assert set(numbers["elasticities"]) == {"K", "c"}
-    assert "0.4408" in capsys.readouterr().out
 
 
 def test_return_map_takes_tangents_in_redundant_coordinates():

@@ -20,7 +20,8 @@ def over_members(scene, criterion, larger):
     return ensemble, evaluate_ensemble(ensemble, scene, nominal, WANTED, GaitSettings())
 
 
-@pytest.mark.parametrize("criterion", [pytest.param("mean", marks=pytest.mark.nightly), "worst"])
+@pytest.mark.nightly
+@pytest.mark.parametrize("criterion", ["mean", "worst"])
 def test_measures_are_those_of_the_members_one_by_one(criterion):
     larger = {"speed": False, "spectral_radius": True, "impact_loss": True}
     ensemble, known = over_members(RIGID, criterion, larger)

@@ -71,7 +71,7 @@ def test_what_cannot_be_met_is_told_with_what_was_reached():
     assert walk.error.reason
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_single_precision_ends_at_its_own_floor():
     soft = jb.seed_scene(K=1e4, c=1e4)
     start = jax.tree.map(lambda leaf: np.float32(leaf), STATE)

@@ -87,13 +87,9 @@ def test_extremes_by_both_engines_agree():
     "options",
     [
         dict(engine="lanes"),
-        pytest.param(dict(engine="xla"), marks=pytest.mark.nightly),
-        pytest.param(
-            dict(solver="kvaerno3", accuracy="draft", duration=0.3), marks=pytest.mark.nightly
-        ),
         dict(solver="euler", dt=1e-6, duration=0.05, max_solver_steps=1 << 16),
     ],
-    ids=["lanes", "xla", "kvaerno3", "dt"],
+    ids=["lanes", "dt"],
 )
 def test_extremes_beside_every_step(options):
     walk = _walk(extremes=_heights, **options)

@@ -217,6 +217,7 @@ def test_derivatives_of_a_mechanism_follow_what_ends_it():
     np.testing.assert_allclose(reverse, forward, rtol=1e-12)
 
 
+@pytest.mark.nightly
 def test_derivatives_do_not_depend_on_the_engine():
     scene = jb.seed_scene()
 

@@ -52,14 +52,6 @@ def test_random_scenes_and_starts_end_alike(noise, slope, factor):
 
 
 @pytest.mark.nightly
-def test_another_solver_agrees():
-    """On the scene that XLA compiles soonest; `test_return_map` holds all to closed forms."""
-    options = dict(duration=0.2, solver="rodas3p", rtol=1e-8, watch=())
-    ends = _both(frictionless_walker(K=1e6), **options)
-    np.testing.assert_allclose(ends[0].final, ends[1].final, rtol=0.0, atol=1e-6)
-
-
-@pytest.mark.nightly
 def test_saved_times_and_footsteps_agree():
     times = jnp.linspace(0.0, 2.5, 6)
     options = dict(duration=2.5, footsteps=3, save=times, accuracy="tight")

@@ -6,40 +6,11 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._constraints import Integrator, compare_constraints
 
 pytestmark = pytest.mark.slow
 
 FOOTSTEP = 0.440835
 HUNDRED = 100.0 * FOOTSTEP
-PROJECTING = ("index1", "index1aug", "described")
-
-
-@pytest.fixture(scope="module")
-def runs():
-    """A footstep in Euler steps of 4e-6 s by those methods that do not walk for long below."""
-    every = compare_constraints(
-        jb.seed_scene(),
-        jb.seed_state(),
-        duration=0.45,
-        integrators=[Integrator("euler", dt=4e-6)],
-        methods=("baumgarte", "penalty", "index1", "index1aug"),
-        repeats=1,
-    )
-    return {run.method: run for run in every}
-
-
-@pytest.mark.nightly
-def test_methods_take_the_seeds_footstep(runs):
-    for name, run in runs.items():
-        assert run.ending == "walking"
-        assert run.steps == pytest.approx(0.45 / 4e-6, abs=2)
-        assert run.state_error < 5e-3
-        if name in PROJECTING:
-            assert run.max_violation_m < 1e-14
-            assert run.max_violation_rate < 1e-14
-        else:
-            assert 1e-9 < run.max_violation_m < 1e-5
 
 
 @pytest.fixture(scope="module")

@@ -172,38 +172,6 @@ def test_a_bad_lane_ends_alone():
     assert int(attempts[3]) < 30
 
 
-@pytest.mark.nightly
-def test_forward_and_reverse_derivatives_of_a_swing_equal_differences():
-    """Single support, away from every switch, where plain stepping may be differentiated.
-
-    By K and by the start at once, which reverse mode traces sooner than K alone; with the fewest
-    stages, for they are what it compiles.
-    """
-    options = dict(solver="rodas3p", duration=0.1, accuracy="tight", save="end")
-
-    def angle(log_K, start, adjoint=None):
-        scene = jb.seed_scene(K=1e6 * jnp.exp(log_K), d=0.1)
-        return jb.simulate(scene, start, adjoint=adjoint, **options).final.theta_1
-
-    def forwards(at, along):
-        return jax.jvp(lambda *each: angle(*each, diffrax.ForwardMode()), at, along)[1]
-
-    def moved(step):
-        return jax.tree.map(lambda leaf, slope: leaf + step * slope, at, along)
-
-    at = (jnp.asarray(0.0), jb.seed_state())
-    along = (jnp.asarray(1.0), jax.tree.map(lambda leaf: 1e-4 * leaf, at[1]))
-    forward = jax.jit(forwards)(at, along)
-    reverse = functools.partial(angle, adjoint=diffrax.RecursiveCheckpointAdjoint())
-    slopes = jax.jit(jax.grad(reverse, argnums=(0, 1)))(*at)
-    backward = sum(jax.tree.leaves(jax.tree.map(lambda slope, leaf: slope * leaf, slopes, along)))
-    difference = (float(angle(*moved(1e-3))) - float(angle(*moved(-1e-3)))) / 2e-3
-    assert float(forward) == pytest.approx(float(backward), rel=1e-8)
-    assert float(forward) == pytest.approx(difference, rel=1e-2)
-    by_K, by_start = float(slopes[0]), float(backward - slopes[0])
-    assert min(abs(by_K), abs(by_start)) > 1e-2 * abs(float(backward))
-
-
 def test_single_precision_is_the_users_choice_and_refused_where_too_coarse():
     start = jax.tree_util.tree_map(lambda leaf: leaf.astype(jnp.float32), jb.seed_state())
     walk = jb.simulate(jb.seed_scene(), start, duration=0.3, accuracy="draft", save="end")

@@ -8,7 +8,7 @@ from jaxbiped.models import hsu_chen
 from jaxbiped.optimise._certificate import _basin
 from jaxbiped.sweep._admissible import admissible_directions, independent_names, passes_a_stop
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 @pytest.fixture(scope="module")

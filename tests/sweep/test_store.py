@@ -4,10 +4,6 @@ import errno
 import importlib
 import json
 import os
-import signal
-import subprocess
-import sys
-import time
 import warnings
 from pathlib import Path
 
@@ -157,34 +153,6 @@ def test_killed_before_the_first_chunk(tmp_path, monkeypatch, by_formula, step, 
         with pytest.raises(KeyboardInterrupt):
             swept(path)
     same_results(swept(path), swept())
-
-
-_RUN = """
-import sys
-from tests.sweep.test_store import SCENE, swept
-from tests.sweep.walkers import simplest_grid
-swept(sys.argv[1], simplest_grid(SCENE, 120), chunk=120)
-"""
-
-
-@pytest.mark.nightly
-def test_a_killed_run_continues_where_it_was(tmp_path):
-    path = tmp_path / "store"
-    run = subprocess.Popen([sys.executable, "-c", _RUN, str(path)])
-    done, deadline = np.zeros(1), time.monotonic() + 100.0
-    while done.sum() < 5 and run.poll() is None and time.monotonic() < deadline:
-        time.sleep(0.005)
-        if path.exists():
-            done = zarr.open_group(str(path), mode="r")["done"][:]
-    run.send_signal(signal.SIGKILL)
-    run.wait()
-    complete = int(zarr.open_group(str(path), mode="r")["done"][:].sum())
-    assert 5 <= complete < 120
-    starts = simplest_grid(SCENE, 120)
-    found = swept(path, starts, chunk=120)
-    assert found.attrs["chunks_found_complete"] == complete
-    assert found.attrs["labelled_in_this_run"] == (120 - complete) * 120
-    same_results(found, swept(starts=starts, chunk=100_000))
 
 
 def place(scene, states):

@@ -128,7 +128,7 @@ PROGRAMS = (
 )  # fmt: skip
 CASES = {each.__name__: each for each in PROGRAMS}
 
-LANDING = ("steps", "labels", "rigid")
+LANDING = ("labels", "rigid")
 """One of each engine's programs that a change waits for; the others are run at night."""
 MOST = {
     "end": (255, 804, 1056),
