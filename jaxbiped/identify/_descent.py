@@ -35,7 +35,7 @@ _STARTS, _ABOUT = 8, float(np.log(3.0))
 _FITS = 3
 """Descents, at most: a better fit that an interval's end comes upon begins another."""
 
-Best: TypeAlias = tuple[float, np.ndarray, list[Prediction]]
+Tried: TypeAlias = tuple[float, np.ndarray, list[Prediction]]
 """Sum of squares, variables and predictions."""
 
 
@@ -62,7 +62,7 @@ class Descent:
         self.how = dict(accuracy=accuracy, engine=engine)
         self.values = np.concatenate([gait.values for gait in measured])
         self.deviations = np.concatenate([gait.deviations for gait in measured])
-        self.best: Best | None = None
+        self.tried: list[Tried] = []
         self.last: tuple[np.ndarray, list[Prediction] | None] | None = None
         self.evaluations, self.searching = 0, True
 
@@ -76,7 +76,7 @@ class Descent:
             fit = self.fit_from(np.zeros(len(self.names)), most)
             if fit.ending is FitEnding.NO_GAIT or fit.p_value < UNLIKELY:
                 for begin in self.others():
-                    self.best = begin
+                    self.tried = [begin]
                     other = self.fit_from(begin[1], most)
                     fit = fit if fit.chi_squared <= other.chi_squared else other
                     if not fit.p_value < UNLIKELY:
@@ -98,11 +98,15 @@ class Descent:
             fit = self.summary(ending)
             if self.best is best or ending is not FitEnding.CONVERGED:
                 break
-            assert self.best is not None
             begin = self.best[1]
         return fit
 
-    def others(self) -> list[Best]:
+    @property
+    def best(self) -> Tried:
+        """The best of the scenes that were tried and have their gaits."""
+        return min(self.tried, key=lambda each: each[0])
+
+    def others(self) -> list[Tried]:
         """Starts within a factor of three, or within the bounds, the best first.
 
         Their gaits are searched from nothing: the first start may have led to others.
@@ -111,13 +115,13 @@ class Descent:
 
         low, high = map(self.variables, self.limits)
         low, high = np.maximum(low, -_ABOUT), np.minimum(high, _ABOUT)
-        found: list[Best | None] = []
+        found: list[Tried] = []
         self.searching = True
         for start in qmc.scale(qmc.Sobol(len(low), seed=0).random(_STARTS), low, high):
-            self.best = None
+            self.tried = []
             self.predictions(start)
-            found.append(self.best)
-        return sorted((each for each in found if each is not None), key=lambda each: each[0])
+            found += self.tried
+        return sorted(found, key=lambda each: each[0])
 
     def minimise(self, begin: np.ndarray, most: int) -> FitEnding:
         from scipy.optimize import least_squares
@@ -166,16 +170,16 @@ class Descent:
         self.last = (at.copy(), found)
         if found is not None:
             square = float(np.sum(self._scaled_misfits(found) ** 2))
-            if self.best is None or square < self.best[0]:
-                self.best = (square, at.copy(), found)
-        best = "no gait yet" if self.best is None else f"chi squared {self.best[0]:.4g}"
+            self.tried.append((square, at.copy(), found))
+        best = f"chi squared {self.best[0]:.4g}" if self.tried else "no gait yet"
         self.now.update(found=best)
         return found
 
     def _predict(self, at: np.ndarray, each: MeasuredGait, k: int) -> Prediction | None:
         guess = self.guess
-        if self.best is not None:
-            guess = self.best[2][k].state_at(at - self.best[1])
+        if self.tried:
+            _, nearest, found = min(self.tried, key=lambda each: float(np.sum((each[1] - at) ** 2)))
+            guess = found[k].state_at(at - nearest)
         values, sizes = self.parameters(at), self.sizes(at)
         try:
             with_parameters(self.scene, values)
@@ -194,26 +198,29 @@ class Descent:
     def slopes(self, at: np.ndarray) -> np.ndarray:
         found = self.predictions(at)
         assert found is not None  # no step ends without its gaits
-        return np.concatenate([each.slopes for each in found]) / self.deviations[:, None]
+        return self._scaled_slopes(found)[0]
 
     def _scaled_misfits(self, found: list[Prediction]) -> np.ndarray:
         predicted = np.concatenate([each.values for each in found])
         return (predicted - self.values) / self.deviations
 
+    def _scaled_slopes(self, found: list[Prediction]) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the misfits, and their errors."""
+        slopes, errors = zip(*((each.slopes, each.slope_errors) for each in found), strict=True)
+        by = self.deviations[:, None]
+        return np.concatenate(slopes) / by, np.concatenate(errors) / by
+
     def summary(self, ending: FitEnding) -> GaitFit:
         """The fit as far as it came."""
         k, names = len(self.names), np.array(self.names)
         at, found = np.zeros(k), None
-        if self.best is not None:
-            _, at, found = self.best
+        if self.tried:
+            square, at, found = self.best
         covariance, undetermined = np.full((k, k), np.nan), np.ones(k, bool)
         held, residuals, freedom = np.zeros(k, bool), np.full(len(self.values), np.nan), 0
         ends = np.full((2, k), np.nan)
         if found is not None:
-            slopes, errors = (
-                np.concatenate([getattr(each, part) for each in found]) / self.deviations[:, None]
-                for part in ("slopes", "slope_errors")
-            )
+            slopes, errors = self._scaled_slopes(found)
             residuals = self._scaled_misfits(found)
             told = information(slopes, errors)
             held = self._at_bounds(at, residuals, slopes) & told.resolved
@@ -228,7 +235,7 @@ class Descent:
             follow = wide and ending is FitEnding.CONVERGED
             for which in np.flatnonzero(~undetermined & ~held).tolist():
                 self.searching = False  # a profile follows gaits from one to the next
-                ends[:, which] = self._interval(at, which, residuals, slopes, told.resolved, follow)
+                ends[:, which] = self._interval(at, which, square, follow)
             lost = ~(ends[1] - ends[0] < 2.0 * _WITHIN * LOOSE) & ~held
             undetermined |= lost
             ends[:, lost] = np.nan
@@ -256,28 +263,32 @@ class Descent:
         push = -slopes.T @ residuals
         return ((at - low <= near) & (push < 0.0)) | ((high - at <= near) & (push > 0.0))
 
+    def _model(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Residuals and those of their derivatives that exceed their own errors."""
+        found = self.predictions(at)
+        if found is None:
+            return None
+        slopes, errors = self._scaled_slopes(found)
+        return self._scaled_misfits(found), slopes * information(slopes, errors).resolved
+
     def _interval(
-        self,
-        at: np.ndarray,
-        which: int,
-        residuals: np.ndarray,
-        slopes: np.ndarray,
-        used: np.ndarray,
-        follow: bool,
+        self, at: np.ndarray, which: int, least: float, follow: bool
     ) -> tuple[float, float]:
-        """Both ends in the variable; by the linearised model, or followed where it bends."""
+        """Both ends in the variable; by the linearised model, or followed where it bends.
+
+        They are followed from the outermost scene that was tried and lies within: the way to it
+        from the best one may lead over scenes where derivatives tell nothing.
+        """
         limits = np.stack([self.variables(each) for each in self.limits])
-        square = float(np.sum(residuals**2)) + _WITHIN**2
-        known = residuals, slopes * used
-
-        def model(variables: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-            if self.predictions(variables) is None:
-                return None
-            return self.residuals(variables), self.slopes(variables) * used
-
-        def end(sign: float) -> float:
+        square, ends = least + _WITHIN**2, []
+        within = [each for tried, each, _ in self.tried if follow and tried < square]
+        for sign in (-1.0, 1.0):
+            begin = max(within, key=lambda each: sign * each[which]) if follow else at
+            known = self._model(begin)
+            assert known is not None
             if follow:
-                return interval_end(model, at, known, square, which, sign, limits)
-            return float(at[which] + linear_step(*known, square, which, sign, limits - at)[which])
-
-        return end(-1.0), end(1.0)
+                end = interval_end(self._model, begin, known, square, which, sign, limits)
+            else:
+                end = at[which] + linear_step(*known, square, which, sign, limits - at)[which]
+            ends.append(float(end))
+        return ends[0], ends[1]

@@ -243,8 +243,8 @@ def interval_end(
                 known = there
                 break
             step = 0.5 * step
-        else:  # the gait, or the walker, ends before the interval does
-            return float(ahead)
+        else:  # no gait on the way: there may be some beyond
+            break
         here = here + step
         farthest = max(farthest, abs(here[which] - at[which]))
     return sign * np.inf

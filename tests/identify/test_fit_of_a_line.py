@@ -120,6 +120,30 @@ def test_an_interval_follows_the_profile_where_the_model_bends(monkeypatch):
     assert abs(np.exp(1.959964 * spread) / inside[-1] - 1.0) > 0.05
 
 
+def test_an_interval_holds_where_an_undetermined_parameter_could_as_well_lie(monkeypatch):
+    """y₁ = log c − log(1 + K) and y₂ = K / (1 + K), which is best where K vanishes. No derivative
+    tells of K there, but larger ones fit within the 95 %, too, and c with them."""
+
+    def predicted(scene, measured, values, sizes, guess, **how):
+        k, c = (values[name] / float(jb.parameter_values(SCENE)[name]) for name in ("J", "d"))
+        told = np.array([np.log(c) - np.log1p(k), k / (1.0 + k) + 0.2, 0.0])
+        slopes = np.array([[-k / (1.0 + k), 1.0], [k / (1.0 + k) ** 2, 0.0], [0.0, 0.0]])
+        return Prediction(told, slopes, np.full((3, 2), 1e-6), (), (), True)
+
+    monkeypatch.setattr(_descent, "predict", predicted)
+    seen = jb.identify.MeasuredGait(
+        {"period": (1e-9, 0.1), "step_length": (1e-9, 0.5), "speed": (1e-9, 1.0)}
+    )
+    fit = jb.fit_gait(SCENE, ("J", "d"), seen)
+    assert fit.undetermined == ("J",)
+    c = np.linspace(-0.5, 2.5, 3001)
+    share = np.linspace(0.0, 0.99, 2001)[:, None]  # K / (1 + K)
+    squares = ((c + np.log1p(-share)) / 0.1) ** 2 + ((share + 0.2) / 0.5) ** 2
+    inside = c[np.min(squares, axis=0) <= fit.chi_squared + 1.959964**2]
+    found = np.log(np.array(fit.intervals["d"]) / float(jb.parameter_values(SCENE)["d"]))
+    assert found == pytest.approx([inside[0], inside[-1]], abs=0.01)
+
+
 def test_a_fit_that_does_not_fit_says_so(monkeypatch):
     matrix = np.array([[0.3], [0.1], [0.2]])
     off = np.array([0.1, -0.1, 0.0])
