@@ -43,6 +43,7 @@ _BENT = {
     "theta_shank_2": 0.118,
     "omega_thigh_2": -0.88,
     "omega_shank_2": -0.88,
+    "hip_vx": 0.35,  # as the leg that stands carries it: its foot does not slip
 }
 
 _KNEES_STRAIGHT = {

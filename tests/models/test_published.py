@@ -227,3 +227,13 @@ def test_the_compass_gait_doubles_its_period_where_equations_by_hand_say():
     there = StraightLegs(COMPASS, hip_mass=10.0, l=1.0, slope=event.value, g=9.8)
     multipliers = there.gait([0.3086, -0.35, -1.2])[2]
     assert np.min(np.abs(multipliers + 1.0)) < 1e-7
+
+
+@pytest.mark.slow
+def test_the_search_finds_the_gait_of_mcgeer_s_knees_from_their_start():
+    """The hip moves as the standing leg carries it; at rest, its foot slips and the search ends."""
+    model = MODELS["mcgeer-kneed"]
+    scene = model.make()
+    gait = jb.find_gait(scene, scene.state(**model.starts["gait"]), **PLAIN)
+    assert gait.outcome is jb.gait.Search.FOUND
+    assert abs(complex(gait.multipliers[0])) == pytest.approx(0.46504, abs=1e-4)
