@@ -88,7 +88,7 @@ class Holds(NamedTuple):
             rates = self.along(self.under(free, reactions))
             short = [
                 jnp.where(
-                    held[i], reactions[i] * self.mobility[i][i] - least, rates[i] + abs(least)
+                    held[i], reactions[i] * self.mobility[i][i] - least, rates[i] + jnp.abs(least)
                 )
                 / jnp.sqrt(self.mobility[i][i])
                 for i in able

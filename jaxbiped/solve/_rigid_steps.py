@@ -83,6 +83,7 @@ def attempt_step(
         rates = select(accepted, rates, now.rates)
     else:
         after = _after_change(walk, after, onto, select(accepted, course, now.modes.course))
+        assert after.modes is not None
         rates = after.modes.course.turning
     one = jnp.where(accepted, 1, 0)
     after = after._replace(
