@@ -166,7 +166,7 @@ def _search_sentence(gait: "Gait") -> str:
     return "the search from the start does not converge"
 
 
-def _what_to_try(scene: AbstractScene, gait: "Gait") -> str:
+def _what_to_try(scene: Any, gait: "Gait") -> str:
     """A clearance rule if legs of one body may scuff, a guess if no branch was followed."""
     always = isinstance(getattr(scene.minimal, "clearance", None), AlwaysTouching)
     stumbled = gait.outcome is Search.NO_RETURN and gait.walk_outcome is Ending.STUMBLED
