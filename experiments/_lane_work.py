@@ -35,15 +35,16 @@ def peak_flops():
     return 2.0 * _CHAINS * _LENGTH * 21 * len(request.inputs) / seconds
 
 
-def _compiled(scene):
+def _compiled(scene, state=None):
     """The very program that `simulate` runs, so that it is traced once."""
-    run = jb.Simulation.prepare(scene, jb.seed_state(), duration=1.0, **_HOW)
+    state = jb.seed_state() if state is None else state
+    run = jb.Simulation.prepare(scene, state, duration=1.0, **_HOW)
     return LANES.compile(run.lane_request())
 
 
-def flops_per_step():
-    """Floating-point operations of an attempted step of the seed's scene."""
-    graph = _compiled(jb.seed_scene()).kernel.graph
+def flops_per_step(scene=None, state=None):
+    """Floating-point operations of an attempted step, of the seed's scene unless told otherwise."""
+    graph = _compiled(jb.seed_scene() if scene is None else scene, state).kernel.graph
     return sum(_FLOPS.get(value.op, 0) for value in graph.body.values)
 
 

@@ -73,3 +73,13 @@ def test_the_default_has_the_smaller_error_in_about_as_many_steps(tmp_path):
     assert new["steps"] < 1.1 * old["steps"]
     assert 0.0 < new["rejected"] < 0.3
     assert label in labels_of(figures["steps_tried.png"])
+
+
+def test_what_five_links_are_timed_by_is_right(tmp_path):
+    bare = {"bodies of a chain", "operations of a step"}
+    numbers, _ = drawn_run("mechanism_speed", tmp_path, unitless=bare, alone=True)
+    ours = [row for row in numbers["rates"]["rows"] if row["way"] == "lanes"]
+    assert all(0.0 < row["error_median"] < 1e-4 for row in ours)
+    assert all(row["error_median"] < 1e-3 for row in numbers["rates"]["rows"] if "rtol" in row)
+    assert numbers["rates"]["floor"] is None or numbers["rates"]["floor"] < 1e-7
+    assert 0.0 < numbers["exponent"] < 1.2
