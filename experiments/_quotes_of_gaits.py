@@ -42,6 +42,17 @@ def of_kneed_ladder(numbers: dict[str, Any]) -> Iterator[str]:
         )
 
 
+def of_mechanism_speed(numbers: dict[str, Any]) -> Iterator[str]:
+    """A walker with five links beside numbalsoda and MuJoCo, and how a step's cost grows."""
+    for each in numbers["rates"]["rows"]:
+        how = each["rtol"] if "rtol" in each else each["step_s"]
+        rate = f"{each['simulated_s_per_cpu_s']:.0f}"
+        yield row(each["way"], small(how, 0), small(each["error_median"]), rate)
+    for each in numbers["chains"]:
+        yield row(str(each["bodies"]), str(each["operations"]))
+    yield f"n^{numbers['exponent']:.2f}"
+
+
 def of_ladder(numbers: dict[str, Any]) -> Iterator[str]:
     """Measures and costs of the rungs, and the rates of the way to the rigid limit."""
     for name, found in numbers["measures"].items():

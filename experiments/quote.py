@@ -117,6 +117,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "level_ground": gaits.of_level_ground,
     "long_walks": accuracy.of_long_walks,
     "mechanism_matrix": gaits.of_mechanism_matrix,
+    "mechanism_speed": gaits.of_mechanism_speed,
     "optimise_speed": gaits.of_optimise_speed,
     "period_doubling": gaits.of_period_doubling,
     "published_walkers": gaits.of_published_walkers,

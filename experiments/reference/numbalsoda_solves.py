@@ -37,15 +37,20 @@ def lsoda(duration: float, rtol: float, atol: float) -> np.ndarray:
 
 
 @functools.cache
-def lsoda_batch() -> Callable[[np.ndarray, np.ndarray, float, float], np.ndarray]:
-    """numbalsoda over many starts (n, 8); gives final states (n, 8).
+def lsoda_batch(
+    address: int | None = None,
+) -> Callable[[np.ndarray, np.ndarray, float, float], np.ndarray]:
+    """numbalsoda over many starts (n, k); gives final states (n, k).
 
     A lane that fails is not a number.
+
+    Args:
+        address: of the equations; those of the seed's walker unless given.
     """
     import numba
     from numbalsoda import lsoda as compiled_lsoda
 
-    address = lsoda_address()
+    address = lsoda_address() if address is None else address
 
     @numba.njit(parallel=True)
     def batch(starts, times, rtol, atol):
@@ -54,7 +59,7 @@ def lsoda_batch() -> Callable[[np.ndarray, np.ndarray, float, float], np.ndarray
             states, done = compiled_lsoda(
                 address, starts[i], times, np.array([0.0]), rtol, atol, 100000
             )
-            finals[i] = states[-1] if done else np.full(8, np.nan)
+            finals[i] = states[-1] if done else np.full(starts.shape[1], np.nan)
         return finals
 
     return batch

@@ -50,3 +50,13 @@ def test_what_lanes_are_timed_by_is_right(tmp_path):
     rows = [row for row in numbers["batches"] if row["way"] == "lanes"]
     assert shown == [row["simulations_per_s"] for row in rows]
     assert {line.get_label() for line in alone.lines} == ways
+
+
+def test_what_five_links_are_timed_by_is_right(tmp_path):
+    bare = {"bodies of a chain", "operations of a step"}
+    numbers, _ = drawn_run("mechanism_speed", tmp_path, unitless=bare, alone=True)
+    ours = [row for row in numbers["rates"]["rows"] if row["way"] == "lanes"]
+    assert all(0.0 < row["error_median"] < 1e-4 for row in ours)
+    assert all(row["error_median"] < 1e-3 for row in numbers["rates"]["rows"] if "rtol" in row)
+    assert numbers["rates"]["floor"] is None or numbers["rates"]["floor"] < 1e-7
+    assert 0.0 < numbers["exponent"] < 1.2
