@@ -54,3 +54,16 @@ def test_stability_is_lost_where_bisection_says(tmp_path):
         # Multipliers change by at most 50 for each rad; the bracket is of 5e-8 rad.
         assert row["off"] < 1e-7 + row["error"] / 25.0
     assert numbers["hundred_gaits"]["gaits"] >= 100
+
+
+def test_branches_and_curves(tmp_path):
+    numbers, figures = drawn_run("k_c_xi_branches", tmp_path)
+    assert set(figures) == {"k_c_xi_branches.png", "k_c_xi_curves.png"}
+    assert all(numbers["branches"]["K"]["stable"])
+    for curve in numbers["curves"]["K"]:
+        assert max(curve["off"]) < 1e-6
+        assert len(curve["values"]) == 5
+    # The stiffer the ground, the flatter the slope that still keeps the gait.
+    fold = numbers["curves"]["K"][0]["values"]
+    assert fold == sorted(fold, key=lambda pair: -pair[0])
+    assert fold == sorted(fold, key=lambda pair: pair[1])

@@ -39,3 +39,13 @@ def test_estimates_scatter_as_their_errors_say(tmp_path):
         assert 0.0 < held["mean_standard_error"] < 0.1 * held["truth"]
     (figure,) = figures.values()
     assert_is_drawn(figure, unitless=set(labels_of(figure)))
+
+
+def test_the_worst_member_costs_speed_and_the_front_is_a_trade(tmp_path):
+    bare = {"bound of the spectral radius", "spectral radius under scatter"}
+    numbers, _ = drawn_run("optimise_robust", tmp_path, unitless=bare)
+    found = numbers["designs"]
+    assert found["worst"]["objective"] < found["mean"]["objective"]
+    assert found["worst"]["share_beyond_bound"] <= found["nominal"]["share_beyond_bound"]
+    loose, strict = numbers["front"]["speed_m_s"]
+    assert loose > strict

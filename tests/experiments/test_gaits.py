@@ -129,3 +129,15 @@ def test_no_gait_that_walks_settle_on_is_missed(tmp_path):
     assert [row["verdict"] for row in numbers["slope"]] == ["agrees"] * 3
     for row in numbers["slope"]:
         assert abs(row["period"] - row["walked"]) < 1e-6
+
+
+def test_every_gait_is_found_with_its_elasticities(tmp_path):
+    measures = ("period", "step length", "speed", "peak force")
+    bare = {f"elasticity of\n{measure}" for measure in measures}
+    numbers, _ = drawn_run("sensitivity_K_c_xi", tmp_path, unitless=bare)
+    assert numbers["without_a_gait"] == []
+    for row in numbers["points"].values():
+        seed = row[len(row) // 2]
+        assert seed["measures"]["period"] == pytest.approx(0.440835, abs=1e-6)
+        assert seed["elasticities"]["peak_normal"][:2] == pytest.approx([0.139, 0.479], abs=1e-3)
+        assert all(max(point["errors"]["period"]) < 1e-4 for point in row)

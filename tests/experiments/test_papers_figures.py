@@ -72,3 +72,31 @@ def test_the_sketch_has_the_walker_where_the_model_has_it(tmp_path):
         np.testing.assert_allclose(foot, hip + (0.40 - 0.08) * down, rtol=0, atol=1e-12)
     assert swing[1] > 0.08
     np.testing.assert_allclose(stance[1], 0.08 - 0.022, rtol=0, atol=1e-12)
+
+
+def test_errors_costs_and_maps_of_constraint_methods(tmp_path):
+    numbers, figures = drawn_run("constraint_trade", tmp_path)
+    trade, constants = figures["trade.png"], figures["constants.png"]
+    assert labels_of(trade) == {"time of a run (s)", "error of the state (SI)"}
+    assert {"a (1/s)", "b (1/s)"} <= labels_of(constants)
+    runs = {(run["method"], run["rtol"] or run["dt_s"]): run for run in numbers["runs"]}
+    for method in ("standard", "index1"):
+        own = [run for run in numbers["runs"] if run["method"] == method]
+        shown = [(run["wall_s_run"], run["state_error"]) for run in own]
+        np.testing.assert_array_equal(points_of(trade.axes[0], method)[0], shown)
+        coarse, fine = runs[method, 1e-5], runs[method, 1e-6]
+        assert fine["state_error"] < 0.3 * coarse["state_error"]
+        assert fine["steps"] == 10 * coarse["steps"]
+    assert runs["index1", 1e-6]["max_violation_m"] < 1e-15
+    costs = numbers["costs"]
+    assert set(costs) == {"minimal", "standard", "index1"}
+    for key in ("single", "batch"):
+        usual = costs["standard"][f"{key}_s"]
+        for each in costs.values():
+            assert each[key] == each[f"{key}_s"] / usual > 0.0
+    found = numbers["maps"]["baumgarte"]
+    off = np.array(found["max_violation_m"], dtype=float)
+    # Faster decay, smaller violation: along a = b, as far as Euler steps stand it.
+    assert off[1, 1] < off[0, 0]
+    # One that is pulled back faster than the steps are short, without damping, explodes.
+    assert found["failed"][0][-1]
