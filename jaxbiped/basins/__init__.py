@@ -8,6 +8,7 @@ from jaxbiped.basins._boundary_dimension import boundary_dimension as boundary_d
 from jaxbiped.basins._boundary_dimension import sampled_uncertainty as sampled_uncertainty
 from jaxbiped.basins._boundary_dimension import uncertainty_exponent as uncertainty_exponent
 from jaxbiped.basins._fractions import Fraction as Fraction
+from jaxbiped.basins._fractions import Fractions as Fractions
 from jaxbiped.basins._fractions import fractions as fractions
 from jaxbiped.basins._fractions import wilson_interval as wilson_interval
 from jaxbiped.basins._label_errors import LabelErrors as LabelErrors

@@ -5,7 +5,13 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped._checks import ArgumentError, check_at_least, check_finite, check_not_negative
+from jaxbiped._checks import (
+    ArgumentError,
+    check_at_least,
+    check_choice,
+    check_finite,
+    check_not_negative,
+)
 from jaxbiped.basins._labels import Label, check_known
 
 
@@ -23,6 +29,22 @@ class Fraction:
     low: float
     high: float
     count: int
+
+
+class Fractions(dict[str, Fraction]):
+    """Fractions by the names of labels, the most frequent first.
+
+    It holds the labels that occur. Of any other it gives the fraction 0 with its interval, and it
+    refuses what is no label's name.
+    """
+
+    def __init__(self, found: dict[str, Fraction], absent: Fraction) -> None:
+        super().__init__(found)
+        self._absent = absent
+
+    def __missing__(self, name: str) -> Fraction:
+        check_choice("label", name, {*self, *map(str, Label)})
+        return self._absent
 
 
 def wilson_interval(
@@ -76,7 +98,7 @@ def wilson_interval(
 
 def fractions(
     labels: npt.ArrayLike, *, doubt: npt.ArrayLike | None = None, confidence: float = 0.95
-) -> dict[str, Fraction]:
+) -> Fractions:
     """The fraction of the starts that has each label, the most frequent first.
 
     Args:
@@ -87,7 +109,7 @@ def fractions(
         confidence: that of the intervals, see `wilson_interval`.
 
     Returns:
-        A `Fraction` by the name of each label that occurs.
+        A `Fraction` by the name of each label that occurs; see `Fractions` for others.
 
     Raises:
         ArgumentError: no entry, an unknown code, doubts of another shape, or a confidence not
@@ -113,10 +135,12 @@ def fractions(
     low, _ = wilson_interval(counts - own, total, confidence=confidence)
     _, high = wilson_interval(counts + own.sum() - own, total, confidence=confidence)
     order = np.argsort(-counts, kind="stable")
-    return {
+    found = {
         str(distinct[k]): Fraction(count / total, float(low[k]), float(high[k]), count)
         for k, count in zip(order, counts[order].tolist(), strict=True)
     }
+    _, most = wilson_interval(own.sum(), total, confidence=confidence)
+    return Fractions(found, Fraction(0.0 if total else np.nan, 0.0, float(most), 0))
 
 
 def _names(labels: np.ndarray) -> np.ndarray:

@@ -75,3 +75,15 @@ def test_labels_in_doubt_widen_the_intervals():
     assert (found.estimate, found.count) == (0.6, 60)
     assert found.low == pytest.approx(float(jb.basins.wilson_interval(58, 100)[0]))
     assert found.high == pytest.approx(float(jb.basins.wilson_interval(61, 100)[1]))
+
+
+def test_a_label_that_does_not_occur_has_the_fraction_zero_with_its_interval():
+    found = jb.basins.fractions(["stopped"] * 10)
+    low, high = jb.basins.wilson_interval(0, 10)
+    assert found["walking"] == jb.basins.Fraction(0.0, float(low), float(high), 0)
+    assert list(found) == ["stopped"]
+    assert jb.basins.fractions(["stopped"] * 9 + ["walking"], doubt=[0] * 9 + [1])[
+        "fell forward"
+    ].high == pytest.approx(float(jb.basins.wilson_interval(1, 10)[1]))
+    with pytest.raises(jb.ArgumentError, match="walkin"):
+        found["walkin"]
