@@ -166,16 +166,16 @@ def new_figure(
         else:
             height = max(height - _LABELS, 0.0) * wanted / width + _LABELS * letter_size()
         width = wanted
-    return _StyledFigure(width, height, _CHOSEN.get())
+    return StyledFigure(width, height, _CHOSEN.get())
 
 
 def make_room(figure: Figure, rows: int) -> None:
     """Makes a figure of a paper's style taller by the rows of a legend, but for the first one."""
-    if isinstance(figure, _StyledFigure) and _CHOSEN.get().width is not None:
+    if isinstance(figure, StyledFigure) and _CHOSEN.get().width is not None:
         figure.set_figheight(figure.get_figheight() + _ROW * letter_size() * (rows - 1))
 
 
-class _StyledFigure(Figure):
+class StyledFigure(Figure):
     """A figure that is drawn and written under the settings that it was made under."""
 
     def __init__(self, width: float, height: float, chosen: _Chosen) -> None:
