@@ -64,10 +64,8 @@ def test_sensitivities_are_within_their_bars(name):
     found, bars = (
         np.asarray(each.period) for each in (gait.sensitivities, gait.sensitivity_errors)
     )
-    outside = {
-        each: (float(a), float(b), float(bar))
-        for each, a, b, bar in zip(gait.parameters, found, checked.slopes, bars, strict=True)
-        if not abs(a - b) <= bar
-    }
-    assert not outside
+    misses = np.abs(found - checked.slopes) / bars
+    # Of a hundred bars one may be missed (docs/gradients.md): of these at most one, by little.
+    assert np.sum(misses > 1.0) <= 1, dict(zip(gait.parameters, misses.tolist(), strict=True))
+    assert misses.max() < 2.0
     np.testing.assert_allclose(found, checked.slopes, rtol=1e-4, atol=1e-9 * np.abs(found).max())
