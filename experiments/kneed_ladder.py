@@ -59,7 +59,7 @@ def numbers_of(gait):
 def stiffened(soft, power, doublings):
     """Gaits of one stiffness after another, each searched from the last one's state."""
     start = jb.models.MODELS["mcgeer-kneed"].starts["gait"]
-    guess, rows = soft.state(**start, standing="shank_2"), []
+    guess, rows = soft.state(**start), []
     values = {name: float(x) for name, x in jb.parameter_values(soft).items()}
     for factor in (2.0**k for k in range(0, doublings + 1, EVERY)):
         grown = {name: values[name] * factor for name in ("K", "stop.K")}
