@@ -85,7 +85,8 @@ def plastic_impact(
     found = _on(old, either(stands[0], first, second), flat, push_off, modes, grip)
     front = found.turning / (old.point(second).x - old.point(first).x)
     tips = flat & (jnp.minimum(front, found.impulse.z - front) < 0.0)
-    one, other = (_on(old, sole, ~flat & flat, push_off, modes, grip) for sole in (first, second))
+    no = jnp.zeros_like(flat)
+    one, other = (_on(old, sole, no, push_off, modes, grip) for sole in (first, second))
     rises = old.on(first, one.rates).point(second).vz >= 0.0
     # Where neither presses alone the walker would have to fly: what pulls less stays.
     stays = rises & ((one.impulse.z >= 0.0) | (one.impulse.z >= other.impulse.z))
