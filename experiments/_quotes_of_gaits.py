@@ -82,7 +82,7 @@ def of_mechanism_matrix(numbers: dict[str, Any]) -> Iterator[str]:
 
 
 def of_force_models(numbers: dict[str, Any]) -> Iterator[str]:
-    """How far the gait moves under other laws, and what tells that a law is not to be trusted."""
+    """How far the gait moves under other laws, and how accurate multipliers are with Tsuji's."""
     seed = numbers["normal"]["ristow-schafer"]["measures"]
 
     def moved(law: dict[str, Any], key: str) -> float:
@@ -95,7 +95,8 @@ def of_force_models(numbers: dict[str, Any]) -> Iterator[str]:
     largest = max(moved(law, "peak_normal_N") for law in damped.values()) + 1.0
     yield f"period, step length and speed change by at most {100 * most:.1f} %"
     yield f"force changes by −{-100 * least:.0f} % (Hunt–Crossley) to {largest:.1f} times"
-    yield f"(off by {numbers['normal']['tsuji']['unit_multiplier_error']:.2f})"
+    error = numbers["normal"]["tsuji"]["unit_multiplier_error"]
+    yield f"the unit multiplier is off by {small(error)}"
 
 
 def of_level_ground(numbers: dict[str, Any]) -> Iterator[str]:

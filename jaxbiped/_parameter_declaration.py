@@ -30,19 +30,21 @@ def parameter(
 ) -> Any:
     """A field for a parameter of a law of contact or of any other part of a scene.
 
-    Values become floating-point arrays. Laws of contact, and whatever else calls
+    Values are converted to floating-point arrays. Laws of contact, and every other class that calls
     `check_parameters`, refuse a value that is not finite or not in the range.
 
     Args:
-        words: what it is, as "contact stiffness": for tables and figures.
-        symbol: as mathematics that matplotlib sets, as "$K$".
-        unit: SI unit, as "N s/m^2"; the exponent may be a parameter's name, "N/m^n"; empty
-            for a pure number.
-        positive: whether it must be above 0.
-        minimum: the smallest value allowed, any unless given.
-        size_below: what its absolute value must be below.
-        several: whether it is a tuple of numbers, as a point or the coefficients of a spline.
-        default: the value unless given; with None, None stays and the law does without it.
+        words: name of the parameter in tables and figures, such as "contact stiffness".
+        symbol: mathematical symbol in matplotlib's notation, such as "$K$".
+        unit: SI unit, such as "N s/m^2". An exponent may be the name of a parameter, as in "N/m^n".
+            Empty for a pure number.
+        positive: whether the value must be above 0.
+        minimum: smallest allowed value; None for no limit.
+        size_below: upper limit of the absolute value, not itself allowed; None for no limit.
+        several: whether the parameter is a tuple of numbers, such as a point or the coefficients of
+            a spline.
+        default: default value. If None is the default, None is kept, and the law works without the
+            parameter.
 
     Example:
         A law of one's own begins so::
@@ -51,8 +53,8 @@ def parameter(
                 grip: float = jaxbiped.laws.parameter("grip", "$G$", "s/m", minimum=0.0)
 
     Returns:
-        The field, for the body of an `equinox.Module`; it makes floating-point arrays of what it is
-        given.
+        The field, for the body of an `equinox.Module`; it converts its values to floating-point
+        arrays.
     """
     one = _optional_float if default is None else as_float
     info = ParameterInfo(Quantity(words, symbol, unit), positive, minimum, size_below)

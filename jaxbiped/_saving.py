@@ -27,16 +27,16 @@ _BEGAN = (1980, 1, 1, 0, 0, 0)
 
 
 def save(path: str | Path, value: Any) -> None:
-    """Saves scenes and results to a file, from which `load` makes the same ones, bit by bit.
+    """Saves scenes and results to a file, from which `load` restores them bit by bit.
 
     Args:
-        path: file to write, such as "gait.npz"; one that is there is replaced.
+        path: file to write, such as "gait.npz"; an existing file is replaced.
         value: a scene of any kind, a state, a trajectory, a gait, branch, fit or optimum, any other
             result, an xarray dataset; or several of them in lists, tuples and dictionaries.
 
     Raises:
-        ArgumentError: a file that cannot be written; or a part that has no import path, as a
-            lambda, or that is no data.
+        ArgumentError: the file cannot be written; or a part has no import path, such as a lambda,
+            or is not data.
         ResourceError: the disk is full or fails.
 
     Examples:
@@ -69,11 +69,11 @@ def save(path: str | Path, value: Any) -> None:
 
 
 def load(path: str | Path) -> Any:
-    """Loads what `save` wrote, of the same types and the same numbers.
+    """Loads what `save` wrote, with the same types and the same numbers.
 
-    Classes of one's own are imported from where they were: a `RuntimeWarning` says where their
-    source has changed. Loading imports the modules that a file names, so that a file from others
-    deserves the trust that their scripts would.
+    Classes of your own are imported from the module that defined them. A `RuntimeWarning` is issued
+    if their source has changed. Because loading imports the modules that a file names, load only
+    files that you trust.
 
     Args:
         path: the file.
@@ -82,8 +82,8 @@ def load(path: str | Path) -> Any:
         The value that was saved.
 
     Raises:
-        ArgumentError: a file that cannot be read or that `save` did not write; one of another
-            format; or a class that is not found or has other fields here.
+        ArgumentError: the file cannot be read, was not written by `save` or has another format; or
+            one of its classes is not found or has other fields in this version.
     """
     try:
         with zipfile.ZipFile(user_path(path)) as archive:

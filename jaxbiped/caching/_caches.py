@@ -54,10 +54,10 @@ def register_cache(
 
 
 def clear_caches() -> None:
-    """Forgets all that calls left behind: compiled programs, records of simulations, buffers.
+    """Empties all caches in memory: compiled programs, records of simulations, buffers.
 
-    The next calls compile again and give the same numbers. Safe at any time and in any thread:
-    what a running call uses lives until it ends. Compiled code on disk stays.
+    Later calls compile again and give the same numbers. It can be called at any time and from any
+    thread: a running call keeps what it uses until it ends. Compiled code on disk stays.
     """
     for _ in range(2):  # what goes in the first round may give buffers back
         for cache in list(_CACHES.values()):
@@ -67,10 +67,10 @@ def clear_caches() -> None:
 
 
 def cache_info() -> dict[str, CacheInfo]:
-    """What each cache holds and may hold at most, by the name of what fills it.
+    """Current size and limit of each cache, by name.
 
     Returns:
-        A `CacheInfo` of size, bound and unit for each cache.
+        A `CacheInfo` with size, bound and unit for each cache.
     """
     return {name: cache.info() for name, cache in sorted(_CACHES.items())}
 

@@ -75,24 +75,25 @@ def check_name(argument: str, name: object) -> None:
 
 
 class Body(eqx.Module):
-    """A rigid body that hangs by a hinge on another one, or on the root point.
+    """A rigid body that hangs by a hinge on another body, or on the root point.
 
-    Its angle θ is absolute, from the slope's normal: 0 where it hangs straight down, and a leg's is
-    positive where its foot is ahead (downhill). A torso stands above its hinge: its centre is
-    negative, and its angle positive where it leans back.
+    Its angle θ is absolute, measured from the slope's normal. It is 0 if the body hangs straight
+    down; the angle of a leg is positive if its foot is ahead (downhill). A torso stands above its
+    hinge, so its centre is negative, and its angle is positive if it leans back.
 
     Attributes:
-        name: of letters, digits and underscores; its angle is `theta_NAME` in states.
-        mass: of the body [kg].
+        name: letters, digits and underscores; in states, its angle is `theta_NAME`.
+        mass: mass of the body [kg].
         inertia: moment of inertia about its mass centre [kg·m²].
-        centre: mass centre in the body's frame, one number down the body or a pair (along, ahead)
-            [m], kept as a `Point`.
-        parent: the body that it hangs on; None for the root point.
-        at: place of its hinge in the parent's frame, likewise [m]; None for the parent's own hinge.
+        centre: mass centre in the body's frame: one number, the distance down the body, or a pair
+            (along, ahead) [m]; stored as a `Point`.
+        parent: name of the body that it hangs on; None for the root point.
+        at: place of its hinge in the parent's frame, in the same form [m]; None for the parent's
+            own hinge.
 
     Raises:
-        ArgumentError: a name of other characters, a mass or an inertia below 0, or `at` without a
-            parent.
+        ArgumentError: the name has other characters, a mass or an inertia is below 0, or `at` is
+            given without a parent.
     """
 
     name: str = eqx.field(static=True)
@@ -118,16 +119,17 @@ class Foot(eqx.Module):
     """A circular foot of a body, or a point foot.
 
     Attributes:
-        body: the body that it is part of.
-        centre: centre of its circle in the body's frame, one number down the body or a pair (along,
-            ahead) [m]; the sole is `centre + radius` down the body.
-        radius: of the circle [m]; None for a point.
-        name: "foot" unless given, or "foot_1", "foot_2" in order where a body has several.
-        leg: the leg that it belongs to; all feet of a body are one leg, named as the body is,
-            unless given.
+        body: name of the body that it is part of.
+        centre: centre of its circle in the body's frame: one number, the distance down the body, or
+            a pair (along, ahead) [m]. The sole lies `centre + radius` down the body.
+        radius: radius of the circle [m]; None for a point.
+        name: name of the foot. Default: "foot", or "foot_1", "foot_2" in order if the body has
+            several.
+        leg: name of the leg that it belongs to. By default, all feet of a body form one leg with
+            the body's name.
 
     Raises:
-        ArgumentError: a name of other characters, or a radius below 0.
+        ArgumentError: the name has other characters, or the radius is below 0.
     """
 
     body: str = eqx.field(static=True)

@@ -11,14 +11,14 @@ from jaxbiped._types import Parameter, Scalar
 
 
 class Ground(AbstractPart):
-    """A plane that falls at an angle towards positive x.
+    """An inclined plane that descends towards positive x.
 
     Attributes (leaves of any batch shape):
         slope: angle of the slope α, downhill positive [rad].
         g: gravitational acceleration [m/s²].
 
     Raises:
-        ArgumentError: a slope of a right angle or more, or g below 0.
+        ArgumentError: the slope is a right angle or more, or g is below 0.
     """
 
     slope: Parameter = parameter("slope", r"$\alpha$", "rad", size_below=math.pi / 2)

@@ -94,14 +94,14 @@ class Spring(AbstractJointPart):
 
     Attributes:
         angle: see `AbstractJointPart`.
-        stiffness: k [N·m/rad]; None for a damper alone.
+        stiffness: k [N·m/rad]; None for a damper without a spring.
         damping: b [N·m·s/rad]; None for none.
-        rest: angle at which the spring is slack [rad]; None for 0.
+        rest: angle at which the spring exerts no torque [rad]; None for 0.
         name: see `AbstractJointPart`.
 
     Raises:
-        ArgumentError: neither stiffness nor damping, one of them below 0, or a rest angle without
-            stiffness.
+        ArgumentError: neither stiffness nor damping is given, one of them is below 0, or a rest
+            angle is given without stiffness.
     """
 
     kind: ClassVar[str] = "spring"
@@ -129,23 +129,24 @@ class Spring(AbstractJointPart):
 
 
 class Stop(AbstractJointPart):
-    """Limits of an angle: elastic in scenes with laws of contact, plastic on rigid feet.
+    """Limits of an angle: compliant in scenes with laws of contact, plastic on rigid feet.
 
-    Beyond a limit a law of the normal force pushes back, τ = −law(φ − upper, φ̇) above and
-    +law(lower − φ, −φ̇) below. Its penetration is an angle [rad] and its force a torque [N·m], so
-    that a stiffness has the unit N·m/radⁿ.
+    Beyond a limit, a law of the normal force pushes back: τ = −law(φ − upper, φ̇) above and
+    +law(lower − φ, −φ̇) below. The penetration is an angle [rad] and the force a torque [N·m], so a
+    stiffness has the unit N·m/radⁿ.
 
     Attributes:
         angle: see `AbstractJointPart`.
-        upper, lower: the limits [rad]; None for none on that side.
-        law: what a scene with laws of contact needs; one of `NORMAL_LAWS`, for example.
-        holds: what a scene on rigid feet does: "while pressed", released when it would have to
-            pull; "until heel strike" or "through heel strike", locked from the hit on.
+        upper, lower: the limits [rad]; None for no limit on that side.
+        law: law of the torque, for example one of `NORMAL_LAWS`; required in a scene with laws of
+            contact.
+        holds: how long the stop holds in a scene on rigid feet: "while pressed", until it would
+            have to pull; "until heel strike" or "through heel strike", locked once it is hit.
         name: see `AbstractJointPart`.
 
     Raises:
-        ArgumentError: no limit, a lower limit that is not below the upper one, or a law or a word
-            of another kind.
+        ArgumentError: no limit is given, the lower limit is not below the upper one, or the law or
+            `holds` is of another kind.
     """
 
     kind: ClassVar[str] = "stop"
@@ -175,21 +176,21 @@ class Stop(AbstractJointPart):
 
 
 class Latch(AbstractJointPart):
-    """A detent that holds an angle until a torque overcomes it, the same on both kinds of feet.
+    """A detent that holds an angle until a torque overcomes it, on compliant and on rigid feet.
 
-    τ = −T u exp((1 − u²)/2) − b φ̇ exp(−u²/2) with u = (φ − at)/width: largest, T, at ±width. A
-    mechanical latch that a knee keeps until heel strike is `Stop(..., holds=...)`.
+    τ = −T u exp((1 − u²)/2) − b φ̇ exp(−u²/2) with u = (φ − at)/width. The torque is largest, T, at
+    u = ±1. For a mechanical latch that holds a knee until heel strike, use `Stop(..., holds=...)`.
 
     Attributes:
         angle: see `AbstractJointPart`.
         at: the angle that it holds [rad]; None for 0.
-        width: where its torque is largest, from there [rad].
+        width: distance from that angle at which the torque is largest [rad].
         torque: T [N·m].
-        damping: b, where it holds [N·m·s/rad]; None for none.
+        damping: b, damping near the angle that it holds [N·m·s/rad]; None for none.
         name: see `AbstractJointPart`.
 
     Raises:
-        ArgumentError: a width that is not above 0, or a torque or damping below 0.
+        ArgumentError: the width is not above 0, or a torque or damping is below 0.
     """
 
     kind: ClassVar[str] = "latch"
@@ -205,14 +206,14 @@ class Latch(AbstractJointPart):
 
 
 class Coupling(AbstractJointPart):
-    """Angles that move together, exactly: Σ w θ = rest.
+    """An exact constraint on angles: Σ w θ = rest.
 
-    The angle and the rate of the first body that it names are not in states: they follow from the
-    others. `Coupling("battery")` welds a body to the one that it hangs on.
+    States do not contain the angle and the rate of the first body that it names, because they
+    follow from the others. `Coupling("battery")` welds a body to its parent.
 
     Attributes:
         angle: see `AbstractJointPart`.
-        rest: what the sum is [rad]; None for 0.
+        rest: value of the sum [rad]; None for 0.
         name: see `AbstractJointPart`.
     """
 
@@ -255,20 +256,21 @@ def _takes_the_motion(law: Any) -> bool:
 
 
 class Motor(AbstractJointPart):
-    """A motor, whose torque is a law of the motion and of nothing else.
+    """A motor, whose torque is a function of the motion alone.
 
     Attributes:
         angle: see `AbstractJointPart`; the torque turns it forward.
-        law: a function of the motion, `law(motion)` [N·m]: a part of `jaxbiped.actuation`, a
-            module of one's own whose leaves are parameters, or a plain function without any.
-        by: "role" where the law is written for the second leg of each pair standing, and is
-            exchanged where the first one stands; "side" where it is told as it stands.
-        share: what the law's torque is multiplied by; None for all of it.
+        law: a function of the motion, `law(motion)`, that returns the torque [N·m]: a law of
+            `jaxbiped.actuation`, a module of your own whose leaves are parameters, or a plain
+            function, which has no parameters.
+        by: "role" if the law is written for the second leg of each pair standing; it is mirrored
+            while the first one stands. "side" if the law acts on the side that is named.
+        share: factor that multiplies the law's torque; None for 1.
         name: see `AbstractJointPart`.
 
     Raises:
-        ArgumentError: a law that cannot be called with the motion alone, a share below 0, or
-            another word.
+        ArgumentError: the law cannot be called with the motion alone, the share is below 0, or `by`
+            is another word.
     """
 
     kind: ClassVar[str] = "motor"

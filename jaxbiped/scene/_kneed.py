@@ -16,27 +16,27 @@ from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 class Kneed(eqx.Module):
     """Two equal legs with knees and round feet; stops keep the knees from overextending.
 
-    Bodies are "thigh_1", "shank_1", "thigh_2" and "shank_2". A knee's angle is the shank's minus
-    the thigh's: positive where the shank is ahead.
+    The bodies are "thigh_1", "shank_1", "thigh_2" and "shank_2". A knee's angle is the shank's
+    angle minus the thigh's; it is positive if the shank is ahead.
 
     Source: McGeer 1990, Passive walking with knees.
 
     Attributes (leaves of any batch shape):
         m_thigh, J_thigh: mass of a thigh [kg], moment of inertia about its mass centre [kg·m²].
         l_thigh, d_thigh: hip to knee, hip to the thigh's mass centre [m].
-        m_shank, J_shank: those of a shank, with its foot [kg, kg·m²].
+        m_shank, J_shank: mass [kg] and moment of inertia [kg·m²] of a shank with its foot.
         l_shank, d_shank: knee to sole, knee to the shank's mass centre along the shank [m].
-        w_shank: how far that mass centre is ahead of the shank's line [m].
+        w_shank: distance of that mass centre ahead of the shank's line [m].
         r: foot radius; the foot's centre lies on the shank's line [m].
         hip_mass: point mass at the hip [kg].
         epsilon: knee angle at which the stop begins to act [rad].
-        stop: law of the stop's torque, one of `NORMAL_LAWS`, for scenes with laws of contact, its
-            penetration an angle [rad]; None for rigid feet alone.
-        holds: what the stops do on rigid feet, see `Stop`.
+        stop: law of the stop's torque in scenes with laws of contact, one of `NORMAL_LAWS`, with an
+            angle [rad] as its penetration; None for use on rigid feet only.
+        holds: how long the stops hold on rigid feet, see `Stop`.
 
     Raises:
-        ArgumentError: a mass or a length that is not above 0, another of these below 0, l_shank
-            below r, or a law or a word of another kind.
+        ArgumentError: a mass or a length is not above 0, another number is below 0, l_shank is
+            below r, or `stop` or `holds` is of another kind.
     """
 
     m_thigh: Parameter = parameter("thigh mass", r"$m_\mathrm{t}$", "kg", positive=True)

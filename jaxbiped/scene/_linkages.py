@@ -17,15 +17,15 @@ from jaxbiped.scene._structure import Angle
 
 
 class LinkageScene(eqx.Module):
-    """A linkage in gravity, and how its joints are held.
+    """A linkage in gravity, with the method that holds its joints.
 
     Attributes:
         linkage: bodies and joints.
-        method: how the constraints are held.
+        method: constraint method.
         gravity: acceleration (x, z) [m/s²].
 
     Raises:
-        ArgumentError: a part of the wrong type, or gravity that is not finite.
+        ArgumentError: a part has the wrong type, or gravity is not finite.
     """
 
     linkage: Linkage
@@ -87,7 +87,7 @@ def check_loaded_bodies(mechanism: Mechanism) -> None:
 
 
 def walker_linkage(walker: Any, orientation: str = "angle", slope: Parameter = 0.0) -> Linkage:
-    """The bodies of a walker, pinned to each other at their hinges.
+    """The linkage of a walker: its bodies, pinned to each other at their hinges.
 
     The mass of the root point is shared equally between the bodies that hang on it, and the first
     of these is pinned to the others there: Φ = hinge of the first − hinge of the other. A pin joins
@@ -97,13 +97,13 @@ def walker_linkage(walker: Any, orientation: str = "angle", slope: Parameter = 0
     Args:
         walker: a `Mechanism`, or a module that makes one.
         orientation: one of `ORIENTATIONS`.
-        slope: angle of the vertical [rad], for couplings to it.
+        slope: angle of the vertical from the slope's normal [rad], for couplings to the vertical.
 
     Returns:
         All bodies and joints, SI units.
 
     Raises:
-        ArgumentError: an unknown orientation, or a body without mass or inertia.
+        ArgumentError: the orientation is unknown, or a body has no mass or inertia.
     """
     mechanism = mechanism_of(walker)
     structure, bodies = mechanism.structure, loaded_bodies(mechanism)

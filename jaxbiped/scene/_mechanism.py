@@ -51,29 +51,31 @@ from jaxbiped.scene._zero_pose import check_zero_pose
 class Mechanism(eqx.Module):
     """A planar tree of rigid bodies on round feet; a frozen pytree of its parameters.
 
-    Bodies hang by hinges on a root point or on one another. With a `mirror` two halves are each
-    other's images: their parameters are the same leaves, so that a derivative is the pair's, and a
-    cycle of its walk is a step.
+    Bodies hang by hinges on a root point or on one another. With a `mirror`, the two halves are
+    each other's images. They share their parameters, so a derivative is with respect to both, and a
+    cycle of the walk is a step.
 
     Args:
-        root: name of the root point, as "hip": its place is `hip_x`, `hip_z` in states.
-        root_mass: point mass there [kg]; None for none.
+        root: name of the root point, such as "hip"; in states, its place is then `hip_x`, `hip_z`.
+        root_mass: point mass at the root point [kg]; None for none.
         bodies: the bodies, parents before children.
         feet: their feet, at least one.
-        joints: what acts at joints: `Spring`, `Stop`, `Latch`, `Coupling`, `Motor`.
-        mirror: pairs of bodies, first the one that swings where a cycle begins, then the one that
+        joints: springs, stops, latches, couplings and motors at joints (`Spring`, `Stop`, `Latch`,
+            `Coupling`, `Motor`).
+        mirror: pairs of bodies: the one that swings at the beginning of a cycle, then the one that
             stands.
-        turn: `{body: N}` of a body that looks the same, its feet too, after an N-th of a turn;
+        turn: `{body: N}` for a body that, with its feet, looks the same after an N-th of a turn;
             its feet share their parameters.
 
     Attributes:
         root_mass: see above.
-        pieces: bodies, feet and joint parts with parameters of their own: of mirror images one.
-        structure: how they hang together.
+        pieces: bodies, feet and joint parts with parameters of their own; one of each mirrored
+            pair.
+        structure: how the pieces are connected.
 
     Raises:
-        ArgumentError: names that are not unique or not known, what is no symmetry, couplings that
-            repeat each other, or masses that leave a motion without inertia.
+        ArgumentError: a name is not unique or not known, `mirror` or `turn` is not a symmetry,
+            couplings repeat each other, or a motion has no inertia.
     """
 
     root_mass: Parameter | None = parameter(
@@ -157,7 +159,7 @@ class Mechanism(eqx.Module):
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """All bodies, mirror images with the same leaves."""
+        """All bodies; mirror images have the same leaves."""
         s = self.structure
         parents = (None if p < 0 else s.bodies[p] for p in s.parents)
         return tuple(
@@ -167,7 +169,7 @@ class Mechanism(eqx.Module):
 
     @property
     def feet(self) -> tuple[Foot, ...]:
-        """All feet, mirror images with the same leaves, and what a turn takes to each other."""
+        """All feet; those that a mirror or a turn maps to each other have the same leaves."""
         s = self.structure
         feet: list[Any] = [self.pieces[k] for k in s.foot_pieces]
         named = zip(feet, s.feet, s.foot_names, s.leg_of_foot, strict=True)
@@ -178,7 +180,7 @@ class Mechanism(eqx.Module):
 
     @property
     def joints(self) -> tuple[AbstractJointPart, ...]:
-        """What acts at joints; the angle of each is in `structure.joints`."""
+        """All joint parts; the angle of each is in `structure.joints`."""
         s, found = self.structure, []
         for k, (own, name) in enumerate(zip(s.joint_pieces, s.joint_names, strict=True)):
             part = with_fields(self.pieces[own], name=name)
@@ -186,7 +188,7 @@ class Mechanism(eqx.Module):
         return tuple(found)
 
     def arguments(self) -> dict[str, Any]:
-        """What the mechanism would be made from again, by the names of its arguments."""
+        """Arguments with which the mechanism can be made again, by name."""
         s = self.structure
         joints = [
             with_fields(part, angle=named_angle(angle, s.bodies))
@@ -204,7 +206,7 @@ class Mechanism(eqx.Module):
         }
 
     def untied(self) -> "Mechanism":
-        """The mechanism without its mirror: each side has parameters of its own, equal at first."""
+        """The mechanism without its mirror: each side has parameters of its own, initially equal."""
         alone = Mechanism(**self.arguments() | {"mirror": ()})
         structure = dataclasses.replace(alone.structure, pairs=self.structure.pairs)
         changed: Mechanism = with_fields(alone, structure=structure)
@@ -230,7 +232,7 @@ class Mechanism(eqx.Module):
         return self.height_over_feet(1.0)
 
     def height_over_feet(self, share: float) -> Scalar:
-        """Height of the root point with all angles 0 over the lowest foot [m].
+        """Height of the root point above the lowest foot with all angles 0 [m].
 
         What lies between the root point and the centre of the foot's circle counts by a share.
         """

@@ -31,16 +31,17 @@ _FIRST = ("K", "c", "xi")
 
 
 def parameter_names(scene: AbstractScene) -> tuple[str, ...]:
-    """Names of a scene's parameters: K, c and xi first, the others in the scene's order.
+    """Names of a scene's parameters: K, c and xi first, then the others in the scene's order.
 
-    A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`; one of
-    several has its number, `torque_1`. A mechanism's parameters are called after its bodies,
-    `thigh.mass`, `shank.foot.radius`, `shank.stop.K`; those of a walker with fields of its own by
-    their paths, `m_thigh`, `stop.K`, after `walker.` where the scene has that name. A redundant
-    scene's parameters are those of the scene that it models.
+    A parameter has its own name, such as `K`; if two parts have a parameter of that name, the part
+    is added, as in `normal.K`. One of several numbers has its index, as in `torque_1`. Parameters
+    of a mechanism begin with the name of a body, as in `thigh.mass`, `shank.foot.radius` or
+    `shank.stop.K`. Those of a walker with fields of its own have their paths, such as `m_thigh` or
+    `stop.K`, with the prefix `walker.` if the scene has the same name. A redundant scene has the
+    parameters of the scene that it models.
 
     Args:
-        scene: of any kind; or a mechanism, or any other module of parameters.
+        scene: a scene of any kind, a mechanism, or any other module of parameters.
 
     Returns:
         The names, one for each numeric leaf of the scene.
@@ -54,13 +55,13 @@ def parameter_names(scene: AbstractScene) -> tuple[str, ...]:
 
 
 def parameter_values(scene: AbstractScene) -> dict[str, Scalar]:
-    """A scene's parameters by name (see `parameter_names`), their own leaves.
+    """A scene's parameters by name (see `parameter_names`), as the leaves of the scene.
 
     Args:
-        scene: of any kind.
+        scene: a scene of any kind.
 
     Returns:
-        Values by name, SI units, in the order of `parameter_names`.
+        Values by name, in SI units, in the order of `parameter_names`.
 
     Examples:
         >>> import jaxbiped as jb
@@ -71,15 +72,15 @@ def parameter_values(scene: AbstractScene) -> dict[str, Scalar]:
 
 
 def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
-    """What each of a scene's parameters is, with its unit, by name (see `parameter_names`).
+    """Words, symbol and unit of each of a scene's parameters, by name (see `parameter_names`).
 
-    Of a law's field that is no `jaxbiped.laws.parameter` no more is known than its name.
+    For a field that was not declared with `jaxbiped.laws.parameter`, only the name is known.
 
     Args:
-        scene: of any kind.
+        scene: a scene of any kind.
 
     Returns:
-        A `Quantity` (words, symbol and SI unit) by each name.
+        A `Quantity` (words, symbol and SI unit) for each name.
     """
     known = _parameters(scene).items()
     return {name: _quantity(_modelled(scene), name, path) for name, (path, _) in known}
@@ -140,18 +141,18 @@ def select_parameters(
 
 
 def with_parameters(scene: SomeScene, values: Mapping[str, Parameter]) -> SomeScene:
-    """The scene with other values of these parameters (see `parameter_names`), checked anew.
+    """The scene with other values of some parameters (see `parameter_names`), checked again.
 
     Args:
-        scene: of any kind.
+        scene: a scene of any kind.
         values: new values by name, SI units; arrays of shape (n,) make a batch of scenes for
             `vmap`.
 
     Returns:
-        A new scene of the same kind; the one given is not changed.
+        A new scene of the same kind; the given one is not changed.
 
     Raises:
-        ArgumentError: a name that the scene does not have, or a value that is not allowed.
+        ArgumentError: the scene does not have a parameter of that name, or a value is not allowed.
 
     Examples:
         >>> import jaxbiped as jb

@@ -33,9 +33,9 @@ def seed_scene(
     xi: float = 1000.0,
     **unknown: float,
 ) -> Scene:
-    """The paper's walker (section 2.3) on its slope, any parameter replaced by its paper name.
+    """The paper's walker (section 2.3) on its slope; every parameter can be set by its name.
 
-    The paper prints slopes as "0,20 rad"; 0.02 is meant.
+    The paper prints slopes such as "0,20 rad"; 0.02 rad is meant.
 
     Args:
         slope: inclination of the ground [rad].
@@ -51,16 +51,15 @@ def seed_scene(
         c: contact damping [N·s/m²].
         mu_static, mu_kinetic: static and kinetic friction coefficients [–].
         v0: slip speed at which friction peaks [m/s].
-        xi: rate at which friction falls beyond it [s/m].
-        unknown: none: any other name is refused.
+        xi: rate at which friction falls above v0 [s/m].
+        unknown: not used; any other name is refused.
 
     Returns:
-        The scene: `Walker`, `Ground`, `RistowSchafer` and `BengisuAkay`, and the paper's rule of
-        clearance.
+        The scene, made of `Walker`, `Ground`, `RistowSchafer` and `BengisuAkay`, with the paper's
+        clearance rule.
 
     Raises:
-        ArgumentError: a value that is not allowed, or a name that is not known; the message names
-            it.
+        ArgumentError: a value is not allowed, or a name is not known; the message names it.
 
     Examples:
         >>> import jaxbiped as jb
@@ -85,21 +84,22 @@ _BRISTLE_DAMPING = 100.0
 
 
 def ladder(scene: Scene | None = None) -> dict[str, Scene | RigidScene]:
-    """Scenes of one walker by name, the cheapest first.
+    """Four scenes of one walker, the cheapest first.
 
-    - rigid: no contact laws at all.
+    - rigid: rigid feet, without contact laws.
     - creep: compliant feet, friction without a peak, spread over a slip of 1 mm/s.
-    - stribeck: the scene itself, the seed's unless given.
-    - bristles: friction that bends by 0.01 mm before it slips.
+    - stribeck: the scene itself.
+    - bristles: friction whose bristles bend by 0.01 mm before the foot slips.
 
     Args:
-        scene: the walker with its friction, the seed's unless given.
+        scene: the walker with its laws. Default: the seed's scene.
 
     Returns:
-        The scenes by the names "rigid", "creep", "stribeck" and "bristles", in this order.
+        The scenes under the names "rigid", "creep", "stribeck" and "bristles", in this order.
 
     Raises:
-        ArgumentError: a scene whose friction is not `BengisuAkay`, from which the others follow.
+        ArgumentError: the scene's friction is not `BengisuAkay`, from which the other laws are
+            derived.
 
     Examples:
         >>> import jaxbiped as jb
