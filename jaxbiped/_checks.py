@@ -26,9 +26,9 @@ class ArgumentError(ValueError):
 
 
 class ResourceError(RuntimeError):
-    """What computes or stores has failed, such as a full disk or lost workers; no argument has.
+    """A resource has failed, such as a full disk or lost workers; the arguments are valid.
 
-    The same call works once that is mended.
+    The same call works once the cause is removed.
     """
 
 

@@ -49,14 +49,14 @@ class AbstractSection(eqx.Module):
 
 
 class MidStance(AbstractSection):
-    """The root point passes over the feet of the stance leg, which carries.
+    """Mid-stance: the root point passes over the feet of the stance leg, which carries the load.
 
     It passes over the mean of their places. The stance leg of a mirrored mechanism is that of the
-    second body of its pairs, of another mechanism the last one.
+    second body of its pairs; for any other mechanism, it is the last leg.
 
     Attributes:
-        body: the body that passes the slope's normal on its way back instead, as "thigh_2"; its
-            leg carries, or the stance leg where it has none.
+        body: a body, such as "thigh_2", whose passage of the slope's normal on its way back counts
+            instead; its leg carries the load, or the stance leg if the body has none.
     """
 
     names_legs: ClassVar[bool] = True
@@ -84,7 +84,9 @@ class MidStance(AbstractSection):
 
 
 class HeelStrike(AbstractSection):
-    """The leg ahead comes down; by then it is called the stance leg. A single leg just lands."""
+    """Heel strike: the leg ahead comes down, and is then called the stance leg. A single leg just
+    lands.
+    """
 
     alternates: ClassVar[bool] = True
     names_legs: ClassVar[bool] = True
@@ -106,11 +108,12 @@ class HeelStrike(AbstractSection):
 
 
 class Section(AbstractSection):
-    """Any scalar function of the state, `function(args, state)`.
+    """A section given by any scalar function of the state, `function(args, state)`.
 
     Attributes:
-        function: rises through zero at an arrival.
-        condition: `condition(args, state)`, whether a crossing counts; None: every one does.
+        function: the function, which rises through zero at an arrival.
+        condition: `condition(args, state)`, whether a crossing counts; None if every crossing
+            counts.
     """
 
     function: Callable[[PyTree, PyTree], Scalar] = eqx.field(static=True)

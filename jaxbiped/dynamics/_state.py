@@ -33,14 +33,14 @@ def field_of(scene: object) -> VectorField:
 
 
 def seed_state() -> State:
-    """The seed paper's start (section 2.3) on a slope of 0.02 rad, its misprints mended.
+    """The seed paper's start (section 2.3) on a slope of 0.02 rad, with its misprints corrected.
 
-    Leg 2 stands, leg 1 swings and is momentarily all but at rest. The paper prints the legs'
-    velocities with the labels swapped and one sign flipped; undoing that gives one hip velocity
-    from both legs, to 1e-5 m/s.
+    Leg 2 stands; leg 1 swings and is momentarily almost at rest. The paper prints the legs'
+    velocities with the labels swapped and one sign flipped. With this corrected, both legs give the
+    same hip velocity to 1e-5 m/s.
 
     Returns:
-        Scalar leaves, 64-bit floats.
+        The state, with scalar leaves of 64 bits.
     """
     return State(
         hip_x=as_float(0.0),

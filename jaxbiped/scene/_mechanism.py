@@ -206,7 +206,7 @@ class Mechanism(eqx.Module):
         }
 
     def untied(self) -> "Mechanism":
-        """The mechanism without its mirror: each side has parameters of its own, initially equal."""
+        """The mechanism without its mirror: each side has its own parameters, initially equal."""
         alone = Mechanism(**self.arguments() | {"mirror": ()})
         structure = dataclasses.replace(alone.structure, pairs=self.structure.pairs)
         changed: Mechanism = with_fields(alone, structure=structure)

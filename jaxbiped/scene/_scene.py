@@ -44,18 +44,20 @@ class Scene(AbstractMinimalScene):
     `equinox.tree_at(lambda s: s.normal.K, scene, jnp.asarray(2e6))`.
 
     Attributes:
-        walker: a `Mechanism`, or a module that makes one by a method `mechanism()`, as `Walker`.
+        walker: a `Mechanism`, or a module with a method `mechanism()` that returns one, such as
+            `Walker`.
         ground: slope and gravity.
-        normal: law of the normal force.
-        friction: law of the tangential force; with bristles, states have bristles, too.
-        clearance: which foot may touch. None for the walker's own rule, `walker.clearance`: that of
-            `Walker` is `StanceRotation()`; `AlwaysTouching()` where it has none.
-        actuation: what drives it beside gravity, a part of `jaxbiped.actuation` or several; None
-            for a passive walker, whose equations have nothing of it.
+        normal: normal law.
+        friction: friction law; if it has bristles, states have bristles too.
+        clearance: rule that decides which foot may touch. None: the walker's own rule,
+            `walker.clearance` (`StanceRotation()` for `Walker`), or `AlwaysTouching()` if it has
+            none.
+        actuation: one actuator of `jaxbiped.actuation` or several; None for a passive walker, whose
+            equations contain no actuation.
 
     Raises:
-        ArgumentError: a part of the wrong type, a stop without a law, a leg that the walker does
-            not have, an actuator of rigid feet, or one at the hip of a walker without a mirror.
+        ArgumentError: a part has the wrong type, a stop has no law, the walker does not have a leg,
+            an actuator is for rigid feet, or one acts at the hip of a walker without a mirror.
     """
 
     compliant: ClassVar[bool] = True
@@ -100,23 +102,23 @@ class Scene(AbstractMinimalScene):
                 )
 
     def state(self, *, standing: str | Sequence[str] | None = None, **values: Parameter) -> Any:
-        """A state of the walker by the names of its scalars; see `Mechanism` for these.
+        """A state of the walker, from scalars by name; see `Mechanism` for the names.
 
         Args:
-            standing: a leg, a body or a foot "BODY.FOOT" that stands, or several of these: the
-                lowest of their feet just touches the ground and rolls. None for the lowest of all
-                feet, and a root point at rest.
+            standing: a leg, a body or a foot "BODY.FOOT" that stands, or several of these; the
+                lowest of their feet just touches the ground and rolls. None: the lowest of all feet
+                just touches the ground, and the root point is at rest.
             **values: angles [rad], rates [rad/s], place [m] and velocity [m/s] of the root point
-                and bristles [–], as `theta_BODY`, `omega_BODY`, `ROOT_z`: numbers, or arrays that
-                broadcast to one shape. What is not named is 0, but for the height of the root
-                point, and its velocity where a foot stands.
+                and bristles [–], named `theta_BODY`, `omega_BODY`, `ROOT_z`: numbers, or arrays
+                that broadcast to one shape. Default: 0, except for the height of the root point,
+                and for its velocity if `standing` is given.
 
         Returns:
-            A state of the scene's kind, all leaves of one shape.
+            A state of the scene's kind, with all leaves of one shape.
 
         Raises:
-            ArgumentError: a name that the state does not have, a foot that does not exist, or a
-                value that is not finite.
+            ArgumentError: the state does not have a name, a foot does not exist, or a value is not
+                finite.
         """
         names = self.state_names
         placed = placement(self.mechanism, self.ground.slope, values, standing, names)
@@ -133,25 +135,25 @@ class Scene(AbstractMinimalScene):
 class RigidScene(AbstractMinimalScene):
     """A walker whose feet are rigid: they roll without slip and strike without rebound.
 
-    Single support is a smooth motion; a footstep ends by a plastic impact at which the
-    feet exchange support at once, and a swing foot that passes through the ground does not touch
-    it. Nothing is stiff, so a footstep costs a small part of one with compliant feet. Whether a
-    real foot would have slipped, flown or scuffed is told by `rigid_checks`.
+    Single support is a smooth motion. A footstep ends with a plastic impact, at which the feet
+    exchange support at once; a swing foot that passes through the ground does not touch it. Nothing
+    is stiff, so a footstep costs a small part of one with compliant feet. `rigid_checks` reports
+    whether a real foot would have slipped, flown or scuffed.
 
-    Stops are plastic: an angle that reaches a limit stays there until it would have to be pulled,
+    Stops are plastic: an angle that reaches a limit stays there until the stop would have to pull,
     or as long as the stop locks it. A leg with two feet on one body stands on either or on both.
-    What stands and what is held is the state's `mode`.
+    The state's `mode` records which feet stand and which stops are held.
 
     Attributes:
-        walker: a `Mechanism` with a mirror or a turn, or a module that makes one by a method
-            `mechanism()`, as `Walker`. Each side has one leg, and the second of each pair stands.
+        walker: a `Mechanism`, or a module with a method `mechanism()` that returns one, such as
+            `Walker`. With a mirror, each side has one leg, and the second of each pair stands.
         ground: slope and gravity.
-        actuation: what drives it beside gravity, a part of `jaxbiped.actuation` or several; None
-            for a passive walker, whose equations have nothing of it.
+        actuation: one actuator of `jaxbiped.actuation` or several; None for a passive walker, whose
+            equations contain no actuation.
 
     Raises:
-        ArgumentError: a part of the wrong type, an actuator of compliant feet, or a walker without
-            a mirror or with other legs.
+        ArgumentError: a part has the wrong type, an actuator is for compliant feet, or the walker
+            has legs that are not supported on rigid feet.
     """
 
     compliant: ClassVar[bool] = False
@@ -171,26 +173,26 @@ class RigidScene(AbstractMinimalScene):
         held: str | Sequence[str] | None = None,
         **values: Parameter,
     ) -> Any:
-        """A state of the walker by the names of its scalars.
+        """A state of the walker, from scalars by name.
 
         Args:
-            standing: which feet stand, as in `Scene.state`: of the second of each pair, or without
-                a mirror of one leg, the last one unless told. The lowest of them stands, or both.
-            held: the stops that are held, by their bodies or their own names, "NAME.upper" and
-                "NAME.lower" where they have both limits; `()` for none. None for those that rest at
-                a limit: one that moves into it hits it as the motion begins.
-            **values: angles [rad] and rates [rad/s] of bodies and place of the root point [m], as
-                `theta_BODY`, `omega_BODY`, `ROOT_x`: numbers, or arrays that broadcast to one
-                shape. What is not named is 0.
+            standing: the feet that stand, named as in `Scene.state`: feet of the second body of
+                each pair, or without a mirror of one leg. Default: the last leg. The lowest of them
+                stands, or both.
+            held: the stops that are held, by the names of their bodies or their own; "NAME.upper"
+                or "NAME.lower" if a stop has both limits; `()` for none. None: those that rest at a
+                limit. A stop whose angle moves into the limit is hit as the motion begins.
+            **values: angles [rad] and rates [rad/s] of bodies and place of the root point [m],
+                named `theta_BODY`, `omega_BODY`, `ROOT_x`: numbers, or arrays that broadcast to one
+                shape. Default: 0.
 
         Returns:
-            A state of the scene's kind, all leaves of one shape. Its `mode` is a whole number,
-            where more than one mode can occur.
+            A state of the scene's kind, with all leaves of one shape. If more than one mode can
+            occur, its `mode` is a whole number.
 
         Raises:
-            ArgumentError: a name that the state does not have, a foot that does not exist or that
-                swings, a value that is not finite, a stop that is passed, or one that is held off
-                its limit.
+            ArgumentError: the state does not have a name, a foot does not exist or swings, a value
+                is not finite, an angle is beyond its stop, or a stop is held away from its limit.
         """
         mechanism, slope = self.mechanism, self.ground.slope
         feet = check_stands(mechanism.structure, standing)
@@ -205,7 +207,9 @@ class RigidScene(AbstractMinimalScene):
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of the scalars of a state: place, angles, their rates, and a mode of several."""
+        """Names of the scalars of a state: place, angles, their rates, and the mode if there are
+        several.
+        """
         structure = self.mechanism.structure
         names = (structure.coordinates[0], *structure.coordinates[2:], *structure.rates[2:])
         return (*names, "mode") if rigid_modes(self.mechanism).any else names
@@ -217,26 +221,27 @@ def _of_scene(words: str, name: str = "") -> Any:
 
 
 class RedundantScene(AbstractWalkerScene):
-    """A walker whose bodies have coordinates of their own, held together by a constraint method.
+    """A walker whose bodies have coordinates of their own and are joined by a constraint method.
 
-    What is modelled is the `Scene`; how it is written down differs. Goes wherever a `Scene` does.
-    States have the place of each body's mass centre and its angle, or its Euler parameters:
-    `x_BODY`, `z_BODY`, `theta_BODY` or `cos_half_BODY` and `sin_half_BODY`; then their rates,
-    `vx_BODY`, `vz_BODY`, `omega_BODY` or `cos_rate_BODY` and `sin_rate_BODY`; then bristles. For
-    `Walker` their type is `RedundantState` or `EulerState`. A state in minimal coordinates is made
-    one where it is given. The mass of the root point is shared equally between the bodies that
-    hang on it, whose mass centres have it in them.
+    It models the same as its `Scene`, in other coordinates, and is accepted in place of a `Scene`.
+    A state has the place of each body's mass centre and its angle or Euler parameters: `x_BODY`,
+    `z_BODY`, `theta_BODY`, or `cos_half_BODY` and `sin_half_BODY`. Their rates follow, `vx_BODY`,
+    `vz_BODY`, `omega_BODY`, or `cos_rate_BODY` and `sin_rate_BODY`, and then bristles. For
+    `Walker`, the type of states is `RedundantState` or `EulerState`. States in minimal coordinates
+    are accepted and converted. The bodies that hang on the root point share its mass equally, and
+    their mass centres include it.
 
     Source: the seed paper, section 4.
 
     Attributes:
-        scene: what is modelled.
-        method: how hinges and couplings are held, one of `CONSTRAINT_METHODS` by its name or an
+        scene: the scene that is modelled.
+        method: constraint method for hinges and couplings: a name of `CONSTRAINT_METHODS`, or an
             object.
-        orientation: how bodies' orientations are written, one of `ORIENTATIONS`.
+        orientation: coordinates of the bodies' orientations, one of `ORIENTATIONS`.
 
     Raises:
-        ArgumentError: a part of the wrong type, an unknown name, or a body without mass or inertia.
+        ArgumentError: a part has the wrong type, a name is unknown, or a body has no mass or
+            inertia.
     """
 
     compliant: ClassVar[bool] = True

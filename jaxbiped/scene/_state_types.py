@@ -16,9 +16,9 @@ class State(NamedTuple):
     """Hip position, leg angles and their rates: eight scalar leaves in the slope's frame.
 
     The frame is fixed to the slope: x along it, downhill positive; z along its outward normal. A
-    leg's angle is measured from that normal, positive when its foot is ahead of (downhill from)
-    the hip. A start whose angles are a whole turn more is the same start, and begins between −π
-    and π. Leaves may carry any common batch shape.
+    leg's angle is measured from that normal, and is positive if its foot is ahead of (downhill
+    from) the hip. Angles of a start are reduced to the range from −π to π. The leaves may have any
+    common batch shape.
 
     Attributes:
         hip_x, hip_z: hip position [m].

@@ -15,7 +15,7 @@ _TORSO = "torso"
 
 
 class WithTorso(eqx.Module):
-    """A walker with a torso, which a coupling holds midway between its legs, or a spring holds.
+    """A walker with a torso, held by a spring, or midway between the legs by a coupling.
 
     Source: Wisse, Schwab and van der Helm 2004, Passive dynamic walking model with upper body.
 
@@ -23,14 +23,15 @@ class WithTorso(eqx.Module):
         walker: the walker below the torso: `Walker`, `Kneed` or any other module with a method
             `mechanism()`; or a `Mechanism`.
         m_torso: mass of the torso [kg].
-        J_torso: its moment of inertia about its mass centre [kg·m²].
-        h: height of its mass centre above the hip [m].
-        spring: what holds the body "torso", on an angle of its own choice; None for a coupling,
-            with which the torso bisects the angle between the legs exactly.
+        J_torso: moment of inertia of the torso about its mass centre [kg·m²].
+        h: height of the torso's mass centre above the hip [m].
+        spring: a spring that holds the body "torso", on any angle. None: a coupling, with which the
+            torso exactly bisects the angle between the legs.
 
     Raises:
-        ArgumentError: a mass that is not above 0, an inertia below 0, what has no mechanism, or,
-            without a spring, a walker without exactly two mirrored bodies on its root point.
+        ArgumentError: a mass is not above 0, an inertia is below 0, `walker` has no mechanism, or,
+            without a spring, the walker does not have exactly two mirrored bodies on its root
+            point.
     """
 
     walker: Any

@@ -20,14 +20,14 @@ class Walker(eqx.Module):
     Attributes (leaves of any batch shape):
         m: mass of one leg [kg].
         J: moment of inertia of one leg about its centre of mass [kg·m²].
-        l: hip to sole [m].
-        d: hip to the leg's centre of mass [m].
+        l: distance from the hip to the sole [m].
+        d: distance from the hip to the leg's centre of mass [m].
         r: foot radius [m].
         hip_mass: point mass at the hip [kg].
 
     Raises:
-        ArgumentError: m or l not above 0; J, d, r or hip_mass below 0; l below r; J zero (legs
-            that are mass points) without d and hip_mass above 0.
+        ArgumentError: m or l is not above 0; J, d, r or hip_mass is below 0; l is below r; or J is
+            zero (legs that are mass points) and d and hip_mass are not both above 0.
     """
 
     clearance: ClassVar[AbstractClearance] = StanceRotation()
@@ -55,7 +55,7 @@ class Walker(eqx.Module):
         return found
 
     def mechanism(self) -> Mechanism:
-        """Two legs on the hip as data: bodies "1" and "2", of which the second stands."""
+        """The walker as a mechanism: bodies "1" and "2" on the hip, of which the second stands."""
         return Mechanism(
             root_mass=self.hip_mass,
             bodies=tuple(Body(n, mass=self.m, inertia=self.J, centre=Point(self.d)) for n in "12"),

@@ -50,66 +50,71 @@ def simulate(
     adjoint: diffrax.AbstractAdjoint | None = None,
     engine: str = "auto",
 ) -> Trajectory[Any]:
-    """Simulates a scene from a state, for a time, a number of footsteps, or whichever ends first.
+    """Simulates a scene from a state, for a time, a number of footsteps, or until the first of
+    both.
 
-    Works under `jit`, `vmap` and differentiation; one lane that falls or fails neither changes nor
-    holds up the others. Under any of these a trajectory saved step by step keeps its full length
-    of `max_solver_steps + 1`, filled with infinities: save only the end of large batches.
+    Works under `jit`, `vmap` and differentiation; a simulation that falls or fails neither changes
+    nor delays the others of its batch. Under any of these, a trajectory saved step by step has the
+    full length `max_solver_steps + 1`, filled up with infinities, so save only the end of large
+    batches.
 
-    First derivatives of times and states, in both modes and by every engine, follow the event that
-    ends or saves the motion; NaN where it is grazed. There are none of `save="steps"`.
+    First derivatives of times and states, in both modes and with every engine, account for the time
+    of the event that ends or saves the motion. They are NaN if the event is grazed, and are not
+    available with `save="steps"`.
 
     Args:
-        scene: what to simulate; a `RedundantScene` for coordinates of each leg. For a `RigidScene`
-            and a `LinkageScene` see `rigid_walk` and `swing`, whose options alone apply; the first
-            saves "end" or `HeelStrike()`, the second an array of times.
-        state: start, a `State`; where friction has bristles also a `BristleState`, for their
-            part (zero unless given). Its dtype, that of the most precise leaf, is the precision
-            of the solve: 64 bits unless the user says otherwise. A redundant scene also takes a
-            redundant state, which is put on its constraints first (see `consistent_state`).
+        scene: the scene; a `RedundantScene` for coordinates of each body. For a `RigidScene` and a
+            `LinkageScene`, only the options of `rigid_walk` and `swing` apply; the first saves
+            "end" or `HeelStrike()`, the second an array of times.
+        state: start, a `State`; if friction has bristles, also a `BristleState` (in a `State`, they
+            are zero). The precision of the solve is that of the most precise leaf, by default 64
+            bits. A redundant scene also accepts a redundant state, which is first moved onto its
+            constraints (see `consistent_state`).
         duration: simulated time [s].
-        footsteps: how many (heel strikes) to end after; with a `duration`, too, the simulation
-            ends at whichever comes first, and is "walking" either way.
+        footsteps: number of footsteps (heel strikes) to simulate. If `duration` is also given, the
+            first limit that is reached ends the walk; its outcome is "walking" in both cases.
         solver: a name (see `SOLVERS`) or any diffrax solver.
-        accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`), or finer where that would not
-            resolve the slip speed over which friction builds up. Or a number: the relative error
-            wanted of every state and time that is returned, lengths in units of the legs' l,
-            times of √(l/g), angles of 1 rad. The walk is then solved at a looser tolerance and
-            by a second method as well, and again more tightly until its error bars meet the
-            number; its `error` has them. A `RuntimeWarning` tells where they cannot.
-        rtol: relative tolerance, in place of the accuracy's; a `RuntimeWarning` tells where it is
-            a thousand times coarser than what resolves how friction builds up.
-        atol: absolute tolerance (SI), in place of a hundredth of the relative one: for the seed's
-            leg length and gravity in SI, for a walker of another size in proportion to that.
-        dt: steps of this size [s], in place of tolerances; explicit methods fail on stiff contact
-            unless it is about 1e-6, and their derivatives unless it is half of that: friction's
-            rate, up to 5e6 1/s, makes a longer Euler step unstable, which the state survives
-            because friction saturates, and derivatives do not. Outside of `jit`, `vmap` and
-            derivatives the walk is solved twice more, by steps 2 and √2 times as long (where there
-            are few, a half and a third as long), and a `RuntimeWarning` tells where one of these
-            leads elsewhere; so does one where the walk's own steps missed contacts.
-        save: "steps" for every step and the continuous solution, "end" for the final state, an
-            array of increasing times [s], shape (n,), at which to save, or a section (by lanes
-            only), whose `arrivals` to save beside the final state: `HeelStrike()` saves the
-            footsteps. The legs take turns there as in `return_map`, but the states saved keep
-            their own names. None for "steps", or of a `RigidScene` for "end".
-        max_arrivals: how many arrivals at a section there is room for.
-        extremes: a function of (scene, state) whose least and largest values, number by number,
-            over the ends of all steps are wanted.
-        watch: which failures end the solve: any of "fall", "stop", "stumble".
-        max_solver_steps: cap on the solver's attempted steps.
-        adjoint: one of diffrax's, to differentiate the steps that were taken instead of the motion,
-            with a `RuntimeWarning`: through contact such derivatives may be wrong in every digit.
-            Where a method projects after each step, only adjoints that see the steps are allowed.
-        engine: "xla", "lanes", "cuda" or "auto" (see `ENGINES`). Results of "xla" agree with the
-            others' to within the tolerance, not bit by bit, nor are their steps the same: rounding
-            decides on them.
+        accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`); the tolerance is finer if
+            necessary to resolve the slip speed over which friction builds up. Or a number: the
+            relative error requested of every state and time that is returned, in units of the legs'
+            l, √(l/g) and 1 rad. The walk is then also solved at a looser tolerance and with a
+            second method, and repeated at finer tolerances until its error bars meet the number.
+            The result's `error` has the error bars, and a `RuntimeWarning` is issued if they do not
+            meet the number.
+        rtol: relative tolerance, instead of an accuracy. A `RuntimeWarning` is issued if it is at
+            least a thousand times coarser than needed to resolve how friction builds up.
+        atol: absolute tolerance (SI units). Default: a hundredth of the relative one, scaled with
+            the size of the walker relative to the seed's.
+        dt: fixed step size [s], instead of tolerances. On stiff contact, explicit methods need
+            steps of about 1e-6 s, and of half that size for derivatives: friction's rate of up to
+            5e6 1/s makes a longer Euler step unstable, which the state survives because friction
+            saturates, but derivatives do not. Outside of `jit`, `vmap` and derivatives, the walk is
+            solved twice more, with steps 2 and √2 times as long (if there are few steps, a half and
+            a third as long). A `RuntimeWarning` is issued if one of these solves disagrees, or if
+            the walk's own steps missed contacts.
+        save: "steps" for every step and the continuous solution; "end" for the final state; an
+            array of increasing times [s], shape (n,); or a section (lanes engine only), whose
+            `arrivals` are saved beside the final state: `HeelStrike()` saves the footsteps. At a
+            section, the legs take turns as in `return_map`, but the saved states keep the names of
+            their legs. None: "steps", or "end" for a `RigidScene`.
+        max_arrivals: maximum number of arrivals at a section to save.
+        extremes: a function of (scene, state); the result has the smallest and largest value of
+            each number that it returns, over the ends of all steps.
+        watch: failures that end the solve: any of "fall", "stop", "stumble".
+        max_solver_steps: maximum number of attempted solver steps.
+        adjoint: an adjoint of diffrax, to differentiate the steps that were taken instead of the
+            motion. A `RuntimeWarning` is issued, because through contact such derivatives may be
+            wrong in every digit. If a constraint method projects after each step, only adjoints
+            that see the steps are allowed.
+        engine: "xla", "lanes", "cuda" or "auto" (see `ENGINES`). Results of "xla" agree with those
+            of the others to within the tolerance, but not bit by bit; rounding changes the steps
+            too.
 
     Returns:
-        The motion, and how it ended.
+        The motion, with its outcome.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
 
     Examples:
         >>> import jaxbiped as jb
@@ -168,35 +173,37 @@ def rigid_walk(
     max_solver_steps: int = 65536,
     engine: str = "auto",
 ) -> Trajectory[RigidState]:
-    """Walks a rigid walker for a number of footsteps, a time, or whichever ends first.
+    """Simulates a rigid walker for a number of footsteps, for a time, or until the first of both.
 
-    Explicit steps of eighth order (Dormand and Prince) under error control. Heel strikes and falls
-    are the roots of each step's interpolant, two within one step included, and Newton's method
-    lands on them. A foot that comes to the ground, or misses it, by less than the tolerance tells
-    does not strike; `grazes` counts these. Works under `jit`, `vmap` and first derivatives, which
-    follow the strikes and the end.
+    The solver takes explicit steps of eighth order (Dormand and Prince) under error control. Heel
+    strikes and falls are located as roots of each step's interpolant, even two within one step, and
+    refined by Newton's method. A foot that reaches the ground, or misses it, by less than the
+    tolerance resolves does not strike; `grazes` counts these events. Works under `jit`, `vmap` and
+    first derivatives, which account for the times of the strikes and of the end.
 
     Args:
         scene: the walker.
-        state: start, leg 2 standing.
-        footsteps: heel strikes after which to end; with a `duration`, too, whichever comes first.
+        state: start, with leg 2 standing.
+        footsteps: number of heel strikes to simulate. If `duration` is also given, the first limit
+            that is reached ends the walk.
         duration: simulated time [s].
         accuracy: "draft" (1e-4), "balanced" (1e-6) or "tight" (1e-11): the relative tolerance; the
-            absolute one (SI) is a hundredth of it. Or a number: the relative error wanted of
-            every state and time that is returned, lengths in units of the legs' l, times of
-            √(l/g), angles of 1 rad, as in `simulate`; `error` then has the bars, and a
-            `RuntimeWarning` tells where they cannot meet the number.
-        rtol: relative tolerance, in place of the accuracy's.
-        max_arrivals: how many heel strikes to keep.
-        max_solver_steps: cap on the attempted steps.
+            absolute one (SI) is a hundredth of it. Or a number: the relative error requested of
+            every state and time that is returned, in units of the legs' l, √(l/g) and 1 rad, as in
+            `simulate`. The result's `error` then has the error bars, and a `RuntimeWarning` is
+            issued if they do not meet the number.
+        rtol: relative tolerance, instead of an accuracy.
+        max_arrivals: maximum number of heel strikes to save.
+        max_solver_steps: maximum number of attempted steps.
         engine: "xla", "lanes", "cuda" or "auto" (see `ENGINES`).
 
     Returns:
-        When, where and how the walk ended: after a footstep, just after the impact, leg 2
-        standing. Its `arrivals` count the heel strikes, and hold the first `max_arrivals`.
+        The final time, state and outcome; after a footstep, the state is that just after the
+        impact, with leg 2 standing. `arrivals` counts the heel strikes and holds the first
+        `max_arrivals`.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
 
     Examples:
         >>> import jaxbiped as jb
@@ -234,22 +241,23 @@ def swing(
     max_solver_steps: int = 65536,
     adjoint: diffrax.AbstractAdjoint | None = None,
 ) -> Trajectory[LinkageState]:
-    """Simulates a linkage from a start, which is first put on its constraints.
+    """Simulates a linkage from a start, which is first moved onto its constraints.
 
     Works under `jit`, `vmap` and differentiation.
 
     Args:
         scene: linkage, constraint method and gravity.
         state: start at time 0, on its constraints or near them.
-        times: when to save, increasing from 0 on [s], shape (n,); the last one ends the solve.
+        times: times at which to save, increasing from 0 [s], shape (n,); the last one ends the
+            solve.
         solver, accuracy, rtol, atol, dt, max_solver_steps, adjoint: as in `simulate`.
 
     Returns:
-        States at the `times`, and how far each is off its constraints, leaves of shape (n,). Its
-        `ending` is "finished", "out of steps" or "solver failed".
+        States at the `times`, and the violation of the constraints by each, leaves of shape (n,).
+        Its `ending` is "finished", "out of steps" or "solver failed".
 
     Raises:
-        ArgumentError: an argument that is not allowed, or constraints that the method cannot hold,
+        ArgumentError: an argument is not allowed, or the method cannot hold the constraints; raised
             before anything is compiled.
     """
     check_type("scene", scene, LinkageScene)
