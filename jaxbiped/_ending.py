@@ -13,18 +13,18 @@ class NamedCode(enum.IntEnum):
 class Ending(NamedCode):
     """How a simulation ended. `str(ending)` is its name in words.
 
-    - walking: the time or the footsteps asked for are done.
-    - fell forward: the hip came down moving downhill; or the swing leg turned back too late, its
-      foot ahead but so deep under the ground that the reaction bars its way.
-    - fell back: the hip came down moving uphill.
-    - stopped: the stance leg came to rest in single support (under the paper's clearance rule it
-      would then lose its ground and sink), or the whole walker stands still on the ground.
-    - stumbled: the foot behind came down, moving forward, while the one ahead carried; or the
-      swing leg was so barred before it had passed the other.
-    - out of steps: the solver's cap on steps was reached.
-    - solver failed: the state is no longer a number.
-    - timed out: no footstep, or no arrival at a section, came in all the time allowed for it.
-    - finished: the time asked for is done, of a linkage, which does not walk.
+    - walking: the requested time or number of footsteps was reached.
+    - fell forward: the hip came down while moving downhill; or the swing leg turned back too late,
+      with its foot ahead but so deep in the ground that the reaction blocks it.
+    - fell back: the hip came down while moving uphill.
+    - stopped: the stance leg came to rest in single support (under the paper's clearance rule, it
+      would then lose contact and sink), or the whole walker stands still on the ground.
+    - stumbled: the foot behind came down, moving forward, while the one ahead carried the load; or
+      the ground blocked the swing leg in this way before it had passed the other leg.
+    - out of steps: the maximum number of solver steps was reached.
+    - solver failed: the state is no longer finite.
+    - timed out: no footstep, or no arrival at a section, occurred within the allowed time.
+    - finished: a linkage, which does not walk, reached the requested time.
     """
 
     WALKING = 0

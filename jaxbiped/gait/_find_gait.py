@@ -71,50 +71,52 @@ def find_gait(
 ) -> Gait:
     """Finds a periodic gait, its Floquet multipliers and its sensitivities to the parameters.
 
-    Newton's method on the return map, damped as Levenberg and Marquardt do where a step fails;
-    derivatives are carried along the motion under a tolerance of their own, and no step straddles
-    a switch. Works under `jit` and `vmap`, over scenes and over guesses.
+    The search is Newton's method on the return map, with Levenberg–Marquardt damping after a failed
+    step. Derivatives are carried along the motion with a tolerance of their own, and no step
+    crosses a switch. Works under `jit` and `vmap`, over scenes and over guesses.
 
     Args:
-        scene: the walker, compliant or rigid. In redundant coordinates every solve starts on the
-            constraints, and returns, multipliers and sensitivities are told in minimal ones: the
-            constraint directions are left out. Second derivatives (the spectral radius's) take the
-            minimal equations along the redundant motion: on the constraints these are the method's
-            own, but for what a penalty leaves (a share of 1/(A s), see `Penalty`).
-        guess: a gait, or a start near one, on the section or not; the gait is then the one that
-            Newton's method comes to from there. Unless given, the search goes through stages, each
-            only if those before found no stable gait: Newton's method from the seed's start, fitted
-            to the scene's legs; walks forwards from many starts (by lanes only); continuation from
-            the seed's scene, or that of the same walker relaxed (straight, passive, of legs alone);
-            Newton's method from scattered starts. The gait is then the stable one, or the one of
-            smallest spectral radius. Under `jit` and `vmap` only start and continuation are tried.
-        footsteps: how many a cycle has. Unless given, the fewest: one of a mirrored walker, of one
-            with unlike legs those of a stride. Without a guess the search goes on where what it
-            finds repeats itself after fewer; where there is no other `cycle_footsteps` says how
-            many.
-        section: where the cycle begins, `MidStance()` unless given. A rigid walker's cycles begin
-            just after its impact, at `HeelStrike()`.
+        scene: the walker, compliant or rigid. For a redundant scene, every solve starts on the
+            constraints, and returns, multipliers and sensitivities are given in minimal
+            coordinates, without the directions of the constraints. Second derivatives (those of the
+            spectral radius) use the minimal equations along the redundant motion. On the
+            constraints, these agree with the method's own equations, except that a penalty leaves a
+            relative difference of 1/(A s) (see `Penalty`).
+        guess: a gait, or a start near one, on the section or not, from which Newton's method
+            begins. If omitted, the search goes through stages until one finds a stable gait:
+            Newton's method from the seed's start, fitted to the scene's legs; forward walks from
+            many starts (lanes engine only); continuation from the seed's scene, or from the same
+            walker relaxed (straight, passive, hardly any mass outside its legs); Newton's method
+            from scattered starts. The result is then the stable gait, or the one of smallest
+            spectral radius. Under `jit` and `vmap`, only the first and the third stage are tried.
+        footsteps: number of footsteps of a cycle. Default: the smallest possible number, one for a
+            mirrored walker and those of a stride for unequal legs. If a gait without a guess closes
+            after fewer footsteps than requested, the search goes on for a longer cycle;
+            `cycle_footsteps` has the actual number.
+        section: section on which the cycle begins. Default: `MidStance()`; for a rigid walker
+            `HeelStrike()`, where cycles begin just after the impact.
         parameters: names of the parameters to differentiate with respect to (see
-            `parameter_names`); all of them unless given, none for ().
+            `parameter_names`). Default: all; () for none.
         accuracy: "draft", "balanced" or "tight"; a `Precision`; or a number, the relative error
-            wanted of measures, multipliers and sensitivities. Then tolerances are tightened until
-            the error bars in the gait's `error` meet it, or a `RuntimeWarning` tells why not.
-        method: "newton", or "optax" to minimise the squared residual by gradient.
-        optimiser: for "optax"; Adam with a rate of 1e-2 unless given.
-        max_evaluations: cycles allowed, and no stages beyond the first; unless given, 40 in each
-            search by "newton", 400 by "optax".
-        radius_sensitivities: whether to differentiate the spectral radius, which takes second
+            requested of measures, multipliers and sensitivities. Tolerances are then tightened
+            until the error bars in the gait's `error` meet the number; if they do not, a
+            `RuntimeWarning` gives the reason.
+        method: "newton", or "optax" to minimise the squared residual by gradient descent.
+        optimiser: optimiser for "optax". Default: Adam with a rate of 1e-2.
+        max_evaluations: maximum number of evaluated cycles; if given, only the first stage is
+            tried. Default: 40 for each search by "newton", 400 by "optax".
+        radius_sensitivities: whether to differentiate the spectral radius, which requires second
             derivatives of the motion.
-        solver: a name (see `SOLVERS`) or any diffrax solver without memory; unless given "rodas4",
-            for a rigid walker "rodas5p".
+        solver: a name (see `SOLVERS`) or any diffrax solver without memory. Default: "rodas4"; for
+            a rigid walker "rodas5p".
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
         progress: whether to show on stderr what is being done, how far it is and what was found; by
             default (None) after two seconds, in a terminal, a notebook or a command.
 
     Returns:
-        The gait, or the best that was found instead: look at its `ending`. `found_by`, `others` and
-        `explain_search` tell how it was found. A `RuntimeWarning` tells where it grazes a switch,
-        so that derivatives are not determined.
+        The gait, or if none was found, the best approximation; its `outcome` distinguishes the two.
+        `found_by`, `others` and `explain_search` report how it was found. A `RuntimeWarning` is
+        issued if the gait grazes a switch, so that derivatives are undefined.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.

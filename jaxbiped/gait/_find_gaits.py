@@ -42,18 +42,18 @@ class Gaits(NamedTuple):
 
 @without_switches
 def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options: Any) -> Gaits:
-    """Searches a periodic gait from each of many starts, all at once, and tells them apart.
+    """Searches for periodic gaits from many starts at once, and distinguishes those that it finds.
 
-    For a look around: without derivatives with respect to parameters. For these give `find_gait`
-    the state of a gait found here as its guess.
+    The gaits have no derivatives with respect to parameters. To obtain these, pass the state of a
+    gait to `find_gait` as its guess.
 
     Args:
         scene: the walker.
-        starts: leaves of shape (n,), see `rolling_starts`.
-        options: those of `find_gait`, but for parameters and radius_sensitivities.
+        starts: n starts, a state with leaves of shape (n,); see `rolling_starts`.
+        options: those of `find_gait`, except parameters and radius_sensitivities.
 
     Returns:
-        The distinct gaits, and which of the n searches came to which.
+        The distinct gaits, and which of them each of the n searches found.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.

@@ -43,50 +43,54 @@ if TYPE_CHECKING:
 
 
 class Gait(eqx.Module, Tabular):
-    """A periodic gait; under `vmap` every array gains the batch's axes. p parameters.
+    """A periodic gait, with p parameters. Under `vmap`, every array gains the axes of the batch.
 
     A state has m components besides the root point's place along the slope.
 
     Attributes:
         ending: code of a `Search`; `outcome` names it.
-        walk_ending: code of the `Ending` of the last trial that did not return; 0 where all did.
+        walk_ending: code of the `Ending` of the last trial that did not return; 0 if all returned.
         measures: period, step length, speed, peak force, spectral radius and state.
-        measure_errors: their estimated errors: what Newton's last correction and a ten times
-            looser solve change; the spectral radius's is the leading multiplier's.
+        measure_errors: estimated errors of the measures, from the changes due to Newton's last
+            correction and to a solve at a tolerance ten times looser; for the spectral radius, the
+            error of the leading multiplier.
         residual: largest change of a component of the state over the cycle, SI units.
         multipliers: Floquet multipliers, largest first, without the trivial one; shape (m − 1,).
-        multiplier_errors: their estimated errors, shape (m − 1,).
-        directions: their eigenvectors in the space of the state without hip_x, shape (m, m − 1).
-        monodromy: derivative of a cycle at a fixed time, shape (m, m).
-        return_jacobian: derivatives on the section with respect to the state: of the state that
-            returns, the period and the step length; shape (m + 2, m).
+        multiplier_errors: estimated errors of the multipliers, shape (m − 1,).
+        directions: eigenvectors of the multipliers, in the space of the state without hip_x, shape
+            (m, m − 1).
+        monodromy: derivative of the motion over one cycle at a fixed time, shape (m, m).
+        return_jacobian: derivatives of the returning state, the period and the step length with
+            respect to the state on the section, shape (m + 2, m).
         unit_multiplier_error: distance from 1 of the multiplier that must be exactly 1.
         bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
-        sensitivities: derivatives of the measures with respect to each parameter, leaves of shape
-            (p,); NaN where the search did not converge.
-        sensitivity_errors: their estimated errors, by two witnesses and with a floor.
-        elasticities: d log |measure| / d log parameter, leaves of shape (p,); zero for a parameter
-            that is zero, NaN for a measure that is.
-        evaluations: evaluations of the return map that the search took.
-        history: residual of each of them, NaN beyond the last.
+        sensitivities: derivatives of the measures with respect to each parameter, with leaves of
+            shape (p,); NaN if the search did not converge.
+        sensitivity_errors: estimated errors of the sensitivities, from two further solves and with
+            a floor.
+        elasticities: d log |measure| / d log parameter, with leaves of shape (p,); zero for a
+            parameter that is zero, NaN for a measure that is zero.
+        evaluations: number of evaluations of the return map in the search.
+        history: residual of each evaluation, NaN beyond the last.
         solver_steps: solver steps attempted in the last cycle.
-        grazes: how often the cycle touches a switch, as a foot the ground, or misses it, by less
-            than the tolerance resolves. Derivatives differ on both sides: multipliers are then
-            those of one side and their errors infinite, and sensitivities NaN.
-        cycle_footsteps: the least number of footsteps after which the orbit closes: a divisor of
-            the number that was asked for.
-        sound: whether the orbit is a walk: no foot deep underground, a step downhill,
-            and more than a fraction of a swing between crossings (boolean).
-        origin: how the search came to it, which other gaits it saw, and where the seed's gait
-            ended on the way to this scene; see `found_by` and `others`.
+        grazes: how often the cycle touches a switch, for example a foot the ground, or misses it,
+            by less than the tolerance resolves. Derivatives on the two sides then differ:
+            multipliers are those of one side, their errors are infinite, and sensitivities are NaN.
+        cycle_footsteps: smallest number of footsteps after which the orbit closes, a divisor of the
+            requested number.
+        sound: whether the orbit is a walk (boolean): no foot is deep underground, the step leads
+            downhill, and more than a fraction of a swing lies between crossings.
+        origin: how the search found the gait, which other gaits it found, and where the branch of
+            the seed's gait ended on the way to this scene; see `found_by` and `others`.
         step_lengths: distance of each heel strike from the one before [m], shape (footsteps,).
-        orbit: times [s] and states at the ends of the last cycle's solver steps, NaN beyond.
+        orbit: times [s] and states at the ends of the solver steps of the last cycle, NaN beyond
+            the last.
         error: error bars of `measures`, `multipliers` and `sensitivities`, an `ErrorEstimate`; None
-            unless the accuracy was asked for by a number.
+            unless the accuracy was a number.
         parameters: names of the p parameters.
-        engine: what computed it, "xla" or "lanes".
-        cycle: "step" for a mirrored walker, whose cycles are steps, "stride" for another.
-        quantities: what the parameters are, with their units; () where that is not known.
+        engine: engine that computed it: "xla" or "lanes".
+        cycle: "step" for a mirrored walker, "stride" for any other.
+        quantities: words, symbols and units of the parameters; () if they are not known.
     """
 
     ending: Scalar
@@ -126,29 +130,29 @@ class Gait(eqx.Module, Tabular):
 
     @property
     def outcome(self) -> Search:
-        """How the search ended, by name; for one gait, not a batch."""
+        """Outcome of the search, as a `Search`; for one gait, not a batch."""
         return Search(int(self.ending))
 
     @property
     def walk_outcome(self) -> Ending:
-        """How the last trial that did not return ended; for one gait, not a batch."""
+        """`Ending` of the last trial that did not return; for one gait, not a batch."""
         return Ending(int(self.walk_ending))
 
     @property
     def found_by(self) -> FoundBy:
-        """The stage of the search that came to it, by name; for one gait, not a batch."""
+        """The stage of the search that found it, as a `FoundBy`; for one gait, not a batch."""
         return FoundBy(int(self.origin.found_by))
 
     @property
     def others(self) -> list[OtherGait]:
-        """Other gaits that the search saw, by their spectral radius; for one gait, not a batch."""
+        """Other gaits that the search found, by spectral radius; for one gait, not a batch."""
         seen = self.origin.others
         known = int(np.sum(np.isfinite(np.asarray(seen.period))))
         return [jtu.tree_map(lambda leaf, k=k: float(leaf[k]), seen) for k in range(known)]
 
     @property
     def critical(self) -> Bifurcation:
-        """The bifurcation that the gait is at, by name; for one gait, not a batch."""
+        """The bifurcation at which the gait is, as a `Bifurcation`; for one gait, not a batch."""
         return Bifurcation(int(self.bifurcation))
 
     @property
@@ -166,11 +170,11 @@ class Gait(eqx.Module, Tabular):
 
         Returns:
             Measures and the state on the section (`state_…`) with their errors; multipliers along
-            `multiplier`; sensitivities and elasticities along `parameter`, which a table has by
-            `along="parameter"`. NaN where no gait was found.
+            `multiplier`; sensitivities and elasticities along `parameter` (in tables:
+            `along="parameter"`). NaN if no gait was found.
 
         Raises:
-            ArgumentError: a batch of gaits.
+            ArgumentError: this is a batch of gaits.
         """
         import xarray
 

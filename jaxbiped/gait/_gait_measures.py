@@ -34,24 +34,25 @@ def gait_measures(
 ) -> Measures:
     """Measures of the gait that `find_gait` finds, differentiable with respect to the scene.
 
-    - `Implicit()` (the default): both modes, all measures, one search.
-    - `Forward()`, `Reverse()`: the gait is searched without derivatives, and one differentiable
-      Newton correction of it carries them; no peak force and no spectral radius (None).
+    - `Implicit()` (the default): forward and reverse mode, all measures, one search.
+    - `Forward()`, `Reverse()`: the gait is found without derivatives, and one differentiable Newton
+      step then carries them. Peak force and spectral radius are None.
 
-    NaN where no gait is found. How a redundant scene's hip is held makes no difference to its gait:
-    through `Implicit()` the derivatives with respect to a method's constants are zero.
+    The measures are NaN if no gait is found. The gait of a redundant scene does not depend on the
+    constraint method, so with `Implicit()`, the derivatives with respect to a method's constants
+    are zero.
 
     Args:
         scene, guess, footsteps, section, accuracy, engine: as for `find_gait`.
-        gradient: how to differentiate.
+        gradient: gradient mode.
 
     Returns:
         The gait's measures, scalars in SI units.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
-        RuntimeError: reverse mode through `Forward()`.
-        TypeError: forward mode through `Reverse()`.
+        RuntimeError: reverse mode is used with `Forward()`.
+        TypeError: forward mode is used with `Reverse()`.
     """
     gradient = Implicit() if gradient is None else gradient
     if not isinstance(gradient, AbstractGradient):

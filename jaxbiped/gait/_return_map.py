@@ -26,14 +26,14 @@ from jaxbiped.variational._hybrid_system import AbstractSystem, section_of, with
 
 
 class Return(NamedTuple):
-    """Where the return map leads.
+    """An arrival of the return map.
 
     Attributes:
-        state: on the section, after the reset (legs exchanged); cyclic coordinates go on from the
-            start's.
+        state: state on the section after the reset (legs exchanged); cyclic coordinates continue
+            from the start.
         time: duration [s].
-        code: 0 for a return, else that of the `Ending` that came instead; state and time are then
-            where it ended.
+        code: 0 for a return; otherwise the code of the `Ending` that came instead, and state and
+            time are those of that ending.
     """
 
     state: PyTree
@@ -57,31 +57,31 @@ def return_map(
 ) -> Return:
     """Follows a motion to its next arrival at a section, differentiably.
 
-    Derivatives follow the arrival: they are those of the map, not of the motion at a fixed time.
+    Derivatives are those of the map, not of the motion at a fixed time.
 
     Args:
-        args: the scene, or the parameters of another `system`.
-        state: start, on the section or not, either leg standing; for a redundant scene a minimal
-            state too, which then comes back as one.
-        section: `MidStance()` unless given, `HeelStrike()` for a rigid walker.
-        footsteps: how many to follow, those of one cycle unless given.
+        args: the scene; with `system`, the parameters of that system.
+        state: start, on the section or not, with either leg standing. For a redundant scene, it may
+            be a minimal state, and the result is then minimal too.
+        section: section to arrive at. Default: `MidStance()`; for a rigid walker `HeelStrike()`.
+        footsteps: number of footsteps to follow. Default: those of one cycle.
         gradient: `Forward()` (the default) or `Reverse()`.
         accuracy: "balanced" or "tight".
-        system: the walker unless given.
-        solver: a name (see `SOLVERS`) or any diffrax solver that estimates its errors; unless
-            given "rodas4", for a rigid walker "rodas5p".
-        max_time: longest time to an arrival [s].
-        engine: "xla", "lanes" or "auto" (see `ENGINES`), which here is "xla" for a system of your
-            own. By lanes all directions of a derivative share one solve.
+        system: another system, an `AbstractSystem`. Default: the walker.
+        solver: a name (see `SOLVERS`) or any diffrax solver that estimates its errors. Default:
+            "rodas4"; for a rigid walker "rodas5p".
+        max_time: maximum time to an arrival [s].
+        engine: "xla", "lanes" or "auto" (see `ENGINES`); for a system of your own, "auto" is "xla".
+            With the lanes engine, all directions of a derivative share one solve.
 
     Returns:
-        State at the arrival, time that it took [s], and the code of what ended the motion before
-        it, leaves shaped as the start's.
+        State at the arrival, duration [s], and a code: 0, or that of the `Ending` that came before
+        an arrival. Leaves have the shape of the start's.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
-        RuntimeError: reverse mode through `Forward()`.
-        TypeError: forward mode through `Reverse()`.
+        RuntimeError: reverse mode is used with `Forward()`.
+        TypeError: forward mode is used with `Reverse()`.
     """
     gradient = Forward() if gradient is None else gradient
     check_anywhere(gradient, "a return map")
@@ -137,35 +137,33 @@ def linearise_return_map(
     max_solver_steps: int = 32768,
     engine: str = "auto",
 ) -> LinearisedReturn:
-    """Follows a motion for one cycle, with derivatives with respect to its start and parameters.
+    """Follows a motion for one cycle, with its derivatives with respect to start and parameters.
 
-    It is what `find_gait` evaluates, and its multipliers and sensitivities are read off (see
-    `stability_of`, `slopes_of`), for studies of the derivatives themselves. Tolerances are traced:
-    any of them are solved by one compiled program.
+    `find_gait` evaluates this function. Use it to study the derivatives themselves; `stability_of`
+    and `slopes_of` compute multipliers and sensitivities from the result. Tolerances are traced, so
+    one compiled program serves all of them.
 
     Args:
-        args: the scene, compliant or rigid, or the parameters of another `system`.
+        args: the scene, compliant or rigid; with `system`, the parameters of that system.
         state: start, on the section or not.
-        rtol: relative tolerance of the state; the absolute one (SI, for a walker of the seed's
-            size) is a hundredth of it.
-        tangent_rtol: relative tolerance of the derivatives; a very large one leaves the choice of
-            steps to the state alone.
+        rtol: relative tolerance of the state; the absolute one (SI units, for a walker of the
+            seed's size) is a hundredth of it.
+        tangent_rtol: relative tolerance of the derivatives; if it is very large, the state alone
+            determines the steps.
         parameters: names of the parameters to differentiate with respect to (see
-            `parameter_names`), of other `args` those of their leaves; all of them unless given,
-            none for ().
-        section: `MidStance()` unless given, `HeelStrike()` for a rigid walker.
-        footsteps: how many a cycle has, the fewest unless given.
-        system: the walker unless given.
-        solver: a name (see `SOLVERS`) or any diffrax solver that estimates its errors; unless
-            given "rodas4", for a rigid walker "rodas5p".
-        max_time: longest time to an arrival [s].
-        max_solver_steps: cap on the attempted steps to an arrival.
-        engine: "xla", "lanes" or "auto" (see `ENGINES`), which here is "xla" for a system of your
-            own.
+            `parameter_names`), or of the leaves of other `args`. Default: all; () for none.
+        section: section to arrive at. Default: `MidStance()`; for a rigid walker `HeelStrike()`.
+        footsteps: number of footsteps of a cycle. Default: the smallest possible number.
+        system: another system, an `AbstractSystem`. Default: the walker.
+        solver: a name (see `SOLVERS`) or any diffrax solver that estimates its errors. Default:
+            "rodas4"; for a rigid walker "rodas5p".
+        max_time: maximum time to an arrival [s].
+        max_solver_steps: maximum number of attempted steps to an arrival.
+        engine: "xla", "lanes" or "auto" (see `ENGINES`); for a system of your own, "auto" is "xla".
 
     Returns:
-        The state that returns, period, advance and largest load with their derivatives, those with
-        respect to a parameter in units of its size.
+        The returning state, period, advance and largest load, with their derivatives; those with
+        respect to a parameter are in units of its size.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.

@@ -25,21 +25,21 @@ if TYPE_CHECKING:
 def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) -> "xarray.Dataset":
     """States, foot forces, penetrations and energies along a trajectory, labelled, in SI units.
 
-    Variables have the dimension `time` [s]; forces and penetrations also `foot`, by the names of
-    the feet, with that of its `leg`. Attributes hold how the motion ended and every parameter of
-    the scene, with their units in `parameter_units` (JSON). Write it with `to_netcdf` (or
-    `to_zarr`, with zarr installed).
+    Variables have the dimension `time` [s]. Forces and penetrations also have `foot`, with the
+    names of the feet; the coordinate `leg` names the leg of each. Attributes hold the outcome and
+    every parameter of the scene, with units in `parameter_units` (JSON). Write the dataset with
+    `to_netcdf` (or `to_zarr` if zarr is installed).
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion; only one, not a batch.
+        scene: the scene that was simulated.
+        trajectory: one motion, not a batch.
 
     Returns:
-        The dataset, one entry along `time` for each time saved.
+        The dataset, with one entry along `time` for each saved time.
 
     Raises:
-        ArgumentError: a rigid walker's scene.
-        ValueError: a batch of trajectories.
+        ArgumentError: the scene is that of a rigid walker.
+        ValueError: the trajectory is a batch.
     """
     import xarray
 

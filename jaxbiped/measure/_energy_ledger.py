@@ -60,24 +60,24 @@ class EnergyLedger(NamedTuple):
 def energy_ledger(
     scene: Scene, trajectory: Trajectory, times: np.ndarray | None = None
 ) -> EnergyLedger:
-    """The energy ledger of a trajectory: gravity's work and where it went, between times.
+    """The energy ledger of a trajectory: gravity's work, and where this energy goes.
 
-    Energies are functions of the state; the works of the contact are integrals of its powers
+    Energies are functions of the state. The work of contact forces is the integral of their power
     over the continuous solution.
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion, saved step by step.
-        times: between which the books are closed, increasing [s], shape (n + 1,); the trajectory's
-            first and last unless given.
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved.
+        times: increasing times [s], shape (n + 1,), that bound the intervals. Default: the first
+            and the last of the trajectory.
 
     Returns:
-        The ledger of every interval [J], leaves of shape (n,); n = 1 unless `times` are given.
+        The ledger of every interval [J], with leaves of shape (n,); n = 1 if `times` is omitted.
 
     Raises:
-        ArgumentError: times that do not increase, or a rigid walker's scene, which has
-            `jaxbiped.measure.rigid_ledger`.
-        ValueError: a trajectory without its continuous solution, or a batch of them.
+        ArgumentError: the times do not increase, or the scene is that of a rigid walker (see
+            `jaxbiped.measure.rigid_ledger`).
+        ValueError: the trajectory has no continuous solution, or is a batch.
 
     Examples:
         >>> import jaxbiped as jb

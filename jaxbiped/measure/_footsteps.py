@@ -110,15 +110,15 @@ def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
     All feet of a leg are one: a toe that follows its heel is no strike.
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion, saved step by step.
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved.
 
     Returns:
         Time [s] and leg of all n heel strikes, leaves of shape (n,).
 
     Raises:
-        ArgumentError: a rigid walker's scene, whose walk keeps its heel strikes itself.
-        ValueError: a trajectory without its continuous solution, or a batch of them.
+        ArgumentError: the scene is that of a rigid walker, whose trajectory holds its heel strikes.
+        ValueError: the trajectory has no continuous solution, or is a batch.
     """
     check_type("scene", scene, Scene, RedundantScene)
     check_scene_of(trajectory, scene)
@@ -146,18 +146,19 @@ def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
 
 
 def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
-    """Every footstep that a trajectory completes; none gives leaves of shape (0,).
+    """Measures of every footstep that a trajectory completes.
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion, saved step by step.
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved.
 
     Returns:
-        The measures of all n footsteps (SI units, named in the fields), leaves of shape (n,).
+        The measures of all n footsteps, with leaves of shape (n,), also for n = 0; the names of the
+            fields contain the units.
 
     Raises:
-        ArgumentError: a rigid walker's scene, whose walk keeps its heel strikes itself.
-        ValueError: a trajectory without its continuous solution, or a batch of them.
+        ArgumentError: the scene is that of a rigid walker, whose trajectory holds its heel strikes.
+        ValueError: the trajectory has no continuous solution, or is a batch.
 
     Examples:
         >>> import jaxbiped as jb

@@ -71,19 +71,19 @@ _OF_STEPS = (
 
 
 class Simulation(eqx.Module):
-    """A checked request to simulate. `prepare` it, then `compile` it to run it apart from that.
+    """A checked request for a simulation: `prepare` makes it, `compile` compiles it.
 
     Attributes:
-        scene, state, duration, rtol, atol, dt, solver, adjoint: as in `simulate`, checked, all of
-            one precision.
+        scene, state, duration, rtol, atol, dt, solver, adjoint: as in `simulate`, checked and
+            converted to one precision.
         footsteps, watch, max_solver_steps, section, max_arrivals, extremes: as in `simulate`.
-        correction: how a redundant start was put on its constraints, or None.
-        times: at which to save [s], shape (n,), or None.
+        correction: how a redundant start was moved onto its constraints, or None.
+        times: times at which to save [s], shape (n,), or None.
         save_steps: whether every step is saved.
         units: scale of each leaf of the state, in which `atol` is measured.
-        finest_tolerance: finest relative tolerance to which its error is refined.
+        finest_tolerance: finest relative tolerance that is tried to meet a requested error.
         engine: "xla", "lanes" or "cuda".
-        replaceable: whether XLA may take over from lanes.
+        replaceable: whether XLA may replace the lanes engine.
     """
 
     finest_tolerance: ClassVar[float] = 1e-12
@@ -110,7 +110,7 @@ class Simulation(eqx.Module):
 
     @staticmethod
     def prepare(scene: Scene | RedundantScene, state: PyTree, **options: Any) -> "Simulation":
-        """Checks the arguments, which are those of `simulate`, the accuracy by name."""
+        """Checks the arguments, which are those of `simulate`; an accuracy must be a name."""
         return Simulation.of(scene, state, Options(**options))
 
     @staticmethod
@@ -200,7 +200,7 @@ class Simulation(eqx.Module):
         return dataclasses.replace(walk, scene_key=scene_key(self.scene))
 
     def at_tolerance(self, rtol: float) -> "Simulation":
-        """The same at another relative tolerance, the absolute one in proportion."""
+        """The same at another relative tolerance; the absolute one changes in proportion."""
         share = float(self.atol) / float(self.rtol)
         both = (jnp.asarray(np.asarray(x, self.rtol.dtype)) for x in (rtol, share * rtol))
         return eqx.tree_at(lambda run: (run.rtol, run.atol), self, tuple(both))
@@ -228,7 +228,7 @@ class Simulation(eqx.Module):
         return None if hindered else request
 
     def compile(self) -> "CompiledSimulation":
-        """Compiles the solve, so that its run can be timed by itself."""
+        """Compiles the solve, so its run can be timed by itself."""
         if (request := self.lane_request()) is not None:
             return CompiledSimulation(prepare_lanes(self, request), self)
         return CompiledSimulation(by_xla.lower(self).compile(), self)

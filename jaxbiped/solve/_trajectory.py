@@ -50,31 +50,33 @@ class Arrivals(NamedTuple, Generic[SomeState]):
 
 
 class Trajectory(eqx.Module, Generic[SomeState]):
-    """A simulated motion and how it ended. Under `vmap` every leaf gains the batch's axes.
+    """A simulated motion and its outcome. Under `vmap`, every leaf gains the axes of the batch.
 
     Attributes:
-        t: times that were saved [s], shape (n,).
-        state: states at those times, leaves of shape (n,): those of a `State`, or of a bristle,
-            redundant, rigid or linkage state, as it began.
+        t: saved times [s], shape (n,).
+        state: states at those times, with leaves of shape (n,), of the same type as the start: a
+            `State`, or a bristle, redundant, rigid or linkage state.
         ending: code of an `Ending`; `Ending(int(code))` names it.
         accepted, rejected: numbers of the solver's steps.
-        dense: the continuous solution, where all steps were saved.
-        arrivals: at a section, where these were asked for; of a rigid walker its heel strikes,
-            just after them.
-        lowest, highest: extremes over the ends of the steps, where they were asked for.
-        correction: how a redundant start was put on its constraints, a `Consistent`; of a linkage,
-            how far off it was, ‖Φ‖ [m].
-        violation: distance of a linkage from its constraints, ‖Φ‖ at the times saved [m],
-            shape (n,).
-        error: its estimated errors, an `ErrorEstimate` with bars by field; None unless the
-            accuracy was asked for by a number.
-        missed_contacts: how many contacts of a foot lie between two steps of one size, which
-            stepped over them; None where no `dt` was given.
-        grazes: how many times the swing foot of a rigid walker met the ground, or missed it, by
-            less than the tolerance tells: it did not count as a heel strike. None of other models.
-        mode_history: modes of a rigid walker of which more than one can occur, a `ModeHistory`.
-        scene_key: a number that its scene alone has, by which measures and figures refuse another.
-        engine: what computed it, "xla", "lanes" or "cuda".
+        dense: the continuous solution, if all steps were saved.
+        arrivals: arrivals at a section, if requested; for a rigid walker, its heel strikes, just
+            after the impact.
+        lowest, highest: extremes over the ends of the steps, if requested.
+        correction: how a redundant start was moved onto its constraints, a `Consistent`; for a
+            linkage, the violation ‖Φ‖ [m] of the start.
+        violation: distance of a linkage from its constraints, ‖Φ‖ at the saved times [m], shape
+            (n,).
+        error: estimated errors, an `ErrorEstimate` with bars by field; None unless the accuracy was
+            a number.
+        missed_contacts: number of contacts of a foot that steps of fixed size passed over; None if
+            `dt` was not given.
+        grazes: how often the swing foot of a rigid walker reached the ground, or missed it, by less
+            than the tolerance resolves; these events do not count as heel strikes. None for other
+            models.
+        mode_history: the modes of a rigid walker, a `ModeHistory`, if more than one can occur.
+        scene_key: a number that identifies the scene; measures and figures use it to refuse another
+            scene.
+        engine: engine that computed it: "xla", "lanes" or "cuda".
     """
 
     t: Float[Array, "..."]
@@ -100,7 +102,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
 
     @property
     def attempted(self) -> Int[Array, "..."]:
-        """How many steps the solver attempted, accepted or not."""
+        """Number of steps that the solver attempted, accepted or not."""
         found: Array = by_numpy(lambda _, a, b: a + b, self.accepted, self.rejected)
         return found
 
@@ -111,32 +113,33 @@ class Trajectory(eqx.Module, Generic[SomeState]):
 
     @property
     def outcome(self) -> Ending:
-        """How it ended, by name; for one simulation, not a batch."""
+        """The outcome as an `Ending`; for one simulation, not a batch."""
         return Ending(int(self.ending))
 
     @property
     def modes(self) -> tuple[tuple[str, ...], ...]:
-        """What stood and what was held, mode by mode: feet, and stops as "NAME held".
+        """The standing feet, and the held stops as "NAME held", of each mode.
 
-        Of one walk on rigid feet; empty where only one mode can occur.
+        For one walk on rigid feet; empty if only one mode can occur.
         """
         return () if self.mode_history is None else self.mode_history.names
 
     @property
     def mode_durations(self) -> np.ndarray:
-        """How long each of `modes` lasted [s], shape (n,)."""
+        """Duration of each of `modes` [s], shape (n,)."""
         if self.mode_history is None:
             return np.zeros(0)
         return self.mode_history.durations(self.t[-1])
 
     def at(self, t: npt.ArrayLike) -> SomeState:
-        """States at times `t` [s] of any shape, to the order of the solver's dense output.
+        """States at times `t` [s] of any shape, with the order of accuracy of the solver's dense
+        output.
 
-        Under `jit`, `vmap` or derivatives, where it cannot raise, they are NaN outside of the
-        trajectory.
+        Under `jit`, `vmap` or derivatives, states outside of the trajectory are NaN instead of an
+        error.
 
         Raises:
-            ValueError: a time outside of the trajectory; or only the final state or given times
+            ValueError: a time is outside of the trajectory, only the final state or given times
                 were saved, or this is a batch.
         """
         dense = self.require_dense()
@@ -156,7 +159,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
         """The continuous solution of a single trajectory.
 
         Raises:
-            ValueError: it was not saved, or this is a batch.
+            ValueError: the continuous solution was not saved, or this is a batch.
         """
         if self.dense is None:
             raise ValueError(
