@@ -48,18 +48,17 @@ def continue_gait(
 ) -> Branch:
     """Follows a periodic gait along a parameter, in both directions and around folds.
 
-    Pseudo-arclength continuation from the gait at the scene's own value of the parameter (or the
-    nearest within the bounds). Where a multiplier crosses the unit circle between two points, the
-    bifurcation is located by root finding and becomes a point of the branch itself.
+    Pseudo-arclength continuation begins at the gait at the scene's own value of the parameter, or
+    at the nearest value within the bounds. If a multiplier crosses the unit circle between two
+    points, the bifurcation is located by root finding and becomes a point of the branch.
 
     Args:
         scene: the walker, compliant (with bristles or without) or rigid.
         along: the parameter's name (see `parameter_names`).
         bounds: the range (from, to), SI units, at whose ends the branch stops.
-        guess: a gait or a start near the one to follow; the gait that `find_gait` finds unless
-            given.
-        footsteps: how many a cycle has; one of a mirrored walker unless given, of one with unlike
-            legs those of a stride.
+        guess: a gait or a start near the gait to follow. Default: the gait that `find_gait` finds.
+        footsteps: number of footsteps of a cycle. Default: one for a mirrored walker, those of a
+            stride for unequal legs.
         log: whether equal steps are equal factors (if omitted: on if a positive range spans two
             decades).
         largest_step: maximum arclength of a step. In the arclength, the parameter is scaled by the
@@ -72,11 +71,11 @@ def continue_gait(
             default (None) after two seconds, in a terminal, a notebook or a command.
 
     Returns:
-        The branch; without points where no gait was found, its `stops` then tell why. An interrupt
-        (Ctrl-C) ends it as "interrupted", with the points so far. It passes no
-        gait twice: where it comes to one again, it ends as "closed", or as "jumped" where a step
-        led back to it. Between two points that differ in how many multipliers lie outside the unit
-        circle there is always an entry, "not-located" where the bifurcation was not found.
+        The branch. If no gait was found, it has no points, and its `stops` give the reason. An
+        interrupt (Ctrl-C) ends it as "interrupted", with the points so far. The branch contains no
+        gait twice: if it returns to an earlier gait, it ends as "closed", or as "jumped" if a step
+        led back to it. Between two points with different numbers of multipliers outside the unit
+        circle there is always an entry, "not-located" if the bifurcation was not found.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -174,13 +173,13 @@ def resume_branch(
     largest_step: float = 0.02,
     max_points: int = 200,
 ) -> Branch:
-    """Follows a branch on from one of its points; what it had beyond is replaced.
+    """Continues a branch from one of its points; later points are replaced.
 
     Args:
         branch: from `continue_gait` or `open_branch`.
-        at: number of the point, the last unless given.
+        at: number of the point. Default: the last.
         direction: "forward" or "backward" in the order of its points.
-        bounds: another range (from, to), SI units; its own unless given.
+        bounds: another range (from, to), SI units. Default: the branch's own range.
         largest_step: largest arclength of a step (see `continue_gait`).
         max_points: points followed at most.
 
@@ -188,7 +187,7 @@ def resume_branch(
         The branch up to the point, and the gaits beyond it.
 
     Raises:
-        ArgumentError: an argument that is not allowed, or a gait that does not return.
+        ArgumentError: an argument is not allowed, or the gait at the point does not return.
     """
     check_choice("direction", direction, ("forward", "backward"))
     check_positive("largest_step", largest_step)

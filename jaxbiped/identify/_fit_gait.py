@@ -34,30 +34,30 @@ def fit_gait(
     max_evaluations: int = 50,
     progress: bool | None = None,
 ) -> GaitFit:
-    """Finds the parameters under which a scene's gaits are those that were measured.
+    """Finds the parameters with which a scene's gaits match measured ones.
 
-    Weighted least squares by a trust-region method (Branch, Coleman and Li 1999, as SciPy has it)
-    over the logarithms of the parameters; gaits are found from their predecessors' states, and
-    their derivatives are those of `find_gait`, certified by error bars. Errors are taken as
-    independent and normal. Covariance is that of the linearised fit, (Jᵀ J)⁻¹, of all parameters
-    together. Intervals are those of the profile: their ends are followed where standard errors
-    exceed 2 % of the parameters, which tries further scenes.
+    Weighted least squares over the logarithms of the parameters, by SciPy's trust-region method
+    (Branch, Coleman and Li 1999). Each gait is searched from the state of the one before; the
+    derivatives, with their error bars, are those of `find_gait`. Measurement errors are assumed to
+    be independent and normal. The covariance is that of the linearised fit of all parameters, (Jᵀ
+    J)⁻¹. Intervals are profile intervals; if a standard error exceeds 2 % of its parameter, the
+    ends are found with further scenes.
 
     Args:
-        scene: the walker, where the fit begins.
+        scene: the walker, with the parameters at which the fit begins.
         vary: names of the parameters to fit (see `parameter_names`), or their bounds by name (SI).
-        measured: one gait or several, under conditions that are known.
-        guess: a gait, or a state near the one where the fit begins; None to search it.
+        measured: one measured gait or several, under known conditions.
+        guess: a gait, or a state near the gait at which the fit begins; None to search for it.
         accuracy, engine: as for `find_gait`.
         max_evaluations: maximum number of scenes that a descent tries.
         progress: whether to show on stderr what is being done, how far it is and what was found; by
             default (None) after two seconds, in a terminal, a notebook or a command.
 
     Returns:
-        Estimates with standard errors, which parameters the data do not tell, and which are at
-        their bounds. An interrupt ends the fit early with the best estimates so far. A
-        `RuntimeWarning` says if the model does not fit: chi squared would be so large in fewer than
-        1 of 1,000 cases.
+        Estimates with standard errors, and the names of parameters that the data do not determine
+        or that are at their bounds. An interrupt ends the fit early, with the best estimates so
+        far. A `RuntimeWarning` is issued if the model does not fit: if chi squared would be so
+        large in fewer than 1 of 1,000 cases.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.

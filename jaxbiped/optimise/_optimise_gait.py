@@ -73,48 +73,47 @@ def optimise_gait(
 ) -> Optimum:
     """Finds the parameters within bounds whose periodic gait is best.
 
-    The gait of every design is found anew, from where the last one's derivatives point; gradients
-    are exact, by the implicit function theorem. A design without a gait, or one whose gait is no
-    walk, turns the search back.
+    The search for the gait of each design starts from a prediction with the derivatives of the
+    previous gait. Gradients are exact, by the implicit function theorem. If a design has no gait,
+    or its gait is not a walk, the step is shortened.
 
     Args:
         scene: the walker to begin from; a parameter outside its bounds is moved onto them.
         vary: bounds (low, high) by the name of each parameter (see `parameter_names`), SI units.
-            Positive ones are varied by their logarithm.
-        maximise, minimise: one of the two: a measure of the gait by name (see `OBJECTIVES`), or
-            weights of several.
-        subject_to: bounds (low, high) by measure, None for no bound and equal ones for an equality;
-            or words, "spectral_radius<0.4", one or a sequence of them.
-        guess: a gait or a start near the gait of the design to begin from; the gait that
-            `find_gait` finds unless given.
-        optimiser: "trust-region", "slsqp", "trust-constr"; or without requirements "optax" (Adam in
-            logits of u) or any optax transformation.
-        iterations: most of the optimiser, of each run.
-        restarts: further runs, from the best of 8 times as many designs scattered over the bounds,
-            whose gaits are sought as one batch.
+            Positive parameters are varied through their logarithm.
+        maximise, minimise: give one of the two: the name of a measure of the gait (see
+            `OBJECTIVES`), or weights of several by name.
+        subject_to: bounds (low, high) by measure, with None for no bound and equal bounds for an
+            equality; or requirements as text, such as "spectral_radius<0.4", one or several.
+        guess: a gait or a start near the gait of the first design. Default: the gait that
+            `find_gait` finds.
+        optimiser: "trust-region", "slsqp" or "trust-constr"; without requirements, also "optax"
+            (Adam in the logits of the bounds) or any optax transformation.
+        iterations: maximum number of iterations of each run.
+        restarts: number of further runs, from the best of 8 times as many designs scattered over
+            the bounds, whose gaits are found as one batch.
         scatter: relative half-widths by parameter; every design is then an ensemble whose members
             differ by factors within these, and measures are taken over all members.
-        members: how many are sampled.
-        criterion: "mean" for the sample's mean, "worst" for the worst case of each measure over
-            the whole box: the sample, up to 64 corners, and what a search comes upon about the
-            best design, which is then optimised anew.
-        seed: of scattered designs and of members.
-        footsteps: how many a cycle has; one of a mirrored walker unless given, of one with unlike
-            legs those of a stride.
+        members: number of sampled members.
+        criterion: "mean" for the sample's mean; "worst" for the worst case of each measure over the
+            whole box: over the sample, up to 64 corners, and points that a search around the best
+            design finds, after which the design is optimised again.
+        seed: random seed of scattered designs and of members.
+        footsteps: number of footsteps of a cycle. Default: one for a mirrored walker, those of a
+            stride for unequal legs.
         accuracy: "balanced" or "tight".
         engine: as for `find_gait`.
         progress: whether to show on stderr what is being done, how far it is and what was found; by
             default (None) after two seconds, in a terminal, a notebook or a command.
-        store: file that keeps every evaluation, from which the same call continues. It serves any
-            call for the same measures of the same designs, also with another optimiser or other
-            bounds of these measures.
+        store: file that keeps every evaluation, from which the same call continues. It also serves
+            calls with another optimiser or with other bounds on the same measures.
 
     Returns:
-        The best design, its gait, and how good it is: see `certify` for more.
+        The best design, its gait and its measures; `certify` tests it further.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled; or a design to
-            begin from that has no gait.
+        ArgumentError: an argument is not allowed (raised before anything is compiled); or the first
+            design has no gait.
 
     Examples:
         >>> import jaxbiped as jb
@@ -223,18 +222,18 @@ def _problem_settings(
 
 
 class ParetoFront(NamedTuple):
-    """Best values of one measure under bounds of another, n points.
+    """Best values of one measure under n bounds on another.
 
     Attributes:
-        bounds: of the other measure, in the order they were asked for, shape (n,).
-        optima: at each of them.
+        bounds: bounds on the other measure, in the given order, shape (n,).
+        optima: the optimum for each bound.
     """
 
     bounds: np.ndarray
     optima: tuple[Optimum, ...]
 
     def values(self, name: str) -> np.ndarray:
-        """A measure along the front, shape (n,)."""
+        """Values of a measure along the front, shape (n,)."""
         return np.asarray([each.known.values[name] for each in self.optima])
 
 
@@ -250,19 +249,19 @@ def pareto_front(
     subject_to: SubjectTo = None,
     **options: Any,
 ) -> ParetoFront:
-    """The trade between two measures: the best of one under each of several bounds of the other.
+    """The trade-off between two measures: the best of one under several bounds on the other.
 
-    Each optimum is where the next search begins, so give the bounds in order.
+    Each search begins at the previous optimum, so give the bounds in order.
 
     Args:
         scene: the walker to begin from.
         vary: as for `optimise_gait`.
         against: the other measure.
-        bounds: of it, shape (n,).
+        bounds: bounds on the other measure, shape (n,).
         upper: whether they are upper bounds.
         maximise, minimise: as for `optimise_gait`.
-        subject_to: what else must hold.
-        options: others of `optimise_gait`; a `store` keeps the evaluations of all points.
+        subject_to: further requirements.
+        options: other options of `optimise_gait`; a `store` keeps the evaluations of all points.
 
     Returns:
         The front.

@@ -45,24 +45,24 @@ _SHARE = 0.7
 
 
 class Attractor(NamedTuple):
-    """A stable gait of a scene, its state without `ROOT_x` having m components.
+    """A stable gait of a scene; its state without `ROOT_x` has m components.
 
     Attributes:
-        cycle_footsteps: footsteps in its cycle.
-        duration: of the cycle [s].
+        cycle_footsteps: number of footsteps of its cycle.
+        duration: duration of the cycle [s].
         step_length: advance along the slope in a cycle [m].
-        state: on the section, a `State` or `RigidState` of numbers.
+        state: state on the section, a `State` or `RigidState` of numbers.
         multipliers: Floquet multipliers, largest first, shape (m − 1,).
-        metric: W, shape (m − 1, m): |W (x − x*)| falls by the `contraction` in a cycle near it.
-        contraction: of that distance, below 1.
-        radius: distance within which every start is taken to converge: all of a sample on shells
-            up to there came nearer (see `with_radius`). Negative where it was not measured, or none
-            did.
-        model: B, shape (m − 1, m − 1): W (x − x*) is B times that after a cycle, to first order.
+        metric: W, shape (m − 1, m): near the gait, |W (x − x*)| falls by the factor `contraction`
+            in a cycle.
+        contraction: factor by which that distance falls, below 1.
+        radius: distance within which every start is taken to converge, because a whole sample of
+            starts on shells up to there came nearer (see `with_radius`). Negative if it was not
+            measured, or if none came nearer.
+        model: B, shape (m − 1, m − 1): to first order, a cycle multiplies W (x − x*) by B.
         slowest: ℓ, shape (2, m): |ℓ (x − x*)| is the offset along the leading multiplier's
             direction, in the metric.
-        crossings: its states on the section, those of the other footsteps as well, shape
-            (cycle_footsteps, m).
+        crossings: states on the section at every footstep of the cycle, shape (cycle_footsteps, m).
     """
 
     cycle_footsteps: int
@@ -88,7 +88,7 @@ class Attractor(NamedTuple):
         return (self.point, self.metric, self.model, self.slowest, self.contraction, self.radius)
 
     def distance(self, states: np.ndarray) -> np.ndarray:
-        """Of states on the section without `ROOT_x`, shape (n, m), in the metric; shape (n,)."""
+        """Distance in the metric, (n,), of states on the section without `ROOT_x`, (n, m)."""
         return np.linalg.norm((states - self.point) @ self.metric.T, axis=1)
 
 

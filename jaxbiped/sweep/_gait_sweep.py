@@ -56,35 +56,36 @@ def gait_sweep(
 ) -> "xarray.Dataset":
     """Finds the periodic gait at every point of a grid over scene parameters.
 
-    The search begins at the point nearest to the scene's own parameters, without a guess, and goes
-    outwards, each point from where its neighbours' gaits point to, so that one branch is followed.
-    Where that leads to no stable gait, Newton's method begins from neighbours; then the point is
-    searched without a guess, and stable gaits that this finds lead on to their neighbours'.
+    The search begins without a guess at the point nearest to the scene's own parameters, and
+    proceeds outwards. Each point starts from an extrapolation of its neighbours' gaits, so one
+    branch is followed. If that gives no stable gait, Newton's method starts from the neighbours,
+    and then the point is searched without a guess; a stable gait that this finds is followed to the
+    neighbours.
 
-    By lanes a grid of 64 points or more is searched in waves, all points of a wave at once: a
-    coarse lattice from its middle outwards, then each finer one from interpolated states. Points of
-    the finer lattices are searched without a guess only where there is no gait.
+    With the lanes engine, a grid of 64 points or more is searched in waves, all points of a wave at
+    once: first a coarse lattice from its middle outwards, then finer ones from interpolated states.
+    Points of the finer lattices are searched without a guess only if no gait was found.
 
     Args:
-        scene: the walker; parameters that are not swept keep its values.
-        over: values of each swept parameter by name (see `parameter_names`), shape (k,) each.
+        scene: the walker; parameters that are not swept keep their values.
+        over: values of each swept parameter by name (see `parameter_names`), arrays of shape (k,).
         parameters, footsteps, accuracy, radius_sensitivities, engine: as for `find_gait`.
-        store: directory or address of a Zarr store (see `sweep`); in memory unless given. A run
-            that was killed continues where it was.
+        store: directory or address of a Zarr store (see `sweep`), from which an interrupted run
+            continues. Default: in memory.
         progress: whether to show on stderr what is being done, how far it is and what was found; by
             default (None) after two seconds, in a terminal, a notebook or a command.
         any_version: whether to continue a store that another version of jaxbiped wrote.
 
     Returns:
-        A dataset along the swept parameters, SI units: the measures, `state_…`, multipliers,
-        `sensitivity_…` and their errors along `parameter`, `ending`, `found_by` and `branch_end`
-        (codes, whose names are in the attributes), and `grazes`, see `Gait`; NaN where there is no
-        gait. A `RuntimeWarning` tells where gaits graze a switch.
+        A dataset along the swept parameters, in SI units: the measures, `state_…`, multipliers,
+        `sensitivity_…` with errors along `parameter`, `ending`, `found_by` and `branch_end` (codes,
+        with names in the attributes), and `grazes` (see `Gait`). NaN where no gait was found. A
+        `RuntimeWarning` is issued if gaits graze a switch.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled; a store of
-            other settings, or one that may not be written.
-        ResourceError: a full disk. What is in the store stays.
+        ArgumentError: an argument is not allowed (raised before anything is compiled); or the store
+            has other settings or cannot be written.
+        ResourceError: the disk is full. The contents of the store are kept.
     """
     scene = check_scene(scene, Scene, RigidScene, RedundantScene)
     values = _check_values(scene, over)

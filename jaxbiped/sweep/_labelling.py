@@ -101,11 +101,11 @@ def _differ(one: Labelled, another: Labelled) -> np.ndarray:
 
 
 class Labelling(eqx.Module):
-    """How starts are labelled. Call it with many of them; `labelling` makes one.
+    """A function from starts to labels, made by `labelling`. Call it with many starts at once.
 
     Attributes:
         scene: the walker.
-        family: its gaits, for every value of the scene's parameters that the starts differ in.
+        family: the gaits, for every value of the scene parameters in which the starts differ.
         effort: how far and how accurately starts are followed.
     """
 
@@ -162,9 +162,10 @@ class Labelling(eqx.Module):
         return found._replace(label=np.where(repeats, np.int8(Label.WALKING), found.label))
 
     def base(self, parameters: Mapping[str, np.ndarray], count: int) -> PyTree:
-        """For n starts with these parameters, the gait's state: what they do not name themselves.
+        """The gait's state for n starts with these parameters, for coordinates that the starts do
+        not name.
 
-        Where there is no gait it is that of the nearest combination that has one.
+        If a combination has no gait, the state is that of the nearest one that has.
         """
         states = self.family.states
         if not self.family.names:
@@ -175,7 +176,7 @@ class Labelling(eqx.Module):
         return type(states[0])(*[leaf[rows] for leaf in leaves])
 
     def settings(self) -> JsonObject:
-        """Everything that the labels depend on, ready for JSON."""
+        """Everything on which the labels depend, ready for JSON."""
         own = scene_identity(self.scene)
         effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
         # All engines give the same labels.

@@ -57,27 +57,28 @@ class Start(NamedTuple):
 
 
 class Labelled(NamedTuple):
-    """What became of n starts: NumPy's arrays of shape (n,).
+    """Labels of n starts, with what led to them: NumPy arrays of shape (n,).
 
     Attributes:
         label: code of a `Label`.
-        gait: the gait that it converges to, by its position in `Family.cycles`; −1 for none.
-        cycle_footsteps: footsteps in that gait's cycle. Where the label is "unresolved" it is that
-            of a cycle which the last footsteps repeated, of a gait that is not among the
+        gait: position in `Family.cycles` of the gait that it converges to; −1 for none.
+        cycle_footsteps: number of footsteps of that gait's cycle. If the label is "unresolved",
+            that of a cycle that the last footsteps repeated, of a gait that is not among the
             attractors.
-        footsteps: heel strikes until the label was certain.
-        time: simulated until then [s].
-        distance: walked along the slope until then [m].
-        rate: share of the distance from the gait that is left after a footstep, over the last
-            cycle; NaN without a cycle, and where nothing but rounding is left of the distance.
-        closest: smallest distance from any of the gaits, in its metric; infinite without arrival.
-        attempted: how many steps the solver attempted; of all its solves, where there were more.
-        final: last states on the section without `ROOT_x`, shape (n, m); infinite without arrival.
-        doubt, disagreed, changed: where the accuracy was asked for by a number, codes of `Doubt`,
-            sums of codes of `Witness`, and whether finer tolerances gave another label than the
-            first; else None.
-        grazes: steps in which a foot touches the ground or misses it by less than the tolerance
-            resolves, where the accuracy was asked for by a number and the walker is compliant.
+        footsteps: number of heel strikes until the label was certain.
+        time: simulated time until then [s].
+        distance: distance walked along the slope until then [m].
+        rate: factor by which the distance from the gait changes per footstep, over the last cycle;
+            NaN without a cycle, or if the distance is only rounding.
+        closest: smallest distance from any of the gaits, in its metric; infinite without an
+            arrival.
+        attempted: number of steps that the solver attempted, in all solves of the start.
+        final: last states on the section without `ROOT_x`, shape (n, m); infinite without an
+            arrival.
+        doubt, disagreed, changed: if the accuracy was a number, codes of `Doubt`, sums of codes of
+            `Witness`, and whether finer tolerances changed the label; otherwise None.
+        grazes: number of steps in which a foot touches the ground or misses it by less than the
+            tolerance resolves, if the accuracy was a number and the walker is compliant.
     """
 
     label: np.ndarray

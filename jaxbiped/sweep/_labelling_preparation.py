@@ -53,27 +53,28 @@ def labelling(
     max_solver_steps: int = 65536,
     engine: str = "auto",
 ) -> Labelling:
-    """A labelling of starts that knows the scene's gait.
+    """Finds the scene's gait and returns a labelling of starts.
 
     Args:
         scene: the walker, compliant or rigid.
-        parameters: values of scene parameters for every combination of which the gait is sought.
-        guess: where the search begins; the seed's start unless given.
-        footsteps: after which a start that is not certain is "unresolved".
-        accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`). Or a number, the share of the
-            labels that may be wrong: each start is then solved at a looser tolerance and by a
-            second method as well, and where the labels differ again at finer tolerances until they
-            agree. Starts whose label remains in doubt are flagged (`Labelled.doubt`); `sweep`
-            estimates how many of the others are wrong, and tightens until it is the number.
-        rtol: relative tolerance, in place of the accuracy's; the absolute one is a hundredth.
-        solver: of the compliant walker, "rodas3p" to "rodas5p".
-        max_solver_steps: cap on a start's attempted steps.
-        engine: "lanes", "cuda", "xla" or "auto" (see `ENGINES`). All give the same labels, but for
-            starts nearer to a boundary than the tolerance.
+        parameters: values of scene parameters by name; the gait is found for every combination.
+        guess: start of the search for the gait. Default: the seed's start.
+        footsteps: maximum number of footsteps; a start that is still uncertain after them is
+            "unresolved".
+        accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`). Or a number, the fraction of
+            the labels that may be wrong: each start is then also solved at a looser tolerance and
+            with a second method, and if the labels differ, at finer tolerances until they agree.
+            Starts whose label remains in doubt are flagged (`Labelled.doubt`). `sweep` estimates
+            how many of the others are wrong, and tightens the tolerance until the number is met.
+        rtol: relative tolerance, instead of an accuracy; the absolute one is a hundredth of it.
+        solver: solver for a compliant walker, "rodas3p" to "rodas5p".
+        max_solver_steps: maximum number of attempted steps for a start.
+        engine: "lanes", "cuda", "xla" or "auto" (see `ENGINES`). All give the same labels, except
+            for starts that are nearer to a boundary than the tolerance.
 
     Returns:
-        A `Labelling`: call it with starts, or give it to `sweep`, `label_at` or `nearest_failure`.
-        A `RuntimeWarning` says where no stable gait was found.
+        A `Labelling`: call it with starts, or pass it to `sweep`, `label_at` or `nearest_failure`.
+        A `RuntimeWarning` is issued if no stable gait was found.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -160,18 +161,18 @@ def _share_wanted(accuracy: str | float, rtol: float | None) -> float | None:
 
 
 def with_gaits_met(labelling: Labelling, starts: AbstractStarts, *, count: int = 512) -> Labelling:
-    """The labelling that also knows the gaits that some of the starts converge to.
+    """The labelling, extended by further gaits to which some of the starts converge.
 
-    As many starts, evenly spread, are followed; where their last footsteps repeat a cycle, a gait
-    is sought from there.
+    Some starts, evenly spread, are followed. If their last footsteps repeat a cycle, a gait is
+    searched from there.
 
     Args:
-        labelling: to which the gaits are added.
+        labelling: the labelling to extend.
         starts: a `grid`, a `sample` or `GivenStarts`.
-        count: how many of the starts are followed, at most.
+        count: maximum number of starts to follow.
 
     Returns:
-        Another labelling, of the same scene; the one given where no other gait was found.
+        A new labelling of the same scene; the given one if no other gait was found.
 
     Raises:
         ArgumentError: count below 1.
@@ -229,17 +230,17 @@ def label_at(
     """The labelling as a function of points, for the analyses in `jaxbiped.basins`.
 
     Args:
-        labelling: see there.
-        names: of the points' coordinates (see `coordinate_names`), d of them.
-        failing: whether to tell only walking (0) from all else (1).
+        labelling: a `Labelling`.
+        names: names of the d coordinates of points (see `coordinate_names`).
+        failing: whether to distinguish only walking (0) from everything else (1).
         place, follow, base: as in `grid`.
 
     Returns:
-        A function of points, shape (n, d), to codes of `Label`, shape (n,). Where the labelling's
-        accuracy is a number, labels that remain in doubt are told by a `RuntimeWarning`.
+        A function from points, shape (n, d), to codes of `Label`, shape (n,). If the labelling's
+        accuracy is a number, a `RuntimeWarning` reports labels that remain in doubt.
 
     Raises:
-        ArgumentError: an unknown coordinate; points of another number of coordinates.
+        ArgumentError: a coordinate is unknown, or points have another number of coordinates.
     """
     check_type("labelling", labelling, Labelling)
     check_coordinates(labelling.scene, names)

@@ -35,28 +35,29 @@ def nearest_failure(
     tolerance: float = 1e-5,
     **options: Any,
 ) -> FatalShock:
-    """The smallest push off the first gait, on its section, after which a start fails.
+    """The smallest push away from the first gait, on its section, after which the walk fails.
 
-    On rigid feet a push keeps what is held, and passes no stop.
+    On rigid feet, a push leaves held stops held, and moves no angle beyond a stop.
 
-    Coordinates are all of the state's but `ROOT_x`, in the order of its leaves, m of them;
-    distances are measured in their scales (`Family.scales`: angles 1 rad, velocities √(g l), rates
-    √(g/l), the root point's height the stance foot's penetration). Any label but walking is a
-    failure.
+    The coordinates are all m leaves of the state except `ROOT_x`, in their order. Distances are
+    measured in the scales `Family.scales`: 1 rad for angles, √(g l) for velocities, √(g/l) for
+    rates, and the stance foot's penetration for the height of the root point. Every label except
+    walking is a failure.
 
     Args:
-        labelling: one that knows a gait.
-        gradients: whether rays are rotated to the boundary's normal by the simulator's derivatives,
-            or by differences of the distances along nearby rays.
-        max_distance: distance up to which to look.
-        tolerance: of the distance.
-        options: others of `minimal_fatal_shock`.
+        labelling: a labelling that has a gait.
+        gradients: whether rays are rotated to the boundary's normal with the simulator's
+            derivatives, instead of differences of the distances along nearby rays.
+        max_distance: maximum distance of the search.
+        tolerance: tolerance of the distance.
+        options: other options of `minimal_fatal_shock`.
 
     Returns:
         The push to the nearest failing start, and its distance in the scales above.
 
     Raises:
-        ArgumentError: no gait is known, or an argument of `minimal_fatal_shock` is not allowed.
+        ArgumentError: the labelling has no gait, or an argument of `minimal_fatal_shock` is not
+            allowed.
     """
     check_type("labelling", labelling, Labelling)
     family = labelling.family

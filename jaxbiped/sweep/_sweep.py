@@ -65,38 +65,38 @@ def sweep(
 ) -> "xarray.Dataset":
     """Labels all starts.
 
-    Gaits that some of the starts converge to are sought first, so that every start is compared
-    with the same ones; what is unresolved in the end but repeats a cycle leads to more of them. No
-    label depends on the chunks or on their order. With a store, memory is bounded by the chunks in
-    hand; a run that was killed continues where it was.
+    Gaits to which some of the starts converge are searched first, so every start is compared with
+    the same gaits. After the sweep, starts that are still unresolved but repeat a cycle are used to
+    search for further gaits. No label depends on the chunks or on their order. With a store, only
+    the chunks in progress are in memory, and an interrupted run continues from the store.
 
     Args:
-        labelling: see there.
+        labelling: how to label starts, see `labelling`.
         starts: a `grid`, a `sample`, or `GivenStarts`.
         store: directory of a Zarr store, for `xarray.open_zarr`, or an address such as
-            "s3://bucket/basin.zarr" (with `jaxbiped[s3]`); in memory unless given.
+            "s3://bucket/basin.zarr" (with `jaxbiped[s3]`). Default: in memory.
         chunk: maximum number of starts that are labelled and written at once.
-        executor: what runs the chunks, any of `concurrent.futures`' kind, such as
-            `distributed.Client(...).get_executor()`; this process unless given.
-        workers: how many chunks the executor runs at once.
-        look_for_gaits: whether to look for gaits besides those of the labelling.
+        executor: executor of the chunks, of the kind of `concurrent.futures`, such as
+            `distributed.Client(...).get_executor()`. Default: this process.
+        workers: number of chunks that the executor runs at once.
+        look_for_gaits: whether to search for gaits other than those of the labelling.
         progress: whether to show on stderr what is being done, how far it is and what was found; by
             default (None) after two seconds, in a terminal, a notebook or a command.
         any_version: whether to continue a store that another version or revision of jaxbiped
             wrote, or one made with laws of yours whose code has changed since.
 
     Returns:
-        A dataset with the labels and all else of `Labelled`, along the axes of the starts.
-        Its attributes say scene, tolerances, gaits, versions and revision. Where the accuracy was
-        asked for by a number it also tells which labels were and remain in doubt (`doubt`, codes of
-        `jb.basins.Doubt`), and `jb.basins.label_errors` how many were labelled anew, and what share
-        of the others is estimated to be wrong; a `RuntimeWarning` tells where that is more than the
-        number.
+        A dataset with the fields of `Labelled` along the axes of the starts. Its attributes have
+        the scene, tolerances, gaits, versions and revision. If the accuracy was a number, the
+        dataset also records which labels were, or remain, in doubt (`doubt`, codes of
+        `jb.basins.Doubt`); `jb.basins.label_errors` reports how many starts were labelled again and
+        the estimated fraction of the others that is wrong. A `RuntimeWarning` is issued if that
+        exceeds the number.
 
     Raises:
-        ArgumentError: an argument that is not allowed; a store of other settings or another
-            version, or one that may not be written.
-        ResourceError: a full disk, or workers that were lost. What is in the store stays.
+        ArgumentError: an argument is not allowed; or the store has other settings or another
+            version, or cannot be written.
+        ResourceError: the disk is full, or workers were lost. The contents of the store are kept.
     """
     check_type("labelling", labelling, Labelling)
     check_type("starts", starts, AbstractStarts)

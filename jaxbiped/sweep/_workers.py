@@ -35,17 +35,17 @@ _AHEAD = 2
 
 
 def cluster_executor(address: str, *, timeout: float = 10.0) -> tuple[Executor, int]:
-    """An executor of a dask.distributed cluster, and how many chunks it runs at once.
+    """An executor of a dask.distributed cluster, and the number of chunks that it runs at once.
 
     Args:
-        address: of the scheduler, such as "tcp://10.0.0.1:8786".
-        timeout: how long to wait for it [s].
+        address: address of the scheduler, such as "tcp://10.0.0.1:8786".
+        timeout: time to wait for the scheduler [s].
 
     Returns:
-        The executor and the number of the workers' threads. `shutdown` ends neither of them.
+        The executor and the number of the workers' threads. `shutdown` does not end the workers.
 
     Raises:
-        ArgumentError: no scheduler answers at this address.
+        ArgumentError: no scheduler answers at the address.
         ResourceError: the package distributed is missing, or the scheduler has no workers.
     """
     check_positive("timeout", timeout, "s")
@@ -76,7 +76,7 @@ def local_executor(workers: int) -> ProcessPoolExecutor:
     """An executor of spawned processes, each with its share of this process's threads.
 
     Args:
-        workers: how many processes, at least 1.
+        workers: number of processes, at least 1.
 
     Returns:
         The executor; `shutdown` ends the processes.
