@@ -45,7 +45,7 @@ class LabelErrors(NamedTuple):
 
     @property
     def fewest(self) -> int:
-        """How many starts it takes to tell that accuracy, where not one label is doubted."""
+        """Smallest number of starts that can confirm that accuracy, if no label is in doubt."""
         return math.ceil(_upper_end(0.0, 0.0) / self.wanted)
 
     def numbers(self) -> JsonObject:
@@ -53,17 +53,17 @@ class LabelErrors(NamedTuple):
         return self._asdict()
 
     def sentence(self) -> str:
-        """For people."""
+        """The errors in one sentence."""
         told = (
             f"{self.relabelled} of {self.starts} labels were in doubt at a tolerance of "
-            f"{self.rtol:.1e} and found anew, {self.changed} of them changed and {self.in_doubt} "
-            f"remain in doubt; of the others a share of {self.wrong:.1e} (up to "
-            f"{self.wrong_high:.1e}) is estimated to be wrong"
+            f"{self.rtol:.1e} and labelled again; {self.changed} of them changed and "
+            f"{self.in_doubt} remain in doubt; of the others, a fraction of {self.wrong:.1e} "
+            f"(up to {self.wrong_high:.1e}) is estimated to be wrong"
         )
         if self.met:
             return f"{told}, of {self.wanted:g} allowed"
         if self.starts < self.fewest:
-            told += f"; fewer than {self.fewest} starts cannot tell it"
+            told += f"; fewer than {self.fewest} starts cannot confirm it"
         return f"accuracy = {self.wanted:g} is not met: {told}."
 
     def warn(self) -> None:

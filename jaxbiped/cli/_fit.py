@@ -28,7 +28,7 @@ _IS_MEASURED = options.Check(
 
 
 class Fit(options.Command, of=("fit_gait",)):
-    """Fit parameters to measured gaits; print estimates, their errors and what data cannot tell."""
+    """Fit parameters to measured gaits; print estimates, errors and undetermined parameters."""
 
     file: Annotated[Positional[Path], _IS_MEASURED]
     """File of measured gaits, CSV or JSON (see jaxbiped.identify.read_measured)."""
@@ -56,7 +56,7 @@ class Fit(options.Command, of=("fit_gait",)):
             f"{fit.freedom} degrees of freedom (p = {fit.p_value:.2g})"
         )
         if fit.undetermined:
-            report.say(f"these data do not tell {', '.join(fit.undetermined)}")
+            report.say(f"these data do not determine {', '.join(fit.undetermined)}")
         if fit.at_bounds:
             report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
         report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))

@@ -60,8 +60,8 @@ def walk_warnings(scene: Any, numbers: JsonObject, *, rtol: float | None) -> lis
         )
     elif not np.isfinite(numbers["energy_residual_J"]):
         found.append(
-            "the energy left open is no number, for the walk's own overflowed: take a smaller "
-            f"--{'dt' if rtol is None else 'rtol'}"
+            "the energy left open is not a number, because the walk's energy overflowed: take a "
+            f"smaller --{'dt' if rtol is None else 'rtol'}"
         )
     return [*found, *friction_warnings(scene)]
 

@@ -113,6 +113,6 @@ def dimensions_of(kind: Any) -> dict[str, tuple[float, float]]:
     for name in kind._fields:
         known = own.get(name) or state_quantity(name)
         if known is None:
-            raise TypeError(f"{kind.__name__}.{name} is not known: it must tell its own_units.")
+            raise TypeError(f"{kind.__name__}.{name} is not known: it must define own_units.")
         found[name] = known.length_and_time
     return found

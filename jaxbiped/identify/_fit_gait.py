@@ -108,8 +108,8 @@ def _check_bounds(
         pair = (0.0, math.inf) if value > 0.0 else (-math.inf, 0.0)
         if value == 0.0 and not isinstance(vary, Mapping):
             raise ArgumentError(
-                f"vary = {name!r} is not allowed where the scene's own {name} is 0, which tells no "
-                "size: give bounds, or begin with another value."
+                f"vary = {name!r} is not allowed, because the scene's own {name} is 0 and "
+                "gives no scale: give bounds, or begin with another value."
             )
         if isinstance(vary, Mapping):
             pair = vary[name]

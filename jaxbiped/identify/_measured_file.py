@@ -224,7 +224,7 @@ def _same(name: str, rows: list[dict[str, Any]]) -> Any:
     if len(said) > 1:
         raise ArgumentError(
             f"{name} is {said[0]!r} and {said[1]!r} in rows of one gait: it must be one number; a "
-            "column 'gait' tells gaits apart."
+            "column 'gait' separates gaits."
         )
     return said[0] if said else None
 

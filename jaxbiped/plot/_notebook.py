@@ -111,7 +111,7 @@ def _of_gait(gait: Gait) -> str:
             rows.append(
                 (name.replace("_", " "), *_with_error(float(value), float(error)), quantity.unit)
             )
-    told = f"{gait.outcome} (jaxbiped.gait.explain_search(scene, gait) tells why)"
+    told = f"{gait.outcome} (jaxbiped.gait.explain_search(scene, gait) explains why)"
     if found:
         told = f"{_STABLE[bool(gait.stable)]}, found by {FoundBy(int(gait.origin.found_by))}"
     caption = f"Gait: {told}; its cycle is a {gait.cycle}"

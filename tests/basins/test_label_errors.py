@@ -41,7 +41,7 @@ def test_nothing_seen_is_not_certain_and_an_excess_is_warned_of():
     assert none.wrong_high == pytest.approx(np.exp(1.96 * np.sqrt(np.log(2.0))) * 1e-3)
     few = estimate_label_errors(Seen(1000), wanted=1e-4, rtol=1e-6)
     assert (few.wrong, few.met) == (0.0, False)
-    with pytest.warns(RuntimeWarning, match=f"fewer than {few.fewest} starts cannot tell it"):
+    with pytest.warns(RuntimeWarning, match=f"fewer than {few.fewest} starts cannot confirm it"):
         few.warn()
     enough = estimate_label_errors(Seen(few.fewest), wanted=1e-4, rtol=1e-6)
     assert enough.met

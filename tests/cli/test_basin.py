@@ -113,7 +113,7 @@ def test_the_share_of_wrong_labels_is_asked_for_and_told(tmp_path, capsys):
     errors = outputs_of(tmp_path, "basin", *arguments, *axes).numbers["label_errors"]
     assert (errors["starts"], errors["wanted"], errors["met"]) == (64, 1e-2, False)
     told = capsys.readouterr().out
-    assert "fewer than 512 starts cannot tell it" in told
+    assert "fewer than 512 starts cannot confirm it" in told
     assert f"{errors['relabelled']} of 64 labels were in doubt at a tolerance of 3.0e-05" in told
     assert "95 % interval by Wilson and labels in doubt" in told
     found = xr.open_zarr(tmp_path / "store")
