@@ -8,6 +8,7 @@ import pytest
 import jaxbiped as jb
 from tests.rigid_walkers import rigid_seed
 
+
 def energy(scene, state):
     walker, ground = scene.walker, scene.ground
     whole = jb.dynamics.whole_state(scene, state)
