@@ -9,6 +9,7 @@ from _scenes import rigid_seed
 from _trade_store import Case, Store
 from _trade_walks import tolerances
 from reference.compliant import numbers
+from reference.footstep import by_logarithms
 from reference.gait import gait
 
 import jaxbiped as jb
@@ -31,7 +32,8 @@ def seed_truth(store: Store, quick: bool) -> Truth:
             return [trade.values(Way("rodas4", "lanes", "", rtol)) for rtol in QUICK_REFERENCES]
         way = Way("rodas5p", "lanes", "", FINEST)
         state = np.array([float(x) for x in trade.find(way).measures.state])
-        found = gait(state[1:], numbers(), ("K", "c", "xi"))
+        seed = numbers()
+        found = gait(state[1:], seed, by_logarithms(seed, ("K", "c", "xi")))
         measures = {"period": found.measures[:1], "multiplier": np.array([found.radius])}
         return trade.values(way), measures | {"gradient": found.elasticities}
 

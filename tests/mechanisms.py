@@ -1,20 +1,14 @@
-"""Mechanisms to walk with, their starts, and their walks in maximal coordinates."""
-
-import numpy as np
-from scipy.integrate import solve_ivp
+"""Mechanisms to walk with, and their starts."""
 
 import jaxbiped as jb
-from jaxbiped.dynamics._tree import Motion
-from jaxbiped.scene._bodies import Body, Foot, Point
+from jaxbiped.scene._bodies import Body, Foot
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
-from tests.random_mechanisms import arm, maximal_accelerations
 
 SLOPE, G = 0.03, 9.8
-V0, XI = 0.1, 10.0
 LAWS = dict(
     normal=jb.laws.HuntCrossley(K=2e5, hysteresis=0.8, n=1.5),
-    friction=jb.laws.BengisuAkay(0.5, 0.4, V0, XI),
+    friction=jb.laws.BengisuAkay(0.5, 0.4, 0.1, 10.0),
 )
 LEGS = tuple(Body(f"leg_{i}", mass=1.0, inertia=0.0096, centre=0.10) for i in (1, 2))
 FEET = tuple(Foot(f"leg_{i}", centre=0.32, radius=0.08) for i in (1, 2))
@@ -124,69 +118,3 @@ def scene_of(name, **changes):
 def start_of(name, scene):
     """Its start, the lowest foot just touching."""
     return scene.state(**_STARTS[name])
-
-
-def walk_in_maximal_coordinates(mechanism, state, duration):
-    """Root point, angles and rates after a while, by SciPy: (2 + bodies) places, then rates.
-
-    Each body has coordinates of its own, held together by constraints; the laws of contact are
-    written here anew from their papers' formulas.
-    """
-    structure, n = mechanism.structure, len(mechanism.bodies)
-    places = _with_fixed(structure, state, structure.coordinates)
-    rates = _with_fixed(structure, state, structure.rates)
-
-    def slopes(_, y):
-        motion = Motion(y[0], y[1], y[2 + n], y[3 + n], tuple(y[2 : 2 + n]), tuple(y[4 + n :]))
-        forces = _contact_forces(mechanism, motion)
-        found = maximal_accelerations(mechanism, motion, SLOPE, G, forces)
-        return np.concatenate([y[2 + n :], found])
-
-    start = np.concatenate([places, rates])
-    ends = solve_ivp(slopes, (0.0, duration), start, method="DOP853", rtol=1e-10, atol=1e-12)
-    return ends.y[:, -1]
-
-
-def _with_fixed(structure, state, names):
-    """Places or rates of the root point and all bodies; couplings here rest at 0."""
-    values = np.zeros(2 + len(structure.bodies))
-    given = [float(getattr(state, name)) for name in names]
-    values[:2] = given[:2]
-    values[[2 + j for j in structure.free]] = given[2:]
-    for each in structure.fixed:
-        values[2 + each.body] = sum(w * values[2 + j] for j, w in each.angle.weights)
-    return values
-
-
-def _contact_forces(mechanism, motion):
-    structure, found = mechanism.structure, []
-    for j, foot in zip(structure.feet, mechanism.feet, strict=True):
-        at, speed = np.array([motion.x, motion.z]), np.array([motion.vx, motion.vz])
-        chain = structure.chains[j]
-        for link, after in zip(chain, (*chain[1:], None), strict=True):
-            place = foot.centre if after is None else mechanism.bodies[after].at
-            if place is not None:
-                point, moves = arm(place, motion.angles[link])
-                at, speed = at + point, speed + moves * motion.rates[link]
-        radius = 0.0 if foot.radius is None else float(foot.radius)
-        depth, into = radius - at[1], -speed[1]
-        if depth <= 0.0:
-            continue
-        normal = max(2e5 * depth**1.5 * (1.0 + 0.8 * into), 0.0)
-        slip = speed[0] + radius * motion.rates[j]
-        sole = _sole(foot.centre, radius, motion.angles[j])
-        found.append((j, sole, _friction(normal, slip), normal))
-    return found
-
-
-def _sole(centre, radius, angle):
-    """The lowest point of a foot's circle in its body's frame."""
-    ahead = 0.0 if centre.ahead is None else float(centre.ahead)
-    s, c = np.sin(angle), np.cos(angle)
-    return Point(float(centre.along) + radius * c, ahead - radius * s)
-
-
-def _friction(normal, slip):
-    u = abs(slip) / V0
-    share = 0.5 * u * (2.0 - u) if u < 1.0 else 0.4 + 0.1 * np.exp(-XI * (abs(slip) - V0))
-    return -normal * share * np.sign(slip)

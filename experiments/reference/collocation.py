@@ -1,12 +1,9 @@
-"""Radau IIA collocation, and its steps on one smooth piece of the compliant walker's motion."""
+"""Radau IIA collocation: nodes, matrix and weights of its methods."""
 
 import functools
 from typing import Any, NamedTuple
 
 import numpy as np
-
-from .compliant import compiled
-from .smooth_pieces import field, slopes
 
 
 class Radau(NamedTuple):
@@ -74,54 +71,3 @@ def radau(stages: int) -> Radau:
     context = mp.clone()
     context.dps = 50
     return Radau(*(each.astype(float) for each in precise_radau(stages, context)))
-
-
-@compiled
-def collocate(y, h, p, pressing, band, nodes, matrix):
-    """States at the stages of one step (s, 8), and whether Newton's method converged."""
-    s, none = len(nodes), np.zeros(0, np.int64)
-    first = field(y, p, pressing, band)
-    at = np.empty((s, 8))
-    for i in range(s):
-        at[i] = y + nodes[i] * h * first
-    change = np.inf
-    for _ in range(30):
-        system, left = np.eye(8 * s), np.empty(8 * s)
-        rates = np.empty((s, 8))
-        for j in range(s):
-            rates[j] = field(at[j], p, pressing, band)
-            own = slopes(at[j], p, pressing, band, none)
-            for i in range(s):
-                system[8 * i : 8 * i + 8, 8 * j : 8 * j + 8] -= h * matrix[i, j] * own
-        for i in range(s):
-            total = y - at[i]
-            for j in range(s):
-                total = total + h * matrix[i, j] * rates[j]
-            left[8 * i : 8 * i + 8] = total
-        if not (np.isfinite(left).all() and np.isfinite(system).all()):
-            return at, False
-        step = np.linalg.solve(system, left)
-        at += step.reshape((s, 8))
-        before, change = change, np.max(np.abs(step))
-        if not np.isfinite(change):
-            return at, False
-        if change < 1e-15 or (change < 1e-11 and change > 0.5 * before):
-            return at, True
-    return at, False
-
-
-@compiled
-def carry(w, at, h, p, pressing, band, matrix, varied):
-    """Tangents at the stages (s, 8, 8 + k): what the collocation's solution changes by."""
-    s, count = len(at), 8 + len(varied)
-    system, left = np.eye(8 * s), np.empty((8 * s, count))
-    every = np.empty((s, 8, count))
-    for j in range(s):
-        every[j] = slopes(at[j], p, pressing, band, varied)
-    for i in range(s):
-        total = w.copy()
-        for j in range(s):
-            total[:, 8:] += h * matrix[i, j] * every[j][:, 8:]
-            system[8 * i : 8 * i + 8, 8 * j : 8 * j + 8] -= h * matrix[i, j] * every[j][:, :8]
-        left[8 * i : 8 * i + 8] = total
-    return np.linalg.solve(system, left).reshape((s, 8, count))

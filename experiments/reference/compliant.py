@@ -152,7 +152,8 @@ def friction_share(normal: float, slip: float, bent: float, law: np.ndarray) -> 
         return fallen(a, b, s, c, d) * np.tanh(law[5] * slip), 0.0
     if kind == 9:
         u = slip / c
-        return b * np.tanh(4.0 * u) + (a - b) * u / (0.25 * u * u + 0.75) ** 2, 0.0
+        dry = b * np.tanh(4.0 * u) + (a - b) * u / (0.25 * u * u + 0.75) ** 2
+        return dry + (d * slip * np.tanh(4.0 * normal / law[5]) / normal if d > 0.0 else 0.0), 0.0
     if kind == 10:
         return bent, b * (slip - s * bent / a)
     if kind == 11:

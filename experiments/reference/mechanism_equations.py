@@ -94,8 +94,8 @@ class Contact(NamedTuple):
 def turned(angle: Any, along: Any, ahead: Any) -> tuple[Any, Any]:
     """A point of a body from its hinge, and its derivative with respect to the angle, (…, 2)."""
     s, c = np.sin(angle), np.cos(angle)
-    point = np.stack(np.broadcast_arrays(along * s + ahead * c, -along * c + ahead * s), -1)
-    moves = np.stack(np.broadcast_arrays(along * c - ahead * s, along * s + ahead * c), -1)
+    point = np.stack([along * s + ahead * c, -along * c + ahead * s], -1)
+    moves = np.stack([along * c - ahead * s, along * s + ahead * c], -1)
     return point, moves
 
 
@@ -147,7 +147,7 @@ def contacts(tree: Tree, motion: Motion, p: np.ndarray) -> list[Contact]:
         point, moves = turned(angle, along, ahead)
         centre, velocity = at + point, speed + moves * rate[..., None]
         slip = velocity[..., 0] + radius * rate
-        sole = np.stack(np.broadcast_arrays(point[..., 0], point[..., 1] - radius), -1)
+        sole = np.stack([point[..., 0], point[..., 1] - radius], -1)
         found.append(Contact(radius - centre[..., 1], -velocity[..., 1], slip, body, sole))
     for part, limit, sign in tree.stops:
         angle, rate = summed(part.weights, motion)

@@ -4,6 +4,7 @@ Every surface between pieces is located, tangents jump there by saltation, and a
 equations that the collocation's own solution satisfies.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,8 @@ from .collocation import Radau, radau
 from .mechanism_equations import FREE, Tree, contacts, leg_rates, motion_of
 from .mechanism_pieces import KINDS, TINY, Field, beyond, pieces_at, sides, surfaces
 
+END = -1
+"""Among the surfaces: where a leg stands upright."""
 FIRST_STEP, GROWTH = 1e-10, 2.5
 """Steps after a switch begin so small [s] that a root's singularity at touchdown is graded away."""
 
@@ -21,17 +24,21 @@ class Flow(NamedTuple):
     """A motion's end, and its derivatives at equal times.
 
     Attributes:
-        state: (n,). gradient: with respect to the start and the directions, (n, n + k).
+        time: [s]. state: (n,).
+        gradient: with respect to the start and the directions, (n, n + k).
         rates: of the state at the end, (n,). switches: what was met, with its times [s].
+        steps: each with its length [s] and the state at its end.
     """
 
+    time: float
     state: np.ndarray
     gradient: np.ndarray
     rates: np.ndarray
     switches: list[tuple[str, float]]
+    steps: "list[tuple[Step, float, np.ndarray]]"
 
 
-class _Step(NamedTuple):
+class Step(NamedTuple):
     """A step's beginning on a piece, and the method."""
 
     y: np.ndarray
@@ -86,6 +93,7 @@ def flow(
     duration: float,
     directions: np.ndarray,
     *,
+    upright: int | None = None,
     stages: int = 7,
     resolution: float = 1e-10,
 ) -> Flow:
@@ -94,18 +102,19 @@ def flow(
     Args:
         tree: the mechanism.
         start: root point, free angles, and their rates, (n,).
-        duration: [s].
+        duration: at most [s].
         directions: in its numbers, by which to differentiate, (k, P).
+        upright: a foot, at the end of a leg of one body: the motion ends where that stands upright.
         stages: of the collocation, whose order is twice that less one.
         resolution: what its last Legendre mode may have of state and tangents.
     """
     method, y, n = radau(stages), np.array(start, float), len(start)
     w = np.eye(n, n + len(directions))
     field = Field(tree, pieces_at(tree, y))
-    t, h, met = 0.0, FIRST_STEP, []
+    t, h, met, steps = 0.0, FIRST_STEP, [], []
     while t < duration:
         h = min(h, duration - t)
-        step = _Step(y, field, method)
+        step = Step(y, field, method)
         at = step.stages(h)
         size = np.inf if at is None else _unresolved(method.last, at)
         if at is None or size > resolution:
@@ -113,7 +122,7 @@ def flow(
             if h < 1e-16:
                 raise RuntimeError(f"no step at {t} s")
             continue
-        which, span = _first_crossing(step, at, h)
+        which, span = _first_crossing(step, at, h, upright)
         if which is not None and span < h:
             found = step.stages(span)
             assert found is not None
@@ -124,16 +133,19 @@ def flow(
             h = span * max(0.2, 0.9 * (resolution / rough) ** (1.0 / stages))
             continue
         y, w, t = at[-1], moved[-1], t + span
+        steps.append((step, span, y))
         room = (resolution / max(rough, 1e-30)) ** (1.0 / stages)
         h = span * min(GROWTH, max(0.2, 0.9 * room))
         if which is None:
             continue
+        if which == END:
+            break
         met.append((f"{KINDS[which % 5]} {which // 5}", t))
         after = Field(tree, beyond(tree, field.pieces, which, y))
         later = _delay(field, which, y, w, directions)
         w = w + np.outer(field(y, tree.p) - after(y, tree.p), later)
         field, h = after, FIRST_STEP
-    return Flow(y, w, field(y, tree.p), met)
+    return Flow(t, y, w, field(y, tree.p), met, steps)
 
 
 def _delay(
@@ -154,7 +166,9 @@ def _unresolved(last: np.ndarray, stages: np.ndarray) -> float:
     return float(np.max(np.abs(np.tensordot(last, stages, 1)) / size))
 
 
-def _first_crossing(step: _Step, at: np.ndarray, h: float) -> tuple[int | None, float]:
+def _first_crossing(
+    step: Step, at: np.ndarray, h: float, upright: int | None
+) -> tuple[int | None, float]:
     """The surface at which the piece ends within a step, and the step that ends there."""
     tree, pieces = step.field.tree, step.field.pieces
     motion = motion_of(tree, at, tree.p)
@@ -176,19 +190,26 @@ def _first_crossing(step: _Step, at: np.ndarray, h: float) -> tuple[int | None, 
             elif not turning_back.all():
                 raise RuntimeError(f"the leg of foot {k} stops while it stands")
         if past.any():
-            found.append((_span(step, which, side, h * step.method.nodes[past.argmax()]), which))
+            own = lambda y, which=which, side=side: side * surfaces(tree, y, tree.p)[which]  # noqa: E731
+            found.append((_span(step, own, h * step.method.nodes[past.argmax()]), which))
+    if upright is not None and pieces.pressing[upright] != FREE:
+        place = 2 + tree.free.index(tree.feet[upright])
+        past = at[:, place] < 0.0
+        if past.any():
+            high = h * step.method.nodes[past.argmax()]
+            found.append((_span(step, lambda y: y[place], high), END))
     if not found:
         return None, h
     span, which = min(found)
     return which, span
 
 
-def _span(step: _Step, which: int, side: float, high: float) -> float:
+def _span(step: Step, surface: Callable[[np.ndarray], float], high: float) -> float:
     """The step that ends on a surface which is crossed within `high`."""
 
     def value(span: float) -> float:
         at = step.stages(span)
         assert at is not None
-        return side * float(surfaces(step.field.tree, at[-1], step.field.tree.p)[which])
+        return float(surface(at[-1]))
 
     return float(scipy.optimize.brentq(value, 1e-6 * high, high, xtol=1e-22, rtol=1e-15))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.cli._gait import _UNITS, gait_numbers
 from tests.cli.commands import outputs_of
 from tests.drawn import assert_is_drawn, points_of
 
@@ -66,6 +67,18 @@ def test_the_seed_walker_s_gait(numbers):
     assert len(sizes) == len(numbers["multiplier_errors"]) == 6
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[0] == pytest.approx(numbers["spectral_radius"])
+
+
+def test_slopes_and_stability_stand_under_their_names(gait, numbers):
+    found = gait[1]
+    place, fields = found.parameters.index("slope"), jb.gait.Measures._fields[:5]
+    for table in ("sensitivities", "sensitivity_errors", "elasticities"):
+        told, ours = numbers[table]["slope"], getattr(found, table)
+        own = (told[name] for name in _UNITS.values())
+        assert list(own) == [float(getattr(ours, name)[place]) for name in fields]
+        assert told["state.omega_2"] == float(ours.state.omega_2[place])
+    unstable = found.measures._replace(spectral_radius=np.asarray(1.01))
+    assert gait_numbers(dataclasses.replace(found, measures=unstable))["stable"] is False
 
 
 def test_writes_pictures(gait, numbers):

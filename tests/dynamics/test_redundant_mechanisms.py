@@ -94,7 +94,9 @@ def test_states_go_both_ways(name, orientation):
     np.testing.assert_allclose(np.stack(back), np.stack(states), atol=1e-14)
     for value in jb.dynamics.violation(held, start):
         assert float(np.max(value)) < 5e-15
-    for function in (jb.dynamics.energies, jb.dynamics.powers, jb.dynamics.feet):
+    for function in (
+        jb.dynamics.energies, jb.dynamics.powers, jb.dynamics.feet, jb.dynamics.foot_forces
+    ):  # fmt: skip
         found, expected = function(held, start), function(scene, states)
         for a, b in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9)

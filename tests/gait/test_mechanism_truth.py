@@ -21,10 +21,20 @@ NIGHTLY = [
 @pytest.mark.parametrize("name", CASES)
 def test_fields_are_those_of_maximal_coordinates(name):
     scene, start = CASES[name].scene, CASES[name].guess
-    tree, y = tree_of(scene), np.array([float(leaf) for leaf in start])
-    expected = Field(tree, pieces_at(tree, y))(y, tree.p)
-    found = np.array([float(leaf) for leaf in jb.dynamics.vector_field(0.0, start, scene)])
-    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+    tree, first = tree_of(scene), np.array([float(leaf) for leaf in start])
+    random, met = np.random.default_rng(0), set()
+    for k in range(20):
+        # Lower and lower, with feet on the ground, stops that are pressed, and slip.
+        y = first + (0.3 * random.standard_normal(len(first)) if k else 0.0)
+        y[1] = first[1] - 2e-3 * k
+        pieces = pieces_at(tree, y)
+        met |= set(enumerate(pieces.pressing))
+        expected = Field(tree, pieces)(y, tree.p)
+        there = jb.dynamics.vector_field(0.0, type(start)(*y), scene)
+        found = np.array([float(leaf) for leaf in there])
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+    # Each contact was seen free and pressed.
+    assert len(met) >= 2 * len(pieces.pressing), met
 
 
 @functools.cache

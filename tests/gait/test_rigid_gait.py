@@ -5,45 +5,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from reference.rigid import rigid_walker
-from scipy.optimize import brentq
 
 import jaxbiped as jb
-from tests.rigid_walkers import (
-    FIRST_DOUBLING,
-    MULTIPLIER,
-    STABLE,
-    UNSTABLE,
-    compass_gait,
-    rigid_seed,
-    simplest_state,
-    simplest_walker,
-)
+from tests.rigid_walkers import compass_gait, rigid_seed
 
 pytestmark = pytest.mark.slow
 
 PLAIN = dict(parameters=(), radius_sensitivities=False)
-
-
-@pytest.mark.parametrize("published", [STABLE, UNSTABLE], ids=["stable", "unstable"])
-def test_fixed_points_of_the_simplest_walker(published):
-    theta, rate = published
-    start = simplest_state(theta + 2e-4, rate - 1e-4)
-    gait = jb.find_gait(simplest_walker(0.009), start, accuracy="tight", **PLAIN)
-    assert gait.outcome is jb.gait.Search.FOUND
-    state = gait.measures.state
-    found = [float(state.theta_2), float(state.omega_2)]
-    np.testing.assert_allclose(found, published, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(state.theta_1, -theta, rtol=0.0, atol=1e-12)
-    assert float(gait.unit_multiplier_error) < 1e-11
-    assert bool(gait.stable) is (published is STABLE)
-    if published is STABLE:
-        # φ = θ2 − θ1 and its rate, the other two of the published numbers.
-        np.testing.assert_allclose(state.theta_2 - state.theta_1, 0.400621801088574, atol=1e-12)
-        np.testing.assert_allclose(state.omega_2 - state.omega_1, -0.015822999948318, atol=1e-12)
-        first, second, last = np.asarray(gait.multipliers)
-        assert min(abs(first - MULTIPLIER), abs(first - MULTIPLIER.conjugate())) < 1e-9
-        assert abs(second - first.conjugate()) < 1e-12
-        assert abs(last) < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -62,23 +30,6 @@ def test_the_least_number_of_footsteps_is_that_of_the_map_itself(slope, asked, l
         assert bool(off < 1e-4) is (k % least == 0)
     said = jb.gait.explain_search(scene, gait)
     assert (f"closes after {least} of the {asked} footsteps" in said) is (least < asked)
-
-
-def test_first_period_doubling_of_the_simplest_walker():
-    seen = {"state": simplest_state(*STABLE)}
-
-    def multiplier_above_minus_one(slope):
-        gait = jb.find_gait(simplest_walker(slope), seen["state"], accuracy="tight", **PLAIN)
-        assert gait.outcome is jb.gait.Search.FOUND
-        seen["state"] = gait.measures.state
-        return float(np.min(np.asarray(gait.multipliers).real)) + 1.0
-
-    for slope in (0.0105, 0.012, 0.0135, 0.0145):
-        multiplier_above_minus_one(slope)
-    doubling = brentq(multiplier_above_minus_one, 0.0145, 0.0155, xtol=1e-12)
-    assert abs(doubling - FIRST_DOUBLING) < 1e-9
-    at = jb.find_gait(simplest_walker(doubling), seen["state"], accuracy="tight", **PLAIN)
-    assert at.critical is jb.gait.Bifurcation.PERIOD_DOUBLING
 
 
 def test_compass_gait_converges_and_is_stable():

@@ -10,7 +10,7 @@ import jaxbiped as jb
 from tests.rigid_walkers import rigid_seed
 
 A = jb.actuation
-SEED = jb.seed_scene()
+SEED = jb.seed_scene(hip_mass=0.1)
 START = jb.seed_state()
 PARTS = (
     A.HipSpring(k=0.05, b=0.001, theta_0=0.1),

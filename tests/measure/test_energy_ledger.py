@@ -5,6 +5,11 @@ import pytest
 from reference.walks import walk as independent_walk
 
 import jaxbiped as jb
+from jaxbiped.dynamics._energy import Energies
+from jaxbiped.measure import _energy_ledger
+from jaxbiped.measure._samples import ModeChanges
+
+SCENE = jb.ladder()["rigid"]
 
 
 def test_the_ledger_closes_at_the_tight_setting(seed_walk):
@@ -59,3 +64,27 @@ def test_gravitys_work_is_its_potential(seed_walk):
 def test_times_that_do_not_increase_are_refused(seed_walk, times):
     with pytest.raises(jb.ArgumentError, match="2 or more increasing numbers"):
         jb.energy_ledger(*seed_walk, np.array(times))
+
+
+def test_what_a_change_of_mode_takes_is_the_energy_beside_it(monkeypatch):
+    """Energies that fall steadily but where a mode changes, once in one footstep, twice in another.
+
+    What joints lose on the way is no loss of the change's; NaN where a change was left out.
+    """
+    changes = np.array([0, 2, 2]), np.array([0.25, 0.5, 0.75])
+    taken = np.array([2.0, 0.5, 0.125])
+
+    def held(_, states):
+        number, time = states
+        gone = [
+            sum(taken[(changes[0] == k) & (changes[1] < t)])
+            for k, t in zip(number, time, strict=True)
+        ]
+        return Energies(5.0 - 0.5 * time, 1.0 - 0.25 * time, -np.array(gone))
+
+    monkeypatch.setattr(_energy_ledger, "_held", held)
+    monkeypatch.setattr(_energy_ledger, "rows_of", lambda starts, number: number)
+    monkeypatch.setattr(_energy_ledger, "states_after", lambda _, rows, times: (rows, times))
+    known = np.array([True, True, True, False])
+    found = _energy_ledger._stop_losses(SCENE, None, np.ones(4), ModeChanges(*changes, known))
+    np.testing.assert_allclose(found, [2.0, 0.0, 0.625, np.nan], atol=1e-12)

@@ -59,10 +59,13 @@ def test_strike_times_equal_the_independent_integrators(seed_walk, reference):
         height = states[span, 1] - 0.32 * np.cos(states[span, 1 + foot]) - 0.08
         fit = np.polyfit(times[span] - time, height, 2)
         assert abs(fit[-1]) < 3e-3
-    found = walk.at(strikes.time_s)
+    found, places = walk.at(strikes.time_s), []
     for k, foot in enumerate(strikes.foot):
         depth = jb.dynamics.feet(scene, found)[foot - 1].penetration[k]
         assert abs(float(depth)) < 1e-9
+        angle = (found.theta_1, found.theta_2)[foot - 1][k]
+        places.append(float(found.hip_x[k] + 0.32 * np.sin(angle)))
+    np.testing.assert_allclose(jb.footsteps(scene, walk).length_m, np.diff(places), rtol=1e-12)
 
 
 def test_a_short_walk_has_no_complete_footstep():

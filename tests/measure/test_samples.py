@@ -5,7 +5,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.measure._samples import moments_of_change, sample
+from jaxbiped.measure._samples import NODES, Samples, moments_of_change, sample
 
 HEIGHTS = np.array([0.5, 0.45, 0.42])
 
@@ -43,3 +43,12 @@ def test_a_batch_is_read_one_at_a_time(fall):
     batch = jb.Trajectory(**{**vars(walk), "t": np.stack([walk.t, walk.t])})
     with pytest.raises(ValueError, match="one of them at a time"):
         batch.at(0.1)
+
+
+def test_samples_lie_at_gauss_points_and_integrate_what_is_above_zero():
+    edges = np.array([0.0, 0.5, 2.0])
+    times = 0.5 * (edges[1:] + edges[:-1])[:, None] + 0.5 * np.diff(edges)[:, None] * NODES
+    samples = Samples(edges, None)
+    np.testing.assert_allclose(samples.integral(times**9), np.diff(edges**10) / 10)
+    np.testing.assert_allclose(samples.positive_integral(times - 1.0), [0.0, 0.5])
+    np.testing.assert_allclose(samples.positive_integral(1.0 - times), [0.375, 0.125])

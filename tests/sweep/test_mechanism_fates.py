@@ -17,8 +17,10 @@ FELL = {Label.FELL_FORWARD, Label.STUMBLED, Label.STOPPED}
 """Labels of starts that fall in the end if the motion goes on."""
 
 
-def test_who_walks_with_knees_is_who_walks_by_other_means():
-    case = cases()["kneed"]
+@pytest.mark.filterwarnings("ignore:Excess work")
+@pytest.mark.parametrize("name", ["seed", "kneed"])
+def test_who_walks_is_who_walks_by_other_means(name):
+    case = cases()[name]
     scene, kind = case.scene, type(case.guess)
     gait = jb.find_gait(scene, case.guess, parameters=(), radius_sensitivities=False)
     starts = starts_about(case, gait.measures.state)

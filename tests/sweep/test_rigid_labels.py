@@ -41,10 +41,12 @@ def test_falls_are_told_with_the_time_of_the_fall_and_no_strike_is_counted_twice
     found = labelling(states)
     true = rigid_walks(labelling.scene, states, 3)
     fell = np.isfinite(true.falls)
-    footsteps = np.isfinite(true.strikes).sum(axis=1)
+    footsteps, back = np.isfinite(true.strikes).sum(axis=1), true.last[:, 1] > 0.0
     np.testing.assert_array_equal(found.footsteps[fell], footsteps[fell])
+    np.testing.assert_array_equal(found.label[fell] == jb.basins.Label.FELL_BACK, back[fell])
     np.testing.assert_allclose(found.time[fell], true.falls[fell], rtol=5e-3)
     assert fell.sum() > 100
+    assert 10 < back[fell].sum() < 100
 
 
 def test_labels_by_a_share_doubt_a_foot_that_grazes():

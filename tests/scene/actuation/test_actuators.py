@@ -1,4 +1,4 @@
-"""Actuators by themselves, against torques and set points by hand."""
+"""Actuators by themselves; their torques are held by `tests/dynamics/test_actuation.py`."""
 
 import dataclasses
 
@@ -97,24 +97,6 @@ def test_a_spline_is_scipys():
         assert abs(float(SPLINE.torque_at(jnp.asarray(outside)))) < 1e-13
 
 
-def test_springs_and_torques_by_hand():
-    spring = A.HipSpring(k=0.3, b=0.02).torques(MOTION)
-    assert float(spring[0]) == pytest.approx(0.3 * 0.3 - 0.02 * 2.4)
-    assert float(spring[1]) == -float(spring[0])
-    # Leg 2 carries more: leg 1 is to be ahead of it by the rest angle.
-    driven = SPRING.motor_torques(MOTION)
-    assert float(driven[0]) == pytest.approx(0.3 * 0.2 * (0.7 - 0.25))
-    assert float(SPRING.torques(MOTION)[0]) == pytest.approx(float(spring[0] + driven[0]))
-    assert A.HipSpring(k=0.3).motor_torques(MOTION) is None
-    constant = A.HipTorque(0.1).torques(MOTION)
-    np.testing.assert_allclose(constant, [0.1 * (0.7 - 0.25), 0.1 * (0.25 - 0.7)])
-    trunk = A.HipTorque(0.1, reaction="trunk").torques(MOTION)
-    np.testing.assert_allclose(trunk, [-0.025, -0.07])
-    pulse = A.HipPulse(0.2, phase=0.05, width=0.1, reaction="trunk").torques(MOTION)
-    expected = [-0.25 * 0.2 * np.exp(-(1.5**2)), -0.7 * 0.2 * np.exp(-(1.5**2))]
-    np.testing.assert_allclose(pulse, expected)
-
-
 @pytest.mark.parametrize("part", AT_HIP, ids=_name)
 def test_the_legs_may_be_exchanged(part):
     swapped = A.HipMotion(*[pair[::-1] for pair in MOTION])
@@ -131,19 +113,6 @@ def test_idle_feet_do_nothing():
     assert float(A.PushOff(0.3).idle().impulse) == 0.0
     idle = A.FootPreload(extension=2e-3).idle()
     assert [float(x) for x in idle.set_point(jnp.asarray(-0.1), jnp.asarray(-1.0))] == [0.0, 0.0]
-
-
-def test_a_foots_extension_and_its_rate():
-    foot = A.FootPreload(extension=2e-3, onset=0.1, span=0.05)
-    angle = jnp.asarray(-0.1)
-    assert float(foot.set_point(angle, angle)[0]) == pytest.approx(1e-3)
-    for angle in (-0.2, -0.05, 0.1):
-        _, speed = jax.jvp(
-            lambda a: foot.set_point(a, 0.0)[0], (jnp.asarray(angle),), (jnp.asarray(-1.3),)
-        )
-        assert float(foot.set_point(jnp.asarray(angle), jnp.asarray(-1.3))[1]) == pytest.approx(
-            float(speed), rel=1e-12
-        )
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Laws of the normal force, against stated properties, derivatives and constructors."""
+"""Laws of the normal force, against formulas written a second time, differences, constructors."""
 
 import operator
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from tests.scene.laws.derivatives import Force
-from tests.scene.laws.drop import restitutions
+from tests.scene.laws.formulas import normal_forces
 from tests.scene.laws.refusals import assert_refused
 
 
@@ -33,6 +33,9 @@ SOME = {
     "HuntCrossley": st.builds(
         jb.laws.HuntCrossley, K=K, hysteresis=numbers(0.0, 1e3), n=numbers(1.0, 2.0)
     ),
+    "SmoothRistowSchafer": st.builds(
+        jb.laws.SmoothRistowSchafer, K=K, c=numbers(0.0, 1e8), n=numbers(1.0, 2.0)
+    ),
 }
 LAWS = [
     jb.laws.Hertz(K=1e6),
@@ -45,24 +48,27 @@ LAWS = [
 DAMPED = LAWS[1:]
 SEED, SMOOTH = (kind(K=1e6, c=1e7) for kind in (jb.laws.RistowSchafer, jb.laws.SmoothRistowSchafer))
 OWN_EXPONENT = ("Hertz", "RistowSchafer", "HuntCrossley")
-depths, rates = numbers(-1e-2, 1e-2), numbers(-2.0, 2.0)
+GRID = np.meshgrid([-1e-3, 0.0, *np.geomspace(1e-9, 1e-2, 22)], [-2.0, -1e-3, 0.0, 1e-2, 2.0])
+"""Depths and rates."""
 name = lambda law: type(law).__name__
 force = eqx.filter_jit(lambda law, depth, rate: law.force(depth, rate))
 held = eqx.filter_jit(lambda law, depth: law.elastic_force(depth))
 
 
 @pytest.mark.parametrize("kind", SOME)
-def test_pushes_only_in_contact_and_its_damper_only_loses(kind):
-    @settings(deadline=None, max_examples=60)
-    @given(SOME[kind], depths, rates)
-    def check(law, depth, rate):
-        found = float(force(law, jnp.asarray(depth), jnp.asarray(rate)))
-        elastic = float(held(law, jnp.asarray(depth)))
-        assert found >= 0.0
-        if depth <= 0.0:
-            assert found == 0.0
-            assert elastic == 0.0
-        assert (found - elastic) * rate >= -1e-9 * elastic * abs(rate)
+def test_forces_are_the_formulas_and_never_pull_and_dampers_only_lose(kind):
+    depths, rates = GRID
+
+    @settings(deadline=None, max_examples=30)
+    @given(SOME[kind])
+    def check(law):
+        found, elastic = (np.asarray(part) for part in (force(law, *GRID), held(law, depths)))
+        np.testing.assert_allclose(found, normal_forces(law, *GRID), rtol=1e-10, atol=1e-9)
+        assert (found >= 0.0).all()
+        assert (found[depths <= 0.0] == 0.0).all()
+        assert (elastic[depths <= 0.0] == 0.0).all()
+        if kind != "SmoothRistowSchafer":  # whose ramp takes from elasticity, too
+            assert ((found - elastic) * rates >= -1e-9 * elastic * np.abs(rates)).all()
 
     check()
 
@@ -76,21 +82,6 @@ def test_a_closed_loop_loses_energy(law):
         work = float(jnp.trapezoid(law.force(depth, rate), depth))
         given_back = float(law.elastic_energy(jnp.asarray(middle + swing)))
         assert work > 1e-3 * given_back if law in DAMPED else abs(work) < 1e-7 * given_back
-
-
-def test_forces_are_the_formulas():
-    depth, rate = 4e-4, 0.05
-    expected = {
-        "Hertz": 1e6 * depth**1.5,
-        "KelvinVoigt": 3e4 * depth + 200.0 * rate,
-        "RistowSchafer": 1e6 * depth**1.5 + 3e5 * depth * rate,
-        "KuwabaraKono": 1e6 * depth**1.5 + 5e3 * depth**0.5 * rate,
-        "Tsuji": 1e6 * depth**1.5 + 1e3 * depth**0.25 * rate,
-        "HuntCrossley": 1e6 * depth**1.5 * (1.0 + 3.0 * rate),
-    }
-    for law in LAWS:
-        found = law.force(jnp.asarray(depth), jnp.asarray(rate))
-        np.testing.assert_allclose(found, expected[name(law)], rtol=1e-13)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=name)
@@ -176,7 +167,7 @@ def _from_weight(kind, ratio, n, **standing):
     return getattr(jb.laws, kind).from_weight(**standing, **damping, **exponent)
 
 
-@pytest.mark.parametrize("kind", SOME)
+@pytest.mark.parametrize("kind", [kind for kind in SOME if kind != "SmoothRistowSchafer"])
 def test_from_weight_realises_penetration_and_damping_ratio(kind):
     @settings(deadline=None, max_examples=15)
     @given(
@@ -205,21 +196,6 @@ def test_from_weight_is_differentiable_and_takes_batches():
     assert law.K.shape == law.gamma.shape == (2,)
     stiffness = lambda m: jb.laws.Hertz.from_weight(mass=m, penetration=1e-3).K
     assert float(jax.jit(jax.grad(stiffness))(2.0)) == pytest.approx(9.8 / 1e-3**1.5)
-
-
-def test_tsuji_restitution_is_the_same_at_any_speed():
-    found = restitutions(jb.laws.Tsuji(K=1e6, gamma=600.0), [0.1, 0.3, 1.0])
-    assert 0.2 < found[0] < 0.8
-    np.testing.assert_allclose(found, found[0], rtol=1e-4)
-
-
-def test_kuwabara_kono_loses_with_the_fifth_root_of_the_speed():
-    losses = 1.0 - restitutions(jb.laws.KuwabaraKono(K=1e6, gamma=20.0), [0.02, 0.2])
-    assert losses[1] / losses[0] == pytest.approx(10.0**0.2, rel=5e-3)
-
-
-def test_hertz_loses_nothing():
-    np.testing.assert_allclose(restitutions(jb.laws.Hertz(K=1e6), [0.1, 1.0]), 1.0, rtol=1e-6)
 
 
 STEEL = {"modulus": 210e9, "poisson": 0.3}
@@ -265,38 +241,3 @@ WEIGHT = dict(mass=1.0, penetration=1e-3)
 )
 def test_bad_arguments_are_named(make, numbers, words):
     assert_refused(lambda: operator.attrgetter(make)(jb.laws)(**numbers), *words)
-
-
-def test_the_smooth_laws_force_rises_from_zero_by_a_ramp():
-    """x t³(10 − 15 t + 6 t²) with t = x/w: a quarter of a newton at half of one."""
-    law = jb.laws.SmoothRistowSchafer(K=1e6, c=0.0)
-    for force, ramped in ((0.5, 0.25), (0.25, 0.25 * 0.25**3 * (10 - 3.75 + 0.375)), (2.0, 2.0)):
-        depth = jnp.asarray((force / 1e6) ** (2.0 / 3.0))
-        assert float(law.force(depth, jnp.asarray(0.0))) == pytest.approx(ramped)
-
-
-def test_the_smooth_law_never_pulls_and_is_the_seeds_away_from_its_corners():
-    depth, rate = jnp.meshgrid(jnp.linspace(-1e-3, 1e-3, 41), jnp.linspace(-2.0, 2.0, 41))
-    force = SMOOTH.force(depth, rate)
-    assert bool(jnp.all(force >= 0.0))
-    assert bool(jnp.all(force[depth <= 0.0] == 0.0))
-    depth, rate = jnp.array([1.1e-5, 5e-4]), jnp.array([0.3, 0.0])
-    np.testing.assert_allclose(SMOOTH.force(depth, rate), SEED.force(depth, rate))
-
-
-def _jump(law, rate, depth, order):
-    """Difference of a derivative's limits from the two sides, relative to its size nearby."""
-    function = lambda d: law.force(d, jnp.asarray(rate))
-    for _ in range(order):
-        function = jax.grad(function)
-    side = 1e-7 * abs(depth) if depth else 1e-12
-    nearby = depth + jnp.linspace(-1e-4, 1e-4, 41)
-    found = jax.vmap(function)(jnp.concatenate([jnp.array([depth - side, depth + side]), nearby]))
-    return abs(float(found[1] - found[0])) / float(jnp.max(jnp.abs(found[2:])))
-
-
-@pytest.mark.parametrize("order", [0, 1, 2])
-def test_the_smooth_law_is_twice_differentiable(order):
-    for rate, depth in ((0.3, 0.0), (0.3, 1e-5), (0.0, 1e-5), (-2.64e-3, 7e-4)):
-        assert _jump(SMOOTH, rate, depth, order) < 1e-3
-    assert _jump(SEED, 0.3, 0.0, 1) > 0.5  # which has a corner there
