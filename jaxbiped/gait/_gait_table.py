@@ -55,7 +55,8 @@ def gait_entries(gait: "Gait") -> dict[str, Entry]:
     for name, part in parts.items():
         words = Quantity(f"multiplier, {name}")
         add(f"multiplier_{name}", part, words, gait.multiplier_errors, "multiplier")
-    add("unit_multiplier_error", gait.unit_multiplier_error, Quantity("error of the multiplier 1"))
+    words = Quantity("error of the unit multiplier")
+    add("unit_multiplier_error", gait.unit_multiplier_error, words)
     add("residual", gait.residual, Quantity("residual", "", "SI"))
     add("grazes", gait.grazes, Quantity("switches that are grazed"))
     for name, quantity in QUANTITIES.items():

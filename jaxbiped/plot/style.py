@@ -153,6 +153,12 @@ def label_point(
     ax.annotate(text, place, xytext=shift, textcoords="offset points", fontsize="small", **anchor)
 
 
+def text_size(text: str) -> tuple[float, float]:
+    """About how wide and how high small letters write lines of text [inches]."""
+    lines = _MATHEMATICS.sub("xxxx", text).split("\n")
+    return _ENTRY_LETTER * letter_size() * max(map(len, lines)), 0.15 * letter_size() * len(lines)
+
+
 def legend(ax: Axes, **options: Any) -> None:
     """A legend in small letters without a frame, within the axes unless told otherwise."""
     ax.legend(**{"frameon": False, "fontsize": "small"} | options)
