@@ -1,6 +1,7 @@
 """Dataset of a trajectory: labelled, for files and for other programs."""
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -64,10 +65,10 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
     for name, value in held._asdict().items():
         entries[f"{name}_energy"] = Entry(along, value, Quantity(f"{name} energy", unit="J"))
 
-    def rows(values: list[Scalar | None]) -> np.ndarray:
+    def rows(values: Sequence[Scalar | None]) -> np.ndarray:
         return np.stack([np.asarray(value) for value in values])
 
-    told = {
+    told: dict[str, tuple[Sequence[Scalar | None], str]] = {
         "normal_force": ([force.normal for force in forces], "N"),
         "penetration": ([foot.penetration for foot in found], "m"),
         "slip_speed": ([foot.slip_speed for foot in found], "m/s"),
