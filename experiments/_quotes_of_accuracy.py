@@ -175,7 +175,7 @@ def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
             )  # fmt: skip
     laws = {"the seed's laws": "walk"} | {k: k for k in ("smoothed laws", "v0 ten times wider")}
     for name, group in laws.items():
-        ours = (each for each in numbers["rows"][group] if each["way"] == "rodas4p by lanes")
+        ours = (each for each in numbers["rows"][group] if each["way"] == "rodas4p (lanes)")
         (found,) = (each for each in ours if each["setting"] == "rtol=1e-06")
         yield row(name, str(found["attempted"]), small(found["errors"]["state"]))
 
@@ -239,6 +239,6 @@ def _named(numbers: dict[str, Any], group: str, axis: str) -> list[str]:
     rows = numbers["rows"].get(f"named {group}")
     if rows is None:
         settings = ("rtol=1e-05", "rtol=1e-06", "rtol=1e-08")
-        ours = [each for each in numbers["rows"][group] if each["way"] == "rodas4p by lanes"]
+        ours = [each for each in numbers["rows"][group] if each["way"] == "rodas4p (lanes)"]
         rows = [each for name in settings for each in ours if each["setting"] == name]
     return [small(each["errors"][axis]) for each in rows]

@@ -48,7 +48,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     def ours(setting: str, **how: Any) -> Row:
         known = truth()
         (codes, steps), work = work_of(lambda: swept(count, **how), repeats)
-        way = f"{how.get('solver', SOLVERS[0])} by lanes"
+        way = f"{how.get('solver', SOLVERS[0])} (lanes)"
         values = shares_off(codes, exact())
         return row_of(way, setting, "ok", known, values, work, attempted=steps)
 
@@ -67,10 +67,10 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     for solver in SOLVERS[: 1 if quick else None]:
         for rtol in QUICK_TOLERANCES if quick else tolerances(quick, -3, -8):
             how = functools.partial(ours, f"rtol={rtol:g}", solver=solver, rtol=rtol)
-            yield Case("basin", f"{solver} by lanes", f"rtol={rtol:g}", how)
+            yield Case("basin", f"{solver} (lanes)", f"rtol={rtol:g}", how)
     for name in () if quick else jb.ACCURACIES:
         how = functools.partial(ours, name, accuracy=name)
-        yield Case("named basin", f"{SOLVERS[0]} by lanes", name, how)
+        yield Case("named basin", f"{SOLVERS[0]} (lanes)", name, how)
     if lsoda_address() is None:
         yield not_installed("basin", "numbalsoda")
         return

@@ -57,7 +57,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
         fell, lost = int(np.sum(endings != 0)), int(np.sum(rejected))
         outcome = "ok" if fell == 0 else f"{fell} of {count} did not walk on"
         counts = dict(attempted=int(np.sum(accepted)) + lost, rejected=lost)
-        told = f"{solver} by {engine}", f"rtol={rtol:g}", outcome, truth()
+        told = f"{solver} ({engine})", f"rtol={rtol:g}", outcome, truth()
         return row_of(*told, values(np.stack(found[0], axis=1)), work, **counts)
 
     def measure_peer(rtol: float) -> Row:
@@ -71,7 +71,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     for solver, engine in WAYS[: 1 if quick else None]:
         for rtol in tolerances(quick, -3, -8) if engine == "lanes" else (1e-4, 1e-6):
             how = functools.partial(measure, solver, engine, rtol)
-            yield Case("batch", f"{solver} by {engine}", f"rtol={rtol:g}", how)
+            yield Case("batch", f"{solver} ({engine})", f"rtol={rtol:g}", how)
     if lsoda_address() is None:
         yield not_installed("batch", "numbalsoda")
         return

@@ -44,7 +44,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
         return Case("slopes", way, f"rtol={rtol:g}", measure)
 
     for solver, engine in WAYS[: 1 if quick else None]:
-        name = f"{solver} by {engine}" + (", steps for the state alone" if engine == "xla" else "")
+        name = f"{solver} ({engine})" + (", steps for the state alone" if engine == "xla" else "")
         for rtol in tolerances(quick, -3, -8):
             yield case(name, rtol, functools.partial(by_jacobian, solver, engine, duration, rtol))
     for rtol in tolerances(quick, -5, -10):

@@ -35,6 +35,11 @@ class Quantity(NamedTuple):
     unit: str = ""
 
     @property
+    def attributes(self) -> dict[str, str]:
+        """What a dataset's variable says of it."""
+        return {"long_name": self.words, "units": self.unit}
+
+    @property
     def unit_in_text(self) -> str:
         """The unit as tables print it, "N·s/m²"; "–" for a pure number."""
         return _EXPONENT.sub(_in_text, self.unit).replace(" ", "·") or "–"

@@ -100,14 +100,14 @@ class Entry(NamedTuple):
         dims: its dimensions.
         values: of their shape.
         quantity: words and SI unit.
-        errors: error bars of the same shape, None for none.
+        errors: error bars of the same shape, or the name of the entry that has them; None for none.
         flags: what its whole numbers mean, in words.
     """
 
     dims: tuple[str, ...]
     values: npt.ArrayLike
     quantity: Quantity = Quantity("")
-    errors: npt.ArrayLike | None = None
+    errors: npt.ArrayLike | str | None = None
     flags: Mapping[int, str] | None = None
 
 
@@ -122,11 +122,12 @@ def variables_of(entries: Mapping[str, Entry]) -> dict[str, Any]:
             attributes["flag_values"] = list(entry.flags)
             words = (each.replace(" ", "_") for each in entry.flags.values())
             attributes["flag_meanings"] = " ".join(words)
-        elif np.asarray(entry.values).dtype.kind in "fiu":
+        elif np.asarray(entry.values).dtype.kind in "bfiu":
             attributes["units"] = entry.quantity.unit
         if entry.errors is not None:
-            bars = f"{name}_error"
+            bars = entry.errors if isinstance(entry.errors, str) else f"{name}_error"
             attributes["ancillary_variables"] = bars
+        if entry.errors is not None and not isinstance(entry.errors, str):
             own = {"long_name": f"error of {entry.quantity.words or name}"}
             own["units"] = entry.quantity.unit
             variables[bars] = (entry.dims, np.asarray(entry.errors, float), own)

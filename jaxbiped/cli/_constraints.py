@@ -147,7 +147,7 @@ class Constraints(options.Command):
                 report.say(f"stopped by Ctrl-C after {len(runs)} of {many} runs")
         complete = len(runs) == many
         # Times by one engine are not those by the other.
-        engines = {run.integrator: f"; {run.integrator} by {run.engine}" for run in runs}
+        engines = {run.integrator: f"; {run.integrator} ({run.engine})" for run in runs}
         report.say(
             f"{self.duration:g} s from the start; errors against the minimal formulation at 1e-10"
             + "".join(engines.values())

@@ -49,8 +49,8 @@ def check_independent(
     if excess:
         raise ArgumentError(
             f"method = {type(method).__name__} is not allowed here: {excess} of {len(lower)} "
-            "constraints say what others say already, which makes it singular; use Penalty, "
-            "Augmented or Index1Augmented."
+            "constraints are redundant, because they follow from the others (such as a joint that "
+            "is given twice); remove them, or use Penalty, Augmented or Index1Augmented."
         )
 
 

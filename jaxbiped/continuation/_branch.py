@@ -1,6 +1,7 @@
 """Branch of gaits along a parameter: its points, bifurcations and ends, also as a dataset."""
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import equinox as eqx
@@ -9,15 +10,17 @@ import numpy as np
 from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
 from jaxbiped._identity import difference_of
+from jaxbiped._quantity import Quantity
 from jaxbiped._summary import notebook_html
-from jaxbiped._tables import Tabular
+from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch_point import Axis, BranchPoint
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import recurring_names, unit_of
+from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
 from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._homotopy import BranchEnd
+from jaxbiped.gait._measures import QUANTITIES
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -112,41 +115,49 @@ class Branch(eqx.Module, Tabular):
 
         Returns:
             Along `point` the parameter, `state_…`, period, step_length, speed, peak_normal,
-            multipliers with their errors, `stable` (1, 0, and −1 where the errors leave it open)
-            and `bifurcation`, SI units; the same of the special points along `event`, with kind,
-            critical multiplier and its error; all else in the attributes.
+            spectral_radius and multipliers with their errors, `stable` (1, 0, and −1 where the
+            errors leave it open) and `bifurcation`, SI units; the same of the special points along
+            `event`, with kind, critical multiplier and its error; all else in the attributes.
         """
         return _branch_dataset(self)
 
 
 _STABLE = {True: 1, False: 0, None: -1}
-_NUMBERS = {
-    "period": "s",
-    "step_length": "m",
-    "peak_normal": "N",
-    "unit_multiplier_error": "",
-    "residual": "SI",
-}
+_NUMBERS = ("period", "step_length", "peak_normal", "unit_multiplier_error", "residual")
 _EVENT_NUMBERS = ("multiplier_real", "multiplier_imag", "error", "value_error", "beyond")
+_OWN = {
+    "unit_multiplier_error": Quantity("error of the unit multiplier"),
+    "residual": Quantity("residual", unit="SI"),
+}
 
 
 def _branch_dataset(branch: Branch) -> "xarray.Dataset":
     import xarray
 
-    units = {name: unit_of(name) for name in recurring_names(branch.state_type)}
-    variables = _columns(branch, branch.points, "", "point", units)
-    kinds = np.array([EVENTS.index(each.kind) for each in branch.bifurcations], np.int8)
-    variables["event_kind"] = ("event", kinds, _flags(EVENTS))
+    entries = _entries(branch, branch.points, "", "point")
     special = [each.point for each in branch.bifurcations]
-    variables |= _columns(branch, special, "event_", "event", units)
+    entries |= _entries(branch, special, "event_", "event")
+    kinds = np.array([EVENTS.index(each.kind) for each in branch.bifurcations], np.int8)
+    flags = dict(enumerate(map(str, EVENTS)))
+    entries["event_kind"] = Entry(("event",), kinds, Quantity("bifurcation"), flags=flags)
     rows = [
         (e.multiplier.real, e.multiplier.imag, e.error, e.value_error, e.beyond)
         for e in branch.bifurcations
     ]
     numbers = np.array(rows, float).reshape(-1, len(_EVENT_NUMBERS)).T
-    event_units = ("", "", "", branch.unit, branch.unit)
-    for name, values, unit in zip(_EVENT_NUMBERS, numbers, event_units, strict=True):
-        variables[f"event_{name}"] = ("event", values, {"units": unit})
+    value = parameter_quantities(branch.scene)[branch.along]
+    critical = "critical multiplier"
+    told: dict[str, tuple[Quantity, str | None]] = {
+        "multiplier_real": (Quantity(f"{critical}, real"), "event_error"),
+        "multiplier_imag": (Quantity(f"{critical}, imaginary"), "event_error"),
+        "error": (Quantity(f"error of the {critical}"), None),
+        "value_error": (value._replace(words=f"error of the {value.words}"), None),
+        "beyond": (value._replace(words=f"{value.words} beyond it"), None),
+    }
+    for (name, (quantity, bars)), each in zip(told.items(), numbers, strict=True):
+        entries[f"event_{name}"] = Entry(("event",), each, quantity, bars)
+    name = f"event_{branch.along}"
+    entries[name] = entries[name]._replace(errors="event_value_error")
     settings = {
         "along": branch.along,
         "axis": branch.axis._asdict(),
@@ -156,49 +167,56 @@ def _branch_dataset(branch: Branch) -> "xarray.Dataset":
         "accuracy": branch.accuracy,
         "engine": branch.engine,
     }
-    return xarray.Dataset(variables, attrs={"branch": strict_json(settings, unknown=str)})
+    attributes = {"branch": strict_json(settings, unknown=str)}
+    return xarray.Dataset(variables_of(entries), attrs=attributes)
 
 
-def _flags(names: Any, codes: Any = None) -> dict[str, Any]:
-    meanings = " ".join(str(name).replace(" ", "_") for name in names)
-    codes = range(len(meanings.split())) if codes is None else codes
-    return {"flag_values": list(codes), "flag_meanings": meanings}
-
-
-def _columns(
-    branch: Branch, points: Any, before: str, along: str, units: dict[str, str]
-) -> dict[str, Any]:
-    """Variables of points along a dimension."""
-    m, n = len(units), len(points)
+def _entries(
+    branch: Branch, points: Sequence[BranchPoint], before: str, along: str
+) -> dict[str, Entry]:
+    """Variables of points along a dimension, their names behind `before`."""
+    names, n = recurring_names(branch.state_type), len(points)
+    m = len(names)
 
     def table(name: str, width: int, kind: type) -> np.ndarray:
         rows = [getattr(point, name) for point in points]
         return np.array(rows, kind).reshape(n, width)
 
-    columns: dict[str, Any] = {
-        branch.along: (along, [point.value for point in points], {"units": branch.unit}),
+    values, errors = table("multipliers", m - 1, complex), table("multiplier_errors", m - 1, float)
+    own = {name: np.array([getattr(each, name) for each in points], float) for name in _NUMBERS}
+    own["speed"] = own["step_length"] / own["period"]
+    entries = {
+        branch.along: Entry(
+            (along,),
+            np.array([point.value for point in points], float),
+            parameter_quantities(branch.scene)[branch.along],
+        )
     }
-    for name, unit in _NUMBERS.items():
-        columns[name] = (along, [getattr(point, name) for point in points], {"units": unit})
-    speeds = [point.step_length / point.period for point in points]
-    columns["speed"] = (along, speeds, {"units": "m/s"})
-    recurring = table("recurring", m, float)
-    for k, (name, unit) in enumerate(units.items()):
-        columns[f"state_{name}"] = (along, recurring[:, k], {"units": unit})
-    values = table("multipliers", m - 1, complex)
-    errors = table("multiplier_errors", m - 1, float)
-    bars = {"ancillary_variables": f"{before}multipliers_error"}
-    for name, array in (("real", values.real), ("imag", values.imag), ("error", errors)):
-        own = {"units": ""} | ({} if name == "error" else bars)
-        columns[f"multipliers_{name}"] = ((along, "multiplier"), array, own)
+    for name, each in own.items():
+        entries[name] = Entry((along,), each, _OWN.get(name) or QUANTITIES[name])
+    entries["spectral_radius"] = Entry(
+        (along,), np.abs(values[:, 0]), QUANTITIES["spectral_radius"], errors[:, 0]
+    )
+    for name, each in zip(names, table("recurring", m, float).T, strict=True):
+        quantity = state_quantity(name) or Quantity(name)
+        entries[f"state_{name}"] = Entry((along,), each, quantity)
+    each_of = (along, "multiplier")
+    for word, part in (("real", values.real), ("imaginary", values.imag)):
+        words, bars = Quantity(f"multiplier, {word}"), f"{before}multipliers_error"
+        entries[f"multipliers_{word[:4]}"] = Entry(each_of, part, words, bars)
+    words = Quantity("error of the multiplier")
+    entries["multipliers_error"] = Entry(each_of, errors, words)
     stable = np.array([_STABLE[point.stable] for point in points], np.int8)
-    words = ("undecided", "unstable", "stable")
-    columns["stable"] = (along, stable, _flags(words, (-1, 0, 1)))
+    flags = {-1: "undecided", 0: "unstable", 1: "stable"}
+    entries["stable"] = Entry((along,), stable, Quantity("stability"), flags=flags)
     codes = np.array([point.bifurcation for point in points], np.int8)
-    columns["bifurcation"] = (along, codes, _flags(Bifurcation))
+    flags = {int(each): str(each) for each in Bifurcation}
+    words = Quantity("multiplier on the unit circle")
+    entries["bifurcation"] = Entry((along,), codes, words, flags=flags)
     for name in ("place", "tangent"):
-        columns[name] = ((along, "component"), table(name, m + 1, float), {"units": "scaled"})
-    return {before + name: column for name, column in columns.items()}
+        words = Quantity(f"{name} on the curve of gaits", unit="scaled")
+        entries[name] = Entry((along, "component"), table(name, m + 1, float), words)
+    return {before + name: entry for name, entry in entries.items()}
 
 
 def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:

@@ -51,11 +51,12 @@ def gait_entries(gait: "Gait") -> dict[str, Entry]:
         quantity = state_quantity(name) or Quantity(name)
         value, error = (getattr(each.state, name) for each in (gait.measures, gait.measure_errors))
         add(f"state_{name}", value, quantity, error)
-    parts = {"real": np.real(gait.multipliers), "imag": np.imag(gait.multipliers)}
+    parts = {"real": np.real(gait.multipliers), "imaginary": np.imag(gait.multipliers)}
     for name, part in parts.items():
         words = Quantity(f"multiplier, {name}")
-        add(f"multiplier_{name}", part, words, gait.multiplier_errors, "multiplier")
-    add("unit_multiplier_error", gait.unit_multiplier_error, Quantity("error of the multiplier 1"))
+        add(f"multiplier_{name[:4]}", part, words, gait.multiplier_errors, "multiplier")
+    words = Quantity("error of the unit multiplier")
+    add("unit_multiplier_error", gait.unit_multiplier_error, words)
     add("residual", gait.residual, Quantity("residual", "", "SI"))
     add("grazes", gait.grazes, Quantity("switches that are grazed"))
     for name, quantity in QUANTITIES.items():

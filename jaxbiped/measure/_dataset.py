@@ -1,11 +1,14 @@
 """Dataset of a trajectory: labelled, for files and for other programs."""
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from jaxbiped._checks import check_type
+from jaxbiped._quantity import Quantity
+from jaxbiped._tables import Entry, variables_of
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._contacts import feet, foot_forces
 from jaxbiped.dynamics._energy import energies
@@ -50,46 +53,41 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
     state = trajectory.state
     found, forces = feet(scene, state), foot_forces(scene, state)
     held = energies(scene, state)  # type: ignore[arg-type]
-    variables = {
-        name: ("time", np.asarray(value), {"units": _unit_of(name)})
+    along, per_foot = ("time",), ("foot", "time")
+    entries = {
+        name: Entry(along, value, state_quantity(name) or Quantity(name))
         for name, value in minimal_state(scene, state)._asdict().items()
     }
     if isinstance(scene, RedundantScene):
         off = np.asarray(violation(scene, cast("BodiesState", state)).position)
-        variables["violation"] = ("time", off, {"units": "m"})
+        words = Quantity("violation of the constraints", unit="m")
+        entries["violation"] = Entry(along, off, words)
     for name, value in held._asdict().items():
-        variables[f"{name}_energy"] = ("time", np.asarray(value), {"units": "J"})
+        entries[f"{name}_energy"] = Entry(along, value, Quantity(f"{name} energy", unit="J"))
 
-    def rows(values: list[Scalar | None]) -> np.ndarray:
+    def rows(values: Sequence[Scalar | None]) -> np.ndarray:
         return np.stack([np.asarray(value) for value in values])
 
-    per_foot = {
-        "normal_force": (rows([force.normal for force in forces]), "N"),
-        "penetration": (rows([foot.penetration for foot in found]), "m"),
-        "slip_speed": (rows([foot.slip_speed for foot in found]), "m/s"),
-        "touches": (rows([touches(foot) for foot in found]), "1"),
+    told: dict[str, tuple[Sequence[Scalar | None], str]] = {
+        "normal_force": ([force.normal for force in forces], "N"),
+        "penetration": ([foot.penetration for foot in found], "m"),
+        "slip_speed": ([foot.slip_speed for foot in found], "m/s"),
+        "touches": ([touches(foot) for foot in found], "1"),
     }
     if forces[0].tangential is not None:
-        per_foot["tangential_force"] = (rows([force.tangential for force in forces]), "N")
+        told["tangential_force"] = ([force.tangential for force in forces], "N")
+    for name, (values, unit) in told.items():
+        entries[name] = Entry(per_foot, rows(values), Quantity(name.replace("_", " "), unit=unit))
     structure = scene.mechanism.structure
     dataset = xarray.Dataset(
-        variables
-        | {
-            name: (("foot", "time"), data, {"units": unit})
-            for name, (data, unit) in per_foot.items()
-        },
+        variables_of(entries),
         coords={
-            "time": ("time", np.asarray(trajectory.t), {"units": "s"}),
+            "time": ("time", np.asarray(trajectory.t), Quantity("time", unit="s").attributes),
             "foot": list(structure.feet_told),
             "leg": ("foot", [structure.legs[leg] for leg in structure.leg_of_foot]),
         },
     )
     return dataset.assign_attrs(ending=str(trajectory.outcome), **_parameters(scene))
-
-
-def _unit_of(name: str) -> str:
-    quantity = state_quantity(name)
-    return (quantity.unit if quantity else "") or "1"
 
 
 def _parameters(scene: Scene | RedundantScene) -> dict[str, float | str]:

@@ -24,10 +24,10 @@ from jaxbiped.plot._figure_style import save_figure as save_figure
 from jaxbiped.plot._fit_charts import fit as fit
 from jaxbiped.plot._fit_charts import optimisation as optimisation
 from jaxbiped.plot._gait_charts import elasticities as elasticities
-from jaxbiped.plot._gait_charts import multipliers as multipliers
 from jaxbiped.plot._laws import bristle_law as bristle_law
 from jaxbiped.plot._laws import friction_law as friction_law
 from jaxbiped.plot._laws import normal_law as normal_law
+from jaxbiped.plot._multiplier_chart import multipliers as multipliers
 from jaxbiped.plot._notebook import notebook_html as notebook_html
 from jaxbiped.plot._notebook import walker as walker
 from jaxbiped.plot._parameter_charts import basin_fractions as basin_fractions

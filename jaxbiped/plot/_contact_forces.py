@@ -46,8 +46,9 @@ def contact_forces(
         scene: what was simulated.
         trajectory: the motion, saved step by step.
         figure: empty figure or subfigure to draw into; a new one unless given.
-        strike: which heel strike to enlarge, counted from 0, or from the last: -1. A motion
-            without a heel strike has no right-hand column.
+        strike: which heel strike to enlarge, counted from 0, or from the last: -1. Those less than
+            4.5 ms before the end, such as the one that ends a walk of some footsteps, do not count;
+            a motion without others has no right-hand column.
 
     Returns:
         The figure given, or the new one.
@@ -59,9 +60,10 @@ def contact_forces(
     check_scene_of(trajectory, scene)
     t, forces = sampled_forces(scene, trajectory)
     times, legs = heel_strikes(scene, trajectory)
+    legs, times = (each[times <= t[-1] - _AFTER] for each in (legs, times))
     if times.size and not -times.size <= strike < times.size:
         raise ArgumentError(
-            f"strike = {strike} is not allowed: this motion has {times.size} heel strikes."
+            f"strike = {strike} is not allowed: there are {times.size} heel strikes to enlarge."
         )
     rows = 2 if "tangential_1" in forces else 1
     columns = 2 if times.size else 1

@@ -1,26 +1,19 @@
-"""Charts of a gait: Floquet multipliers in the complex plane, and elasticities as tornados."""
+"""Elasticities of a gait as tornados, and the error bars of charts of gaits."""
 
+import math
 from typing import Any
 
 import jax.tree_util as jtu
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._measures import QUANTITIES
-from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import row_label
-
-_NEAR_ZERO = 0.03
-"""Multipliers closer to zero than this are named together."""
-_VISIBLE = 0.005
-"""Errors below this hide behind a dot."""
 
 
 def check_drawable(gait: Gait) -> None:
@@ -29,60 +22,6 @@ def check_drawable(gait: Gait) -> None:
         raise ArgumentError("this is a batch of gaits: draw one of them.")
     if gait.outcome is not Search.FOUND:
         raise ArgumentError(f"the search ended {str(gait.outcome)!r}: there is no gait to draw.")
-
-
-def multipliers(gait: Gait | BranchPoint, *, ax: Axes | None = None) -> Figure:
-    """Draws the Floquet multipliers with their error bars, without the trivial one.
-
-    The circle is the unit circle, within which a gait is stable. A disc about a multiplier is its
-    estimated error, where that is larger than the dot. Those near zero lie on top of each other
-    and are named together.
-
-    Args:
-        gait: a gait that was found, or a point of a branch.
-        ax: axes to draw into; a new figure unless given.
-
-    Returns:
-        The figure that holds `ax`, or the new one.
-
-    Raises:
-        ValueError: no gait was found, or this is a batch.
-    """
-    if isinstance(gait, BranchPoint):
-        errors, stable = np.asarray(gait.multiplier_errors), gait.stable
-        critical = Bifurcation(gait.bifurcation)
-    else:
-        check_drawable(gait)
-        errors = np.asarray(error_bars(gait, "multipliers"))
-        stable, critical = bool(gait.stable), gait.critical
-    values = np.asarray(gait.multipliers)
-    ax = style.axes_or_new(ax, 5.6, 5.6)
-    look: dict[str, Any] = {"edgecolor": style.GROUND_COLOUR, "zorder": 0, "label": "unit circle"}
-    ax.add_patch(Circle((0.0, 0.0), 1.0, facecolor="#F6F6F6", **look))
-    for value, error in zip(values, errors, strict=True):
-        if _VISIBLE < error < np.inf:
-            place = (value.real, value.imag)
-            ax.add_patch(Circle(place, error, facecolor=style.LEG_COLOURS[1], alpha=0.25))
-    bars = np.where(np.isfinite(errors), errors, np.nan)
-    look = {"color": style.LEG_COLOURS[0], "elinewidth": 0.9, "capsize": 2.0}
-    ax.errorbar(values.real, values.imag, bars, bars, fmt="none", **look)
-    look = {"color": style.LEG_COLOURS[0], "markersize": 5}
-    ax.plot(values.real, values.imag, "o", label="multipliers", **look)
-    _name(ax, values)
-    _frame(ax, max(1.0, float(np.max(np.abs(values) + np.nan_to_num(bars)))))
-    largest = float(np.max(errors))
-    said = f"largest error {largest:.1e}" + ("" if largest > _VISIBLE else ": within the dots")
-    look = {"fontsize": "small", "color": style.GROUND_COLOUR}
-    ax.text(0.02, 0.02, said, transform=ax.transAxes, **look)
-    verdict = _VERDICTS[stable]
-    if critical is not Bifurcation.NONE:
-        verdict += f", at a bifurcation ({critical})"
-    radius = float(np.max(np.abs(values)))
-    style.set_title(ax, f"Floquet multipliers: spectral radius {radius:.4f}\n{verdict}")
-    return style.figure_of(ax)
-
-
-_VERDICTS = {True: "stable", False: "not stable", None: "undecided within the errors"}
 
 
 _ERRORS = {"multipliers": "multiplier_errors", "sensitivities": "sensitivity_errors"}
@@ -122,39 +61,6 @@ def elasticity_errors(gait: Gait, name: str) -> np.ndarray:
     return np.where(np.isfinite(own) & np.isfinite(found), found, np.nan)
 
 
-def _frame(ax: Axes, reach: float) -> None:
-    """Equal scales, both axes through zero, room for the names."""
-    ax.axhline(0.0, color=style.SHADE_COLOUR, linewidth=0.8, zorder=0.5)
-    ax.axvline(0.0, color=style.SHADE_COLOUR, linewidth=0.8, zorder=0.5)
-    ax.set_aspect("equal")
-    ax.set_xlim(-1.15 * reach, 1.15 * reach)
-    ax.set_ylim(-1.15 * reach, 1.15 * reach)
-    ax.set_xlabel(r"real part, Re $\lambda$ (–)")
-    ax.set_ylabel(r"imaginary part, Im $\lambda$ (–)")
-    ax.spines[["top", "right"]].set_visible(False)
-
-
-def _name(ax: Axes, values: np.ndarray) -> None:
-    """Writes each multiplier beside its dot; of a complex pair once, those near zero together."""
-    small = np.abs(values) < _NEAR_ZERO
-    reals = 0
-    for value in values[~small & (values.imag >= 0.0)]:
-        if value.imag > 0.0:
-            text, shift, anchor = f"{value.real:.3f} ± {value.imag:.3f} i", 6, "bottom"
-        else:
-            # Neighbours on the real axis are written at different depths.
-            text = f"{value.real:.3f}".replace("-", "−")
-            shift, anchor = -6 - 12 * (reals % 2), "top"
-            reals += 1
-        across, side = (-6, "right") if value.real > 0.3 else (6, "left")
-        place = (value.real, value.imag)
-        style.label_point(ax, text, place, (across, shift), ha=side, va=anchor)
-    if small.any():
-        largest = float(np.max(np.abs(values[small])))
-        text = f"{int(small.sum())} near 0\n" + rf"($|\lambda| \leq$ {largest:.1e})"
-        style.label_point(ax, text, (0.0, 0.0), (-8, -8), ha="right", va="top")
-
-
 _LINEAR = 1e-4
 """Elasticities up to this are drawn to a linear scale, beyond to a logarithmic one."""
 
@@ -171,7 +77,7 @@ The scale is logarithmic beyond
 
 
 def elasticities(
-    gait: Gait, measure: str | tuple[str, ...] = tuple(QUANTITIES), *, ax: Axes | None = None
+    gait: Gait, measure: str | tuple[str, ...] | None = None, *, ax: Axes | None = None
 ) -> Figure:
     """Draws elasticities, d log measure / d log parameter, with error bars, the largest on top.
 
@@ -181,7 +87,7 @@ def elasticities(
     Args:
         gait: a gait that was found, with its sensitivities to some parameters.
         measure: one or several of "period", "step_length", "speed", "peak_normal" and
-            "spectral_radius", a panel each; all of them unless given.
+            "spectral_radius", a panel each; all whose elasticities are known unless given.
         ax: axes to draw one measure into; a new figure unless given.
 
     Returns:
@@ -191,12 +97,13 @@ def elasticities(
         ValueError: no gait was found, this is a batch, a measure that is not one of those, several
             for one pair of axes, or a gait without parameters.
     """
-    names = (measure,) if isinstance(measure, str) else tuple(measure)
+    check_drawable(gait)
+    asked = _known(gait) if measure is None else measure
+    names = (asked,) if isinstance(asked, str) else tuple(asked)
     if not names:
         raise ArgumentError("measure = () is not allowed: it must name a measure at least.")
     for name in names:
         check_choice("measure", name, QUANTITIES)
-    check_drawable(gait)
     if not gait.parameters:
         raise ArgumentError("this gait has no sensitivities: find it with parameters to vary.")
     if ax is not None and len(names) > 1:
@@ -218,12 +125,19 @@ def elasticities(
     return style.figure_of(panels[0])
 
 
+def _known(gait: Gait) -> list[str]:
+    """Measures with an elasticity that is known and not zero; all of them if none has one."""
+    values = {name: np.nan_to_num(getattr(gait.elasticities, name)) for name in QUANTITIES}
+    return [name for name, own in values.items() if own.any()] or list(QUANTITIES)
+
+
 def _row_labels(gait: Gait) -> tuple[list[str], bool]:
     """What the parameters are called, and whether by their symbols alone: in the style of a paper,
-    whose text explains them, where these differ."""
-    symbols = [each.symbol for each in gait.quantities]
-    if not style.has_titles() and all(symbols) and len(set(symbols)) == len(gait.parameters):
-        return symbols, True
+    whose text explains them, where these differ. Parameters of a body are told by its name."""
+    symbols = {each.symbol for each in gait.quantities} - {""}
+    told = len(symbols) == len(gait.parameters) and not any("." in n for n in gait.parameters)
+    if not style.has_titles() and told:
+        return [each.symbol for each in gait.quantities], True
     return [row_label(each) for each in gait.quantities or gait.parameters], False
 
 
@@ -271,12 +185,14 @@ def _panel(
 
 
 def _scale(ax: Axes, largest: float, narrow: bool) -> None:
-    """The same reach on both sides, a tick every other decade; only the last in `narrow` axes."""
+    """The same reach on both sides; ticks at its largest power of ten and a hundredth of that, at
+    the largest alone in `narrow` axes."""
     ax.set_xscale("symlog", linthresh=_LINEAR, linscale=0.5)
     reach = max(1.6 * largest, 10.0 * _LINEAR)
     ax.set_xlim(-reach, reach)
-    powers = [10.0**k for k in range(-2, 7, 2) if 10.0**k <= reach][-1 if narrow else 0 :]
-    marks = {-power: f"−{power:g}" for power in reversed(powers)} | {0.0: "0"}
-    marks |= {power: f"{power:g}" for power in powers}
+    top = math.floor(math.log10(reach) + 1e-9)
+    powers = [10.0**k for k in (top, top - 2)[: 1 if narrow else 2] if 10.0**k >= 10.0 * _LINEAR]
+    marks = {0.0: "0"}
+    for power in powers:
+        marks |= {-power: f"−{power:g}", power: f"{power:g}"}
     ax.set_xticks(list(marks), list(marks.values()), fontsize="small")
-    ax.set_xticks([mark for mark in (-0.01, 0.01) if mark not in marks], minor=True)

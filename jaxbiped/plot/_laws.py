@@ -220,7 +220,8 @@ def _is_out(t: ArrayLike, y: _Drop, args: Any, **rest: object) -> Scalar:
 
 def _mark_speeds(ax: Axes, bend: float, end: float) -> None:
     """Ticks at zero and at the powers of ten of both signs where the scale is logarithmic."""
-    first, last = math.ceil(math.log10(1.5 * bend)), math.floor(math.log10(end) + 1e-9)
+    least = bend * (6.0 if style.is_narrow() else 1.5)
+    first, last = math.ceil(math.log10(least)), math.floor(math.log10(end) + 1e-9)
     marks = {10.0**k: f"10^{{{k}}}" for k in range(first, last + 1)} or {end: f"{end:g}"}
     below = {-x: f"$-{text}$" for x, text in reversed(marks.items())}
     labels = below | {0.0: "0"} | {x: f"${text}$" for x, text in marks.items()}

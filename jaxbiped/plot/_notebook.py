@@ -19,7 +19,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._measures import QUANTITIES
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.plot import style
-from jaxbiped.plot._gait_charts import multipliers
+from jaxbiped.plot._multiplier_chart import multipliers
 from jaxbiped.plot._parameter_charts import branch
 from jaxbiped.plot._phase_portrait import gait_orbit
 from jaxbiped.plot._samples import AnyScene

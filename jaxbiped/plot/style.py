@@ -41,8 +41,7 @@ _FADES = 0.62
 """What is left of a colour's depth from a body to the next one of its leg."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito's, in the order in which lines of many kinds take them."""
-GROUND_COLOUR = "#595959"
-SHADE_COLOUR = "#DDDDDD"
+GROUND_COLOUR, SHADE_COLOUR = "#595959", "#DDDDDD"
 _ENERGY_COLOURS = {
     "kinetic": ("#0072B2", "#56B4E9"),
     "elastic": ("#A8578A", "#CC79A7"),
@@ -203,6 +202,12 @@ def _widths(entries: list[Any]) -> list[float]:
     return [_ENTRY_SAMPLE + _ENTRY_LETTER * len(text) for text in letters]
 
 
+def text_size(text: str) -> tuple[float, float]:
+    """About how wide and how high lines of text are in small letters [inches]."""
+    lines = _MATHEMATICS.sub("xxxx", text).split("\n")
+    return _ENTRY_LETTER * letter_size() * max(map(len, lines)), 0.15 * letter_size() * len(lines)
+
+
 _MATHEMATICS = re.compile(r"\$.*?\$")
 
 
@@ -217,8 +222,8 @@ def legend_above(
     entries = _entries(ax, options)
     if width is None:
         width = 1.1 * ax.get_window_extent().width / figure_of(ax).dpi
-    title = _TITLE_LETTER * len(ax.get_title(loc="left"))
-    if letter_size() * (sum(_widths(entries)) + title) > width:
+    needed = sum(_widths(entries)) + _TITLE_LETTER * len(ax.get_title(loc="left"))
+    if letter_size() * needed > width:
         legend_below(lowest or ax, columns=len(entries), handles=entries, **options)
     else:
         row = {"handles": entries, "ncols": max(len(entries), 1), "bbox_to_anchor": (1.0, 1.0)}
@@ -290,5 +295,5 @@ def _kind(name: str) -> tuple[bool, int]:
     """Whether it is an ending, and its place among these; or that of its gait or cycle's length."""
     if not name.startswith(str(Label.WALKING)):
         return True, _ORDER.index(name) if name in _ORDER else len(_ORDER)
-    numbers = [int(number) for number in re.findall(r"\d+", name)] or [1]
-    return False, numbers[-1] - (len(numbers) == 1)
+    numbers = re.findall(r"\d+", name) or [1]
+    return False, int(numbers[-1]) - (len(numbers) == 1)

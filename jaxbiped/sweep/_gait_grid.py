@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
+from jaxbiped._quantity import Quantity
 from jaxbiped._tables import variables_of
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state_quantities import recurring_names
@@ -96,7 +97,7 @@ class GaitGrid:
 def open_gait_grid(
     first: Gait,
     values: Mapping[str, np.ndarray],
-    units: Mapping[str, str],
+    quantities: Mapping[str, Quantity],
     settings: JsonObject,
     writer: Mapping[str, str],
     path: Path | None,
@@ -107,12 +108,14 @@ def open_gait_grid(
 
     Args:
         first: any gait of the sweep, for the shapes.
-        values, units: of the swept parameters.
+        values, quantities: of the swept parameters.
         settings, writer, any_version: as there.
         path: of the store; None for one in memory.
     """
     state = type(first.measures.state)
-    dataset = _empty(first, values, units).assign_attrs({**writer, SETTINGS: strict_json(settings)})
+    dataset = _empty(first, values, quantities).assign_attrs(
+        {**writer, SETTINGS: strict_json(settings)}
+    )
     if path is None:
         return GaitGrid(dataset, state, None)
     new = continue_store(
@@ -158,7 +161,7 @@ def _load(path: Path, empty: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _empty(
-    gait: Gait, values: Mapping[str, np.ndarray], units: Mapping[str, str]
+    gait: Gait, values: Mapping[str, np.ndarray], quantities: Mapping[str, Quantity]
 ) -> "xarray.Dataset":
     import xarray
 
@@ -169,6 +172,6 @@ def _empty(
         empty = np.full((*shape, *value.shape), -1 if whole else np.nan, value.dtype)
         variables[name] = ((*dims, *own), empty, attributes)
     coordinates: dict[str, Any] = {
-        name: (name, column, {"units": units[name]}) for name, column in values.items()
+        name: (name, column, quantities[name].attributes) for name, column in values.items()
     }
     return xarray.Dataset(variables, coordinates | gait_coordinates(gait))

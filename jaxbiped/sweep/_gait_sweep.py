@@ -134,9 +134,9 @@ def gait_sweep(
                 gait = find_gait(scene_at(place), start, engine=engine, **options)
                 yield slice(k, k + 1), rows_of(gait, None)
 
-        units = {name: parameter_quantities(scene)[name].unit for name in values}
+        quantities = parameter_quantities(scene)
         grid = open_gait_grid(
-            first, values, units, settings, provenance(scene), path, any_version=any_version
+            first, values, quantities, settings, provenance(scene), path, any_version=any_version
         )
         try:
             GaitWaves(grid, (centre, first), find, search_alone, now).run()

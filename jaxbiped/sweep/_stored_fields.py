@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from jaxbiped._quantity import Quantity
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.sweep._labelling_loop import Labelled
@@ -48,20 +49,20 @@ class Layout(NamedTuple):
         starts: the starts.
         chunk_shape: of all chunks but those at the far end of the axis that is cut: one place of
             the axes before it, all of those after.
-        units: SI units of the starts' coordinates, as far as they are known.
+        quantities: what the starts' coordinates are, as far as it is known.
         doubts: whether `DOUBT_FIELDS` are kept.
     """
 
     starts: AbstractStarts
     chunk_shape: tuple[int, ...]
-    units: Mapping[str, str]
+    quantities: Mapping[str, Quantity]
     doubts: bool = False
 
     @staticmethod
     def of(
         starts: AbstractStarts,
         chunk: int,
-        units: Mapping[str, str] | None = None,
+        quantities: Mapping[str, Quantity] | None = None,
         *,
         doubts: bool = False,
     ) -> "Layout":
@@ -70,7 +71,7 @@ class Layout(NamedTuple):
         for size in reversed(starts.shape):
             shape.append(max(1, min(left, size)))
             left = left // size if left >= size else 1
-        return Layout(starts, tuple(reversed(shape)), units or {}, doubts)
+        return Layout(starts, tuple(reversed(shape)), quantities or {}, doubts)
 
     @property
     def fields(self) -> dict[str, tuple[str, float, str, str]]:
@@ -128,7 +129,8 @@ def empty_dataset(layout: Layout) -> "xarray.Dataset":
     dims = tuple(starts.axes)
     kinds = dict(layout.fields)
     for name in starts.own_columns:
-        kinds[f"start_{name}"] = ("f8", np.nan, layout.units.get(name, ""), f"the start's {name}")
+        own = layout.quantities.get(name, Quantity(name))
+        kinds[f"start_{name}"] = ("f8", np.nan, own.unit, f"the start's {own.words}")
     variables = {}
     for name, (dtype, nothing, unit, what) in kinds.items():
         attributes: JsonObject = {"long_name": what}
@@ -141,7 +143,7 @@ def empty_dataset(layout: Layout) -> "xarray.Dataset":
         values = np.broadcast_to(np.asarray(nothing, dtype=dtype), starts.shape)
         variables[name] = (dims, values, attributes)
     coordinates = {
-        name: (name, values, {"units": layout.units.get(name, "")})
+        name: (name, values, layout.quantities.get(name, Quantity(name)).attributes)
         for name, values in starts.axes.items()
         if values is not None
     }

@@ -107,9 +107,8 @@ def sweep(
     path = store_path(store)
     began = time.perf_counter()
     quantities = coordinate_quantities(labelling.scene)
-    units = {name: quantity.unit for name, quantity in quantities.items()}
     doubts = labelling.effort.wanted is not None
-    layout = Layout.of(starts, int(chunk), units, doubts=doubts)
+    layout = Layout.of(starts, int(chunk), quantities, doubts=doubts)
     own = {
         "fields": list(layout.fields),
         "starts": starts.described(),

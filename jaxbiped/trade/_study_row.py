@@ -89,7 +89,7 @@ class Way(NamedTuple):
     @property
     def name(self) -> str:
         """Method and engine, without the setting."""
-        return f"{self.solver} by {self.engine}"
+        return f"{self.solver} ({self.engine})"
 
 
 _ENOUGH = 3.0

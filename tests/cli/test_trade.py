@@ -21,7 +21,7 @@ def test_errors_and_costs_of_the_named_accuracies(tmp_path):
     usual = (("walk", "rodas4p", "state"), ("gait", "rodas4", "multiplier"))
     for of, solver, axis in usual:
         draft, balanced, tight = (
-            row for row in rows if row["of"] == of and row["way"] == f"{solver} by lanes"
+            row for row in rows if row["of"] == of and row["way"] == f"{solver} (lanes)"
         )
         settings = [row["setting"] for row in (draft, balanced, tight)]
         assert settings == ["draft", "balanced", "tight"]

@@ -1,6 +1,7 @@
 """Branches of rigid walkers against what was published and what `find_gait` says."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -192,6 +193,12 @@ def test_a_dataset_says_what_is_in_it(rigid):
     data = rigid.to_dataset()
     assert data["slope"].attrs["units"] == "rad"
     assert data["state_omega_2"].attrs["units"] == "rad/s"
+    sizes = np.abs(data["multipliers_real"] + 1j * data["multipliers_imag"]).max("multiplier")
+    assert np.array_equal(data["spectral_radius"], sizes)
+    assert np.array_equal(data["spectral_radius_error"], data["multipliers_error"][:, 0])
+    assert all(each.attrs["long_name"] for each in data.variables.values())
+    table = rigid.to_latex(along="event", columns=["event_slope", "event_kind"])
+    assert re.search(r"0\.100401149\d+\(\d\d\) & period-doubling", table)
     assert data["speed"].values == pytest.approx(data["step_length"] / data["period"])
     assert set(np.unique(data["stable"])) == {-1, 0, 1}
     assert data["event_kind"].attrs["flag_meanings"].split()[int(data["event_kind"][0])] == (

@@ -22,7 +22,7 @@ def test_ways_are_told_against_independent_references(made):
     assert numbers["floors"]["walk"]["state"] < 1e-10
     assert numbers["floors"]["slopes"]["slopes"] < 1e-6
     walks = {(row["way"], row["setting"]): row for row in numbers["rows"]["walk"]}
-    loose, tight = (walks["rodas4p by lanes", f"rtol={r}"] for r in ("0.0001", "1e-06"))
+    loose, tight = (walks["rodas4p (lanes)", f"rtol={r}"] for r in ("0.0001", "1e-06"))
     assert loose["errors"]["state"] > 10.0 * tight["errors"]["state"]
     assert loose["attempted"] < tight["attempted"]
 
@@ -48,9 +48,9 @@ def test_a_second_run_goes_on_from_the_store(made):
 
 def test_equal_errors_lie_between_the_settings_that_enclose_them(made):
     numbers = made[1].numbers
-    table = numbers["at_equal_error"]["walk"]["state"]["steps"]["rodas4p by lanes"]
+    table = numbers["at_equal_error"]["walk"]["state"]["steps"]["rodas4p (lanes)"]
     known = [steps for steps in table if steps is not None]
-    rows = [row for row in numbers["rows"]["walk"] if row["way"] == "rodas4p by lanes"]
+    rows = [row for row in numbers["rows"]["walk"] if row["way"] == "rodas4p (lanes)"]
     least, most = sorted(row["attempted"] for row in rows)
     assert known == sorted(known)
     assert all(0.999 * least <= steps <= 1.001 * most for steps in known)

@@ -97,6 +97,20 @@ def test_an_unstable_gait_stays_inside_the_frame_and_names_its_bifurcation():
     np.testing.assert_allclose(up[0], [[-1.6, -0.1], [-1.6, 0.1]])
 
 
+@pytest.mark.parametrize("style", ["screen", "paper"])
+def test_names_of_multipliers_cover_no_dot(style):
+    """Found by a walker with unequal feet: a name lay on the dot below it."""
+    values = (-0.131 + 0.148j, -0.131 - 0.148j, -5.6e-4, 3.7e-7, 0.0, 0.0)
+    with jb.plot.figure_style(style):
+        figure = multipliers(_gait(values=values))
+        figure.draw_without_rendering()
+        (ax,) = figure.axes
+        dots = ax.transData.transform([(each.real, each.imag) for each in map(complex, values)])
+        for text in (each for each in ax.texts if "error" not in each.get_text()):
+            box = text.get_window_extent()
+            assert not any(box.contains(*dot) for dot in dots), text.get_text()
+
+
 def test_multipliers_of_a_branchs_point():
     point = branch_point(0.02, -1.6, error=0.1)
     (ax,) = multipliers(point).axes
@@ -150,6 +164,7 @@ def test_tornado_has_the_largest_on_top_and_says_every_number():
     bottom, top = ax.get_ylim()
     assert bottom > top
     assert ax.get_xlim()[1] > 0.5
+    assert ax.get_xticks().max() == pytest.approx(0.1)
 
 
 def test_tornado_of_all_measures_and_unknown_last():
@@ -159,6 +174,17 @@ def test_tornado_of_all_measures_and_unknown_last():
     names = [label.get_text() for label in axes[3].get_yticklabels()]
     assert [name.rpartition(", ")[2] for name in names] == ["$l$", "$c$", "$m_S$", "$K$"]
     assert axes[3].texts[-1].get_text() == "unknown"
+
+
+def test_measures_without_a_known_elasticity_are_left_out_unless_asked_for():
+    gait = _gait()
+    unknown = gait.elasticities._replace(spectral_radius=np.array([np.nan, np.nan, np.nan, 0.0]))
+    gait = dataclasses.replace(gait, elasticities=unknown)
+    titles = [ax.get_title(loc="left") for ax in elasticities(gait).axes]
+    assert "spectral radius" not in titles
+    assert "speed" in titles
+    (ax,) = elasticities(gait, "spectral_radius").axes
+    assert [text.get_text() for text in ax.texts].count("unknown") == 3
 
 
 @pytest.mark.parametrize("measure", ["hop", (), ("period", "hop")])

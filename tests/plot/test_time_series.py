@@ -91,6 +91,16 @@ def test_a_heel_strike_is_enlarged(seed_walk):
         contact_forces(scene, walk, strike=len(times))
 
 
+def test_the_strike_that_ends_a_walk_is_not_the_one_enlarged(seed_walk):
+    """Nothing follows it that could be drawn."""
+    walk = jb.simulate(seed_walk[0], jb.seed_state(), footsteps=2)
+    times, feet = jb.measure.heel_strikes(seed_walk[0], walk)
+    assert times[-1] == pytest.approx(float(walk.t[-1]), abs=1e-9)
+    axes = contact_forces(seed_walk[0], walk).axes
+    assert f"leg {feet[-2]} at {times[-2]:.3f} s" in axes[1].get_title(loc="left")
+    assert _curve(axes[1], feet[-2])[0].max() == pytest.approx(4.5)
+
+
 def test_panels_are_those_of_what_there_is(seed_walk):
     """No tangential panel without friction, no second column without a heel strike."""
     scene, walk = seed_walk

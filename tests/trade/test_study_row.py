@@ -10,7 +10,7 @@ from jaxbiped.trade import Row, Way, Work, cheapest, cost_at, failed_row, row_of
 
 def test_a_way_is_named_apart_from_its_setting():
     tight, draft = (Way("rodas4", "lanes", s, r) for s, r in (("tight", 2e-9), ("draft", 1e-5)))
-    assert tight.name == draft.name == "rodas4 by lanes"
+    assert tight.name == draft.name == "rodas4 (lanes)"
 
 
 def test_the_first_run_does_not_count_as_a_warm_one():
