@@ -34,13 +34,13 @@ def check_drawable(gait: Gait) -> None:
 def multipliers(gait: Gait | BranchPoint, *, ax: Axes | None = None) -> Figure:
     """Draws the Floquet multipliers with their error bars, without the trivial one.
 
-    The circle is the unit circle, within which a gait is stable. A disc about a multiplier is its
-    estimated error, where that is larger than the dot. Those near zero lie on top of each other
-    and are named together.
+    The circle is the unit circle, within which a gait is stable. A disc around a multiplier is its
+    estimated error, if that is larger than the dot. Multipliers near zero lie on top of each other
+    and share a label.
 
     Args:
         gait: a gait that was found, or a point of a branch.
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
@@ -175,14 +175,14 @@ def elasticities(
 ) -> Figure:
     """Draws elasticities, d log measure / d log parameter, with error bars, the largest on top.
 
-    A bar to the right: the measure grows with the parameter. The scale is logarithmic beyond
-    1e-4 on either side of zero; the numbers stand at the right.
+    A bar to the right means that the measure grows with the parameter. The scale is logarithmic
+    beyond 1e-4 on either side of zero; the numbers stand at the right.
 
     Args:
         gait: a gait that was found, with its sensitivities to some parameters.
         measure: one or several of "period", "step_length", "speed", "peak_normal" and
             "spectral_radius", a panel each; all of them unless given.
-        ax: axes to draw one measure into; a new figure unless given.
+        ax: axes to draw one measure into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
