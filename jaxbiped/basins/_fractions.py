@@ -17,12 +17,12 @@ from jaxbiped.basins._labels import Label, check_known
 
 @dataclasses.dataclass(frozen=True)
 class Fraction:
-    """A fraction of the starts, and its confidence interval.
+    """A fraction of the starts with its confidence interval.
 
     Attributes:
-        estimate: count over all that were counted [–].
+        estimate: count divided by the number of counted starts [–].
         low, high: ends of the confidence interval [–].
-        count: how many starts have the label.
+        count: number of starts with the label.
     """
 
     estimate: float
@@ -34,8 +34,8 @@ class Fraction:
 class Fractions(dict[str, Fraction]):
     """Fractions by the names of labels, the most frequent first.
 
-    It holds the labels that occur. Of any other it gives the fraction 0 with its interval, and it
-    refuses what is no label's name.
+    It holds the labels that occur. For any other label, it returns the fraction 0 with its
+    interval; names that are not labels are refused.
     """
 
     def __init__(self, found: dict[str, Fraction], absent: Fraction) -> None:
@@ -99,21 +99,21 @@ def wilson_interval(
 def fractions(
     labels: npt.ArrayLike, *, doubt: npt.ArrayLike | None = None, confidence: float = 0.95
 ) -> Fractions:
-    """The fraction of the starts that has each label, the most frequent first.
+    """The fraction of the starts with each label, the most frequent first.
 
     Args:
-        labels: names (`label_names`) or codes of `Label`, any shape. Pending ones are not counted:
-            where all are, no fraction is known and the result is empty.
-        doubt: which labels remain in doubt (booleans), of the labels' shape. Intervals then begin
-            where none of those counts, and end where all of them count.
-        confidence: that of the intervals, see `wilson_interval`.
+        labels: names (`label_names`) or codes of `Label`, any shape. Pending labels are not
+            counted; if all are pending, the result is empty.
+        doubt: whether each label remains in doubt (booleans), of the labels' shape. The lower end
+            of each interval then counts none of these labels, and the upper end all of them.
+        confidence: confidence level of the intervals, see `wilson_interval`.
 
     Returns:
         A `Fraction` by the name of each label that occurs; see `Fractions` for others.
 
     Raises:
-        ArgumentError: no entry, an unknown code, doubts of another shape, or a confidence not
-            between 0 and 1.
+        ArgumentError: there is no label, a code is unknown, `doubt` has another shape, or the
+            confidence is not between 0 and 1.
 
     Examples:
         >>> import jaxbiped as jb

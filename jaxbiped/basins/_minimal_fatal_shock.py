@@ -34,18 +34,19 @@ class FatalShock(NamedTuple):
     """The smallest push found that changes the label; distances are in scaled coordinates.
 
     Attributes:
-        distance: of the failing start from the gait; infinite where none was found.
-        push: from the gait to that start, in the coordinates' units, shape (d,); NaN if none.
+        distance: distance of the failing start from the gait; infinite if none was found.
+        push: vector from the gait to that start, in the coordinates' units, shape (d,); NaN if
+            none.
         boundary_point: coordinates between the last start with the gait's label along the ray and
             the failing one, at most the tolerance apart, shape (d,).
-        label: the failing start's; the gait's own where none was found.
+        label: label of the failing start; that of the gait if none was found.
         direction: unit vector of the push in scaled coordinates, shape (d,).
         angle: between direction and the boundary's normal there [rad]: 0 at a nearest point of
             a smooth boundary. NaN where the normal is not known.
-        bisected_distance: the distance before any ray was turned.
-        origin_label: the gait's.
-        asked: how many labels were asked for.
-        calls: in how many calls.
+        bisected_distance: the distance before any ray was rotated.
+        origin_label: label of the gait.
+        asked: number of requested labels.
+        calls: number of calls in which they were requested.
     """
 
     distance: float
@@ -80,33 +81,33 @@ def minimal_fatal_shock(
 ) -> FatalShock:
     """Distance from a gait to the nearest start with another label, in scaled coordinates.
 
-    All rays march outward together, max_distance / steps at a time, until half as far again as the
-    first of them that meets another label; those steps are bisected. A tongue of another basin
-    thinner than a step may be stepped over, and one between the rays is missed: the distance is
-    that of a start that was seen to fail, to within the tolerance along its ray, and a nearer one
-    may exist. Then the nearest rays are turned to the boundary's normal, found from `normal` or
-    from the distances along nearby rays, as long as they get shorter: this ends at a local
-    minimum; at an edge of the boundary, where it has no normal, only near one. (The least
-    distance to the edge of the basin is the "minimal fatal shock" of Halekotte and Feudel, Sci.
-    Rep. 10 (2020) 11783.)
+    All rays march outward together, max_distance / steps at a time, until they are half as long
+    again as the first ray that met another label; the last steps are bisected. A tongue of another
+    basin that is thinner than a step, or lies between the rays, may be missed. The distance is
+    therefore that of a start that was found to fail, to within the tolerance along its ray, and a
+    nearer one may exist. The nearest rays are then rotated towards the boundary normal (computed
+    with `normal`, or estimated from the distances along nearby rays) for as long as this shortens
+    them. The search ends at a local minimum of the distance, or only near one if the minimum lies
+    on an edge of the boundary, where no normal exists. (The smallest distance to the boundary of
+    the basin is the "minimal fatal shock" of Halekotte and Feudel, Sci. Rep. 10 (2020) 11783.)
 
     Args:
         label_of: labels, whole numbers of shape (n,), of points of shape (n, d). Every label
             that differs from the origin's counts as fatal, "unresolved" too: map the codes first
             where a difference should not count.
         origin: coordinates of the gait, shape (d,).
-        scales: what counts as one unit of distance along each coordinate, shape (d,).
+        scales: unit of distance along each coordinate, shape (d,).
         max_distance: scaled distance up to which rays march.
         tolerance: scaled distance to which the boundary is bisected.
         directions: how many rays (both ways along every axis first, so at least 2 d, then evenly
             over the sphere; d = 1 has two), 32 d unless given; or scaled directions of shape
             (n, d).
-        steps: of the march.
+        steps: number of steps of the march.
         normal: gradients, shape (n, d), at points of shape (n, d) near the boundary, in the units
             of the points, of any function that is constant along the boundary; either sign. NaN
             where it is not known: such a ray is not turned.
         improved: how many rays are turned, the nearest ones at least 0.5 rad apart.
-        batch: the most points in a call.
+        batch: maximum number of points in a call.
 
     Returns:
         The push to the nearest start that was found to fail, its scaled distance, and the boundary

@@ -14,19 +14,21 @@ from jaxbiped.basins._label_oracle import LabelOf, LabelOracle, check_box
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RefinedBoundary:
-    """Labels about the boundaries between basins, and the cells that boundaries pass through.
+    """Labels near the boundaries between basins, and the cells that the boundaries cross.
 
-    At level k a cell is the box's side over `shape` 2^k wide; d dimensions, n points labelled.
+    In d dimensions, n points are labelled. At level k, a cell is as wide as the box divided by
+    `shape` 2^k.
 
     Attributes:
         lower, upper: corners of the box, shape (d,).
-        shape: cells along each dimension at level 0.
+        shape: number of cells along each dimension at level 0.
         levels: the finest level.
-        positions: the points labelled, on the lattice of the finest level; whole, shape (n, d).
+        positions: positions of the labelled points on the lattice of the finest level; whole
+            numbers, shape (n, d).
         labels: their labels, shape (n,).
-        cells: at each level from 0 the cells whose corners disagree: positions on the lattice of
-            that level's cells; whole, shape (m_k, d).
-        calls: how often labels were asked for.
+        cells: for each level from 0, the cells whose corners disagree: positions on the lattice of
+            that level's cells; whole numbers, shape (m_k, d).
+        calls: number of calls for labels.
     """
 
     lower: np.ndarray
@@ -40,21 +42,21 @@ class RefinedBoundary:
 
     @property
     def asked(self) -> int:
-        """How many points were labelled."""
+        """Number of labelled points."""
         return len(self.labels)
 
     @property
     def full(self) -> int:
-        """How many points the full grid of the finest level has."""
+        """Number of points of the full grid of the finest level."""
         return math.prod(n + 1 for n in self.cells_across(self.levels))
 
     @property
     def points(self) -> np.ndarray:
-        """Coordinates of the points labelled, shape (n, d)."""
+        """Coordinates of the labelled points, shape (n, d)."""
         return _places(self.lower, self.upper, self.cells_across(self.levels), self.positions)
 
     def cells_across(self, level: int) -> tuple[int, ...]:
-        """How many cells of a level lie along each dimension of the box."""
+        """Number of cells of a level along each dimension of the box."""
         return tuple(n << level for n in self.shape)
 
     def cell_size(self, level: int) -> np.ndarray:
@@ -68,11 +70,11 @@ class RefinedBoundary:
     def on_grid(self, *, largest: int = 10_000_000) -> np.ndarray:
         """Labels on the full grid of the finest level, one entry a lattice point.
 
-        A point that was not labelled gets the label of the nearest one that was, counted along
-        the lattice: no boundary cell lies between them.
+        A point that was not labelled gets the label of the nearest labelled one along the lattice;
+        no boundary cell lies between them.
 
         Args:
-            largest: the most points that the grid may have.
+            largest: maximum number of points of the grid.
 
         Raises:
             ArgumentError: the full grid is larger than that.
@@ -104,26 +106,26 @@ def refine_boundary(
     follow: bool = True,
     batch: int = 65536,
 ) -> RefinedBoundary:
-    """Labels a coarse grid over a box, then halves again and again the cells a boundary crosses.
+    """Labels a coarse grid over a box, then repeatedly halves the cells that a boundary crosses.
 
-    A cell is halved along all dimensions where its 2^d corners do not all have one label. So a
-    basin (or a bay of one) that holds no corner of the coarse grid is missed, unless it can be
-    reached by following the boundary from cell to cell. No point is labelled twice.
+    A cell is halved along all dimensions if its 2^d corners do not all have the same label. A basin
+    (or a bay of one) that contains no corner of the coarse grid is therefore missed, unless the
+    boundary leads to it from cell to cell. No point is labelled twice.
 
     Args:
         label_of: labels, whole numbers of shape (n,), of points of shape (n, d).
         lower, upper: corners of the box, shape (d,), in the units of the points.
-        shape: cells of the coarse grid along each dimension.
-        levels: how often cells are halved; 0 labels the coarse grid alone.
-        follow: whether a boundary that leaves the halved cells through a face is followed into
-            the neighbour, at the same level. Costs further calls of few points.
-        batch: the most points in a call. Without `follow` a level is one call where it fits.
+        shape: number of cells of the coarse grid along each dimension.
+        levels: number of times that cells are halved; 0 labels only the coarse grid.
+        follow: whether a boundary that leaves the halved cells through a face is followed into the
+            neighbour at the same level. This costs further calls with few points.
+        batch: maximum number of points in a call. Without `follow`, a level is one call if it fits.
 
     Returns:
-        All points labelled, and the boundary cells of every level.
+        All labelled points, and the boundary cells of every level.
 
     Raises:
-        ArgumentError: an argument that is not allowed, or labels of a wrong shape.
+        ArgumentError: an argument is not allowed, or labels have a wrong shape.
     """
     low, high = check_box(lower, upper)
     coarse = tuple(check_count("shape", n) for n in np.atleast_1d(np.asarray(shape)))

@@ -43,7 +43,7 @@ class AbstractConstraintMethod(AbstractPart):
     """Finds the multipliers λ of M q̈ = Q − Jᵀ λ. A pytree of its constants.
 
     Attributes:
-        needs_independent: whether constraints that say the same twice make it singular.
+        needs_independent: whether repeated constraints make the method singular.
     """
 
     needs_independent: AbstractClassVar[bool]
@@ -54,20 +54,20 @@ class AbstractConstraintMethod(AbstractPart):
 
 
 class AbstractProjectingMethod(AbstractConstraintMethod):
-    """Also takes positions and velocities back to the constraints after every step.
+    """A method that also projects positions and velocities onto the constraints after every step.
 
     Attributes:
-        iterations: corrections of the positions after each step.
+        iterations: number of corrections of the positions after each step.
     """
 
     iterations: eqx.AbstractVar[int]
 
     @abc.abstractmethod
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
-        """The correction −W Jᵀ(J W Jᵀ)⁻¹ r of each coordinate that takes a residual r off.
+        """The correction −W Jᵀ(J W Jᵀ)⁻¹ r of each coordinate that removes a residual r.
 
-        The same for positions, where r is Φ, and for velocities, where it is Φ̇. W is the
-        metric's inverse.
+        The formula is the same for positions, with r = Φ, and for velocities, with r = Φ̇. W is the
+        inverse of the metric.
         """
 
 

@@ -27,8 +27,8 @@ from jaxbiped.linalg._symmetric import Factors, factorise, solve
 class Standard(AbstractConstraintMethod):
     """[M Jᵀ; J 0] [q̈; λ] = [Q; γ]: the constraints hold at the level of accelerations only.
 
-    Whatever error the integrator makes in positions and velocities stays, and an error of the
-    velocities makes the positions drift without bound.
+    Integration errors of positions and velocities remain, and an error of the velocities makes the
+    positions drift without bound.
 
     Source: the seed paper, section 4, "standard".
     """
@@ -135,12 +135,12 @@ def iterate_multipliers(
 class Penalty(AbstractPenalised):
     """(M + A JᵀJ) q̈ = Q − A Jᵀ(J̇ q̇ + 2 ζ ω Φ̇ + ω² Φ): stiff springs in place of constraints.
 
-    What holds the joint is λ = A (Φ̈ + 2 ζ ω Φ̇ + ω² Φ), so a loaded joint is open by about
-    λ/(A ω²), and accelerations and forces are off by a share of 1/(A s), s ≈ 1/m an eigenvalue of
-    J M⁻¹ Jᵀ: 2e-11 at the walker's hip. The A of 1e7 kg that is usual elsewhere belongs to solving
-    with M + A JᵀJ, which a larger one makes ill-conditioned. Here 1/A is added to J M⁻¹ Jᵀ, which
-    it cannot harm; the larger A is, the nearer is `Baumgarte` with a = ζ ω and b = ω. Constraints
-    that say the same twice share the load, to A s roundings.
+    The joint is held by λ = A (Φ̈ + 2 ζ ω Φ̇ + ω² Φ), so a loaded joint is open by about λ/(A ω²).
+    Accelerations and forces have a relative error of 1/(A s), where s ≈ 1/m is an eigenvalue of J
+    M⁻¹ Jᵀ: 2e-11 at the walker's hip. The usual A of 1e7 kg belongs to solving with M + A JᵀJ,
+    which a larger A makes ill-conditioned. Here 1/A is added to J M⁻¹ Jᵀ instead, which does no
+    harm; as A grows, the method approaches `Baumgarte` with a = ζ ω and b = ω. Repeated constraints
+    share the load, with an error of A s roundings.
 
     Source: the seed paper, section 4, "penalty"; Bayo, García de Jalón and Serna (1988).
     """
@@ -154,9 +154,9 @@ class Penalty(AbstractPenalised):
 class Augmented(AbstractAugmented):
     """M q̈⁰ = Q, then (M + A JᵀJ) q̈ᵏ⁺¹ = M q̈ᵏ − A Jᵀ(J̇ q̇ + 2 ζ ω Φ̇ + ω² Φ), repeated.
 
-    The iterations take off what the penalty alone leaves: each shrinks it by about 1/(A s), where
-    s ≈ 1/m is an eigenvalue of J M⁻¹ Jᵀ. Their number is fixed, so that nothing depends on a test
-    and derivatives are those of the same arithmetic: three leave nothing at the usual A.
+    The iterations remove the violation that the penalty alone leaves: each multiplies it by about
+    1/(A s), where s ≈ 1/m is an eigenvalue of J M⁻¹ Jᵀ. Their number is fixed, so derivatives are
+    those of the same arithmetic. At the usual A, three iterations suffice.
 
     Source: the seed paper, section 4, "augmented"; Bayo, García de Jalón and Serna (1988).
     """
@@ -178,8 +178,8 @@ class Index1(AbstractExactProjection):
 class Index1Augmented(AbstractAugmented, AbstractProjectingMethod):
     """`Augmented` within the step; after it q and q̇ are projected in the mass metric.
 
-    The projections are augmented Lagrangian iterations themselves, (M + A JᵀJ) Δq = −A Jᵀ Φ and
-    again with what that leaves, so that constraints which say the same twice do no harm.
+    The projections are themselves augmented Lagrangian iterations, (M + A JᵀJ) Δq = −A Jᵀ Φ,
+    repeated with the remaining violation. Repeated constraints are therefore allowed.
 
     Source: the seed paper, section 4, "index-1 augmented lagrangian"; Bayo and Ledesma (1996).
     """
@@ -194,8 +194,8 @@ class Index1Augmented(AbstractAugmented, AbstractProjectingMethod):
 class DirectCorrection(AbstractExactProjection):
     """`Standard` within the step; after it q ← q − Jᵀ(J Jᵀ)⁻¹ Φ, and q̇ likewise with Φ̇.
 
-    Corrections as small as can be in the coordinates' own numbers, metres and radians alike: a
-    different split between translation and rotation than the mass metric's.
+    The corrections are the smallest in the coordinates' own numbers, metres and radians alike, so
+    they split differently between translation and rotation than in the mass metric.
 
     Source: the seed paper, section 4, "described", the direct correction method.
     """

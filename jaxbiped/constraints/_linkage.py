@@ -18,11 +18,11 @@ class LinkBody(AbstractPart):
     """A rigid body in the plane.
 
     Attributes:
-        mass: [kg].
+        mass: mass [kg].
         inertia: moment of inertia about its centre of mass [kg·m²].
 
     Raises:
-        ArgumentError: a mass or an inertia that is not above 0.
+        ArgumentError: the mass or the inertia is not above 0.
     """
 
     mass: Parameter = parameter("body mass", "$m$", "kg", positive=True)
@@ -30,18 +30,19 @@ class LinkBody(AbstractPart):
 
 
 class Pin(eqx.Module):
-    """A frictionless pin: a point of one body stays where a point of another one is.
+    """A frictionless pin, which joins a point of one body to a point of another.
 
-    A body's own frame has its origin in the centre of mass; at θ = 0 it is parallel to the plane's.
+    A body's own frame has its origin at the centre of mass; at θ = 0 its axes are parallel to those
+    of the plane.
 
     Attributes:
         point_1: the pin in the first body's own frame, (x, z) [m].
-        point_2: in the second body's own frame; in the plane where that is the ground [m].
+        point_2: the pin in the second body's own frame, or in the plane if that is the ground [m].
         body_1: position of the first body in the linkage.
-        body_2: of the second one, None for the ground.
+        body_2: position of the second body, None for the ground.
 
     Raises:
-        ArgumentError: a coordinate that is not finite, or a body joined to itself.
+        ArgumentError: a coordinate is not finite, or a body is joined to itself.
     """
 
     point_1: tuple[Parameter, Parameter] = parameter("pin in body 1", "$s_1$", "m", several=True)
@@ -61,10 +62,10 @@ class Pin(eqx.Module):
 class LinkAngle(AbstractPart):
     """A sum of bodies' angles that is held, Σ w θ = value.
 
-    With Euler parameters an angle is known between −2π and 2π alone.
+    With Euler parameters, an angle is known only between −2π and 2π.
 
     Attributes:
-        value: what the sum is [rad].
+        value: value of the sum [rad].
         weights: of the angles, by the positions of their bodies in the linkage.
 
     Raises:
@@ -80,14 +81,14 @@ class Linkage(eqx.Module):
     """Bodies and joints; its coordinates are each body's centre of mass and orientation.
 
     Attributes:
-        bodies: of which there are n.
-        joints: each takes two degrees of freedom, unless others took them already.
+        bodies: the n bodies.
+        joints: the pins; each removes two degrees of freedom, unless other joints already do.
         orientation: one of `ORIENTATIONS`.
-        angles: each takes one.
+        angles: held sums of angles; each removes one degree of freedom.
 
     Raises:
-        ArgumentError: no body, a part of the wrong type, a joint of a body that there is not, or
-            an unknown orientation.
+        ArgumentError: there is no body, a part has the wrong type, a joint names a body that does
+            not exist, or the orientation is unknown.
     """
 
     bodies: tuple[LinkBody, ...] = eqx.field(converter=tuple)

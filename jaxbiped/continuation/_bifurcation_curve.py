@@ -42,13 +42,13 @@ class BifurcationCurve(NamedTuple):
     """Bifurcations of one kind along two parameters, n points in order.
 
     Attributes:
-        kind: of all of them.
+        kind: kind of the bifurcations.
         along: names of the two parameters.
-        units: their SI units.
-        values: of the two, SI units, shape (n, 2).
-        points: the gaits, whose `value` is that of the first parameter.
-        multipliers: the critical ones, shape (n,), complex.
-        errors: their estimated errors, shape (n,).
+        units: SI units of the two parameters.
+        values: values of the two parameters, SI units, shape (n, 2).
+        points: the gaits; their `value` is that of the first parameter.
+        multipliers: the critical multipliers, shape (n,), complex.
+        errors: estimated errors of the multipliers, shape (n,).
         stops: how the curve ended at its two ends.
     """
 
@@ -82,10 +82,9 @@ def bifurcation_curve(
         along: name of the second parameter.
         bounds: range (from, to) of the second parameter, SI units; the scene's own value must lie
             in it.
-        log: whether equal steps are equal factors; unless given, where a positive range spans two
-            decades.
-        largest_step: largest arclength of a step (see `continue_gait`).
-        max_points: points followed in each direction at most.
+        log: whether equal steps are equal factors. Default: if a positive range spans two decades.
+        largest_step: maximum arclength of a step (see `continue_gait`).
+        max_points: maximum number of points in each direction.
         accuracy: "balanced" or "tight"; multipliers are differentiated by differences.
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
 
@@ -93,7 +92,7 @@ def bifurcation_curve(
         The curve.
 
     Raises:
-        ArgumentError: an argument that is not allowed, or a bifurcation that is not found again.
+        ArgumentError: an argument is not allowed, or the bifurcation is not found again.
     """
     check_type("branch", branch, Branch)
     check_type("bifurcation", bifurcation, BifurcationPoint)

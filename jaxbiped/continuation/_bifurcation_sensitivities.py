@@ -23,14 +23,15 @@ _CRITICAL = 1e-3
 
 
 class BifurcationSensitivities(NamedTuple):
-    """How a bifurcation's value moves with p parameters.
+    """Derivatives of a bifurcation's critical value with respect to p parameters.
 
     Attributes:
         along: name of the parameter whose critical value it is.
         value: that value, SI units.
-        parameters: names of the others.
+        parameters: names of the p other parameters.
         slopes: derivatives of the value, SI units, shape (p,).
-        errors: their estimated errors, from a ten times looser solve, shape (p,).
+        errors: estimated errors of the derivatives, from a solve at a tolerance ten times looser,
+            shape (p,).
         elasticities: relative change of the value over relative change of the parameter, (p,).
     """
 
@@ -54,15 +55,15 @@ def bifurcation_sensitivities(
     Args:
         branch: from `continue_gait`.
         bifurcation: one of its folds, period doublings or Neimark–Sacker points.
-        parameters: names (see `parameter_names`); all but the branch's own unless given.
+        parameters: names (see `parameter_names`). Default: all except the branch's own.
         accuracy: "draft", "balanced" or "tight".
 
     Returns:
         The derivatives, with their errors.
 
     Raises:
-        ArgumentError: an argument that is not allowed; a limit; a doubling or Neimark–Sacker point
-            beyond which another multiplier had left the unit circle already.
+        ArgumentError: an argument is not allowed; the point is a limit; or at a doubling or
+            Neimark–Sacker point, another multiplier had already left the unit circle.
     """
     check_type("branch", branch, Branch)
     check_type("bifurcation", bifurcation, BifurcationPoint)

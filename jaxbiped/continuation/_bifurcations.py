@@ -30,15 +30,15 @@ _AT = 1e-3
 
 
 class BranchEvent(enum.StrEnum):
-    """What happens at a special point of a branch.
+    """Kind of a special point of a branch.
 
     - fold: a multiplier at +1; two branches meet, and the parameter turns back.
     - period-doubling: one at −1; gaits of twice the footsteps branch off.
     - neimark-sacker: a complex pair on the unit circle.
     - branch-point: one at +1 where the parameter does not turn back: branches cross.
-    - limit: the branch ends by a limit of the model (see `LimitCause`).
-    - not-located: multipliers cross the unit circle between two neighbouring points, but where was
-      not found.
+    - limit: the branch ends at a limit of the model (see `LimitCause`).
+    - not-located: multipliers cross the unit circle between two neighbouring points, but the
+      crossing was not located.
     """
 
     FOLD = "fold"
@@ -64,18 +64,19 @@ class BifurcationPoint(NamedTuple):
     """A special point of a branch.
 
     Attributes:
-        kind: what happens there.
-        point: the gait there; at a limit the last before it, of an interval in which it was not
-            located that at one end.
-        multiplier: the critical multiplier; at a limit the largest, where it was not located that
-            nearest to the unit circle.
-        error: its estimated error.
-        value_error: estimated error of the parameter's value, SI units: how far from there the
-            witness of the cycle, ten times looser, has the same, and at least what the errors of
-            the critical multiplier nearby make of it; NaN at a limit, and at a fold where the
-            witness has none nearby. Where it was not located, the length of the interval.
-        beyond: the parameter's value at the other end of the interval where it was not located, SI
-            units, else NaN.
+        kind: kind of the point.
+        point: the gait there; at a limit, the last gait before it; if the bifurcation was not
+            located, the gait at one end of the interval.
+        multiplier: the critical multiplier; at a limit, the largest one; if the bifurcation was not
+            located, the one nearest to the unit circle.
+        error: estimated error of the multiplier.
+        value_error: estimated error of the parameter's value, SI units: the distance to the same
+            bifurcation in a solve at a tolerance ten times looser, or the error that follows from
+            that of the critical multiplier, whichever is larger. NaN at a limit, and at a fold that
+            the looser solve does not have nearby. If the bifurcation was not located, the length of
+            the interval.
+        beyond: if the bifurcation was not located, the parameter's value at the other end of the
+            interval, SI units; otherwise NaN.
     """
 
     kind: BranchEvent
@@ -92,7 +93,7 @@ class BifurcationPoint(NamedTuple):
 
     @property
     def value(self) -> float:
-        """Of the parameter, SI units."""
+        """Value of the parameter, SI units."""
         return self.point.value
 
 

@@ -35,15 +35,15 @@ class Branch(eqx.Module, Tabular):
     """A branch of periodic gaits along a parameter, n points in the order of its arclength.
 
     Attributes:
-        scene: the walker; on the branch its parameter takes other values.
+        scene: the walker; on the branch, one of its parameters varies.
         points: the gaits, each a `BranchPoint`.
-        bifurcations: folds, period doublings, Neimark–Sacker points, limits and what was not
-            located, in their order along the branch, each a `BifurcationPoint`.
+        bifurcations: folds, period doublings, Neimark–Sacker points, limits and crossings that were
+            not located, in their order along the branch, each a `BifurcationPoint`.
         stops: how the branch ended at its two ends, each a `BranchStop`.
         axis: the parameter and its range.
-        state_type: of the states on the section.
-        footsteps: how many a cycle has.
-        accuracy, engine: by which it was followed.
+        state_type: type of the states on the section.
+        footsteps: number of footsteps of a cycle.
+        accuracy, engine: accuracy and engine with which it was followed.
     """
 
     rows: ClassVar[str] = "point"
@@ -84,21 +84,21 @@ class Branch(eqx.Module, Tabular):
 
     @property
     def values(self) -> np.ndarray:
-        """Of the parameter, SI units, shape (n,)."""
+        """Values of the parameter, SI units, shape (n,)."""
         return np.array([point.value for point in self.points])
 
     @property
     def stable(self) -> list[bool | None]:
-        """Of each gait whether it is stable; None where the errors leave it open."""
+        """Whether each gait is stable; None if an error bar crosses the unit circle."""
         return [point.stable for point in self.points]
 
     @property
     def multipliers(self) -> np.ndarray:
-        """Largest first, shape (n, m − 1), complex."""
+        """Floquet multipliers, largest first, shape (n, m − 1), complex."""
         return np.stack([point.multipliers for point in self.points])
 
     def state(self, point: int | BranchPoint | BifurcationPoint) -> WalkerState:
-        """The state on the section of a gait: of the point of that number, or of the one given."""
+        """The state on the section of a gait: of the point of that number, or of a given one."""
         if isinstance(point, int):
             point = self.points[point]
         if isinstance(point, BifurcationPoint):
@@ -106,12 +106,12 @@ class Branch(eqx.Module, Tabular):
         return state_at(self.state_type, point.recurring)
 
     def scene_at(self, point: int | BranchPoint | BifurcationPoint) -> Scene | RigidScene:
-        """The scene of a gait, of the point of that number or of the one given."""
+        """The scene of a gait: of the point with that number, or of a given point."""
         value = self.points[point].value if isinstance(point, int) else point.value
         return with_parameters(self.scene, {self.axis.name: value})
 
     def to_dataset(self) -> "xarray.Dataset":
-        """The branch as a dataset for `to_netcdf` or `to_zarr`; `open_branch` takes it back.
+        """The branch as a dataset for `to_netcdf` or `to_zarr`; `open_branch` restores it.
 
         Returns:
             Along `point` the parameter, `state_…`, period, step_length, speed, peak_normal,
@@ -220,17 +220,18 @@ def _entries(
 
 
 def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
-    """The branch that a dataset holds, to be drawn, or followed on by `resume_branch`.
+    """The branch that a dataset holds, to draw it or to continue it with `resume_branch`.
 
     Args:
-        dataset: from `Branch.to_dataset`, also one that was stored and opened again.
-        scene: the walker that it was made with.
+        dataset: a dataset from `Branch.to_dataset`, also after it was stored and opened again.
+        scene: the scene of the branch.
 
     Returns:
         The branch.
 
     Raises:
-        ArgumentError: a dataset of something else, of another scene, or that lacks a variable.
+        ArgumentError: the dataset is not that of a branch, belongs to another scene, or lacks a
+            variable.
     """
     scene = check_scene(scene, Scene, RigidScene)
     if "branch" not in dataset.attrs:

@@ -25,7 +25,7 @@ class Axis(NamedTuple):
     """A parameter and the range in which it is followed.
 
     Attributes:
-        name: of the parameter (see `parameter_names`).
+        name: name of the parameter (see `parameter_names`).
         first, last: ends of the range, SI units; s is 0 at the first and 1 at the last.
         log: whether equal steps in s are equal factors.
         leaf: position of the parameter among the scene's leaves.
@@ -50,7 +50,7 @@ class Axis(NamedTuple):
         return self.last - self.first
 
     def place(self, value: float) -> float:
-        """The s of a value."""
+        """The s at a value of the parameter."""
         if self.log:
             return float(np.log(value / self.first) / np.log(self.last / self.first))
         return (value - self.first) / (self.last - self.first)
@@ -89,18 +89,19 @@ class BranchPoint(NamedTuple):
     """A gait on a branch. The state has m components besides hip_x.
 
     Attributes:
-        value: of the parameter, SI units.
+        value: value of the parameter, SI units.
         recurring: the m components, shape (m,).
         period: duration of the cycle [s].
-        step_length: advance along the slope in it [m].
+        step_length: advance along the slope in the cycle [m].
         peak_normal: largest normal force on a foot [N].
         multipliers: Floquet multipliers, largest first, without the trivial one, shape (m − 1,).
-        multiplier_errors: their estimated errors, shape (m − 1,); infinite where the gait grazes a
-            switch.
+        multiplier_errors: estimated errors of the multipliers, shape (m − 1,); infinite if the gait
+            grazes a switch.
         unit_multiplier_error: distance from 1 of the multiplier that must be 1.
         bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
         residual: largest change of a component over the cycle, SI units.
-        place, tangent: of the curve of gaits, in the sizes of components and range, (m + 1,).
+        place, tangent: point and tangent of the curve of gaits, scaled by the sizes of the
+            components and the range, shape (m + 1,).
     """
 
     value: float

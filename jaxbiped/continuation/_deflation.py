@@ -43,7 +43,7 @@ _SPREADS = (0.003, 0.01, 0.03, 0.1, 0.3)
 
 
 class IsolatedGait(NamedTuple):
-    """A gait of a scene that a search found beside others.
+    """One of several gaits of a scene that a search found.
 
     Attributes:
         state: on the section.
@@ -69,18 +69,18 @@ def find_isolated(
     accuracy: str = "balanced",
     engine: str = "auto",
 ) -> tuple[IsolatedGait, ...]:
-    """Finds gaits of so many footsteps without a guess, by deflated Newton's method.
+    """Finds several gaits of a given number of footsteps without a guess, by deflation.
 
-    From each of many scattered starts gaits are sought as long as new ones are found, every search
-    avoiding those that are known with all the places where they cross the section.
+    From each of many scattered starts, Newton's method searches for gaits as long as it finds new
+    ones. Each search avoids the known gaits, wherever they cross the section.
 
     Args:
         scene: the walker, compliant or rigid.
-        footsteps: how many a cycle has, the fewest unless given; gaits that repeat themselves after
-            fewer are avoided, but not returned.
+        footsteps: number of footsteps of a cycle. Default: the smallest possible number. Gaits that
+            close after fewer footsteps are avoided, but not returned.
         known: states of gaits to avoid.
-        starts: how many, scattered about the gait that `find_gait` finds.
-        seed: of their random numbers.
+        starts: number of starts, scattered around the gait that `find_gait` finds.
+        seed: random seed for the starts.
         accuracy: "balanced" or "tight".
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
 

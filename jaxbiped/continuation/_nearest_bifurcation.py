@@ -27,15 +27,16 @@ _STEPS = dict(largest_step=0.02, max_points=200)
 
 
 class NearestBifurcation(NamedTuple):
-    """What a gait comes to first when a parameter grows or shrinks.
+    """The first bifurcation or limit that a gait meets when a parameter grows or shrinks.
 
     Attributes:
         along: name of the parameter.
-        kind: what happens there; None where nothing does within the range that was followed.
-        value: of the parameter there, SI units; NaN for none.
-        ratio: of that value to the gait's own; NaN on level ground.
+        kind: kind of the bifurcation or limit; None if there is none within the range that was
+            followed.
+        value: value of the parameter there, SI units; NaN for none.
+        ratio: that value divided by the gait's own; NaN on level ground.
         multiplier: the critical multiplier there.
-        error: its estimated error.
+        error: estimated error of the multiplier.
     """
 
     along: str
@@ -86,18 +87,18 @@ def farthest_allowed(scene: Scene | RigidScene, name: str, end: float) -> float:
 def nearest_bifurcation(
     scene: Scene | RigidScene, gait: Gait, along: str = "slope", *, factor: float = FACTOR
 ) -> NearestBifurcation:
-    """Follows a gait in a parameter to both sides, and tells the first bifurcation or limit.
+    """Follows a gait along a parameter to both sides, up to the first bifurcation or limit.
 
     Args:
-        scene: the gait's.
-        gait: where to begin.
+        scene: the scene of the gait.
+        gait: gait at which to begin.
         along: the parameter's name (see `parameter_names`).
-        factor: how far to follow it: from its own value over this to its own times this, or to
-            where the walker allows no more; the slope of level ground by 0.1 rad to both sides.
+        factor: range to follow: from the parameter's value divided by this factor to its value
+            times it, as far as the walker allows; on level ground, 0.1 rad of slope to both sides.
 
     Returns:
-        Of the first on each side along the branch, the one whose value differs by the smaller
-        factor: what lies beyond a fold is another gait's.
+        Of the first events on both sides, the one whose value differs by the smaller factor. Events
+        beyond a fold belong to another gait and do not count.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled; a parameter

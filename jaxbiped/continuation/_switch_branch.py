@@ -29,15 +29,15 @@ in s from the doubling at which it begins: intervals shrink by 4.7."""
 
 
 class DoublingCascade(NamedTuple):
-    """Period doublings one after another.
+    """A sequence of successive period doublings.
 
     Attributes:
-        branches: the first, then those of 2, 4, 8, … times its footsteps, each as far as it was
-            followed.
+        branches: the first branch, then those with 2, 4, 8, … times its footsteps, each as far as
+            it was followed.
         doublings: the first period doubling of each branch in the direction of the cascade.
-        values: of the parameter there, SI units, shape (n,).
-        ratios: of successive intervals of these, shape (n − 2,); they tend to Feigenbaum's
-            4.669….
+        values: values of the parameter at the doublings, SI units, shape (n,).
+        ratios: ratios of successive intervals between these values, shape (n − 2,); they tend to
+            Feigenbaum's constant 4.669….
     """
 
     branches: tuple[Branch, ...]
@@ -59,19 +59,19 @@ def switch_branch(
     largest_step: float = 0.02,
     max_points: int = 200,
 ) -> Branch:
-    """Follows the gaits of twice the footsteps that branch off at a period doubling.
+    """Follows the branch of gaits with twice the footsteps from a period doubling.
 
     Args:
         branch: from `continue_gait`.
-        doubling: one of its bifurcations, its first period doubling unless given.
-        largest_step: largest arclength of a step (see `continue_gait`).
-        max_points: points followed at most.
+        doubling: one of the branch's period doublings. Default: the first.
+        largest_step: maximum arclength of a step (see `continue_gait`).
+        max_points: maximum number of points.
 
     Returns:
         The branch of doubled period, from just beside the doubling onwards.
 
     Raises:
-        ArgumentError: an argument that is not allowed, or no doubled gait near it.
+        ArgumentError: an argument is not allowed, or there is no doubled gait near the doubling.
     """
     check_type("branch", branch, Branch)
     check_positive("largest_step", largest_step)
@@ -90,21 +90,21 @@ def doubling_cascade(
     largest_step: float = 0.02,
     max_points: int = 200,
 ) -> DoublingCascade:
-    """Follows period doublings from a branch to those of 2, 4, 8, … times its footsteps.
+    """Follows successive period doublings to branches with 2, 4, 8, … times the footsteps.
 
     Args:
         branch: from `continue_gait`, with a period doubling.
-        doublings: how many to follow, that of the branch among them.
-        doubling: where the cascade begins, the branch's first period doubling unless given.
-        largest_step: largest arclength of a step (see `continue_gait`); those of later branches
-            are smaller as they are shorter.
-        max_points: points on each branch at most.
+        doublings: number of doublings, including that of the branch.
+        doubling: doubling at which the cascade begins. Default: the branch's first.
+        largest_step: maximum arclength of a step (see `continue_gait`); steps on later, shorter
+            branches are smaller in proportion.
+        max_points: maximum number of points on each branch.
 
     Returns:
-        The branches and their doublings; fewer where a branch has none.
+        The branches and their doublings; fewer than requested if a branch has no doubling.
 
     Raises:
-        ArgumentError: an argument that is not allowed, or no doubled gait near a doubling.
+        ArgumentError: an argument is not allowed, or there is no doubled gait near a doubling.
     """
     check_count("doublings", doublings)
     here = _first_doubling(branch) if doubling is None else doubling

@@ -28,13 +28,13 @@ _UNITS = dict(zip(Violation._fields, ("m", "m/s", "(no unit)", "rad", "rad/s"), 
 
 
 class Consistent(NamedTuple):
-    """A start on its constraints, and by how much it was not.
+    """A start that was moved onto its constraints, and the size of the correction.
 
     Attributes:
         state: the consistent state nearest in the mass metric.
-        violation: of the start that was given.
-        position: how far it was moved, √(Δqᵀ M Δq / total mass) [m].
-        velocity: the same of its velocities [m/s].
+        violation: violation of the constraints by the given start.
+        position: size of the correction of positions, √(Δqᵀ M Δq / total mass) [m].
+        velocity: size of the correction of velocities, in the same way [m/s].
     """
 
     state: BodiesState
@@ -47,14 +47,14 @@ def project(scene: RedundantScene, state: BodiesState) -> BodiesState:
     """The state as the scene's method corrects it after each step; differentiable.
 
     Args:
-        scene: whose constraint method projects.
+        scene: a scene whose constraint method projects.
         state: redundant, leaves of any common shape, SI units.
 
     Returns:
         A state of the same kind and shape.
 
     Raises:
-        ArgumentError: a method that does not project.
+        ArgumentError: the scene's method does not project.
     """
     method = scene.method
     if not isinstance(method, AbstractProjectingMethod):
@@ -68,19 +68,19 @@ def project(scene: RedundantScene, state: BodiesState) -> BodiesState:
 def consistent_state(
     scene: RedundantScene, state: CompliantState, *, max_violation: Violation = FURTHEST
 ) -> Consistent:
-    """The consistent state nearest to a start, least in the mass metric.
+    """The consistent state nearest to a start in the mass metric.
 
     Args:
-        scene: whose bodies are joined.
-        state: start; a minimal one is made redundant, and needs no correction.
+        scene: the redundant scene.
+        state: start; a minimal state is converted and needs no correction.
         max_violation: a start that violates its constraints by more is refused.
 
     Returns:
-        The state, and how much was corrected; leaves shaped as the state's.
+        The state and the size of the correction, with leaves of the state's shape.
 
     Raises:
-        ArgumentError: not a state of the scene's kind, an entry that is not finite, leaves of
-            different shapes, or a start too far off. What is being traced is not refused.
+        ArgumentError: the state is not of the scene's kind, an entry is not finite, leaves have
+            different shapes, or the start is too far off. Traced values are not checked.
     """
     if is_redundant(state):
         state = state_for(scene, state)

@@ -126,8 +126,8 @@ def standing_height(
 
     Args:
         scene: the walker on its ground.
-        stance_angle: of all bodies of that leg from the slope's normal [rad].
-        penetration: how deep the foot indents the ground [m].
+        stance_angle: angle of all bodies of that leg from the slope's normal [rad].
+        penetration: depth of the foot in the ground [m].
 
     Returns:
         The root point's height above the slope [m], of the broadcast shape.
@@ -147,8 +147,9 @@ class FootForce(NamedTuple):
     """Force of the ground on one foot.
 
     Attributes:
-        normal: F_N along the slope's outward normal [N], never negative.
-        tangential: along the slope, downhill positive [N]; None where the scene has no friction.
+        normal: normal force F_N along the slope's outward normal [N], never negative.
+        tangential: tangential force along the slope, downhill positive [N]; None if the scene has
+            no friction.
     """
 
     normal: Scalar
@@ -187,7 +188,7 @@ def foot_forces(scene: CompliantScene, state: CompliantState) -> tuple[FootForce
         Normal and tangential force on each foot [N], leaves shaped as the state's.
 
     Raises:
-        ArgumentError: a state without the bristles that the scene's friction needs.
+        ArgumentError: the state lacks the bristles that the scene's friction needs.
     """
     return tuple(foot_force(scene, foot) for foot in feet(scene, state))
 

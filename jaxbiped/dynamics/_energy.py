@@ -29,9 +29,10 @@ class Energies(NamedTuple):
     """Energies at a state [J].
 
     Attributes:
-        kinetic: of all bodies and the root point.
-        gravitational: zero with all mass at the origin of the slope's frame.
-        elastic: stored in the feet that touch, and in springs, stops and latches.
+        kinetic: kinetic energy of all bodies and the root point.
+        gravitational: potential energy of gravity, zero if all mass is at the origin of the slope's
+            frame.
+        elastic: energy stored in the feet that touch, and in springs, stops and latches.
     """
 
     kinetic: Scalar
@@ -48,14 +49,15 @@ class Powers(NamedTuple):
     """Powers at a state [W].
 
     Attributes:
-        gravity: of gravity on the walker.
-        indentation: of the walker on the ground's normal reaction, F_N δ̇, all feet together, and on
-            springs, stops and latches.
-        damper: what of it is lost, and not stored: of a foot that touches (F_N − elastic force) δ̇.
-        friction: lost to friction, never negative.
-        actuation: of the actuators, springs and dampers between the legs among them; None for a
-            passive walker.
-        motors: of each motor by itself, as `ActuatorPowers` has them; None for a passive walker.
+        gravity: power of gravity on the walker.
+        indentation: power of the walker against the ground's normal reaction, F_N δ̇, summed over
+            all feet, and against springs, stops and latches.
+        damper: the part of it that is lost and not stored; for a foot that touches, (F_N − elastic
+            force) δ̇.
+        friction: power lost to friction, never negative.
+        actuation: power of the actuators, including springs and dampers between the legs; None for
+            a passive walker.
+        motors: power of each motor by itself, as in `ActuatorPowers`; None for a passive walker.
     """
 
     gravity: Scalar

@@ -18,16 +18,18 @@ from jaxbiped.scene._scene_checks import check_scene
 
 
 class RigidChecks(NamedTuple):
-    """What a footstep asks of the ground, at n states in order of time.
+    """Requirements of a footstep on the ground, at n states in order of time.
 
     Attributes:
-        normal: force that keeps the stance foot down [N], shape (n,); below zero the foot flies.
-        needed_friction: least coefficient that keeps it from slipping [–], shape (n,); infinite
-            where it flies.
-        clearance: height of the swing foot above the ground [m], shape (n,); below zero it scuffs.
+        normal: normal force on the stance foot [N], shape (n,); if it is below zero, the foot
+            flies.
+        needed_friction: smallest coefficient of friction that prevents slip [–], shape (n,);
+            infinite if the foot flies.
+        clearance: height of the swing foot above the ground [m], shape (n,); if it is below zero,
+            the foot scuffs.
         impact_friction: the same coefficient for the impact that ends the footstep.
-        lifting: speed at which the trailing foot leaves the ground after it [m/s]; below zero the
-            ground would have held it.
+        lifting: speed at which the trailing foot leaves the ground after the impact [m/s]; if it is
+            below zero, the ground would have held the foot.
     """
 
     normal: Scalar
@@ -38,16 +40,16 @@ class RigidChecks(NamedTuple):
 
     @property
     def flies(self) -> Scalar:
-        """Where the stance foot would leave the ground (booleans, shape (n,))."""
+        """Whether the stance foot would leave the ground (booleans, shape (n,))."""
         return self.normal <= 0.0
 
     @property
     def scuffs(self) -> Scalar:
-        """Where the swing foot is below the ground (booleans, shape (n,))."""
+        """Whether the swing foot is below the ground (booleans, shape (n,))."""
         return self.clearance < 0.0
 
     def slips(self, mu: float) -> Scalar:
-        """Where a foot with this coefficient of friction would slip (booleans, shape (n,)).
+        """Whether a foot with this coefficient of friction would slip (booleans, shape (n,)).
 
         Raises:
             ArgumentError: mu below 0.
@@ -61,14 +63,15 @@ def rigid_checks(scene: RigidScene, states: Any) -> RigidChecks:
 
     Args:
         scene: the walker.
-        states: leaves of n states in order, of any shape that has n entries; those that are not
-            finite are left out. The last is taken for the moment of the impact.
+        states: n states in order, with leaves of any shape that has n entries; states that are not
+            finite are left out. The last one counts as the moment of the impact.
 
     Returns:
-        What the footstep asks of the ground, leaves of shape (n,), and of its impact, scalars.
+        The requirements of the footstep, with leaves of shape (n,), and those of its impact,
+            scalars.
 
     Raises:
-        ArgumentError: an argument of the wrong type.
+        ArgumentError: an argument has the wrong type.
     """
     scene = check_scene(scene, RigidScene)
     check_type("states", states, state_type(scene))

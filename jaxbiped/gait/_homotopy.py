@@ -83,16 +83,16 @@ class BranchEnd(NamedCode):
     """How a branch of gaits ended. `str(end)` is its name in words.
 
     - not followed: there was no need to.
-    - reached: it came to the scene that was asked for.
+    - reached: it reached the requested scene.
     - fold: it turned back at a fold.
-    - walk ends: beyond, the walk of the gait itself ends (its `Ending` tells how).
-    - breaks off: the return map is not smooth there, as where a foot begins to scuff.
-    - no beginning: no gait is known to begin from.
-    - unfinished: the steps allowed were used up.
-    - no walk: beyond, the orbit is none of a walk (see `Search`).
-    - closed: it came back to its beginning.
+    - walk ends: beyond this point, the walk of the gait ends (see its `Ending`).
+    - breaks off: the return map is not smooth there, for example because a foot begins to scuff.
+    - no beginning: there is no known gait at which to begin.
+    - unfinished: the maximum number of steps was reached.
+    - no walk: beyond this point, the orbit is not a walk (see `Search`).
+    - closed: it returned to its beginning.
     - branches off: it begins at another branch.
-    - jumped: a step led back to gaits that it had passed.
+    - jumped: a step led back to gaits that were already followed.
     - interrupted: by Ctrl-C.
     """
 

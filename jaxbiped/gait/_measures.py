@@ -35,17 +35,18 @@ _ROUNDING = 1e-15
 
 
 class Measures(NamedTuple):
-    """What is measured of a gait, or its derivatives; leaves of one shape.
+    """Measures of a gait, or their derivatives; all leaves have one shape.
 
-    A rigid walker's peak force is that of single support: its impacts have impulses.
+    The peak force of a rigid walker is that of single support; its impacts have impulses instead.
 
     Attributes:
         period: duration of the cycle [s].
         step_length: advance along the slope in a cycle [m].
         speed: mean speed along the slope [m/s].
-        peak_normal: largest normal force on a foot [N]; None where the gradient mode has none.
-        spectral_radius: largest absolute value of a Floquet multiplier, the trivial one left out;
-            None where the gradient mode has none.
+        peak_normal: largest normal force on a foot [N]; None if the gradient mode does not provide
+            it.
+        spectral_radius: largest absolute value of a Floquet multiplier, without the trivial one;
+            None if the gradient mode does not provide it.
         state: the state on the section, a `State` or a `RigidState`, hip_x zero.
     """
 

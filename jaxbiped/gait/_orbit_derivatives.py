@@ -59,10 +59,10 @@ class Slopes(NamedTuple):
     """Derivatives of an orbit with respect to p parameters in units of their sizes (1 where zero).
 
     Attributes:
-        recurring: of the m recurring components on the section, shape (m, p).
-        period: of the period, shape (p,).
-        advance: of what the cyclic coordinates gain in a cycle, shape (d, p).
-        peak: of the largest load, shape (p,).
+        recurring: derivatives of the m recurring components on the section, shape (m, p).
+        period: derivatives of the period, shape (p,).
+        advance: derivatives of the advance of the cyclic coordinates in a cycle, shape (d, p).
+        peak: derivatives of the largest load, shape (p,).
     """
 
     recurring: Scalar
@@ -163,8 +163,8 @@ def slopes_of(last: LinearisedReturn) -> Slopes:
         last: a return to where it began, with p directions of parameters.
 
     Returns:
-        Derivatives of the orbit, in units of the parameters' sizes; NaN where it grazes a switch,
-        for they differ on both sides.
+        Derivatives of the orbit, in units of the parameters' sizes; NaN if it grazes a switch,
+        because they differ on the two sides.
     """
     m = last.recurring.shape[0]
     by_state, by_parameter = last.jacobian[:, :m], last.jacobian[:, m:]

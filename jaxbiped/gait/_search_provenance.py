@@ -39,9 +39,10 @@ class FoundBy(NamedCode):
 
     - guess: Newton's method from the guess that was given.
     - start: Newton's method from the seed's start, fitted to the scene.
-    - walking: walks forwards from many starts.
-    - continuation: the gait of the seed's scene, followed to this one; for a walker of other bodies
-      that of the same walker relaxed: straight, passive, with hardly any mass outside its legs.
+    - walking: forward walks from many starts.
+    - continuation: continuation of the gait of the seed's scene to this one; for a walker with
+      other bodies, of the same walker relaxed: straight, passive, with hardly any mass outside its
+      legs.
     - scattered starts: Newton's method from scattered starts.
     """
 
@@ -53,7 +54,7 @@ class FoundBy(NamedCode):
 
 
 class OtherGait(NamedTuple):
-    """A gait that was seen, but is not the one returned.
+    """A gait that was found, but is not the one returned.
 
     Attributes:
         period: duration of its cycle [s].
@@ -69,17 +70,17 @@ class OtherGait(NamedTuple):
 
 
 class Origin(NamedTuple):
-    """How a search came to a gait; under `vmap` every array gains the batch's axes.
+    """How a search found a gait. Under `vmap`, every array gains the axes of the batch.
 
     Attributes:
         found_by: code of a `FoundBy`.
-        others: other gaits that were seen, by their radius, leaves of shape (4,), NaN beyond the
-            last.
-        branch_end: code of a `BranchEnd`: how the branch of the seed's gait ended on its way to
-            the scene, where it was followed.
-        branch_walk_ending: code of the `Ending` of the walk by which it ended.
-        nearest: the scene on that branch nearest to the one asked for that has a gait, NaN where
-            none was followed.
+        others: other gaits that were found, by their spectral radius, with leaves of shape (4,),
+            NaN beyond the last.
+        branch_end: code of a `BranchEnd`: how the branch of the seed's gait ended on its way to the
+            scene, if it was followed.
+        branch_walk_ending: code of the `Ending` of the walk at which it ended.
+        nearest: the scene with a gait on that branch that is nearest to the requested one; NaN if
+            no branch was followed.
     """
 
     found_by: Scalar
@@ -107,11 +108,11 @@ def code_array(code: int) -> PyTree:
 
 
 def explain_search(scene: AbstractScene, gait: "Gait") -> str:
-    """How a gait was found, which others were seen, or where the seed's gait ended on the way.
+    """How a gait was found, which others were found, or where the branch of the seed's gait ended.
 
     Args:
-        scene: the scene that was searched, whole numbers and all; not a batch.
-        gait: what `find_gait` returned for it.
+        scene: the scene that was searched; not a batch.
+        gait: the result of `find_gait` for it.
 
     Returns:
         One sentence, without a full stop.

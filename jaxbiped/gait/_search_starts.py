@@ -205,13 +205,13 @@ def _seed() -> tuple[State, Scene]:
 def rolling_starts(
     scene: Scene | RigidScene, count: int, *, spread: float = 0.3, seed: int = 0
 ) -> WalkerState:
-    """Starts about the seed's: its angles and leg rates scattered, the stance foot rolling.
+    """Starts around the seed's: angles and leg rates are scattered, and the stance foot rolls.
 
     Args:
         scene: the walker, compliant or rigid.
-        count: n, how many; the first is the seed's own, fitted to the scene.
-        spread: largest relative change of an angle or rate.
-        seed: of the random numbers.
+        count: n, the number of starts; the first is the seed's own, fitted to the scene.
+        spread: maximum relative change of an angle or rate.
+        seed: random seed.
 
     Returns:
         States with leaves of shape (n,): the stance leg stands as deep as in the seed's start,

@@ -17,12 +17,12 @@ _NOTHING = 1e-300
 
 
 class Bifurcation(NamedCode):
-    """What a multiplier on the unit circle announces. `str(bifurcation)` is its name in words.
+    """What a multiplier on the unit circle indicates. `str(bifurcation)` is its name in words.
 
-    - none: no multiplier within its error of the unit circle.
-    - fold: one at +1: two orbits meet and vanish.
-    - period doubling: one at −1.
-    - Neimark–Sacker: a complex pair.
+    - none: no multiplier lies within its error of the unit circle.
+    - fold: a multiplier is at +1; two orbits meet and vanish.
+    - period doubling: a multiplier is at −1.
+    - Neimark–Sacker: a complex pair is on the unit circle.
     """
 
     NONE = 0
@@ -39,10 +39,10 @@ class Stability(NamedTuple):
 
     Attributes:
         multipliers: largest first, without the trivial one; complex, shape (m − 1,).
-        errors: estimated errors of their absolute values' and arguments, shape (m − 1,).
+        errors: estimated errors of the multipliers, shape (m − 1,).
         directions: eigenvectors of the monodromy matrix, of unit length, shape (m, m − 1).
         unit_error: distance from 1 of the multiplier that belongs to a shift of time. It must be
-            exactly 1: a free witness of the derivatives' error.
+            exactly 1, so its error estimates that of the derivatives.
         spectral_radius: largest absolute value.
         bifurcation: code of a `Bifurcation`.
     """
@@ -62,12 +62,12 @@ def stability_of(
 
     Args:
         monodromy: derivative of one cycle at a fixed time, shape (m, m).
-        witness: the same from a looser solve.
+        witness: the same derivative from a solve at a looser tolerance.
         velocity: rates of the recurring components at the orbit, shape (m,).
-        closeness: distance from the unit circle that counts as on it, at least.
+        closeness: smallest distance from the unit circle that counts as on it.
 
     Returns:
-        The multipliers but the trivial one, with their errors and directions.
+        The multipliers, without the trivial one, with their errors and directions.
     """
     found, unit_error = _nontrivial(monodromy, velocity)
     looser, _ = _nontrivial(witness, velocity)

@@ -28,10 +28,10 @@ _NULL = 1e-9
 class FitEnding(NamedCode):
     """How a fit ended. `str(ending)` is its name in words.
 
-    - converged: no step lowers the sum of squares any more.
-    - out of evaluations: the number allowed was used up; the estimates are the best seen.
-    - no gait: the start has none under the conditions of one of the measured gaits.
-    - interrupted: by the user; the estimates are the best seen.
+    - converged: no step reduces the sum of squares any further.
+    - out of evaluations: the allowed number was used up; the estimates are the best so far.
+    - no gait: the start has no gait under the conditions of one of the measured gaits.
+    - interrupted: by the user; the estimates are the best so far.
     """
 
     CONVERGED = 0
@@ -93,19 +93,21 @@ class GaitFit(Tabular):
 
     Attributes:
         ending: how the fit ended.
-        estimates: by name, SI units; of what is undetermined the value that the search left it at.
-        standard_errors: by name, SI units, in the joint fit; NaN for what is undetermined or at a
-            bound.
-        intervals: by name the ends of the 95 % interval: farther out no value of all other
-            parameters, within their bounds, makes up for this one. NaN for what is undetermined or
-            at a bound.
+        estimates: estimates by name, SI units; for an undetermined parameter, the last value of the
+            search.
+        standard_errors: standard errors of the joint fit by name, SI units; NaN for parameters that
+            are undetermined or at a bound.
+        intervals: ends of the 95 % interval by name; farther out, no values of the other
+            parameters, within their bounds, compensate for this one. NaN for parameters that are
+            undetermined or at a bound.
         correlation: of the estimates' errors, shape (k, k).
-        undetermined: names of the parameters that the data do not tell.
-        at_bounds: names of the parameters that a bound of theirs holds: the data want them beyond.
+        undetermined: names of the parameters that the data do not determine.
+        at_bounds: names of the parameters that are held by a bound, because the data favour a value
+            beyond it.
         residuals: (predicted − measured) over standard deviation, shape (n,).
-        freedom: degrees of freedom: numbers measured less combinations of parameters, and clocks of
-            angles, that are told by them.
-        evaluations: how many scenes were searched for gaits.
+        freedom: degrees of freedom: the number of measured values minus the number of parameter
+            combinations and clocks of angles that they determine.
+        evaluations: number of scenes that were searched for gaits.
         units: SI units of the parameters by name.
     """
 
@@ -134,12 +136,12 @@ class GaitFit(Tabular):
 
     @property
     def chi_squared(self) -> float:
-        """Sum of the squared residuals; about `freedom` where the model is right."""
+        """Sum of the squared residuals; about `freedom` if the model is right."""
         return float(np.sum(self.residuals**2))
 
     @property
     def p_value(self) -> float:
-        """Probability of a chi squared at least as large where the model is right; NaN for none."""
+        """Probability of a chi squared at least as large if the model is right; NaN for none."""
         from scipy.stats import chi2
 
         return float(chi2.sf(self.chi_squared, self.freedom)) if self.freedom > 0 else math.nan

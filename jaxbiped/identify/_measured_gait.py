@@ -26,27 +26,27 @@ _LONGEST = 20.0
 
 @dataclasses.dataclass(frozen=True, init=False)
 class MeasuredAngles:
-    """Angles of bodies over time, from a footstep on. Entries that are masked count as missing.
+    """Angles of bodies over time. Masked entries count as missing.
 
-    Each angle is that of one body throughout: of two legs `theta_2` is the angle of the one that
-    stands at the beginning, and swings in the next footstep.
+    Each angle belongs to one body throughout: of two legs, `theta_2` is that of the leg that stands
+    at the beginning and swings in the next footstep.
 
     Args:
         times: see below.
         deviation: see below.
         theta_1, theta_2: angles of the legs of a walker with bodies "1" and "2".
         since: see below.
-        **angles: angles of any bodies by their names in states, as `theta_thigh_1`.
+        **angles: angles of any bodies by their names in states, such as `theta_thigh_1`.
 
     Attributes:
-        times: on the data's own clock [s], shape (n,).
+        times: times on the data's own clock [s], shape (n,).
         deviation: standard deviation of every angle [rad].
         known: the angles by their names in states [rad], shape (n,) each.
-        since: "mid-stance" if the clock reads zero at mid-stance of the leg that stands where a
-            cycle begins, of any model. None: the clock is unknown, and its zero is fitted along.
+        since: "mid-stance" if the clock reads zero at mid-stance of the leg that stands when a
+            cycle begins, for any model. None: the clock is unknown, and its zero is fitted too.
 
     Raises:
-        ArgumentError: numbers or shapes that are not allowed.
+        ArgumentError: a number or a shape is not allowed.
     """
 
     times: npt.ArrayLike
@@ -105,7 +105,7 @@ class MeasuredAngles:
 
     @property
     def seen(self) -> dict[str, np.ndarray]:
-        """By name which of the angles are known, and when (booleans), shape (n,)."""
+        """Whether each angle is known at each time, by name (booleans), shape (n,)."""
         timed = ~np.ma.getmaskarray(np.ma.asarray(self.times))
         return {
             name: timed & ~np.ma.getmaskarray(np.ma.asarray(each))
@@ -114,7 +114,7 @@ class MeasuredAngles:
 
     @property
     def values(self) -> np.ndarray:
-        """The angles that are known, one body behind the other."""
+        """The known angles, one body after the other."""
         return np.concatenate(
             [np.asarray(_as_array(self.known[n]))[at] for n, at in self.seen.items()]
         )
@@ -139,15 +139,15 @@ class MeasuredGait:
     """Observations of one steady gait.
 
     Attributes:
-        measures: by name (period [s], step_length [m], speed [m/s], peak_normal [N]) the value and
-            its standard deviation; masked ones count as missing.
-        conditions: parameters that are known and were others than the scene's, by name, such as the
+        measures: value and standard deviation of each measure by name (period [s], step_length [m],
+            speed [m/s], peak_normal [N]); masked values count as missing.
+        conditions: known parameters whose values differ from the scene's, by name, such as the
             slope.
         angles: angles of bodies over time, if any.
-        footsteps: in a cycle; None for the fewest that a cycle of the walker has.
+        footsteps: number of footsteps of a cycle; None for the smallest possible number.
 
     Raises:
-        ArgumentError: an unknown name, or a number that is not allowed.
+        ArgumentError: a name is unknown, or a number is not allowed.
 
     Examples:
         >>> import jaxbiped as jb
@@ -184,7 +184,7 @@ class MeasuredGait:
 
     @property
     def values(self) -> np.ndarray:
-        """All that was measured, one number behind the other, shape (n,)."""
+        """All measured values, one after the other, shape (n,)."""
         return np.concatenate(
             [
                 [value for value, _ in self.measures.values()],
@@ -194,12 +194,12 @@ class MeasuredGait:
 
     @property
     def clocks(self) -> int:
-        """Clocks whose zero is fitted along: 1 where that of the angles is unknown."""
+        """Number of clocks whose zero is fitted: 1 if that of the angles is unknown."""
         return int(self.angles is not None and self.angles.since is None)
 
     @property
     def deviations(self) -> np.ndarray:
-        """Their standard deviations, shape (n,)."""
+        """Standard deviations of the measured values, shape (n,)."""
         parts = [np.array([deviation for _, deviation in self.measures.values()])]
         if self.angles is not None:
             parts.append(np.full(len(self.angles.values), self.angles.deviation))

@@ -20,15 +20,16 @@ from jaxbiped.solve._trajectory import Trajectory
 class CostOfTransport(NamedTuple):
     """The mechanical cost of transport of n stretches of a walk; leaves of shape (n,).
 
-    cost = (motor_work + gravity_work)/(weight · distance). Of a passive walker it is the slope's
-    sine; on level ground gravity's part is that of steps that differ, none for a periodic gait.
+    cost = (motor_work + gravity_work)/(weight · distance). For a passive walker it is the sine of
+    the slope. On level ground, gravity contributes only if successive steps differ, so its
+    contribution vanishes for a periodic gait.
 
     Attributes:
         cost: [–].
-        motor_work: what each motor does where its power is positive, added up [J]: none gains
-            energy by braking. Springs and dampers are no motors.
+        motor_work: sum of the positive work of each motor [J]; no motor gains energy by braking.
+            Springs and dampers do not count as motors.
         gravity_work: work of gravity on the walker, negative uphill [J].
-        distance: along the slope [m].
+        distance: distance along the slope [m].
     """
 
     cost: np.ndarray
@@ -45,23 +46,23 @@ def cost_of_transport(
     """The mechanical cost of transport of a walk, footstep by footstep.
 
     Source: Collins, Ruina, Tedrake and Wisse 2005, Efficient bipedal robots based on
-    passive-dynamic walkers: the mechanical cost of transport, which counts the positive work of the
-    actuators alone; of their passive walkers, gravity's work.
+    passive-dynamic walkers. Their mechanical cost of transport counts only the positive work of the
+    actuators, and for passive walkers gravity's work.
 
     Args:
-        scene: what walked, compliant or rigid.
-        walk: of a compliant walker its trajectory, saved step by step; of a rigid one a walk that
-            kept its heel strikes, by `max_arrivals`.
-        times: between which to count, increasing [s], shape (n + 1,); the heel strikes unless
-            given. A rigid walk is counted between its heel strikes.
+        scene: the scene that was simulated, compliant or rigid.
+        walk: for a compliant walker, a trajectory with every step saved; for a rigid one, a walk
+            that saved its heel strikes (`max_arrivals`).
+        times: increasing times [s], shape (n + 1,), that bound the stretches. Default: the heel
+            strikes, which are always used for a rigid walk.
 
     Returns:
-        The cost of each stretch with what it is made of, leaves of shape (n,).
+        The cost of each stretch and its components, with leaves of shape (n,).
 
     Raises:
-        ArgumentError: a walk of another kind than the scene, times that do not increase, or with a
-            rigid walk, or a rigid walk that kept fewer than two heel strikes.
-        ValueError: a trajectory without its continuous solution, or a batch of them.
+        ArgumentError: the walk does not match the scene, the times do not increase or are given for
+            a rigid walk, or a rigid walk saved fewer than two heel strikes.
+        ValueError: the trajectory has no continuous solution, or is a batch.
 
     Examples:
         >>> import jaxbiped as jb

@@ -33,20 +33,21 @@ from jaxbiped.solve._trajectory import Trajectory
 
 
 class EnergyLedger(NamedTuple):
-    """Gravity's work and where it went, between consecutive times [J]; leaves of shape (n,).
+    """Gravity's work and where this energy goes, between consecutive times [J]; leaves (n,).
 
     gravity_work + actuation_work = damper_loss + friction_loss + stored_change + residual. The
-    residual is no physics: it measures the error of the solve.
+    residual has no physical meaning; it measures the error of the solve.
 
     Attributes:
         gravity_work: work of gravity on the walker.
-        damper_loss: lost in the contact's normal direction, including the elastic energy that a
-            foot leaves in the ground when it lets go, and in springs, stops and latches of joints.
-        friction_loss: lost to friction.
+        damper_loss: energy lost in the normal direction of contact, including the elastic energy
+            that a foot leaves in the ground at release, and in springs, stops and latches of
+            joints.
+        friction_loss: energy lost to friction.
         stored_change: change of kinetic and elastic energy.
-        residual: what the others leave open.
-        actuation_work: work of motors and actuators on the walker; what a spring among the
-            actuators stores and a damper there loses is in it. Zero for a passive walker.
+        residual: imbalance of the other terms.
+        actuation_work: work of motors and actuators on the walker, including the energy that a
+            spring among the actuators stores and a damper loses. Zero for a passive walker.
     """
 
     gravity_work: np.ndarray
@@ -117,22 +118,22 @@ _BEFORE = 1e-7
 
 
 class RigidLedger(NamedTuple):
-    """Works and losses of footsteps, each from one heel strike to the next [J]; leaves (n,).
+    """Work and losses of footsteps, each from one heel strike to the next [J]; leaves (n,).
 
     gravity_work + actuation_work = impact_loss + stop_loss + joint_loss + stored_change + residual.
-    The residual is no physics: it measures the error of the solve.
+    The residual has no physical meaning; it measures the error of the solve.
 
     Attributes:
         gravity_work: work of gravity on the walker.
-        actuation_work: of the actuators, push-off included; what a spring between the legs stores
-            and a damper there loses is in it. Zero for a passive walker.
-        impact_loss: lost in the impact that ends the footstep.
+        actuation_work: work of the actuators, including push-off and the energy that a spring
+            between the legs stores and a damper loses. Zero for a passive walker.
+        impact_loss: energy lost in the impact that ends the footstep.
         stored_change: change of kinetic and elastic energy, from just after one impact to just
             after the next.
-        residual: what the others leave open.
-        motor_work: what each motor does where its power is positive, added up, and the push-off.
-        joint_loss: lost in dampers and latches of the walker's joints.
-        stop_loss: lost where a stop is hit, or another foot of the leg that stands comes down.
+        residual: imbalance of the other terms.
+        motor_work: sum of the positive work of each motor and of the push-off.
+        joint_loss: energy lost in dampers and latches of the walker's joints.
+        stop_loss: energy lost when a stop is hit, or another foot of the standing leg lands.
     """
 
     gravity_work: np.ndarray
@@ -146,19 +147,19 @@ class RigidLedger(NamedTuple):
 
 
 def rigid_ledger(scene: RigidScene, walk: Trajectory[Any]) -> RigidLedger:
-    """The energy ledger of the footsteps between the heel strikes that a rigid walk kept.
+    """The energy ledger of the footsteps between the saved heel strikes of a rigid walk.
 
-    Works are integrals of the actuators' powers over single support, walked again tightly.
+    Work is the integral of the actuators' power over single support, simulated again tightly.
 
     Args:
-        scene: what walked.
-        walk: with its heel strikes, by `max_arrivals`; one more than footsteps wanted.
+        scene: the scene that was simulated.
+        walk: a walk with its heel strikes saved (`max_arrivals`).
 
     Returns:
-        The ledger of every footstep [J], leaves of shape (n,).
+        The ledger of every footstep [J], with leaves of shape (n,).
 
     Raises:
-        ArgumentError: arguments of the wrong type, or a walk that kept fewer than two heel strikes.
+        ArgumentError: an argument has the wrong type, or fewer than two heel strikes are saved.
 
     Examples:
         >>> import jaxbiped as jb

@@ -43,8 +43,8 @@ class HeelStrikes(NamedTuple):
     """Heel strikes of a walk; leaves of shape (n,).
 
     Attributes:
-        time_s: when the foot comes to touch [s].
-        foot: number of the leg that does, from 1 on in the order of the mechanism's legs.
+        time_s: time at which the foot touches down [s].
+        foot: number of the leg that strikes, counted from 1 in the order of the mechanism's legs.
     """
 
     time_s: np.ndarray
@@ -58,14 +58,14 @@ class Footsteps(Tabular):
     Attributes:
         time_s: time of the heel strike that completes the step [s].
         period_s: time since the heel strike before [s].
-        length_m: distance along the slope between the places where the two legs struck, each with
-            its foot that touched first [m].
+        length_m: distance along the slope between the places where the two legs struck, measured at
+            the foot of each that touched first [m].
         speed_m_s: length over period [m/s].
         peak_normal_N: largest normal force on a foot [N].
         max_penetration_m: largest penetration of a foot that touches [m].
-        double_support_s: time from the first strike until one leg alone carries again [s].
+        double_support_s: time from the first strike until a single leg carries the load again [s].
         cost_of_transport: energy lost over weight times length [–].
-        energy_residual_J: what the step's energy ledger leaves open [J].
+        energy_residual_J: residual of the step's energy ledger [J].
         leg: name of the leg that strikes.
     """
 
@@ -85,7 +85,7 @@ class Footsteps(Tabular):
         """The footsteps as a labelled dataset, for `to_netcdf` or `to_zarr`.
 
         Returns:
-            Along `footstep` what the fields hold, named without their units, SI units.
+            The fields along `footstep`, named without their units, in SI units.
         """
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         return footstep_dataset(fields)
@@ -105,16 +105,16 @@ def footstep_dataset(fields: Mapping[str, Any]) -> "xarray.Dataset":
 
 
 def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
-    """Heel strikes: a leg comes to touch ahead of the one that carries, which struck before.
+    """Heel strikes: a leg touches down ahead of the leg that carries the load, which struck before.
 
-    All feet of a leg are one: a toe that follows its heel is no strike.
+    The feet of a leg count as one: a toe that follows its heel does not count as a strike.
 
     Args:
         scene: the scene that was simulated.
         trajectory: the motion, with every step saved.
 
     Returns:
-        Time [s] and leg of all n heel strikes, leaves of shape (n,).
+        Time [s] and leg of all n heel strikes, with leaves of shape (n,).
 
     Raises:
         ArgumentError: the scene is that of a rigid walker, whose trajectory holds its heel strikes.

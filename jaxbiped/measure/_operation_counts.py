@@ -8,15 +8,15 @@ from jaxbiped.scene._scene import RigidScene, Scene
 def operation_counts(scene: Scene | RigidScene) -> dict[str, int]:
     """Operations of one evaluation of the scene's vector field, by name, most frequent first.
 
-    Counted after equal operations are shared, constants folded, and all that depends on the scene
-    alone is left out: what the lane engine computes for each stage of a step. An elementary
-    function counts as the arithmetic that it is made of.
+    These are the operations that the lanes engine computes for each stage of a step: equal
+    operations are shared, constants are folded, and operations that depend on the scene alone are
+    left out. An elementary function counts as the arithmetic of which it consists.
 
     Args:
         scene: the walker, compliant or rigid.
 
     Returns:
-        How many times each operation is done, by its name.
+        The number of times that each operation occurs, by name.
     """
     kind, field = state_type(scene), field_of(scene)
     state = kind(*[0.0] * len(kind._fields))

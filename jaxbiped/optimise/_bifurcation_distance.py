@@ -37,12 +37,12 @@ _ENDS = (*LIMITS, BranchEnd.REACHED, BranchEnd.CLOSED)
 
 
 class Sought(enum.StrEnum):
-    """What came of following a gait's branch to a bifurcation.
+    """Outcome of following a gait's branch to a bifurcation.
 
-    - met: it lies in the range that is followed.
-    - none in range: the branch was followed to the ends of the range, or to its own before them.
-    - unknown: neither; the gait was not found again, or the bifurcation, or the points that a
-      branch may have were used up.
+    - met: the bifurcation lies in the range that is followed.
+    - none in range: the branch was followed to the ends of the range, or ended before them.
+    - unknown: the gait or the bifurcation was not found again, or the maximum number of points was
+      reached.
     """
 
     MET = "met"
@@ -51,19 +51,20 @@ class Sought(enum.StrEnum):
 
 
 class BifurcationDistance(NamedTuple):
-    """A gait's distance to a bifurcation in a parameter, p parameters in all.
+    """A gait's distance from a bifurcation along a parameter; the scene has p parameters.
 
     Attributes:
-        along: name of that parameter.
-        outcome: whether one was met; NaN is all that it leaves open.
-        value: of the parameter at the bifurcation, SI units.
-        distance: of that from the gait's own value, never negative; of both ways the smaller. Where
-            none lies in the range, that of the range's farther end, and no derivatives.
-        error: estimated, of both.
+        along: name of the parameter.
+        outcome: whether a bifurcation was met; values that are not known are NaN.
+        value: value of the parameter at the bifurcation, SI units.
+        distance: distance of that value from the gait's own, never negative; the smaller of both
+            directions. If no bifurcation lies in the range, that of the farther end of the range,
+            without derivatives.
+        error: estimated error of value and distance.
         value_slopes: derivatives of `value` with respect to the parameters, shape (p,).
-        slopes: of `distance`, shape (p,).
-        slope_errors: estimated, of both, shape (p,).
-        bounds: the range that was to be followed, (low, high), SI units.
+        slopes: derivatives of `distance`, shape (p,).
+        slope_errors: estimated errors of both derivatives, shape (p,).
+        bounds: the range to follow, (low, high), SI units.
     """
 
     along: str
@@ -85,21 +86,21 @@ def bifurcation_distance(
     *,
     accuracy: str = "balanced",
 ) -> BifurcationDistance:
-    """Follows a gait both ways to its first fold or doubling, and differentiates where that lies.
+    """Follows a gait both ways to its first fold or doubling, and differentiates its place.
 
     Args:
-        scene: the gait's.
-        gait: where to begin.
+        scene: the scene of the gait.
+        gait: gait at which to begin.
         kind: "fold" or "period-doubling".
         along: the parameter's name (see `parameter_names`). It is followed from an eighth to eight
-            times its own value, or to where the walker allows no more, the slope of level ground by
-            0.1 rad to both sides.
+            times its own value, as far as the walker allows; on level ground, by 0.1 rad of slope
+            to both sides.
         accuracy: "balanced" or "tight".
 
     Returns:
-        The distance to the nearer of both, with respect to all parameters in the order of
-        `parameter_names`; errors are what ten times looser solves change. Its `outcome` tells
-        where there is none.
+        The distance from the nearer of both, with derivatives with respect to all parameters in the
+        order of `parameter_names`. Errors are the changes due to solves at tolerances ten times
+        looser. The `outcome` reports whether there is a bifurcation.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled; a parameter

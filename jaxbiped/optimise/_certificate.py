@@ -75,22 +75,23 @@ class OtherEngine(NamedTuple):
 
 
 class Certificate(NamedTuple):
-    """What is known of an optimum; None for what was not asked for.
+    """Results of the tests of an optimum; None for parts that were not requested.
 
     Attributes:
-        optimality: conditions of Karush, Kuhn and Tucker: residual, multipliers, their errors.
+        optimality: Karush–Kuhn–Tucker conditions: residual, multipliers and their errors.
         multipliers: Floquet multipliers, largest first, complex.
-        multiplier_errors: their estimated errors.
+        multiplier_errors: estimated errors of the Floquet multipliers.
         unit_multiplier_error: distance from 1 of the multiplier that must be 1.
-        stable: whether all lie inside the unit circle; None where an error bar crosses it.
-        sensitivity_norm: see `OBJECTIVES`, with its error; infinite where the gait is not stable.
-        basin: fraction of the starts within `scatter` of the gait that come back to it.
-        fatal_push: the smallest push found after which the gait is left, in the scales of
-            `nearest_failure`: a nearer one may exist, none was seen.
+        stable: whether all multipliers lie inside the unit circle; None if an error bar crosses it.
+        sensitivity_norm: gait sensitivity norm (see `OBJECTIVES`) with its error; infinite if the
+            gait is not stable.
+        basin: fraction of the starts within `scatter` of the gait that return to it.
+        fatal_push: the smallest fatal push that was found, in the scales of `nearest_failure`; a
+            smaller one may exist.
         walk: a walk from a pushed start.
-        other_engine: the gait by the other engine.
-        nearest_bifurcations: in each parameter asked for, what the gait comes to first.
-        failed: why a part that was asked for is not known, by its name.
+        other_engine: the gait computed with the other engine.
+        nearest_bifurcations: the first bifurcation or limit along each requested parameter.
+        failed: reasons why requested parts are not known, by name.
     """
 
     optimality: Optimality
@@ -120,13 +121,13 @@ def certify(
     seed: int = 0,
     progress: bool | None = None,
 ) -> Certificate:
-    """Tests an optimum by what its search did not use.
+    """Tests an optimum with information that its search did not use.
 
     Args:
-        optimum: from `optimise_gait`, of a gait whose cycle is the shortest.
+        optimum: an optimum from `optimise_gait`, whose gait has the shortest cycle.
         starts: number of starts around the gait that are labelled for its basin; 0 for none.
-        scatter: half-width of all bodies' angles [rad], and of their rates in units of √(g/l), l
-            the walker's height.
+        scatter: half-width of the scatter of all bodies' angles [rad], and of their rates in units
+            of √(g/l), where l is the walker's height.
         footsteps: number of footsteps of the walk from a pushed start; 0 for none.
         push: relative change of all velocities of that start.
         fatal_push: whether to search for the smallest fatal push, which labels some thousands of
@@ -141,11 +142,11 @@ def certify(
             seconds, in a terminal, a notebook or a command.
 
     Returns:
-        The certificate. A part that cannot be told, or that Ctrl-C cuts off, takes no other with
-        it: see `failed`.
+        The certificate. A part that fails or is interrupted (Ctrl-C) is named in `failed`; the
+        other parts are kept.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is tested.
+        ArgumentError: an argument is not allowed; raised before anything is tested.
     """
     check_type("optimum", optimum, Optimum)
     check_not_negative("starts", starts)

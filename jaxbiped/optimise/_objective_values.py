@@ -49,17 +49,17 @@ _WHOLE = ("sensitivity_norm", "floor_sensitivity", *CLEARANCE_NORMS)
 
 
 class Evaluation(NamedTuple):
-    """Objectives of one gait with respect to the p parameters of its scene.
+    """Objectives of one gait, with derivatives with respect to the p parameters of its scene.
 
     Attributes:
-        values: by name.
-        errors: their estimated errors.
+        values: values by name.
+        errors: estimated errors of the values.
         slopes: derivatives by name, shape (p,).
-        slope_errors: their estimated errors.
-        state: of the gait, its recurring components, shape (m,).
-        state_slopes: derivatives, shape (m, p).
-        beyond_range: distances whose bifurcation does not lie in the range that is followed: their
-            values stand for more than the range holds, and their derivatives are zeros.
+        slope_errors: estimated errors of the derivatives.
+        state: recurring components of the gait's state, shape (m,).
+        state_slopes: derivatives of the state, shape (m, p).
+        beyond_range: names of distances whose bifurcation lies beyond the range that is followed;
+            their values are lower bounds, and their derivatives are zero.
     """
 
     values: dict[str, float]
@@ -71,7 +71,7 @@ class Evaluation(NamedTuple):
     beyond_range: tuple[str, ...] = ()
 
     def functional(self, name: str) -> Functional:
-        """All that is known of one objective."""
+        """Value, error, derivatives and their errors of one objective."""
         return _row(*(part[name] for part in self[:4]))
 
 

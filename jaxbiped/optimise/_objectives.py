@@ -56,13 +56,14 @@ def _of_swing(scene: Scene | RigidScene) -> str | None:
 
 
 class Objective(NamedTuple):
-    """What can be optimised or bounded; a user's own is added to `OBJECTIVES`.
+    """A measure that can be optimised or bounded. Add one of your own to `OBJECTIVES`.
 
     Attributes:
         quantity: words, symbol and unit.
-        lacks: why a scene has none of it, None where it has.
-        measured: of a user's own, value, error, derivatives with respect to the p parameters (p,)
-            and their errors, of a scene and its gait.
+        lacks: function that returns why a scene does not have this objective, or None if it has.
+        measured: for an objective of your own, a function of a scene and its gait that returns the
+            value, its error, the derivatives with respect to the p parameters, shape (p,), and
+            their errors.
     """
 
     quantity: Quantity

@@ -25,13 +25,13 @@ class Held(NamedTuple):
     """A requirement at an optimum.
 
     Attributes:
-        name: of the measure, or of the variable at its bound.
-        bound: that it is held to.
+        name: name of the measure, or of the variable at its bound.
+        bound: the bound.
         value: its value.
-        error: estimated error of that.
+        error: estimated error of the value.
         active: whether the bound holds the optimum back.
-        multiplier: derivative of the objective with respect to the bound; zero where not active.
-        multiplier_error: estimated, from the gradients' error bars.
+        multiplier: derivative of the objective with respect to the bound; zero if not active.
+        multiplier_error: estimated error of the multiplier, from the gradients' error bars.
     """
 
     name: str
@@ -44,14 +44,14 @@ class Held(NamedTuple):
 
 
 class Optimality(NamedTuple):
-    """How far a design is from an optimum.
+    """Distance of a design from an optimum, by the Karush–Kuhn–Tucker conditions.
 
     Attributes:
         residual: largest derivative of the objective that no multiplier balances, for one whole
             range between a variable's bounds, relative to the objective's own size.
-        error: what the gradients' error bars make of it.
-        excess: by how much the worst requirement is missed, relative to its bound.
-        requirements, bounds: what holds the optimum, or could; of the variables those at a bound.
+        error: error of the residual that follows from the gradients' error bars.
+        excess: largest violation of a requirement, relative to its bound.
+        requirements, bounds: the requirements, and the bounds at which variables are.
     """
 
     residual: float

@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 class Outcome(NamedCode):
     """How an optimisation ended. `str(outcome)` is its name in words.
 
-    - converged: the optimiser's own test is met, and every requirement kept, to
-      its measure's error bar.
-    - corner: no better design was found nearby, but the derivatives do not balance: as at corners
-      of the spectral radius, where multipliers meet.
+    - converged: the optimiser's own test is met, and every requirement holds to within its
+      measure's error bar.
+    - corner: no better design was found nearby, but the derivatives do not balance, for example at
+      corners of the spectral radius, where multipliers meet.
     - unfinished: the iterations were used up, or the optimiser could not go on.
     - interrupted: by Ctrl-C; the best so far is kept.
-    - infeasible: no design was found that keeps the requirements; the nearest to them is told.
-    - beyond range: the best design has a gait whose fold or doubling, the distance of which was to
-      be optimised, does not lie in the range that is followed. There that distance has no
-      derivatives, so that no better design can be told.
+    - infeasible: no design was found that meets the requirements; the nearest one is returned.
+    - beyond range: the distance of a fold or doubling was to be optimised, and for the best design
+      it lies beyond the range that is followed. The distance has no derivatives there, so better
+      designs cannot be distinguished.
     """
 
     CONVERGED = 0
@@ -43,15 +43,15 @@ class Outcome(NamedCode):
 
 
 class Iteration(NamedTuple):
-    """An iterate.
+    """An iterate of an optimisation.
 
     Attributes:
         variables: parameters by name.
-        objective: the sum that was asked for.
-        excess: by how much the worst requirement is missed, relative to its bound.
-        measures: those that play a part, by name.
-        beyond_range: those of them whose bifurcation does not lie in the range that is followed:
-            the value stands for more than that.
+        objective: the requested sum of measures.
+        excess: largest violation of a requirement, relative to its bound.
+        measures: measures in the objective and the requirements, by name.
+        beyond_range: those of them whose bifurcation lies beyond the range that is followed; the
+            value is a lower bound.
     """
 
     variables: dict[str, float]
@@ -63,22 +63,23 @@ class Iteration(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Optimum(Tabular):
-    """The best design that an optimisation came to.
+    """The best design that an optimisation found.
 
     Attributes:
-        outcome: how it ended.
-        message: the optimiser's own words; and which fold or doubling does not lie in its range.
-        scene: of the best design.
+        outcome: how the optimisation ended.
+        message: the optimiser's message, and which fold or doubling lies beyond its range.
+        scene: scene of the best design.
         gait: its gait, with the sensitivities to all parameters.
         variables: its parameters by name.
-        objective: the sum that was asked for.
-        error: its estimated error.
-        known: all measures that play a part, with gradients and errors.
-        optimality: what the conditions of optimality say.
-        history: every iterate, of all runs one behind the other.
-        evaluations: designs whose gait was found.
-        lost: how often none was, or a measure of it was not finite.
-        unmeasured: gaits of the latter kind.
+        objective: the requested sum of measures.
+        error: estimated error of the objective.
+        known: measures in the objective and the requirements, with gradients and errors.
+        optimality: the optimality conditions.
+        history: every iterate, of all runs one after the other.
+        evaluations: number of designs whose gait was found.
+        lost: number of evaluations in which no gait was found or a measure of the gait was not
+            finite.
+        unmeasured: number of gaits with a measure that was not finite.
     """
 
     rows: ClassVar[str] = "variable"
@@ -107,10 +108,10 @@ class Optimum(Tabular):
         """The optimum as a labelled dataset, for `to_netcdf` or `to_zarr`.
 
         Returns:
-            Along `variable` the best design's parameters; along `measure` all measures that play a
-            part, with their errors; along `iteration` every iterate: the objective, by how much the
-            worst requirement is missed (`excess`), the design (`design_…`) and its measures
-            (`measure_…`). `gait.to_dataset()` has the gait.
+            The best design's parameters along `variable`; the measures with their errors along
+            `measure`; and every iterate along `iteration`: the objective, the largest violation of
+            a requirement (`excess`), the design (`design_…`) and its measures (`measure_…`).
+            `gait.to_dataset()` has the gait.
         """
         import xarray
 

@@ -31,22 +31,23 @@ def animate(
     frames_per_second: float = 25.0,
     slow_down: float = 1.0,
 ) -> FuncAnimation:
-    """An animation of the walk, gravity down the page, the camera moving along with the hip.
+    """An animation of the walk, with gravity down the page and a camera that moves with the hip.
 
-    Bodies are lines between their hinges, their feet and, where there is neither, their mass
-    centres, which dots mark; feet are circles.
+    Bodies are lines between their hinges and feet, or to their mass centres if they have neither.
+    Dots mark mass centres; feet are circles.
 
     The slope carries a mark every 0.1 m. A motion of T seconds has
     floor(T × slow_down × frames_per_second) + 1 frames. Keep the result until it is saved.
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion, saved step by step; of a rigid walker with its heel strikes.
-        frames_per_second: of the picture [1/s]; a GIF rounds the time of a frame to 10 ms.
-        slow_down: seconds of the picture for a second of the motion.
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        frames_per_second: frames per second of the picture; a GIF rounds the time of a frame to 10
+            ms.
+        slow_down: seconds of the animation per second of the motion.
 
     Returns:
-        The animation, of matplotlib.
+        The animation, a matplotlib object.
 
     Raises:
         ValueError: the trajectory was not saved step by step, or a number not above 0.
@@ -70,11 +71,11 @@ def animate(
 
 
 def save_animation(animation: FuncAnimation, path: str | Path) -> Path:
-    """Writes what `animate` returned as a GIF that repeats, and returns its path.
+    """Writes an animation as a GIF that repeats, and returns its path.
 
     Args:
         animation: from `animate`.
-        path: of the file to write.
+        path: path of the file to write.
 
     Returns:
         The path.
@@ -88,13 +89,13 @@ def save_animation(animation: FuncAnimation, path: str | Path) -> Path:
 
 
 def animation_html(animation: FuncAnimation) -> str:
-    """What `animate` returned as HTML with controls, for `IPython.display.HTML`.
+    """An animation as HTML with controls, for `IPython.display.HTML`.
 
     Args:
         animation: from `animate`.
 
     Returns:
-        HTML, the frames within it.
+        HTML that contains the frames.
     """
     return animation.to_jshtml()
 

@@ -46,7 +46,7 @@ def basin(
     title: str = "",
     ax: Axes | None = None,
 ) -> Figure:
-    """Draws labels of starts on a grid, each in its own colour, and says the fraction of each.
+    """Draws labels of starts on a grid, each in its own colour, with the fraction of each label.
 
     Args:
         labels: codes of `Label` or names (`label_names`), shape (ny, nx); row by row along y. Or a
@@ -63,8 +63,8 @@ def basin(
         mark: where the gait is, in the units of the axes; of a `sweep`'s dataset the gaits that it
             knows are marked unless this is given: along an axis that is a parameter as a curve, and
             projected where a gait lies off the slice.
-        title: above the axes.
-        ax: axes to draw into; a new figure unless given.
+        title: title above the axes.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
@@ -119,9 +119,9 @@ def refined_basin(
         codes: names of the label codes; those of `Label` unless given.
         cells: whether to outline the boundary cells of every level but the finest, which
             are those that were halved.
-        mark: where the gait is, in the units of the axes.
+        mark: place of the gait, in the units of the axes.
         title: above the axes; how many labels were asked for unless given.
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.

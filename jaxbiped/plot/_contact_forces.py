@@ -43,12 +43,12 @@ def contact_forces(
     `sampled_forces`), so that peaks do not depend on where the solver's steps happen to end.
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion, saved step by step.
-        figure: empty figure or subfigure to draw into; a new one unless given.
-        strike: which heel strike to enlarge, counted from 0, or from the last: -1. Those less than
-            4.5 ms before the end, such as the one that ends a walk of some footsteps, do not count;
-            a motion without others has no right-hand column.
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved.
+        figure: empty figure or subfigure to draw into. Default: a new figure.
+        strike: number of the heel strike to enlarge, counted from 0, or from the end with -1.
+            Strikes less than 4.5 ms before the end, such as the one that ends a walk of some
+            footsteps, are not counted. A motion without a strike has no right-hand column.
 
     Returns:
         The figure given, or the new one.

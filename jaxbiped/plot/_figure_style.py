@@ -88,12 +88,12 @@ _CHOSEN: contextvars.ContextVar[_Chosen] = contextvars.ContextVar("style", defau
 
 @contextlib.contextmanager
 def figure_style(style: str = "screen", *, columns: int = 1) -> Iterator[None]:
-    """Draws all figures that are made meanwhile in a style.
+    """A context in which new figures are made in a style.
 
     Args:
         style: "screen", or "paper": 3.4 inches (one column) or 7 inches (two columns) wide, letters
             of 8 points, no titles, 300 dots per inch in PNG.
-        columns: 1 or 2, how many columns of a paper a figure spans.
+        columns: number of columns of a paper that a figure spans, 1 or 2.
 
     Returns:
         A context; figures made in it keep its style.
@@ -201,13 +201,13 @@ def save_figure(
     formats: tuple[str, ...] | list[str] | None = None,
     dpi: float | None = None,
 ) -> list[Path]:
-    """Writes a figure, fonts embedded (Type 42 in PDF, curves in SVG), the same file each time.
+    """Writes a figure with embedded fonts (Type 42 in PDF, curves in SVG), the same file each time.
 
     Args:
-        figure: any of matplotlib's.
-        path: of the file; its ending tells the format, unless `formats` does.
+        figure: any matplotlib figure.
+        path: path of the file; its ending determines the format if `formats` is omitted.
         formats: some of "png", "pdf" and "svg"; "png" if the path has no such ending either.
-        dpi: dots per inch; those of the figure's style unless given.
+        dpi: dots per inch. Default: those of the figure's style.
 
     Returns:
         Paths of the files, one for each format.

@@ -23,15 +23,16 @@ _KEPT = 1e-6
 
 
 def fit(fitted: GaitFit) -> Figure:
-    """Draws what measured gaits say of the parameters, and what they leave unexplained.
+    """Draws the estimates of a fit with their intervals, and its residuals.
 
     Above, each estimate with its 95 % interval (thin) and its standard error (thick), relative to
-    the estimate, and in numbers above it. A parameter that the data do not determine, or that a
-    bound holds, has no bars. Below, (predicted − measured) over the standard deviation of each
-    number measured; about 95 % of them lie within the shade where model and deviations are right.
+    the estimate, and in numbers above it. A parameter that the data do not determine, or that is at
+    a bound, has no bars. Below, (predicted − measured) over the standard deviation of each number
+    measured; about 95 % of them lie within the shaded band if the model and the deviations are
+    right.
 
     Args:
-        fitted: from `fit_gait`.
+        fitted: a fit from `fit_gait`.
 
     Returns:
         A new figure.
@@ -108,13 +109,13 @@ def optimisation(optimum: Optimum) -> Figure:
     of several runs follow one another.
 
     Args:
-        optimum: from `optimise_gait`.
+        optimum: an optimum from `optimise_gait`.
 
     Returns:
         A new figure.
 
     Raises:
-        ArgumentError: no iterate was noted.
+        ArgumentError: the optimum has no iterates.
     """
     history = optimum.history
     if not history:

@@ -81,14 +81,15 @@ def elasticities(
 ) -> Figure:
     """Draws elasticities, d log measure / d log parameter, with error bars, the largest on top.
 
-    A bar to the right: the measure grows with the parameter. The scale is logarithmic beyond
-    1e-4 on either side of zero; the numbers stand at the right.
+    A bar to the right means that the measure grows with the parameter. The scale is logarithmic
+    beyond 1e-4 on either side of zero; the numbers stand at the right.
 
     Args:
         gait: a gait that was found, with its sensitivities to some parameters.
         measure: one or several of "period", "step_length", "speed", "peak_normal" and
-            "spectral_radius", a panel each; all whose elasticities are known unless given.
-        ax: axes to draw one measure into; a new figure unless given.
+            "spectral_radius", a panel each. Default: all
+            whose elasticities are known.
+        ax: axes to draw one measure into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.

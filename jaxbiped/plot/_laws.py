@@ -54,7 +54,7 @@ def normal_law(
             and one times the rate whose damping force equals the force at rest at `depth`.
         mass: what drops [kg].
         approach_speed: rate of penetration as it touches [m/s].
-        figure: empty figure or subfigure to draw into; a new one unless given.
+        figure: empty figure or subfigure to draw into. Default: a new figure.
 
     Returns:
         The figure given, or the new one.
@@ -93,7 +93,7 @@ def friction_law(
         fastest: where the scale of slip speeds ends [m/s]; unless given, at a thousand times the
             highest of the laws' own speeds, at most 1 m/s.
         load: normal force [N]; it matters only to a law that is not proportional to it.
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
@@ -257,7 +257,7 @@ def bristle_law(
     Args:
         law: the law, its parameters plain numbers.
         slip_speed: of the slide [m/s].
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.

@@ -22,13 +22,13 @@ _VISIBLE = 0.005
 def multipliers(gait: Gait | BranchPoint, *, ax: Axes | None = None) -> Figure:
     """Draws the Floquet multipliers with their error bars, without the trivial one.
 
-    The circle is the unit circle, within which a gait is stable. A disc about a multiplier is its
-    estimated error, where that is larger than the dot. Those near zero lie on top of each other
-    and are named together.
+    The circle is the unit circle, within which a gait is stable. A disc around a multiplier is its
+    estimated error, if that is larger than the dot. Multipliers near zero lie on top of each other
+    and share a label.
 
     Args:
         gait: a gait that was found, or a point of a branch.
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.

@@ -43,7 +43,7 @@ def walker(scene: AnyScene, *, ax: Axes | None = None) -> Figure:
 
     Args:
         scene: compliant or rigid, in minimal or redundant coordinates.
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.

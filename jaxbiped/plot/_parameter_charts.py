@@ -55,7 +55,7 @@ def branch(
         branches: of one scene along one parameter.
         measure: "period", "step_length", "speed", "peak_normal", "spectral_radius" or a component
             of the state, such as "theta_2".
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
@@ -97,7 +97,7 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
 
     Args:
         curves: along the same two parameters.
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
@@ -213,7 +213,7 @@ def basin_fractions(
         kind: "lines", or "stacked": areas that add up to one, without bands.
         confidence: of the bands.
         log: whether the parameter's axis is logarithmic.
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.

@@ -59,9 +59,9 @@ def phase_portrait(
     are two. Arrows tell the direction, a dot the start, a cross the end of a walk that ended.
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion, saved step by step; of a rigid walker with its heel strikes.
-        ax: axes to draw into; a new figure unless given.
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        ax: axes to draw into. Default: a new figure.
         legs: whose bodies to draw, counted from 1: (1,), (2,) or (1, 2).
         bodies: names of the bodies to draw, such as ("torso",), in place of these.
 
@@ -135,11 +135,11 @@ def gait_orbit(gait: Gait, *, ax: Axes | None = None) -> Figure:
 
     One cycle: where it is a step, mirrored bodies are exchanged at each footstep, so the two curves
     of an odd number of footsteps make one closed curve. The dots are the bodies on the section,
-    where the cycle begins. Arrows tell the direction.
+    where the cycle begins. Arrows show the direction.
 
     Args:
         gait: a gait that was found, of any walker.
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.

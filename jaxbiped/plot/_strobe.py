@@ -48,9 +48,9 @@ def gait_strobe(
     point's path. Gravity points down the page.
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion, saved step by step; of a rigid walker with its heel strikes.
-        ax: axes to draw into; a new figure unless given.
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        ax: axes to draw into. Default: a new figure.
         start, stop: first and last time drawn [s]; the end is 1.8 s, about four footsteps of the
             paper's walk, after the start unless given, and never after the motion's own.
         count: number of poses; unless given, one about every 0.1 s.

@@ -28,9 +28,9 @@ def leg_angles(scene: AnyScene, trajectory: Trajectory[Any], *, ax: Axes | None 
     """Draws the angles of all bodies from the slope's normal [rad] over time [s].
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion, saved step by step; of a rigid walker with its heel strikes.
-        ax: axes to draw into; a new figure unless given.
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
@@ -54,11 +54,11 @@ def time_series(
     """Draws scalars of the state over time [s].
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion, saved step by step; of a rigid walker with its heel strikes.
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
         names: of the state's scalars, or angles and rates of bodies that couplings fix, of one
             unit: `theta_torso`, `omega_shank_1`, `hip_vx`.
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
@@ -134,7 +134,7 @@ def rigid_leg_angles(
         scene: the walker.
         state: start of the walk.
         duration: how long to draw [s].
-        ax: axes to draw into; a new figure unless given.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
@@ -157,9 +157,9 @@ def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None
     interrupted.
 
     Args:
-        scene: what was simulated.
-        trajectory: the motion, saved step by step.
-        ax: axes to draw into; a new figure unless given.
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved.
+        ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.

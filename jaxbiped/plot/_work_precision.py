@@ -28,14 +28,14 @@ def work_precision(
     floor: float | None = None,
     ax: Axes | None = None,
 ) -> Figure:
-    """Draws what each way costs for the error that it has, both on logarithmic scales.
+    """Draws cost against error for each method, on logarithmic scales.
 
-    A line for each way through its settings. What failed stands as a cross in a shaded band at the
-    right, at its cost (at the bottom where nothing ran). Below the floor no error is known.
+    Each method has a line through its settings. A failed run is a cross in a shaded band at the
+    right, at its cost (at the bottom if nothing ran). Errors below the floor cannot be determined.
 
     Args:
-        rows: as `jaxbiped trade --json` writes them: `way`, `setting`, `outcome`, `errors`, and
-            the costs. Rows that have other axes only are left out.
+        rows: rows as `jaxbiped trade --json` writes them: `way`, `setting`, `outcome`, `errors`,
+            and the costs. Rows without this axis are left out.
         axis: name of the error axis, such as "state".
         cost: "cpu_s", "seconds" or "attempted".
         floor: error by which the references disagree, in the axis's units.
@@ -110,7 +110,7 @@ _FLOOR = 1e-17
 
 
 def constraint_runs(runs: Sequence[Mapping[str, Any]]) -> Figure:
-    """Draws what each method × integrator violates, how far off it ends and how long it takes.
+    """Draws the violation, the final error and the time of each constraint method and integrator.
 
     A row for each method, a panel for each measure on a logarithmic scale, a mark for each
     integrator at its tolerance or step size. A run that failed stands as a cross at the right

@@ -11,15 +11,15 @@ from jaxbiped.scene._bodies import check_name
 
 
 class AbstractClearance(eqx.Module):
-    """Decides from a leg and its rotation whether its feet may touch, all of them together."""
+    """A rule that decides from a leg and its rotation whether its feet may touch."""
 
     @abc.abstractmethod
     def admits(self, leg: str, leg_rate: Scalar) -> Scalar | bool | None:
         """Whether the feet of a leg, by its name, may touch.
 
-        `leg_rate` is that of the line from the root point to the mean of its feet [rad/s]. None
-        stands for "always" and False for "never", known before anything runs: nothing of the rule,
-        or of the contact, is then left in the compiled program.
+        `leg_rate` is the rate of the line from the root point to the mean of its feet [rad/s]. The
+        result None means "always" and False "never"; both are known before anything runs, so the
+        rule, or the contact, is then left out of the compiled program.
         """
 
 
@@ -47,13 +47,13 @@ def _leg_name(leg: Any) -> Any:
 
 
 class OneFoot(AbstractClearance):
-    """Only one leg ever touches: a walker in single support, or a leg that is dropped.
+    """Only one leg may touch: a walker in single support, or a leg that is dropped.
 
     Attributes:
-        leg: the leg's name; of `Walker` also the number 1 or 2, which is kept as its name.
+        leg: name of the leg; for `Walker` also the number 1 or 2, which is stored as the name.
 
     Raises:
-        ArgumentError: what is no name. A scene refuses a leg that it does not have.
+        ArgumentError: it is not a name. A scene refuses a leg that it does not have.
     """
 
     leg: str = eqx.field(static=True, converter=_leg_name)

@@ -30,7 +30,7 @@ def test_what_overflowed_is_no_accurate_walk():
     )  # fmt: skip
     coarse, overflowed = walk_warnings(SCENE, numbers, rtol=10.0)
     assert "rtol = 10 is too coarse for v0" in coarse
-    assert "is no number" in overflowed
+    assert "is not a number" in overflowed
     settled = numbers | {"energy_residual_J": 0.0}
     assert walk_warnings(SCENE, settled, rtol=1e-6) == []
     grows = jb.with_parameters(SCENE, {"mu_kinetic": 0.6})

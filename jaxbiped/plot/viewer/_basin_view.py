@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class BasinView(AbstractPage):
-    """A basin's picture whose starts show their walks.
+    """A picture of a basin in which a selected start shows its walk.
 
     Attributes:
         basin: the picture, ready for JSON.
@@ -58,18 +58,18 @@ def view_basin(
     footsteps: int = 3,
     title: str = "Basin of attraction",
 ) -> BasinView:
-    """A basin's picture in which a start that is picked shows its walk.
+    """Makes a picture of a basin in which a selected start shows its walk.
 
-    Walks of an even choice of the starts are simulated, by the draft accuracy, and kept in the
-    page: their motion to 1e-4 of a leg's length, without forces.
+    The walks of evenly chosen starts are simulated at draft accuracy and stored in the page: their
+    motion to 1e-4 of a leg's length, without forces.
 
     Args:
-        labelling: by which the starts were labelled, of a compliant walker.
+        labelling: labelling of the starts, of a compliant walker.
         starts: a grid with two axes, the second along the page.
-        found: their labels, by `jaxbiped.sweep`.
-        most: how many walks to keep; one weighs some 4 kB.
-        footsteps: of each.
-        title: of the picture.
+        found: their labels, from `jaxbiped.sweep`.
+        most: maximum number of walks to store, about 4 kB each.
+        footsteps: number of footsteps of each walk.
+        title: title of the picture.
 
     Returns:
         The view: `save(path)` writes it as one page of HTML, a notebook shows it in a frame.

@@ -120,10 +120,10 @@ def asset(name: str) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class View(AbstractPage):
-    """Walks that can be watched, side by side under one clock. A notebook shows it.
+    """One or several walks to watch, side by side with one clock. A notebook displays it.
 
     Attributes:
-        recordings: the walks as they are played.
+        recordings: recordings of the walks.
     """
 
     recordings: tuple[Recording, ...]
@@ -174,20 +174,20 @@ def view(
     start: RigidState | None = None,
     name: str = "walk",
 ) -> View:
-    """A walk to watch: played, scrubbed, with forces, footprints and linked charts.
+    """A view of a walk that can be played and scrubbed, with forces, footprints and linked charts.
 
-    Positions between the times that are kept are those of `trajectory.at` to 1e-5 of a leg's
-    length. Forces and energies are as exact as they are drawn.
+    Positions between the stored times agree with `trajectory.at` to 1e-5 of a leg's length. Forces
+    and energies have the accuracy of the drawing.
 
     Args:
-        scene: what was simulated.
+        scene: the scene that was simulated.
         trajectory: the motion, saved step by step; of a rigid walker with its heel strikes, by
             `max_arrivals`.
-        start: of a rigid walk, which otherwise is seen from its first heel strike on.
-        name: what it is called.
+        start: start of a rigid walk, which is otherwise shown from its first heel strike on.
+        name: name of the walk.
 
     Returns:
-        The view: a notebook shows it, `save(path)` writes it as one page of HTML.
+        The view. A notebook displays it, and `save(path)` writes it as one HTML page.
 
     Raises:
         ArgumentError: arguments of the wrong type, or a rigid walk without heel strikes or start.
@@ -214,13 +214,13 @@ def view(
 
 
 def side_by_side(*views: View) -> View:
-    """Several walks side by side under one clock, their charts on the same axes.
+    """Several walks side by side with one clock, with their charts on the same axes.
 
     Args:
-        views: from `view`, in order, each with a name of its own.
+        views: views from `view`, in order, each with its own name.
 
     Returns:
-        One view of all.
+        One view of all walks.
 
     Raises:
         ArgumentError: no view, or something else.

@@ -25,12 +25,12 @@ ACTUATORS: dict[str, type["AbstractActuator"]] = {}
 
 
 class HipMotion(NamedTuple):
-    """What an actuator at the hip knows of the walker; pairs of leg 1 and leg 2.
+    """Motion that an actuator at the hip can use; pairs for leg 1 and leg 2.
 
     Attributes:
-        angle: from the slope's normal [rad].
-        rate: of the angles [rad/s].
-        load: share of the load that each leg carries [–], one where it stands alone; None for a leg
+        angle: angles from the slope's normal [rad].
+        rate: rates of the angles [rad/s].
+        load: share of the load that each leg carries [–], one if it stands alone; None for a leg
             that is known to carry nothing.
     """
 
@@ -40,7 +40,7 @@ class HipMotion(NamedTuple):
 
 
 class AbstractActuator(AbstractNamedPart):
-    """Something that drives the walker, or stores energy for it; in `ACTUATORS` by its `name`.
+    """A device that drives the walker or stores energy for it; listed in `ACTUATORS` by its `name`.
 
     Attributes:
         feet: the feet that it needs, "rigid" or "compliant", None for any. A property of the class.
@@ -51,7 +51,7 @@ class AbstractActuator(AbstractNamedPart):
 
     @abc.abstractmethod
     def idle(self) -> Self:
-        """The same at strength zero, where a search for a driven gait may begin."""
+        """The same actuator at strength zero, at which a search for a driven gait may begin."""
 
 
 class AbstractHipActuator(AbstractActuator):
@@ -59,23 +59,24 @@ class AbstractHipActuator(AbstractActuator):
 
     @abc.abstractmethod
     def torques(self, hip: HipMotion) -> LegTorques:
-        """All torque on each leg [N·m]."""
+        """Total torque on each leg [N·m]."""
 
     @abc.abstractmethod
     def motor_torques(self, hip: HipMotion) -> LegTorques | None:
-        """What of it a motor gives, not a spring or a damper [N·m]; None without a motor."""
+        """Torques of a motor alone, without springs and dampers [N·m]; None without a motor."""
 
 
 class AbstractPhaseTorque(AbstractHipActuator):
     """A torque at the hip that is a function of the phase: how far the stance leg has turned.
 
-    The phase is minus the stance leg's angle [rad], which grows as the walker rolls over that leg;
-    so the system stays autonomous. A positive torque drives the walker downhill: it turns the
-    stance leg back. In double support each leg's torque is weighted by the load that it carries.
+    The phase is minus the stance leg's angle [rad], which grows as the walker rolls over that leg.
+    The torque does not depend on time, so the system stays autonomous. A positive torque drives the
+    walker downhill: it turns the stance leg back. In double support, the torque of each leg is
+    weighted by the load that it carries.
 
     Attributes:
-        reaction: what takes the opposite torque: "swing", the other leg, which it swings forward;
-            or "trunk", an upright trunk that is not modelled.
+        reaction: part that takes the opposite torque: "swing", the other leg, which it swings
+            forward; or "trunk", an upright trunk that is not modelled.
     """
 
     reaction: AbstractVar[str]
@@ -85,7 +86,7 @@ class AbstractPhaseTorque(AbstractHipActuator):
 
     @abc.abstractmethod
     def torque_at(self, phase: Scalar) -> Scalar:
-        """Torque at a phase [rad], positive where it drives the walker downhill [N·m]."""
+        """Torque at a phase [rad], positive if it drives the walker downhill [N·m]."""
 
     def torques(self, hip: HipMotion) -> LegTorques:
         driving = [

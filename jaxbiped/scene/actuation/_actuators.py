@@ -63,11 +63,11 @@ def cubic_spline(
 
 
 class HipSpring(AbstractHipActuator):
-    """A torque −k (θ − θ0) − b θ̇ on the swing leg, the opposite on the other; θ is between them.
+    """Torque −k (θ − θ0) − b θ̇ on the swing leg, its opposite on the other; θ is between them.
 
-    Without a rest angle nothing drives it, and it is the same in either leg's stance. A rest angle
-    that is always ahead of the stance leg takes a motor, whose part is the torque k θ0; it changes
-    sides with the load.
+    Without a rest angle, the spring is passive and acts equally in the stance of either leg. A rest
+    angle that is always ahead of the stance leg requires a motor, which contributes the torque k
+    θ0; it changes sides with the load.
 
     Source: Kuo 2002, Energetics of actively powered locomotion using the simplest walking model,
     whose hip spring has no damper.
@@ -75,8 +75,7 @@ class HipSpring(AbstractHipActuator):
     Attributes (leaves of any batch shape):
         k: stiffness [N·m/rad].
         b: damping [N·m·s/rad].
-        theta_0: how far the swing leg is ahead of the stance leg at rest [rad]; None for 0 and no
-            motor.
+        theta_0: rest angle of the swing leg ahead of the stance leg [rad]; None for 0 and no motor.
 
     Raises:
         ArgumentError: k or b below 0.
@@ -109,7 +108,7 @@ class HipTorque(AbstractPhaseTorque):
     """The same torque at every phase.
 
     Attributes (leaves of any batch shape):
-        torque: positive where it drives the walker downhill [N·m].
+        torque: torque, positive if it drives the walker downhill [N·m].
         reaction: see `AbstractPhaseTorque`.
 
     Raises:
@@ -131,9 +130,9 @@ class HipPulse(AbstractPhaseTorque):
     """A torque pulse exp(−((φ − phase)/width)²) at the phase φ.
 
     Attributes (leaves of any batch shape):
-        pulse: largest torque, positive where it drives the walker downhill [N·m].
-        phase: where it is: minus the stance leg's angle, 0 when that leg is upright [rad].
-        width: over which it falls by 1/e [rad].
+        pulse: largest torque, positive if it drives the walker downhill [N·m].
+        phase: phase of the peak: minus the stance leg's angle, 0 when that leg is upright [rad].
+        width: distance from the peak at which the torque has fallen to 1/e [rad].
         reaction: see `AbstractPhaseTorque`.
 
     Raises:
@@ -156,16 +155,17 @@ class HipPulse(AbstractPhaseTorque):
 class HipSpline(AbstractPhaseTorque):
     """Σ τ_i B(φ/h − i), cubic B-splines at n phases of equal distance h; the parameters τ_1 … τ_n.
 
-    Twice continuously differentiable; it falls to zero within 2 h before the first phase and
-    beyond the last. Where all τ_i are equal, so is the torque from the second phase to the last but
-    one.
+    The torque is twice continuously differentiable. It falls to zero within 2 h before the first
+    phase and beyond the last. If all τ_i are equal, the torque is constant from the second phase to
+    the last but one.
 
     Source: de Boor, A Practical Guide to Splines (2001), chapter IX.
 
     Attributes (leaves of any batch shape):
-        torque: coefficients τ_1 … τ_n, two or more, positive where they drive the walker downhill
-            [N·m]; parameters by the names `torque_1` and so on.
-        first, last: phases of the first and the last: minus the stance leg's angle [rad].
+        torque: coefficients τ_1 … τ_n, two or more, positive if they drive the walker downhill
+            [N·m]; the parameters are named `torque_1` and so on.
+        first, last: phases of the first and the last coefficient: minus the stance leg's angle
+            [rad].
         reaction: see `AbstractPhaseTorque`.
 
     Raises:
@@ -189,14 +189,14 @@ class HipSpline(AbstractPhaseTorque):
 
 
 class PushOff(AbstractActuator):
-    """An impulse along the trailing leg, from its foot to the hip, at once before heel strike.
+    """An impulse along the trailing leg, from its foot to the hip, just before heel strike.
 
-    For rigid feet alone. The massless ankle takes its support from the ground under it and lets go.
+    For rigid feet only. The massless ankle pushes against the ground and then releases it.
 
     Source: Kuo 2002, Energetics of actively powered locomotion using the simplest walking model.
 
     Attributes (leaves of any batch shape):
-        impulse: [N·s].
+        impulse: impulse [N·s].
 
     Raises:
         ArgumentError: impulse below 0.
@@ -213,14 +213,14 @@ class PushOff(AbstractActuator):
 class FootPreload(AbstractActuator):
     """The foot's set point, (extension/2) (1 + tanh((φ − onset)/span)) below the leg's own.
 
-    φ is minus the leg's angle. The massless foot is pressed into the ground by so much while its
-    leg trails, and let up again in the swing: normal laws see the penetration δ with this added.
-    For compliant feet alone.
+    φ is minus the leg's angle. The massless foot is pressed into the ground by this distance while
+    its leg trails, and retracted in the swing: the normal law receives the penetration δ with this
+    distance added. For compliant feet only.
 
     Attributes (leaves of any batch shape):
-        extension: of a leg that trails far [m].
+        extension: full extension, of a leg that trails far [m].
         onset: phase at which half of it is reached: minus the leg's angle [rad].
-        span: over which it builds up [rad].
+        span: range of the phase over which it builds up [rad].
 
     Raises:
         ArgumentError: extension below 0 or span not above 0.
@@ -233,7 +233,7 @@ class FootPreload(AbstractActuator):
     span: Parameter = parameter("extension's span", "$w_e$", "rad", positive=True, default=0.05)
 
     def set_point(self, angle: Scalar, rate: Scalar) -> tuple[Scalar, Scalar]:
-        """How far the foot is extended [m], and how fast it is [m/s]."""
+        """Extension of the foot [m], and its rate [m/s]."""
         rise = tanh((-angle - self.onset) / self.span)
         half = 0.5 * self.extension
         return half * (1.0 + rise), -half * (1.0 - rise * rise) * rate / self.span

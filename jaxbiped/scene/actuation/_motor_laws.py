@@ -64,10 +64,10 @@ class AbstractReadingLaw(AbstractMotorLaw):
 
 
 class Constant(AbstractMotorLaw):
-    """The same torque always, or for as long as the motor's leg stands (a motor by role).
+    """A constant torque; for a motor by role, for as long as the motor's leg stands.
 
     Attributes (leaves of any batch shape):
-        torque: [N·m].
+        torque: torque [N·m].
     """
 
     torque: Parameter = parameter("motor torque", r"$\tau$", "N m")
@@ -83,8 +83,8 @@ class PD(AbstractReadingLaw):
     Attributes (leaves of any batch shape):
         kp: gain of the angle [N·m/rad].
         kd: gain of its rate [N·m·s/rad]; None for none.
-        target: angle that it drives to [rad]; None for 0.
-        of: the angle φ; the motor's own unless given.
+        target: target of the angle [rad]; None for 0.
+        of: the angle φ. Default: the motor's own.
     """
 
     kp: Parameter = parameter("proportional gain", r"$k_\mathrm{p}$", "N m/rad")
@@ -105,10 +105,10 @@ class Pulse(AbstractReadingLaw):
     """A pulse τ exp(−((φ − at)/width)²).
 
     Attributes (leaves of any batch shape):
-        torque: the largest one [N·m].
-        at: where it is [rad].
-        width: over which it falls by 1/e [rad].
-        of: the angle φ; the phase unless given.
+        torque: largest torque [N·m].
+        at: angle of the peak [rad].
+        width: distance from the peak at which the torque has fallen to 1/e [rad].
+        of: the angle φ. Default: the phase.
 
     Raises:
         ArgumentError: width not above 0.
@@ -130,8 +130,8 @@ class Spline(AbstractReadingLaw):
 
     Attributes (leaves of any batch shape):
         torque: coefficients τ_1 … τ_n, two or more [N·m]; parameters `torque_1` and so on.
-        first, last: the first and the last of the angles [rad].
-        of: the angle φ; the phase unless given.
+        first, last: angles of the first and the last coefficient [rad].
+        of: the angle φ. Default: the phase.
 
     Raises:
         ArgumentError: fewer than two coefficients, or last not above first.

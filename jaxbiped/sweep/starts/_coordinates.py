@@ -45,15 +45,15 @@ def state_coordinates(scene: AbstractWalkerScene) -> dict[str, str]:
 
 
 def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
-    """All coordinates that starts of a scene can differ in.
+    """Names of all coordinates in which starts of a scene can differ.
 
     Args:
         scene: the walker, compliant or rigid.
 
     Returns:
-        Names of the state's coordinates but `ROOT_x`, and then of the scene's parameters. Of two
-        legs "1" and "2" come first `theta_stance`, `theta_swing` and their rates, other names of
-        theirs.
+        Names of the state's coordinates except `ROOT_x`, and then of the scene's parameters. For
+        two legs "1" and "2", the aliases `theta_stance`, `theta_swing` and those of their rates
+        come first.
 
     Examples:
         >>> import jaxbiped as jb
@@ -64,13 +64,13 @@ def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
 
 
 def coordinate_quantities(scene: Scene | RigidScene) -> dict[str, Quantity]:
-    """What each coordinate that starts of a scene can differ in is, with its unit, by name.
+    """Words, symbol and unit of each coordinate in which starts of a scene can differ, by name.
 
     Args:
         scene: the walker, compliant or rigid.
 
     Returns:
-        A `Quantity` (words, symbol and SI unit) by each name.
+        A `Quantity` (words, symbol and SI unit) for each name.
     """
     own = {
         name: START_QUANTITIES.get(name) or state_quantity(name)

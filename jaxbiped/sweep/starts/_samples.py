@@ -86,10 +86,10 @@ class Sample(AbstractStarts):
     """Random or quasi-random starts within bounds. `sample` makes one.
 
     Attributes:
-        lower, upper: bounds of each coordinate.
+        lower, upper: lower and upper bound of each coordinate.
         count: how many starts.
         method: one of `SAMPLINGS`.
-        seed: of the sequence.
+        seed: random seed of the sequence.
         rest: as in `Grid`.
     """
 
@@ -139,22 +139,22 @@ def sample(
 ) -> Sample:
     """Random or quasi-random starts within bounds of coordinates (see `grid`).
 
-    A start is the same whichever chunk it is made in. "latin-hypercube" draws all of them for each
-    chunk; the other methods only the chunk's.
+    A start does not depend on its chunk. "latin-hypercube" draws all starts for each chunk; the
+    other methods draw only those of the chunk.
 
     Args:
         scene: the walker.
         bounds: lower and upper bound of each coordinate (see `coordinate_names`), in its SI unit.
         count: how many starts.
         method: one of `SAMPLINGS`.
-        seed: of the random numbers.
+        seed: random seed.
         place, follow, base: as in `grid`.
 
     Returns:
-        The starts, of shape (count,); none is computed before it is labelled.
+        The starts, of shape (count,); each is computed when it is labelled.
 
     Raises:
-        ArgumentError: an unknown coordinate or method, bounds that enclose nothing, no starts.
+        ArgumentError: a coordinate or method is unknown, bounds are empty, or there are no starts.
     """
     check_coordinates(scene, bounds)
     check_count("count", count)

@@ -42,7 +42,7 @@ class Batch(NamedTuple):
 
 
 class AbstractStarts(eqx.Module):
-    """Starts that are made as they are needed: each is a function of its number alone."""
+    """Starts that are computed when needed: each is a function of its number alone."""
 
     @property
     @abc.abstractmethod
@@ -127,8 +127,8 @@ class Grid(AbstractStarts):
     """A regular grid over coordinates; the last axis runs fastest. `grid` makes one.
 
     Attributes:
-        values: coordinates' values, shape (k,) each.
-        rest: where what they do not name comes from.
+        values: values of the coordinates, arrays of shape (k,).
+        rest: source of the coordinates that are not named.
         swept: which of the coordinates are parameters of the scene.
     """
 
@@ -175,23 +175,23 @@ def grid(
 
     Args:
         scene: the walker.
-        values: of each coordinate (see `coordinate_names`), the last one running fastest.
-        place: whether the stance leg is placed on the ground: height and velocity of the root
-            point, where they are not named, follow from its lowest foot, as deep and as slowly
-            slipping as in the gait, or in the base. Unless given they do where a body's angle or
-            rate is told by its name in the state; `theta_stance` and its like name a slice through
-            the gait's own root point.
-        follow: a function of (scene, states), leaves (n,), that completes the starts in another
-            way, after all else. For workers in other processes it must be a module's own.
-        base: a state of the scene, of which starts keep what they do not name; that of the gait on
-            its section unless given.
+        values: values of each coordinate (see `coordinate_names`); the last one runs fastest.
+        place: whether the stance leg is placed on the ground: unless they are named, height and
+            velocity of the root point then follow from its lowest foot, with the penetration and
+            slip speed of the gait, or of the base. Default: if an axis is an angle or rate of a
+            body under its name in the state, whereas `theta_stance` and similar names give a slice
+            with the gait's own root point.
+        follow: a function of (scene, states), with leaves of shape (n,), that finally modifies the
+            starts. For workers in other processes, it must be defined in a module.
+        base: a state of the scene that provides the coordinates that are not named. Default: the
+            gait's state on its section.
 
     Returns:
-        The starts, of the shape that the axes span; none is computed before it is labelled.
+        The starts, with the shape of the axes; each is computed when it is labelled.
 
     Raises:
-        ArgumentError: an unknown coordinate or one that is named twice, an empty axis, a value that
-            is not finite, or a base of another kind.
+        ArgumentError: a coordinate is unknown or named twice, an axis is empty, a value is not
+            finite, or the base is of another kind.
 
     Examples:
         >>> import jaxbiped as jb
@@ -240,13 +240,13 @@ def check_parameters(scene: Scene | RigidScene, columns: dict[str, np.ndarray]) 
 
 
 class GivenStarts(AbstractStarts):
-    """Starts as they are given.
+    """Starts given as states.
 
     Attributes:
         states: a state of the scene's kind with leaves of shape (n,).
 
     Raises:
-        ArgumentError: a state of another kind, or leaves of different shapes.
+        ArgumentError: the state is of another kind, or its leaves have different shapes.
     """
 
     states: PyTree
