@@ -112,7 +112,9 @@ class GraphWriter:
         """The inner block runs where any lane wants it; each lane then takes its own."""
         here, inside, values, defaults = head.args
         parts = _parts_of(head)
-        wanted = [i for i, part in enumerate(parts) if part in self.needed]
+        every = [i for i, part in enumerate(parts) if part in self.needed]
+        stored = [i for i in every if width == 1 and self._stays_stored(head, i)]
+        wanted = [i for i in every if i not in stored]
         mask = self.use(here, width)
         before = [self.use(defaults[i], width) for i in wanted]
         start, rare, after = self.text.label, self.text.fresh("some"), self.text.fresh("none")
@@ -121,9 +123,13 @@ class GraphWriter:
             f"br i1 {self.text.any_lane(mask, width)}, label %{rare}, label %{after}{hint}"
         )
         self.text.begin(rare)
-        chosen = []
+        chosen, either = [], dict[tuple[str, str, int], str]()
         with self.text.scope():
             self.write(inside, width)
+            for i in stored:
+                apart = self._apart(values[i], defaults[i])
+                if apart not in either:
+                    either[apart] = self.text.address(apart[0], values[i].kind, apart[2])
             for i, old in zip(wanted, before, strict=True):
                 of, new = vector(values[i].kind, width), self.use(values[i], width)
                 text = f"select {vector(Kind.BOOL, width)} {mask}, {of} {new}, {of} {old}"
@@ -135,6 +141,31 @@ class GraphWriter:
             of = vector(values[i].kind, width)
             text = f"phi {of} [ {old}, %{start} ], [ {new}, %{end} ]"
             self.name(parts[i], self.text.assign(text), width)
+        for apart, moved in either.items():
+            one, other, distance = apart
+            pointer = self.text.assign(f"phi ptr [ {other}, %{start} ], [ {moved}, %{end} ]")
+            either[apart] = pointer
+            if {one, other} <= self.padded_rooms and distance % self.inner == 0:
+                self.padded_rooms.add(pointer)
+        for i in stored:
+            known, apart = self.homes[id(defaults[i])], self._apart(values[i], defaults[i])
+            self.homes[id(parts[i])] = known._replace(pointer=either[apart])
+
+    def _stays_stored(self, head: Value, place: int) -> bool:
+        """Whether both of a conditional's numbers lie in memory: the result lies at either place.
+
+        Those that it gives then are entries of maps.
+        """
+        value, default = head.args[2][place], head.args[3][place]
+        if self.inner == 1 or value.op != "part" or id(default) not in self.homes:
+            return False
+        source, place = value.args
+        return source.op == "map" or (source.op == "if" and self._stays_stored(source, place))
+
+    def _apart(self, value: Value, default: Value) -> tuple[str, str, int]:
+        """The memories in which two values lie, and how much further in it the first one does."""
+        new, old = self.homes[id(value)], self.homes[id(default)]
+        return new.pointer, old.pointer, new.offset - old.offset
 
     def _write_repeat(self, head: Value, width: int) -> None:
         length, inside, starts, held, ends = head.args
@@ -218,24 +249,31 @@ class GraphWriter:
 
         Values that lie irregularly are copied.
         """
-        kind = row[0].kind
-        places = [self.homes.get(id(value)) for value in row]
-        first = places[0]
-        if first is not None and (self.width > 1 or first.pointer in self.padded_rooms):
-            second = places[1] if len(places) > 1 else None
-            stride = 1 if second is None else second.offset - first.offset
-            regular = all(
-                place == Place(first.pointer, first.offset + i * stride)
-                for i, place in enumerate(places)
-            )
-            # Many entries are one vector only where they lie side by side.
-            if regular and (stride == 1 or self.width > 1):
-                return self.text.address(first.pointer, kind, first.offset * self.width), stride
+        kind, regular = row[0].kind, self.regular_row(row)
+        if regular is not None:
+            (pointer, offset), stride = regular
+            return self.text.address(pointer, kind, offset * self.width), stride
         pointer = self.room(kind, padded)
         for i, value in enumerate(row):
             at = self.text.address(pointer, kind, i * self.width)
             self.text.store(self.use(value), at, kind, self.width)
         return pointer, 1
+
+    def regular_row(self, row: Sequence[Value]) -> tuple[Place, int] | None:
+        """The first of some values that lie regularly, and how many vectors further each next."""
+        places = [self.homes.get(id(value)) for value in row]
+        first = places[0]
+        if first is None or (self.width == 1 and first.pointer not in self.padded_rooms):
+            return None
+        second = places[1] if len(places) > 1 else None
+        stride = 1 if second is None else second.offset - first.offset
+        regular = all(
+            place == Place(first.pointer, first.offset + i * stride)
+            for i, place in enumerate(places)
+        )
+        # Many entries are one vector only where they lie side by side, from a whole one on.
+        whole = self.width > 1 or (stride == 1 and first.offset % self.inner == 0)
+        return (first, stride) if regular and whole else None
 
 
 def _parts_of(head: Value) -> list[Value]:

@@ -4,6 +4,8 @@ A lane whose simulation is over takes the next one at once, so that a long simul
 up its neighbours.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from jaxbiped.compiler.codegen._kernel_target import (
@@ -80,9 +82,8 @@ class _Kernel:
             return
         w = self.writer
         kind = next(iter(array.ravel())).kind
-        rows = np.moveaxis(array, 0, -1) if array.ndim else array.reshape(1)
-        padded = w.padded(rows.shape[-1]) if array.ndim else 1
-        flat = rows.reshape(-1, rows.shape[-1])
+        flat = _rows(array)
+        padded = w.padded(flat.shape[-1]) if array.ndim else 1
         pointer = self._zeroed_room(kind, padded * len(flat))
         if array.ndim:
             w.padded_rooms.add(pointer)
@@ -163,17 +164,31 @@ class _Kernel:
         with t.scope():
             w.write(graph.body)
             found = [
-                (w.use(a), b)
+                each
                 for new, old in zip(graph.following, graph.carried, strict=True)
-                for a, b in zip(new.ravel(), old.ravel(), strict=True)
-                if a is not b
+                for each in self._following(new, old)
             ]
             done = w.use(graph.done)
-            for text, value in found:
-                self._store(text, value.kind, w.homes[id(value)])
+            for text, kind, place, width in found:
+                self._store(text, kind, place, width)
             done = self._live(done)
             t.store(done, lanes.bits["done"], Kind.BOOL, self.width)
             return self._any(done)
+
+    def _following(self, new: Array, old: Array) -> Iterator[tuple[str, Kind, Place, int]]:
+        """What is to be carried, of which kind, where to and of which width."""
+        w, step = self.writer, self.writer.inner
+        for values, kept in zip(_rows(new), _rows(old), strict=True) if old.size else ():
+            whole = self.width == 1 and old.ndim and 1 < step <= old.shape[0]
+            regular = w.regular_row(values) if whole else None
+            if regular is None:
+                changed = ((a, b) for a, b in zip(values, kept, strict=True) if a is not b)
+                yield from ((w.use(a), b.kind, w.homes[id(b)], self.width) for a, b in changed)
+                continue
+            (pointer, offset), first, kind = regular[0], w.homes[id(kept[0])], kept[0].kind
+            for i in range(0, w.padded(len(kept)), step):
+                found = self.t.load(self.t.address(pointer, kind, offset + i), kind, step)
+                yield found, kind, Place(first.pointer, first.offset + i), step
 
     def _records(self) -> None:
         """Records, once or as long as any lane has another."""
@@ -208,6 +223,12 @@ class _Kernel:
     def _live(self, mask: str) -> str:
         return self.t.assign(f"and {vector(Kind.BOOL, self.width)} {mask}, {self._mark('live')}")
 
-    def _store(self, text: str, kind: Kind, place: Place) -> None:
+    def _store(self, text: str, kind: Kind, place: Place, width: int | None = None) -> None:
         at = self.t.address(place.pointer, kind, place.offset * self.width)
-        self.t.store(text, at, kind, self.width)
+        self.t.store(text, at, kind, self.width if width is None else width)
+
+
+def _rows(array: Array) -> Array:
+    """Its numbers with what lies side by side in memory in rows: the first axis as the last one."""
+    rows = np.moveaxis(array, 0, -1) if array.ndim else array.reshape(1)
+    return rows.reshape(-1, rows.shape[-1])

@@ -207,3 +207,34 @@ def test_equal_calls_are_lowered_once():
 def test_an_unknown_primitive_is_named():
     with pytest.raises(UnknownPrimitiveError, match=r"'erf'.*engine=\"xla\""):
         compiled(jax.scipy.special.erf, ()).check()
+
+
+def test_arrays_that_a_conditional_chooses_are_the_same_for_any_width():
+    """Of one simulation they stay in memory; kept, chosen within a choice, and read by a map."""
+
+    def attempt(x, carried):
+        rows, count = carried
+
+        def grown():
+            more = jax.lax.map(lambda row: row * x + 1.0, rows)
+            return jax.lax.cond(
+                count > 3.0, lambda: jax.lax.map(lambda row: row * row, more), lambda: more
+            )
+
+        chosen = jax.lax.cond(jnp.abs(count - 3.0) < 2.5, grown, lambda: rows)
+        turned = jax.lax.map(lambda each: each[0] + each[1], (chosen, rows[::-1]))
+        after = jnp.where(count < 6.0, chosen, turned), count + 1.0
+        return after, count > 6.0
+
+    def start(x):
+        return jnp.arange(22.0).reshape(11, 2) / 7.0 * x, jnp.zeros(())
+
+    points = np.linspace(0.1, 0.9, 9)  # of one sign: fused products round otherwise
+    program = stepped(attempt, start=start)
+    narrow, wide = (program.run(points, width=w).outputs[0] for w in (1, host().width))
+    np.testing.assert_array_equal(narrow, wide)
+    for x, found in zip(points, narrow, strict=True):
+        carried, over = start(x), False
+        while not over:
+            carried, over = attempt(x, carried)
+        np.testing.assert_allclose(found, carried[0], rtol=1e-13)
