@@ -199,8 +199,14 @@ def trace(
     if leaves_range(begin):
         return stopped(BranchEnd.REACHED, BOUND)
     control = StepControl(_FIRST * largest_step, largest_step, _SMALLEST, _LEAST_COSINE, _ASIDE)
+
+    def is_likely(here: CurvePoint, there: CurvePoint) -> bool:
+        found = bifurcations_between(curve, axis, here, there)
+        return explains(here, there, [event.kind for _, event in found])
+
+    gaits = follow(curve, here, control, low=0.0, high=1.0, is_likely=is_likely)
     try:
-        for attempt in islice(follow(curve, here, control, low=0.0, high=1.0), max_points):
+        for attempt in islice(gaits, max_points):
             if attempt.found is None:
                 return stopped(*reason_of(attempt.code))
             there = attempt.found

@@ -146,10 +146,12 @@ def follow(
     *,
     low: float = -np.inf,
     high: float = np.inf,
+    is_likely: Callable[[CurvePoint, CurvePoint], bool] = lambda here, there: True,
 ) -> Iterator[Attempt]:
     """The points of a curve onwards from one, the last of them exactly at a bound of s.
 
-    Where steps get too small, a failed attempt tells why at the end.
+    Steps get shorter where they seem to lead to another curve, also by what `is_likely` says of
+    their ends. Where they get too small, a failed attempt tells why at the end.
     """
     here, step = begin, control.first
     bounds = {True: high, False: low}
@@ -162,8 +164,9 @@ def follow(
         # The last step ends on the bound, the others where the tangent says.
         guess = here.place + length * here.tangent
         attempt = correct(curve, guess, here.tangent, holds_s=length < step)
-        jumps = attempt.found is not None and _jumps(here, attempt.found, length, control)
-        if attempt.found is None or (jumps and step > 50.0 * control.smallest):
+        there, doubts = attempt.found, step > 50.0 * control.smallest
+        jumps = there is not None and doubts and _jumps(here, there, length, control)
+        if there is None or jumps or (doubts and not is_likely(here, there)):
             step *= 0.4
             if step < control.smallest:
                 yield Attempt(None, code=attempt.code)
@@ -172,7 +175,7 @@ def follow(
         yield attempt
         if length < step:
             return
-        here = attempt.found
+        here = there
         step = min(control.largest, step * (1.7 if attempt.quick else 1.1))
 
 

@@ -76,6 +76,11 @@ class Runs:
         else:
             optimise = functools.partial(run_optax, transformation=self.optimiser)
         ended = optimise(functions, begin.u, self.iterations, self.note)
+        if ended.converged and optimise is not run_trust_region and not self._is_balanced():
+            # It may have stopped on a ridge of the objective, along which designs get better.
+            self.problem.latest = self.best
+            on = run_trust_region(functions, self.best.u, self.iterations, self.note)
+            ended = RunEnding(on.converged, f"{ended.message.rstrip('.')}. From there by trust-region: {on.message}")
         better = rank_of(self.problem, self.best) < rank_of(self.problem, before)
         if not self.ended.message or better:
             self.ended = ended
@@ -91,7 +96,11 @@ class Runs:
             return Outcome.BEYOND_RANGE
         if not self.ended.converged:
             return Outcome.UNFINISHED
-        return Outcome.CONVERGED if told.residual <= OPTIMAL else Outcome.CORNER
+        return Outcome.CONVERGED if self._is_balanced() else Outcome.CORNER
+
+    def _is_balanced(self) -> bool:
+        """Whether the best design's derivatives balance."""
+        return optimality_of(self.problem, self.best).residual <= OPTIMAL
 
     def note(self, u: np.ndarray) -> None:
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)

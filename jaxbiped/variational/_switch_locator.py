@@ -50,8 +50,8 @@ class SwitchLocatorState(NamedTuple):
         saltation_pending: whether the last accepted step passed a switch where the field is not
             smooth: columns of `TangentSolver` have yet to jump there.
         jumps_at_peak: whether the field jumped in the step with the largest value.
-        crossed_field: number of the switch where the field is not smooth that the last step passed,
-            counted from one; 0 where it passed none.
+        crossed_field: number of the first switch where the field is not smooth that the last step
+            passed, counted from one; 0 where it passed none.
         arrived: whether the section was reached.
         code: that of the failure that ended the solve, 0 for none.
         peak: largest value of the watched quantity at the ends of steps; None where none is.
@@ -109,14 +109,16 @@ class SwitchLocator(AbstractWrappedControl):
         adapted = attempt.by(self.controller)
         parts = (plain_args(attempt.args), plain_state(attempt.y0), plain_state(attempt.y1))
         scene, before, after = jax.lax.stop_gradient(parts)
-        crossed, part = self._crossings(cast(Scalar, t1 - t0), scene, before, after, known)
-        before_switch, span = (t1 - t0) * part, t1 - t0
-        far = span - before_switch > jnp.maximum(_OVERSHOOT * before_switch, 4.0 * MARGIN)
+        crossed, *parts = self._crossings(cast(Scalar, t1 - t0), scene, before, after, known)
+        span = t1 - t0
+        before_first, before_field = (span * part for part in parts)
+        far = span - before_first > jnp.maximum(_OVERSHOOT * before_first, 4.0 * MARGIN)
         again = crossed.any & (far | (crossed.field & (span > 2.0 * NEAR)))
-        target = t0 + before_switch * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
-        approaches = crossed.field & (before_switch > NEAR)
-        target = jnp.where(approaches, t0 + before_switch * (1.0 - _BEFORE), target)
-        target = jax.lax.stop_gradient(target)
+        past_first = before_first * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
+        # Whatever else comes first, the step ends on this side of a field that is not smooth.
+        short_of_field = jnp.minimum(past_first, before_field * (1.0 - _BEFORE))
+        approaches = crossed.field & (before_field > NEAR)
+        target = jax.lax.stop_gradient(t0 + jnp.where(approaches, short_of_field, past_first))
         adapted = try_again(attempt, adapted, again, target)
         inner, keep = adapted.memory, adapted.keep
         landed = self._landed(inner, keep, crossed, scene, after, attempt.y1, known)
@@ -134,8 +136,9 @@ class SwitchLocator(AbstractWrappedControl):
 
     def _crossings(
         self, span: Scalar, scene: PyTree, before: PyTree, after: PyTree, landed: SwitchLocatorState
-    ) -> tuple["_Crossed", Scalar]:
-        """Which surfaces a step crosses, and the part of it that lies before the first.
+    ) -> tuple["_Crossed", Scalar, Scalar]:
+        """Which surfaces a step crosses, and the parts of it that lie before the first of them, and
+        before the first where the field is not smooth.
 
         Or before a switch comes so near zero that it may be crossed twice in this step.
         """
@@ -172,7 +175,7 @@ class SwitchLocator(AbstractWrappedControl):
         if turns is not None:
             any_crossed = any_crossed | jnp.any(turns.touches)
 
-        def locate() -> tuple[Scalar, Scalar]:
+        def locate() -> tuple[Scalar, Scalar, Scalar]:
             parts = []
             for state, found in ((before, at_start), (after, at_end)):
                 rate = watch.field(jnp.zeros_like(span), state, scene)
@@ -181,20 +184,22 @@ class SwitchLocator(AbstractWrappedControl):
                 parts += [values, span * jnp.stack(slopes)]
             roots = StepCubic(parts[0], parts[2], parts[1], parts[3]).sign_change()
             roots = jnp.where(jnp.stack(crossed), roots, 1.0)
-            first, which = jnp.min(roots), jnp.asarray(0)
+            first, field, which = jnp.min(roots), jnp.ones_like(span), jnp.asarray(0)
             for number, switch in enumerate(at_end[:count]):
                 if not switch.corner:
-                    is_first = crossed[number] & (roots[number] <= first)
+                    is_first = crossed[number] & ((which == 0) | (roots[number] < field))
+                    field = jnp.where(is_first, roots[number], field)
                     which = jnp.where(is_first, 1 + number, which)
-            if turns is None:
-                return first, which
-            touch = jnp.min(jnp.where(turns.touches, turns.places, 1.0))
-            return jnp.minimum(first, touch), jnp.where(touch < first, 0, which)
+            if turns is not None:
+                touch = jnp.min(jnp.where(turns.touches, turns.places, 1.0))
+                first = jnp.minimum(first, touch)
+            return first, field, which
 
-        part, which = jnp.ones_like(span), jnp.asarray(0)
+        part, field, which = jnp.ones_like(span), jnp.ones_like(span), jnp.asarray(0)
         if crossed:
-            part, which = fusion_barrier(any_crossed, locate)
-            part, which = jnp.where(any_crossed, part, 1.0), jnp.where(any_crossed, which, 0)
+            part, field, which = fusion_barrier(any_crossed, locate)
+            part, field = (jnp.where(any_crossed, each, 1.0) for each in (part, field))
+            which = jnp.where(any_crossed, which, 0)
         found = _Crossed(
             any_crossed,
             functools.reduce(jnp.logical_or, switching, none),
@@ -203,7 +208,7 @@ class SwitchLocator(AbstractWrappedControl):
             none if turns is None else turns.graze,
             which,
         )
-        return found, part
+        return found, part, field
 
     def _landed(
         self,
@@ -264,5 +269,5 @@ class _Crossed(NamedTuple):
 
     @property
     def field(self) -> Scalar:
-        """Whether the first of the surfaces is a switch where the field itself is not smooth."""
+        """Whether one of the surfaces is a switch where the field itself is not smooth."""
         return self.which > 0

@@ -97,12 +97,17 @@ def test_across_a_speed_the_rate_of_crossing_is_the_one_before():
     np.testing.assert_allclose(found.change, [0.0, 5.0 / -9.8], atol=1e-9)
 
 
-@pytest.mark.parametrize(("levels", "first"), [((0.25, 0.625), 0.375), ((0.625, 0.25), 0.375)])
-def test_of_the_switches_within_a_step_the_first_one_ends_it(levels, first):
-    """From 1 to 0 in a second, at constant speed."""
+@pytest.mark.parametrize(
+    ("levels", "corner", "which"),
+    [((0.25, 0.625), None, 2), ((0.625, 0.25), None, 1), ((0.625, 0.25), 0.875, 1)],
+)
+def test_of_the_switches_within_a_step_the_first_one_ends_it(levels, corner, which):
+    """From 1 to 0 in a second, at constant speed; tangents jump there, whatever comes before."""
+    every = [(level, False) for level in levels] + [(corner, True)] * (corner is not None)
+    first = 1.0 - max(level for level, _ in every)
     watch = Watch(
         field=lambda t, y, args: (-1.0 + 0.0 * y[0],),
-        switches=lambda args, y: tuple(Switch(y[0] - level, True) for level in levels),
+        switches=lambda args, y: tuple(Switch(y[0] - at, True, corner=c) for at, c in every),
         section=lambda args, y: (0.1 - y[0], jnp.asarray(True)),
     )
     locator = SwitchLocator(step_control(1e-6, 1e-8, rms_norm), watch)
@@ -115,8 +120,9 @@ def test_of_the_switches_within_a_step_the_first_one_ends_it(levels, first):
         later = begun._replace(accepted=jnp.asarray(1))
         return [locator._crossings(one, (), before, after, each) for each in (begun, later)]
 
-    (crossed, part), (arrives, _) = told(*ends)
-    assert float(part) == pytest.approx(first)
+    (crossed, part, field_part), (arrives, *_) = told(*ends)
+    assert (float(part), float(field_part)) == pytest.approx((first, 0.375))
+    assert (int(crossed.which), bool(crossed.field)) == (which, True)
     assert bool(crossed.any)
     assert bool(crossed.switch)
     # The first step of a solve is no arrival.
