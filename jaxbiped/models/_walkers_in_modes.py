@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import jaxbiped as jb
-from jaxbiped._checks import check_at_least
+from jaxbiped._checks import check_at_least, check_positive
 
 if TYPE_CHECKING:
     from jaxbiped._types import Parameter
@@ -69,6 +69,7 @@ def rimless_wheel(
         ArgumentError: a number that is not allowed.
     """
     check_at_least("spokes", spokes, "3", 3)
+    check_positive("inertia", inertia)
     hub: Any = 0.0
     tips: list[Any] = [
         (math.cos(turn), math.sin(turn))
