@@ -25,7 +25,7 @@ def goswami(
 
     Args:
         slope: slope of the ground [rad]; doublings of the period begin near 4.4 degrees.
-        mu: mass at the hip, by that of a leg [–].
+        mu: mass at the hip, by that of a leg, above 0 [–].
         beta: b/a, from the hip to a leg's mass by from there to the foot [–].
 
     Returns:

@@ -60,7 +60,8 @@ def rimless_wheel(
     Args:
         slope: slope of the ground [rad].
         spokes: how many spokes.
-        inertia: moment of inertia about the hub [of the mass times the spokes' length squared].
+        inertia: moment of inertia about the hub, above 0 [of the mass times the spokes' length
+            squared].
 
     Returns:
         The wheel on rigid feet.
