@@ -3,8 +3,11 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple, NoReturn
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
 
 from jaxbiped._checks import ArgumentError, is_number
 from jaxbiped._types import Scalar
@@ -140,14 +143,27 @@ def motor_torque(
 
 
 def _told(motor: Motor, motion: MotorMotion) -> Scalar:
-    torque = motor.law(motion)
-    is_one = not isinstance(torque, list | tuple) and is_number(torque)
-    if not isinstance(torque, jax.Array) and not is_one:
+    words = f"the law of Motor({motor.angle!r})"
+    try:
+        torque = motor.law(motion)
+    except (jax.errors.ConcretizationTypeError, jax.errors.TracerArrayConversionError) as error:
         raise ArgumentError(
-            f"the law of Motor({motor.angle!r}) returns {torque!r}, which is not allowed: it must "
-            "return one torque [N m]."
-        )
+            f"{words} takes the motion for plain numbers, which is not allowed: write it with "
+            "jax.numpy, and a choice with jax.numpy.where."
+        ) from error
+    is_one = not isinstance(torque, list | tuple) and is_number(torque)
+    if not is_one and not isinstance(torque, jax.Array):
+        raise ArgumentError(_not_one_torque(words, repr(torque)))
+    known = jtu.tree_leaves(eqx.filter((motion.motion, motion.slope, motor), eqx.is_array_like))
+    shape, most = np.shape(torque), np.broadcast_shapes(*map(np.shape, known))
+    if shape != most[len(most) - len(shape) :] or jnp.iscomplexobj(torque):
+        told = f"an array of the shape {shape} and the type {jnp.result_type(torque)}"
+        raise ArgumentError(_not_one_torque(words, told))
     return jnp.asarray(torque) if motor.share is None else motor.share * torque
+
+
+def _not_one_torque(words: str, told: str) -> str:
+    return f"{words} returns {told}, which is not allowed: it must return one torque [N m]."
 
 
 def motor_torques(

@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING
 
 import jaxbiped as jb
-from jaxbiped._checks import check_finite, check_not_negative, check_positive, check_within
+from jaxbiped._checks import check_finite, check_positive, check_within
 
 if TYPE_CHECKING:
     from jaxbiped._types import Parameter
@@ -25,7 +25,7 @@ def goswami(
 
     Args:
         slope: slope of the ground [rad]; doublings of the period begin near 4.4 degrees.
-        mu: mass at the hip, by that of a leg [–].
+        mu: mass at the hip, by that of a leg, above 0 [–].
         beta: b/a, from the hip to a leg's mass by from there to the foot [–].
 
     Returns:
@@ -34,7 +34,7 @@ def goswami(
     Raises:
         ArgumentError: a number that is not allowed.
     """
-    check_not_negative("mu", mu)
+    check_positive("mu", mu)
     check_positive("beta", beta)
     mass = 20.0 / (2.0 + mu)
     walker = jb.Walker(

@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import jaxbiped as jb
-from jaxbiped._checks import check_at_least
+from jaxbiped._checks import check_at_least, check_positive
 
 if TYPE_CHECKING:
     from jaxbiped._types import Parameter
@@ -60,7 +60,8 @@ def rimless_wheel(
     Args:
         slope: slope of the ground [rad].
         spokes: how many spokes.
-        inertia: moment of inertia about the hub [of the mass times the spokes' length squared].
+        inertia: moment of inertia about the hub, above 0 [of the mass times the spokes' length
+            squared].
 
     Returns:
         The wheel on rigid feet.
@@ -69,6 +70,7 @@ def rimless_wheel(
         ArgumentError: a number that is not allowed.
     """
     check_at_least("spokes", spokes, "3", 3)
+    check_positive("inertia", inertia)
     hub: Any = 0.0
     tips: list[Any] = [
         (math.cos(turn), math.sin(turn))

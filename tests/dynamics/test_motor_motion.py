@@ -189,7 +189,25 @@ def test_a_law_may_not_depend_on_time():
         torque_of(with_motor(lambda motion: motion.time), leg=1)
 
 
-@pytest.mark.parametrize("told", [None, (1.0, 2.0)])
+@pytest.mark.parametrize("told", [None, (1.0, 2.0), np.ones(3), 1j])
 def test_a_law_that_returns_no_torque_is_refused(told):
     with pytest.raises(jb.ArgumentError, match="must return one torque"):
         torque_of(with_motor(lambda motion: told), leg=1)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda motion: 0.1 if motion.angle > 0.0 else 0.0,
+        lambda motion: np.sin(motion.angle),
+        lambda motion: math.sin(motion.angle),
+    ],
+)
+def test_a_law_that_cannot_be_traced_is_refused(law):
+    walker = with_motor(law)
+
+    def traced(angle):
+        return torque_of(walker, MOTION._replace(angles=(angle,) * 3), leg=1).torque
+
+    with pytest.raises(jb.ArgumentError, match=r"takes the motion for plain numbers, .*jax\.numpy"):
+        jax.eval_shape(traced, 0.1)

@@ -162,11 +162,13 @@ def test_slopes_are_given_and_refused():
     ("make", "name", "value"),
     [
         (jb.models.goswami, "mu", -1.0),
+        (jb.models.goswami, "mu", 0.0),
         (jb.models.goswami, "beta", 0.0),
         (jb.models.wisse, "torso_mass", 11.0),
         (jb.models.wisse, "torso_height", math.inf),
         (jb.models.kuo, "impulse", math.nan),
         (rimless_wheel, "spokes", 2),
+        (rimless_wheel, "inertia", 0.0),
     ],
 )
 def test_what_a_walker_cannot_have_is_refused_by_its_name(make, name, value):
