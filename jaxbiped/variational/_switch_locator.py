@@ -50,8 +50,9 @@ class SwitchLocatorState(NamedTuple):
         saltation_pending: whether the last accepted step passed a switch where the field is not
             smooth: columns of `TangentSolver` have yet to jump there.
         jumps_at_peak: whether the field jumped in the step with the largest value.
-        crossed_field: number of the switch where the field is not smooth that the last step passed,
-            counted from one; 0 where it passed none.
+        crossed_field: number of the switch that the last step passed, counted from one, negative
+            where only the force's slope jumps; 0 where it passed none.
+        past: time from that switch to the step's end [s].
         arrived: whether the section was reached.
         code: that of the failure that ended the solve, 0 for none.
         peak: largest value of the watched quantity at the ends of steps; None where none is.
@@ -67,6 +68,7 @@ class SwitchLocatorState(NamedTuple):
     saltation_pending: Scalar
     jumps_at_peak: Scalar
     crossed_field: Scalar
+    past: Scalar
     arrived: Scalar
     code: Scalar
     peak: PyTree
@@ -98,7 +100,7 @@ class SwitchLocator(AbstractWrappedControl):
             sizes = jax.lax.stop_gradient(jtu.tree_map(jnp.abs, state))
         counts = zero, zero, zero, zero
         return first, SwitchLocatorState(
-            inner, sizes, *counts, no, no, zero, no, zero, peak, at_peak
+            inner, sizes, *counts, no, no, zero, jnp.zeros_like(first), no, zero, peak, at_peak
         )
 
     def adapt(self, attempt: Attempt) -> Adapted:
@@ -112,14 +114,15 @@ class SwitchLocator(AbstractWrappedControl):
         crossed, part = self._crossings(cast(Scalar, t1 - t0), scene, before, after, known)
         before_switch, span = (t1 - t0) * part, t1 - t0
         far = span - before_switch > jnp.maximum(_OVERSHOOT * before_switch, 4.0 * MARGIN)
-        again = crossed.any & (far | (crossed.field & (span > 2.0 * NEAR)))
+        again = crossed.any & (far | ((crossed.which != 0) & (span > 2.0 * NEAR)))
         target = t0 + before_switch * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
-        approaches = crossed.field & (before_switch > NEAR)
+        approaches = (crossed.which != 0) & (before_switch > NEAR)
         target = jnp.where(approaches, t0 + before_switch * (1.0 - _BEFORE), target)
         target = jax.lax.stop_gradient(target)
         adapted = try_again(attempt, adapted, again, target)
         inner, keep = adapted.memory, adapted.keep
         landed = self._landed(inner, keep, crossed, scene, after, attempt.y1, known)
+        landed = landed._replace(past=span - before_switch)
         ends = landed.arrived | (landed.code != 0)
         ended = diffrax.RESULTS.where(
             ends, diffrax.RESULTS.event_occurred, diffrax.RESULTS.successful
@@ -182,10 +185,9 @@ class SwitchLocator(AbstractWrappedControl):
             roots = StepCubic(parts[0], parts[2], parts[1], parts[3]).sign_change()
             roots = jnp.where(jnp.stack(crossed), roots, 1.0)
             first, which = jnp.min(roots), jnp.asarray(0)
-            for number, switch in enumerate(at_end[:count]):
-                if not switch.corner:
-                    is_first = crossed[number] & (roots[number] <= first)
-                    which = jnp.where(is_first, 1 + number, which)
+            for number, switch in enumerate(at_end[:count], 1):
+                is_first = crossed[number - 1] & (roots[number - 1] <= first)
+                which = jnp.where(is_first, -number if switch.corner else number, which)
             if turns is None:
                 return first, which
             touch = jnp.min(jnp.where(turns.touches, turns.places, 1.0))
@@ -239,6 +241,7 @@ class SwitchLocator(AbstractWrappedControl):
             saltation_pending=jnp.where(keep, crossed.field, old.saltation_pending),
             jumps_at_peak=jumps_at_peak,
             crossed_field=jnp.where(keep, crossed.which, 0),
+            past=old.past,
             # What has fallen by then has not arrived.
             arrived=keep & crossed.section & (code == 0),
             code=code,
