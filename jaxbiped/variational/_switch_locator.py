@@ -122,7 +122,7 @@ class SwitchLocator(AbstractWrappedControl):
         adapted = try_again(attempt, adapted, again, target)
         inner, keep = adapted.memory, adapted.keep
         landed = self._landed(inner, keep, crossed, scene, after, attempt.y1, known)
-        landed = landed._replace(past=span - before_switch)
+        landed = landed._replace(past=jnp.asarray(span - before_switch))
         ends = landed.arrived | (landed.code != 0)
         ended = diffrax.RESULTS.where(
             ends, diffrax.RESULTS.event_occurred, diffrax.RESULTS.successful

@@ -1,7 +1,6 @@
 """Variational solve for lanes: the twin of what `_solve_to_section` does through diffrax."""
 
 import dataclasses
-import functools
 from typing import NamedTuple
 
 import diffrax
@@ -166,8 +165,9 @@ class AdaptiveColumns:
         ended = jnp.where(late, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
-        rates = functools.partial(self.watch.field, jnp.zeros(()), args=given.args)
-        by_state, by_parameter = at_fixed_time(rates(now.state), now.columns, now.shifts)
+        zero, field = jnp.zeros(()), self.watch.field
+        rates = field(zero, now.state, given.args)
+        by_state, by_parameter = at_fixed_time(rates, now.columns, now.shifts)
         by_parameter = jnp.where(given.carries_parameters > 0.0, by_parameter, jnp.nan)
         seeded, columns = self._seeded(given), jnp.concatenate([by_state, by_parameter]).T
         y, t = Tangents(now.state, columns), now.t
@@ -177,7 +177,8 @@ class AdaptiveColumns:
             y, t, time_columns = onto_section(self.watch, y, t, seeded, along_columns_in_turn)
         if self.watch.peak is not None:
             at_peak = now.landed.at_peak
-            peaks = at_fixed_time(rates(at_peak), now.peak_columns, now.peak_shifts)
+            rates = field(zero, at_peak, given.args)
+            peaks = at_fixed_time(rates, now.peak_columns, now.peak_shifts)
             highest = Tangents(at_peak, jnp.concatenate(peaks).T)
             peak, peak_columns = peak_of(self.watch, highest, seeded, along_columns_in_turn)
             peak_columns = jnp.where(now.landed.jumps_at_peak, jnp.nan, peak_columns)
