@@ -182,6 +182,36 @@ def column_step(
     return jnp.stack([end[i] for i in back]), jnp.stack([error[i] for i in back])
 
 
+def cross(
+    step: Differentiated, columns: Sequence[Scalar], sizes: Scalar, past: Scalar
+) -> list[Scalar]:
+    """Columns after a step so short that it is linear, which ends a time `past` a switch.
+
+    By the Jacobians at its start and its end, each for its time: a stage beyond the switch would
+    have its Jacobian for all of the step. The m directions of state, (m, c), then those of p
+    parameters, which move by their `sizes`.
+    """
+    order, led = step.order, len(step.stages.direct)
+    back = [order.index(i) for i in range(len(order))]
+    before = step.stages.step / step.tableau.gamma - past
+
+    def advance(column: Scalar, forcing: Scalar) -> Scalar:
+        start = jnp.stack([column[i] for i in order])
+        direct = start[led : 2 * led]
+        for time, i in ((before, 0), (past, -1)):
+            kept = step.by_state[i] @ start + forcing[i]
+            start = start + time * jnp.concatenate([direct, kept])
+        return jnp.stack([start[i] for i in back])
+
+    rows = jnp.moveaxis(step.by_parameter, -1, 0) * sizes[:, None, None]
+    idle = jnp.zeros((len(columns[0]), *rows.shape[1:]))
+    pairs = zip(columns, (idle, rows), strict=True)
+    return [
+        jax.lax.map(lambda each: advance(*each), pair) if len(pair[0]) else pair[0]
+        for pair in pairs
+    ]
+
+
 def _weighted_sum(weights: Sequence[float], increments: Sequence[Scalar], start: Scalar) -> Scalar:
     """start + Σ weights_j increments_j, one behind the other: sums that begin alike are shared."""
     for weight, increment in zip(weights, increments, strict=False):

@@ -50,8 +50,10 @@ class SwitchLocatorState(NamedTuple):
         saltation_pending: whether the last accepted step passed a switch where the field is not
             smooth: columns of `TangentSolver` have yet to jump there.
         jumps_at_peak: whether the field jumped in the step with the largest value.
-        crossed_field: number of the first switch where the field is not smooth that the last step
-            passed, counted from one; 0 where it passed none.
+        crossed_field: number of the first switch that the last step passed, counted from one, negative
+            where only the force's slope jumps; 0 where it passed none. Of switches where the field
+            jumps the first comes before all where only a slope does.
+        past: time from that switch to the step's end [s].
         arrived: whether the section was reached.
         code: that of the failure that ended the solve, 0 for none.
         peak: largest value of the watched quantity at the ends of steps; None where none is.
@@ -67,6 +69,7 @@ class SwitchLocatorState(NamedTuple):
     saltation_pending: Scalar
     jumps_at_peak: Scalar
     crossed_field: Scalar
+    past: Scalar
     arrived: Scalar
     code: Scalar
     peak: PyTree
@@ -98,7 +101,7 @@ class SwitchLocator(AbstractWrappedControl):
             sizes = jax.lax.stop_gradient(jtu.tree_map(jnp.abs, state))
         counts = zero, zero, zero, zero
         return first, SwitchLocatorState(
-            inner, sizes, *counts, no, no, zero, no, zero, peak, at_peak
+            inner, sizes, *counts, no, no, zero, jnp.zeros_like(first), no, zero, peak, at_peak
         )
 
     def adapt(self, attempt: Attempt) -> Adapted:
@@ -111,17 +114,18 @@ class SwitchLocator(AbstractWrappedControl):
         scene, before, after = jax.lax.stop_gradient(parts)
         crossed, *parts = self._crossings(cast(Scalar, t1 - t0), scene, before, after, known)
         span = t1 - t0
-        before_first, before_field = (span * part for part in parts)
+        before_first, before_switch = (span * part for part in parts)
         far = span - before_first > jnp.maximum(_OVERSHOOT * before_first, 4.0 * MARGIN)
-        again = crossed.any & (far | (crossed.field & (span > 2.0 * NEAR)))
+        again = crossed.any & (far | ((crossed.which != 0) & (span > 2.0 * NEAR)))
         past_first = before_first * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
-        # Whatever else comes first, the step ends on this side of a field that is not smooth.
-        short_of_field = jnp.minimum(past_first, before_field * (1.0 - _BEFORE))
-        approaches = crossed.field & (before_field > NEAR)
-        target = jax.lax.stop_gradient(t0 + jnp.where(approaches, short_of_field, past_first))
+        # Whatever else comes first, the step ends on this side of the switch.
+        short_of_switch = jnp.minimum(past_first, before_switch * (1.0 - _BEFORE))
+        approaches = (crossed.which != 0) & (before_switch > NEAR)
+        target = jax.lax.stop_gradient(t0 + jnp.where(approaches, short_of_switch, past_first))
         adapted = try_again(attempt, adapted, again, target)
         inner, keep = adapted.memory, adapted.keep
         landed = self._landed(inner, keep, crossed, scene, after, attempt.y1, known)
+        landed = landed._replace(past=jnp.asarray(span - before_switch))
         ends = landed.arrived | (landed.code != 0)
         ended = diffrax.RESULTS.where(
             ends, diffrax.RESULTS.event_occurred, diffrax.RESULTS.successful
@@ -138,7 +142,7 @@ class SwitchLocator(AbstractWrappedControl):
         self, span: Scalar, scene: PyTree, before: PyTree, after: PyTree, landed: SwitchLocatorState
     ) -> tuple["_Crossed", Scalar, Scalar]:
         """Which surfaces a step crosses, and the parts of it that lie before the first of them, and
-        before the first where the field is not smooth.
+        before the switch that is told.
 
         Or before a switch comes so near zero that it may be crossed twice in this step.
         """
@@ -184,21 +188,22 @@ class SwitchLocator(AbstractWrappedControl):
                 parts += [values, span * jnp.stack(slopes)]
             roots = StepCubic(parts[0], parts[2], parts[1], parts[3]).sign_change()
             roots = jnp.where(jnp.stack(crossed), roots, 1.0)
-            first, field, which = jnp.min(roots), jnp.ones_like(span), jnp.asarray(0)
-            for number, switch in enumerate(at_end[:count]):
-                if not switch.corner:
-                    is_first = crossed[number] & ((which == 0) | (roots[number] < field))
-                    field = jnp.where(is_first, roots[number], field)
-                    which = jnp.where(is_first, 1 + number, which)
+            first, place, which = jnp.min(roots), jnp.ones_like(span), jnp.asarray(0)
+            for number, switch in enumerate(at_end[:count], 1):
+                root, sign = roots[number - 1], -1 if switch.corner else 1
+                other = which == 0 if switch.corner else which <= 0
+                is_first = crossed[number - 1] & (other | ((which * sign > 0) & (root < place)))
+                place = jnp.where(is_first, root, place)
+                which = jnp.where(is_first, sign * number, which)
             if turns is not None:
                 touch = jnp.min(jnp.where(turns.touches, turns.places, 1.0))
                 first = jnp.minimum(first, touch)
-            return first, field, which
+            return first, place, which
 
-        part, field, which = jnp.ones_like(span), jnp.ones_like(span), jnp.asarray(0)
+        part, place, which = jnp.ones_like(span), jnp.ones_like(span), jnp.asarray(0)
         if crossed:
-            part, field, which = fusion_barrier(any_crossed, locate)
-            part, field = (jnp.where(any_crossed, each, 1.0) for each in (part, field))
+            part, place, which = fusion_barrier(any_crossed, locate)
+            part, place = (jnp.where(any_crossed, each, 1.0) for each in (part, place))
             which = jnp.where(any_crossed, which, 0)
         found = _Crossed(
             any_crossed,
@@ -208,7 +213,7 @@ class SwitchLocator(AbstractWrappedControl):
             none if turns is None else turns.graze,
             which,
         )
-        return found, part, field
+        return found, part, place
 
     def _landed(
         self,
@@ -244,6 +249,7 @@ class SwitchLocator(AbstractWrappedControl):
             saltation_pending=jnp.where(keep, crossed.field, old.saltation_pending),
             jumps_at_peak=jumps_at_peak,
             crossed_field=jnp.where(keep, crossed.which, 0),
+            past=old.past,
             # What has fallen by then has not arrived.
             arrived=keep & crossed.section & (code == 0),
             code=code,

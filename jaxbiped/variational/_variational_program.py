@@ -17,9 +17,9 @@ from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._first_and_last_step import clip_step, first_step
 from jaxbiped.solve.controllers._tangent_step_size import step_control
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._column_step import Differentiated, column_step, differentiate_step
+from jaxbiped.variational._column_step import Differentiated, column_step, cross, differentiate_step
 from jaxbiped.variational._reset import behind_reset
-from jaxbiped.variational._saltation import at_fixed_time, field_switch_values, meet, meeting_at
+from jaxbiped.variational._saltation import at_fixed_time, meet, meeting_at
 from jaxbiped.variational._solve_to_section import onto_section, peak_of
 from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
 from jaxbiped.variational._tangent_solver import SHARE
@@ -134,7 +134,7 @@ class AdaptiveColumns:
         t, next_t = clip_step(keep, t, next_t, limit, given.almost)
         state = select(keep, step.end, now.state)
         columns, peaks, peak_shifts = now.columns, now.peak_columns, now.peak_shifts
-        new_columns, shifts = self._met(given, now, landed.crossed_field, new_columns)
+        new_columns, shifts = self._met(given, now, landed, new_columns, step)
         if self.watch.reset is not None:
             met, seeded = keep & (landed.crossed_field > 0), self._seeded(given)
             state, new_columns = behind_reset(
@@ -165,7 +165,9 @@ class AdaptiveColumns:
         ended = jnp.where(late, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
-        by_state, by_parameter = self._at_fixed_time(given, now.state, now.columns, now.shifts)
+        zero, field = jnp.zeros(()), self.watch.field
+        rates = field(zero, now.state, given.args)
+        by_state, by_parameter = at_fixed_time(rates, now.columns, now.shifts)
         by_parameter = jnp.where(given.carries_parameters > 0.0, by_parameter, jnp.nan)
         seeded, columns = self._seeded(given), jnp.concatenate([by_state, by_parameter]).T
         y, t = Tangents(now.state, columns), now.t
@@ -175,7 +177,8 @@ class AdaptiveColumns:
             y, t, time_columns = onto_section(self.watch, y, t, seeded, along_columns_in_turn)
         if self.watch.peak is not None:
             at_peak = now.landed.at_peak
-            peaks = self._at_fixed_time(given, at_peak, now.peak_columns, now.peak_shifts)
+            rates = field(zero, at_peak, given.args)
+            peaks = at_fixed_time(rates, now.peak_columns, now.peak_shifts)
             highest = Tangents(at_peak, jnp.concatenate(peaks).T)
             peak, peak_columns = peak_of(self.watch, highest, seeded, along_columns_in_turn)
             peak_columns = jnp.where(now.landed.jumps_at_peak, jnp.nan, peak_columns)
@@ -194,29 +197,27 @@ class AdaptiveColumns:
         )
 
     def _met(
-        self, given: VariationalProblem, now: _Now, which: Scalar, stepped: list[Scalar]
+        self,
+        given: VariationalProblem,
+        now: _Now,
+        landed: SwitchLocatorState,
+        stepped: list[Scalar],
+        step: Differentiated,
     ) -> tuple[list[Scalar], tuple[Scalar, ...]]:
-        """Columns and shifts after a step, which may have met the switch of a number."""
-        if not field_switch_values(self.watch, now.state, given.args):
+        """Columns and shifts after a step, which may have met a switch."""
+        which = landed.crossed_field
+        if not self.watch.switches(given.args, now.state):
             return stepped, now.shifts
 
         def met() -> tuple[list[Scalar], tuple[Scalar, ...]]:
             meeting = meeting_at(self.watch, now.state, self._seeded(given), which)
-            return meet(meeting, now.columns, now.shifts, given.sizes)
+            columns, shifts = meet(meeting, now.columns, now.shifts, given.sizes)
+            return cross(step, columns, given.sizes, landed.past), shifts
 
         found: tuple[list[Scalar], tuple[Scalar, ...]] = jax.lax.cond(
-            which > 0, met, lambda: (stepped, now.shifts)
+            which != 0, met, lambda: (stepped, now.shifts)
         )
         return found
-
-    def _at_fixed_time(
-        self,
-        given: VariationalProblem,
-        state: PyTree,
-        columns: tuple[Scalar, ...],
-        shifts: tuple[Scalar, ...],
-    ) -> list[Scalar]:
-        return at_fixed_time(self.watch.field(jnp.zeros(()), state, given.args), columns, shifts)
 
     def _seeded(self, given: VariationalProblem) -> Seeded:
         m, p = given.by_state.shape[0], given.by_parameter.shape[0]

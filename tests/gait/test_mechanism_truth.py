@@ -75,7 +75,15 @@ def test_sensitivities_are_within_their_bars(name):
         np.asarray(each.period) for each in (gait.sensitivities, gait.sensitivity_errors)
     )
     misses = np.abs(found - checked.slopes) / bars
-    # Of a hundred bars one may be missed (docs/gradients.md): of these at most one, by little.
-    assert np.sum(misses > 1.0) <= 1, dict(zip(gait.parameters, misses.tolist(), strict=True))
-    assert misses.max() < 2.0
+    assert misses.max() < 1.0, dict(zip(gait.parameters, misses.tolist(), strict=True))
     np.testing.assert_allclose(found, checked.slopes, rtol=1e-4, atol=1e-9 * np.abs(found).max())
+
+
+@pytest.mark.slow
+def test_a_derivative_through_corners_of_friction_keeps_no_error_of_the_crossing():
+    """By the damping c; the value is that of a collocation by nine stages (`checked_cycle`)."""
+    case = CASES["torso on a spring"]
+    gait = jb.find_gait(
+        case.scene, case.guess, accuracy="tight", parameters=("c",), radius_sensitivities=False
+    )
+    assert float(gait.sensitivities.period[0]) == pytest.approx(-6.27446239523e-11, rel=1e-8)
