@@ -80,7 +80,10 @@ class Runs:
             # It may have stopped on a ridge of the objective, along which designs get better.
             self.problem.latest = self.best
             on = run_trust_region(functions, self.best.u, self.iterations, self.note)
-            ended = RunEnding(on.converged, f"{ended.message.rstrip('.')}. From there by trust-region: {on.message}")
+            ended = RunEnding(
+                on.converged,
+                f"{ended.message.rstrip('.')}. From there by trust-region: {on.message}",
+            )
         better = rank_of(self.problem, self.best) < rank_of(self.problem, before)
         if not self.ended.message or better:
             self.ended = ended

@@ -23,7 +23,9 @@ def best_of(count, function, goal="speed", subject_to=None, **how):
     def told(_, u):
         return {name: (value, slope / rates(u)) for name, (value, slope) in function(u).items()}
 
-    return solved(drawn(told, vary, {goal: 1.0}, 1.0, subject_to, begin=0.3), **{"iterations": 300} | how)
+    return solved(
+        drawn(told, vary, {goal: 1.0}, 1.0, subject_to, begin=0.3), **{"iterations": 300} | how
+    )
 
 
 def gained(runs, function):
