@@ -109,16 +109,17 @@ class SwitchLocator(AbstractWrappedControl):
         adapted = attempt.by(self.controller)
         parts = (plain_args(attempt.args), plain_state(attempt.y0), plain_state(attempt.y1))
         scene, before, after = jax.lax.stop_gradient(parts)
-        crossed, *parts = self._crossings(cast(Scalar, t1 - t0), scene, before, after, known)
-        span = t1 - t0
-        before_first, before_field = (span * part for part in parts)
+        span = cast(Scalar, t1 - t0)
+        crossed, first, field = self._crossings(span, scene, before, after, known)
+        before_first, before_field = span * first, span * field
         far = span - before_first > jnp.maximum(_OVERSHOOT * before_first, 4.0 * MARGIN)
         again = crossed.any & (far | (crossed.field & (span > 2.0 * NEAR)))
         past_first = before_first * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
         # Whatever else comes first, the step ends on this side of a field that is not smooth.
         short_of_field = jnp.minimum(past_first, before_field * (1.0 - _BEFORE))
         approaches = crossed.field & (before_field > NEAR)
-        target = jax.lax.stop_gradient(t0 + jnp.where(approaches, short_of_field, past_first))
+        target = t0 + jnp.where(approaches, short_of_field, past_first)
+        target = cast(Scalar, jax.lax.stop_gradient(target))
         adapted = try_again(attempt, adapted, again, target)
         inner, keep = adapted.memory, adapted.keep
         landed = self._landed(inner, keep, crossed, scene, after, attempt.y1, known)
