@@ -215,7 +215,7 @@ class Descent:
         k, names = len(self.names), np.array(self.names)
         at, found = np.zeros(k), None
         if self.tried:
-            square, at, found = self.best
+            _, at, found = best = self.best
         covariance, undetermined = np.full((k, k), np.nan), np.ones(k, bool)
         held, residuals, freedom = np.zeros(k, bool), np.full(len(self.values), np.nan), 0
         ends = np.full((2, k), np.nan)
@@ -235,7 +235,7 @@ class Descent:
             follow = wide and ending is FitEnding.CONVERGED
             for which in np.flatnonzero(~undetermined & ~held).tolist():
                 self.searching = False  # a profile follows gaits from one to the next
-                ends[:, which] = self._interval(at, which, square, follow)
+                ends[:, which] = self._interval(best, which, follow)
             lost = ~(ends[1] - ends[0] < 2.0 * _WITHIN * LOOSE) & ~held
             undetermined |= lost
             ends[:, lost] = np.nan
@@ -264,30 +264,29 @@ class Descent:
         return ((at - low <= near) & (push < 0.0)) | ((high - at <= near) & (push > 0.0))
 
     def _model(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Residuals and those of their derivatives that exceed their own errors."""
+        """Residuals and derivatives at variables; None where a gait is lost."""
         found = self.predictions(at)
-        if found is None:
-            return None
+        return None if found is None else self._linearised(found)
+
+    def _linearised(self, found: list[Prediction]) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals and those of their derivatives that exceed their own errors."""
         slopes, errors = self._scaled_slopes(found)
         return self._scaled_misfits(found), slopes * information(slopes, errors).resolved
 
-    def _interval(
-        self, at: np.ndarray, which: int, least: float, follow: bool
-    ) -> tuple[float, float]:
+    def _interval(self, best: Tried, which: int, follow: bool) -> tuple[float, float]:
         """Both ends in the variable; by the linearised model, or followed where it bends.
 
         They are followed from the outermost scene that was tried and lies within: the way to it
         from the best one may lead over scenes where derivatives tell nothing.
         """
         limits = np.stack([self.variables(each) for each in self.limits])
-        square, ends = least + _WITHIN**2, []
-        within = [each for tried, each, _ in self.tried if follow and tried < square]
+        square, ends = best[0] + _WITHIN**2, []
+        within = [each for each in self.tried if follow and each[0] < square]
         for sign in (-1.0, 1.0):
-            begin = max(within, key=lambda each: sign * each[which]) if follow else at
-            known = self._model(begin)
-            assert known is not None
+            _, at, found = max(within, key=lambda each: sign * each[1][which]) if follow else best
+            known = self._linearised(found)
             if follow:
-                end = interval_end(self._model, begin, known, square, which, sign, limits)
+                end = interval_end(self._model, at, known, square, which, sign, limits)
             else:
                 end = at[which] + linear_step(*known, square, which, sign, limits - at)[which]
             ends.append(float(end))

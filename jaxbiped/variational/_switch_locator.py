@@ -50,9 +50,9 @@ class SwitchLocatorState(NamedTuple):
         saltation_pending: whether the last accepted step passed a switch where the field is not
             smooth: columns of `TangentSolver` have yet to jump there.
         jumps_at_peak: whether the field jumped in the step with the largest value.
-        crossed_field: number of the first switch that the last step passed, counted from one, negative
-            where only the force's slope jumps; 0 where it passed none. Of switches where the field
-            jumps the first comes before all where only a slope does.
+        crossed_field: number of the first switch that the last step passed, counted from one,
+            negative if only the slope of a force jumps there; 0 if it passed none. A switch where
+            the field jumps precedes all others.
         past: time from that switch to the step's end [s].
         arrived: whether the section was reached.
         code: that of the failure that ended the solve, 0 for none.
@@ -112,16 +112,17 @@ class SwitchLocator(AbstractWrappedControl):
         adapted = attempt.by(self.controller)
         parts = (plain_args(attempt.args), plain_state(attempt.y0), plain_state(attempt.y1))
         scene, before, after = jax.lax.stop_gradient(parts)
-        crossed, *parts = self._crossings(cast(Scalar, t1 - t0), scene, before, after, known)
-        span = t1 - t0
-        before_first, before_switch = (span * part for part in parts)
+        span = cast(Scalar, t1 - t0)
+        crossed, first, place = self._crossings(span, scene, before, after, known)
+        before_first, before_switch = span * first, span * place
         far = span - before_first > jnp.maximum(_OVERSHOOT * before_first, 4.0 * MARGIN)
         again = crossed.any & (far | ((crossed.which != 0) & (span > 2.0 * NEAR)))
         past_first = before_first * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
         # Whatever else comes first, the step ends on this side of the switch.
         short_of_switch = jnp.minimum(past_first, before_switch * (1.0 - _BEFORE))
         approaches = (crossed.which != 0) & (before_switch > NEAR)
-        target = jax.lax.stop_gradient(t0 + jnp.where(approaches, short_of_switch, past_first))
+        target = t0 + jnp.where(approaches, short_of_switch, past_first)
+        target = cast(Scalar, jax.lax.stop_gradient(target))
         adapted = try_again(attempt, adapted, again, target)
         inner, keep = adapted.memory, adapted.keep
         landed = self._landed(inner, keep, crossed, scene, after, attempt.y1, known)

@@ -9,9 +9,15 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.dynamics._state import state_type
 from jaxbiped.gait._search_provenance import warn_of_unknown
 from tests.rigid_walkers import rigid_seed, simplest_walker
 
+AT_THE_PEAK = (
+    *(0.39938175678, -0.03094697743654, 0.0, 0.53105390071869, -0.00069004081888),
+    *(3.19638276100159, -1.32769119739532, -1.03811444205348e-05, 0.00650604115799),
+)
+"""A gait of the bristles on 0.0592 rad, without hip_x."""
 pytestmark = pytest.mark.slow
 
 PLAIN = dict(parameters=(), radius_sensitivities=False)
@@ -150,6 +156,23 @@ def test_a_scene_with_bristles_is_searched_in_stages_too():
     assert bool(gait.stable)
     assert float(gait.measures.period) == pytest.approx(0.4464, abs=1e-3)
     assert gait.measures.state._fields[-1] == "bristle_2"
+
+
+def test_multipliers_hold_where_the_load_peaks_as_the_clearance_rule_admits_a_foot():
+    """An unstable gait of the bristles; central differences of the return map."""
+    scene = jb.with_parameters(jb.ladder()["bristles"], {"slope": 0.0592})
+    start = state_type(scene)(0.0, *AT_THE_PEAK)
+    gait = jb.find_gait(scene, start, **PLAIN)
+    state = np.array([float(each) for each in gait.measures.state[1:]])
+
+    def returned(point):
+        found = jb.return_map(scene, state_type(scene)(0.0, *point), accuracy="tight").state
+        return np.array([float(each) for each in found[1:]])
+
+    step = 1e-6 * np.eye(len(state))
+    slopes = [(returned(state + h) - returned(state - h)) / 2e-6 for h in step]
+    right = np.sort(np.abs(np.linalg.eigvals(np.stack(slopes, axis=1))))[::-1][:3]
+    np.testing.assert_allclose(np.abs(gait.multipliers)[:3], right, rtol=1e-4)
 
 
 def test_a_gait_that_grazes_a_switch_is_told():
