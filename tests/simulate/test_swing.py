@@ -102,7 +102,9 @@ def test_a_joint_said_twice(name, angles):
     scene = jb.LinkageScene(pinned_pendulum(twice=True), method)
     how = dict(times=TIMES[:11], solver="euler", dt=1e-3)
     if method.needs_independent:
-        with pytest.raises(jb.ArgumentError, match="2 of 6 constraints are redundant, because they follow"):
+        with pytest.raises(
+            jb.ArgumentError, match="2 of 6 constraints are redundant, because they follow"
+        ):
             jb.swing(scene, START, **how)
         return
     plain = jb.LinkageScene(pinned_pendulum(), method)
