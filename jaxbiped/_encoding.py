@@ -65,7 +65,9 @@ class Encoder:
             return self._dataset(value, where)
         if callable(value) and hasattr(value, "__qualname__"):
             return {"import": self._path(value, where)}
-        raise ArgumentError(f"{where} is not allowed: a {type(value).__name__} cannot be saved.")
+        raise ArgumentError(
+            f"{where} is not allowed: objects of type {type(value).__name__} cannot be saved."
+        )
 
     def _array(self, value: Any, where: str) -> JsonObject:
         if isinstance(value, np.ma.MaskedArray):

@@ -122,6 +122,8 @@ def fractions(
         {'walking': (0.75, 3), 'fell forward': (0.25, 1)}
     """
     _check_confidence(confidence)
+    if hasattr(labels, "data_vars"):
+        raise ArgumentError("labels is a whole dataset, which is not allowed: give its `label`.")
     names = _names(np.asarray(labels))
     unsure = np.zeros(np.shape(labels), bool) if doubt is None else np.asarray(doubt, dtype=bool)
     if unsure.shape != np.shape(labels):

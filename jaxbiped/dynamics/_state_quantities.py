@@ -57,7 +57,8 @@ def state_quantity(name: str) -> Quantity | None:
     for kind, own in _EACH_BODY.items():
         if name.startswith(f"{kind}_"):
             body = name.removeprefix(f"{kind}_")
-            symbol = rf"${own.symbol}_\mathrm{{{body.replace('_', ' ')}}}$"
+            spaced = body.replace("_", r"\ ")
+            symbol = rf"${own.symbol}_\mathrm{{{spaced}}}$"
             return Quantity(f"{own.words} {body}", symbol, own.unit)
     root, _, kind = name.rpartition("_")
     known = _OF_ROOT.get(kind)

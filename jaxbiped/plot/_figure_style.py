@@ -198,7 +198,7 @@ def save_figure(
     figure: Figure,
     path: str | Path,
     *,
-    formats: tuple[str, ...] | list[str] | None = None,
+    formats: str | tuple[str, ...] | list[str] | None = None,
     dpi: float | None = None,
 ) -> list[Path]:
     """Writes a figure with embedded fonts (Type 42 in PDF, curves in SVG), the same file each time.
@@ -219,7 +219,10 @@ def save_figure(
     ending = path.suffix.removeprefix(".").lower()
     stem = path.with_suffix("") if ending in FIGURE_FORMATS else path
     if formats is None:
-        formats = (ending,) if ending in FIGURE_FORMATS else ("png",)
+        is_format = ending in figure.canvas.get_supported_filetypes()
+        formats = (ending,) if is_format else ("png",)
+    if isinstance(formats, str):
+        formats = (formats,)
     written = []
     for each in formats:
         check_choice("formats", each, FIGURE_FORMATS)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.identify._gait_fit import GaitFit
 from jaxbiped.optimise._objectives import OBJECTIVES
@@ -37,6 +37,7 @@ def fit(fitted: GaitFit) -> Figure:
     Returns:
         A new figure.
     """
+    check_type("fitted", fitted, GaitFit)
     names = list(fitted.estimates)
     tall = 0.7 + 0.42 * len(names), 1.9
     figure = style.new_figure(6.8, sum(tall) + 0.5, rows=True)
@@ -117,6 +118,7 @@ def optimisation(optimum: Optimum) -> Figure:
     Raises:
         ArgumentError: the optimum has no iterates.
     """
+    check_type("optimum", optimum, Optimum)
     history = optimum.history
     if not history:
         raise ArgumentError("optimum has no history: there is no iterate to draw.")

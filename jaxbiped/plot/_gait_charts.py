@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._measures import QUANTITIES
@@ -18,6 +18,7 @@ from jaxbiped.plot._symbols import row_label
 
 def check_drawable(gait: Gait) -> None:
     """Raises `ArgumentError` for a batch of gaits, or where no gait was found."""
+    check_type("gait", gait, Gait)
     if np.ndim(gait.ending) != 0:
         raise ArgumentError("this is a batch of gaits: draw one of them.")
     if gait.outcome is not Search.FOUND:

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from jaxbiped._checks import check_type
 from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._stability import Bifurcation
@@ -36,6 +37,7 @@ def multipliers(gait: Gait | BranchPoint, *, ax: Axes | None = None) -> Figure:
     Raises:
         ValueError: no gait was found, or this is a batch.
     """
+    check_type("gait", gait, Gait, BranchPoint)
     if isinstance(gait, BranchPoint):
         errors, stable = np.asarray(gait.multiplier_errors), gait.stable
         critical = Bifurcation(gait.bifurcation)
@@ -60,6 +62,7 @@ def multipliers(gait: Gait | BranchPoint, *, ax: Axes | None = None) -> Figure:
     _name(ax, values)
     largest = float(np.max(errors))
     said = f"largest error {largest:.1e}" + ("" if largest > _VISIBLE else ": within the dots")
+    said = said if np.isfinite(largest) else "not all errors are known"
     look = {"fontsize": "small", "color": style.GROUND_COLOUR}
     ax.text(0.02, 0.02, said, transform=ax.transAxes, **look)
     verdict = _VERDICTS[stable]
@@ -101,10 +104,11 @@ def _name(ax: Axes, values: np.ndarray) -> None:
         names.append((f"{int(small.sum())} near 0\n" + rf"($|\lambda| \leq$ {largest:.1e})", 0j))
     circle = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 200))
     taken = [*values[~small], *([0j] if small.any() else []), *circle]
+    edge = ax.get_xlim()[1]
     inches = ax.get_window_extent().width / style.figure_of(ax).dpi
-    scale = np.diff(ax.get_xlim()) / inches
+    scale = 2.0 * edge / inches
     for text, value in names:
-        wide, high = scale * style.text_size(text)
+        wide, high = (scale * each for each in style.text_size(text))
         # Down the middle of each text that might be written.
         corners = {
             (right, up): value
@@ -114,7 +118,7 @@ def _name(ax: Axes, values: np.ndarray) -> None:
             for up in (1, -1)
         }
         others = np.array([each for each in taken if each != value])[:, None]
-        right, up = max(corners, key=lambda each: _room(corners[each], others))
+        right, up = max(corners, key=lambda each: _room(corners[each], others, edge))
         taken += list(corners[right, up])
         side, level = "left" if right > 0 else "right", "bottom" if up > 0 else "top"
         place = (value.real, value.imag)
@@ -122,5 +126,7 @@ def _name(ax: Axes, values: np.ndarray) -> None:
         style.label_point(ax, words, place, (6 * right, 4 * up), ha=side, va=level)
 
 
-def _room(text: np.ndarray, others: np.ndarray) -> float:
-    return float(np.min(np.abs(text - others), initial=1.0))
+def _room(text: np.ndarray, others: np.ndarray, edge: float) -> float:
+    """Smallest distance of a text from others; below zero by how far it leaves the axes."""
+    outside = edge - float(np.max(np.abs(text.real)))
+    return min(outside, 0.0) or float(np.min(np.abs(text - others)))

@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from jaxbiped._checks import check_type
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -48,6 +49,7 @@ def walker(scene: AnyScene, *, ax: Axes | None = None) -> Figure:
     Returns:
         The figure that holds `ax`, or the new one.
     """
+    check_type("scene", scene, AbstractWalkerScene)
     skeleton = skeleton_of(scene.mechanism)
     ahead = [-_STRIDE, *[_STRIDE] * len(skeleton.legs), 0.0]
     groups = [min(part.look.group, len(skeleton.legs)) for part in skeleton.parts]

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
+from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.continuation._bifurcation_curve import BifurcationCurve
@@ -63,7 +63,9 @@ def branch(
     Raises:
         ArgumentError: an unknown measure, branches along several parameters, or without points.
     """
-    given = [branches] if isinstance(branches, Branch) else list(branches)
+    given: list[Branch] = [*branches] if isinstance(branches, list | tuple) else [branches]  # type: ignore[list-item]
+    for each in given:
+        check_type("branches", each, Branch)
     if not given or not all(len(each) for each in given):
         raise ArgumentError("branches is not allowed: each must have a point.")
     if len({each.along for each in given}) > 1:
@@ -159,7 +161,7 @@ def _draw_lines(ax: Axes, each: Branch, measure: str, look: dict[str, Any]) -> N
         (there if here.value in special else here).stable for here, there in pairwise(each.points)
     ]
     if not kinds:
-        ax.plot(*values[0], ".", color=look["color"])
+        ax.plot(*values[0], "o", color=look["color"], markersize=4)
     for kind, group in groupby(range(len(kinds)), key=kinds.__getitem__):
         first, *others = group
         x, y = zip(*values[first : first + len(others) + 2], strict=True)

@@ -1,6 +1,6 @@
 """Phase portraits: bodies of a walk (paper, figure 5), and the periodic orbit of a gait."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import jax
@@ -101,9 +101,10 @@ def _chosen(skeleton: Skeleton, legs: tuple[int, ...], bodies: Sequence[str]) ->
     for name in bodies:
         check_choice("bodies", name, [part.name for part in skeleton.parts])
     count = len(skeleton.legs)
-    if not bodies and (not legs or not set(legs) <= set(range(1, count + 1))):
+    known = isinstance(legs, Collection) and set(legs) <= set(range(1, count + 1))
+    if not bodies and not (known and legs):
         raise ArgumentError(
-            f"legs = {legs!r} is not allowed: it must name some of the legs 1 to {count}."
+            f"legs = {legs!r} is not allowed: it must name some of the legs 1 to {count}, as (1,)."
         )
     chosen = [
         part

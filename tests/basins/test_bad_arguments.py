@@ -100,6 +100,7 @@ RIGHT = {
         ("wilson", dict(count=[1, 2], total=[3, 4, 5]), "(2,); (3,); broadcast"),
         ("wilson", dict(count=1, total=2, confidence=1.0), "confidence; 1.0; below 1"),
         ("fractions", dict(labels=["a"], confidence=0.0), "confidence; 0.0; above 0"),
+        ("fractions", dict(labels=xr.Dataset()), "labels; dataset; label"),
         ("fractions", dict(labels=[]), "labels; (0,); at least one"),
         ("fractions", dict(labels=[0, 99]), "labels; 99; Label"),
         ("fractions", dict(labels=[0, 1], doubt=[True]), "doubt has shape (1,)"),

@@ -74,6 +74,7 @@ def test_endings_tell_formats_and_others_belong_to_the_name(tmp_path):
         ("slope_0.02", None, ["slope_0.02.png"]),
         ("slope_0.02", ["pdf", "svg"], ["slope_0.02.pdf", "slope_0.02.svg"]),
         ("a.PDF", ["png"], ["a.png"]),
+        ("b", "pdf", ["b.pdf"]),
     ):
         paths = plot.save_figure(figure, tmp_path / name, formats=formats)
         assert [path.name for path in paths] == written
@@ -106,6 +107,7 @@ def test_figures_below_the_context_have_their_own_style_again():
         (lambda: plot.figure_style("poster").__enter__(), "style = 'poster' is not known"),
         (lambda: plot.figure_style("paper", columns=3).__enter__(), "columns = 3"),
         (lambda: plot.save_figure(Figure(), "a", formats=["eps"]), "formats = 'eps' is not known"),
+        (lambda: plot.save_figure(Figure(), "a.jpg"), "formats = 'jpg' is not known"),
         (lambda: plot.save_figure(Figure(), "/nowhere/a"), "cannot be written"),
     ],
 )

@@ -111,6 +111,23 @@ def test_names_of_multipliers_cover_no_dot(style):
             assert not any(box.contains(*dot) for dot in dots), text.get_text()
 
 
+def test_errors_that_are_not_known_are_said_and_names_stay_in_the_axes():
+    """A NaN was said to lie within the dots; a far multiplier's name left the figure."""
+    values = (40 + 3j, 40 - 3j, -2.0, 0.5, 0.0, 0.0)
+    figure = multipliers(_gait(values=values, multiplier_errors=np.full(6, np.nan)))
+    figure.draw_without_rendering()
+    (ax,) = figure.axes
+    assert "not all errors are known" in [text.get_text() for text in ax.texts]
+    (name,) = [text for text in ax.texts if "40.000" in text.get_text()]
+    assert name.get_window_extent().x1 < ax.get_window_extent().x1
+
+
+@pytest.mark.parametrize("draw", [*FIGURES, jb.plot.fit, jb.plot.optimisation, jb.plot.branch])
+def test_another_result_is_refused_in_one_sentence(draw):
+    with pytest.raises(jb.ArgumentError, match=r"is not allowed: it must be an? "):
+        draw(jb.seed_scene())
+
+
 def test_multipliers_of_a_branchs_point():
     point = branch_point(0.02, -1.6, error=0.1)
     (ax,) = multipliers(point).axes

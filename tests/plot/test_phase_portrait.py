@@ -63,7 +63,7 @@ def test_a_short_motion_has_no_stride_and_an_end_has_a_name():
     assert "fell forward" in legend_of(ax)
 
 
-@pytest.mark.parametrize("legs", [(), (0,), (1, 3)])
+@pytest.mark.parametrize("legs", [(), (0,), (1, 3), 1])
 def test_legs_are_numbered_1_and_2(seed_walk, legs):
     with pytest.raises(jb.ArgumentError, match="legs"):
         phase_portrait(*seed_walk, legs=legs)
