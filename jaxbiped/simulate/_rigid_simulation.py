@@ -179,7 +179,8 @@ class RigidSimulation(eqx.Module):
         history = None
         if moded and recorded is not None:
             history = history_of(self.scene, found.begin, rows, recorded.counts)
-            rows = by_numpy(_strikes_first, rows)[: self.max_arrivals]
+            kept = functools.partial(_first_strikes, count=self.max_arrivals)
+            rows = by_numpy(kept, rows) if self.max_arrivals else no_rows
         t, end = single_time(found.t, found.state)
         return Trajectory(
             t=t,
@@ -194,9 +195,9 @@ class RigidSimulation(eqx.Module):
         )
 
 
-def _strikes_first(numpy: Any, rows: Any) -> Any:
-    """Rows of heel strikes in their order, then those of other changes, without the flag."""
-    order = numpy.argsort(rows[:, 1] == 0.0, stable=True)
+def _first_strikes(numpy: Any, rows: Any, count: int) -> Any:
+    """So many rows, those of heel strikes first, in their order and without the flag."""
+    order = numpy.argsort(rows[:, 1] == 0.0, stable=True)[:count]
     return numpy.concatenate([rows[:, :1], rows[:, 2:]], axis=1)[order]
 
 

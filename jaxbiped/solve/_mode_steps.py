@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._joint_loads import of_all_bodies
 from jaxbiped.dynamics._mode_changes import mode_switches
 from jaxbiped.dynamics._rolling import rolling_field
@@ -157,14 +157,32 @@ class OntoSurface(NamedTuple):
     rest: Scalar
 
 
-def onto_surface(at: SurfaceCourse, which: Scalar, rtol: Scalar) -> OntoSurface:
-    """The way from a state to the surface of this number."""
-    value, rate = at.values[0], at.rates[0]
-    for k in range(1, len(at.values)):
-        value = jnp.where(which == k, at.values[k], value)
-        rate = jnp.where(which == k, at.rates[k], rate)
-    near = jnp.abs(value) <= _NEAR * rtol
+def onto_surface(at: SurfaceCourse, which: Scalar, rtol: Scalar, pace: Scalar) -> OntoSurface:
+    """The way from a state to the surface of this number.
+
+    Args:
+        at: the surfaces there.
+        which: its number.
+        rtol: relative tolerance.
+        pace: a step whose error is about the tolerance [s].
+    """
+    straight = [jnp.zeros_like(pace)] * (len(at.values) - len(at.bends))
+    every = zip(at.values, at.rates, [*at.bends, *straight], at.live, strict=True)
+    value, rate, bend, live = next(every)
+    known = jnp.asarray(len(at.bends) > 0)
+    for k, each in enumerate(every, start=1):
+        value, rate, bend, live, known = select(
+            which == k, (*each, jnp.asarray(k < len(at.bends))), (value, rate, bend, live, known)
+        )
+    there = jnp.abs(value) <= _NEAR * rtol
     # So slow that it lies on its surface as far as that is known.
-    lies = near & (jnp.abs(rate) <= jnp.sqrt(rtol))
-    rest = jnp.where(lies, 0.0, -value / jnp.where(rate == 0.0, 1.0, rate))
-    return OntoSurface(near & (lies | (rate != 0.0)), rest)
+    lies = there & (jnp.abs(rate) <= jnp.sqrt(rtol))
+    rest = -value / jnp.where(rate == 0.0, 1.0, rate)
+    turned = 0.5 * bend * rest * rest
+    # Where it is known how a gap bends, one step leads onto it from farther away.
+    root = jnp.sqrt(rtol)
+    close = known & (rate < 0.0) & (jnp.abs(value) <= _NEAR * root) & (jnp.abs(rest) <= root * pace)
+    close = close & (jnp.abs(turned) <= 0.2 * _NEAR * rtol)
+    near = (there & (lies | (rate != 0.0))) | close
+    rest = jnp.where(lies, 0.0, rest - turned / jnp.where(rate == 0.0, 1.0, rate))
+    return OntoSurface(live & near, rest)

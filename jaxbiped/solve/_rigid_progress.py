@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._mode_changes import change_mode
 from jaxbiped.dynamics._rolling import rolling_rates
 from jaxbiped.dynamics._stance import of_stance
@@ -13,6 +13,8 @@ from jaxbiped.solve._mode_steps import SurfaceCourse, course_of, has_modes
 
 _FIRST_STEP = 0.03
 """First step, in units of √(l/g)."""
+_STRETCH = 1.15
+"""By how much a step may be longer than chosen to end where a strike is due."""
 
 
 class RigidWalk(NamedTuple):
@@ -79,15 +81,22 @@ class ModeProgress(NamedTuple):
 
     Attributes:
         course: the surfaces at the state.
-        changing: number of the one that is landed on, counted from one; 0 for none.
+        changing: number of the one that the next step leads onto, counted from one; 0 for none.
         changed: whether the last attempt ended by a change of mode.
         begin: the first mode.
+        met: when each was last changed at [s].
+        paces: first steps behind a heel strike, then behind each change [s]; 0 where unknown.
+        behind: number of the one of these that the next step begins from, counted from one; 0 for
+            none.
     """
 
     course: SurfaceCourse
     changing: Scalar
     changed: Scalar
     begin: Scalar
+    met: Scalar
+    paces: Scalar
+    behind: Scalar
 
 
 def initial_progress(walk: RigidWalk) -> RigidProgress:
@@ -100,7 +109,10 @@ def initial_progress(walk: RigidWalk) -> RigidProgress:
     state, modes = walk.state, None
     if has_modes(walk.scene):
         state = change_mode(walk.scene, state)
-        modes = ModeProgress(course_of(walk.scene, state), none, no, state.mode)
+        course = course_of(walk.scene, state)
+        paces = jnp.zeros(1 + len(course.values), zero.dtype)
+        met = jnp.full_like(paces[1:], -jnp.inf)
+        modes = ModeProgress(course, none, no, state.mode, met, paces, none)
     rates = rolling_rates(walk.scene, state) if modes is None else modes.course.turning
     never = jnp.full_like(zero, jnp.inf)
     return RigidProgress(
@@ -122,6 +134,28 @@ def initial_progress(walk: RigidWalk) -> RigidProgress:
         code=none,
         modes=modes,
     )
+
+
+def with_next_step(walk: RigidWalk, after: RigidProgress) -> RigidProgress:
+    """With its step, unless it lands: the pace, or what ends it where an event or the end is due.
+
+    Where footsteps last alike a mode changes as long behind the strike as it did in the last one.
+    """
+    left, modes = after.due - after.t, after.modes
+    changing, least = jnp.zeros_like(after.landing), 1e-6 * after.period
+    if modes is not None:
+        steady = after.due < jnp.inf
+        for k, met in enumerate(modes.met, start=1):
+            waits = met + after.period - after.t
+            first = steady & (waits > least) & (waits < left)
+            left, changing = select(first, (waits, jnp.full_like(changing, k)), (left, changing))
+    hits = (left > least) & (left <= _STRETCH * after.pace)
+    step = jnp.minimum(jnp.where(hits, left, after.pace), walk.duration - after.t)
+    lands = after.landing > 0
+    if modes is not None:
+        changing = jnp.where(lands, modes.changing, jnp.where(hits, changing, 0))
+        modes = modes._replace(changing=changing)
+    return after._replace(step=jnp.where(lands, after.step, step), modes=modes)
 
 
 def state_with_hip(walk: RigidWalk, now: RigidProgress) -> Any:

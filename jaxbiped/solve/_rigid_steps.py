@@ -10,20 +10,22 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._mode_changes import SLACK, change_mode
 from jaxbiped.dynamics._rolling import rolling_rates
+from jaxbiped.dynamics._stance import angles_and_rates
 from jaxbiped.dynamics._strike_surfaces import lean
 from jaxbiped.solve._failure_events import rigid_ending
 from jaxbiped.solve._mode_steps import (
     ModeEvents,
+    SurfaceCourse,
     course_of,
     mode_events,
     onto_surface,
 )
 from jaxbiped.solve._rigid_progress import (
-    ModeProgress,
     RigidProgress,
     RigidWalk,
     root_place,
     shifted,
+    with_next_step,
 )
 from jaxbiped.solve._rolling_step import (
     NEAR,
@@ -39,8 +41,6 @@ from jaxbiped.solve._rolling_step import (
 _SAFETY, _MOST_SHRINK, _MOST_GROWTH = 0.8, 0.2, 5.0
 _ROUNDING = 1e-14
 """Shortest step, as a share of the time."""
-_STRETCH = 1.15
-"""By how much a step may be longer than chosen to end where a strike is due."""
 _LANDED = 1e-3
 """How near a landing comes to where a load is zero, in units of the tolerance."""
 _MOST_LANDINGS = 12
@@ -64,8 +64,8 @@ def attempt_step(
         course = course_of(walk.scene, trial)
         length = _length(error)
         changes = mode_events(now.step, now.modes.course, course, walk.rtol, length)
-        surface = onto_surface(course, now.modes.changing - 1, walk.rtol)
-        there = advance(trial, surface.rest, [1.0], [roughly])
+        surface = onto_surface(course, now.modes.changing - 1, walk.rtol, now.pace)
+        there = _along_course(walk, trial, course, surface.rest)
         own = onto._replace(near=surface.near, rest=surface.rest, state=there)
         onto = select(now.modes.changing > 0, own, onto)
     free, kept = _after_free_step(walk, now, trial, error, roughly, onto, lands_on_falls, changes)
@@ -89,6 +89,7 @@ def attempt_step(
     after = after._replace(
         rates=rates, accepted=now.accepted + one, rejected=now.rejected + (1 - one)
     )
+    after = with_next_step(walk, after)
     enough = (walk.footsteps > 0.0) & (after.footsteps.astype(after.t.dtype) >= walk.footsteps)
     done = enough | ((after.landing == 0) & (after.t >= walk.duration))
     attempts = (after.accepted + after.rejected).astype(after.t.dtype)
@@ -127,19 +128,21 @@ def _after_change(
     moved = root_place(walk, onto.state) - root_place(walk, state)
     state = shifted(state, jnp.where(changed, moved, 0.0))
     t = jnp.where(changed, trial.t + onto.rest, trial.t)
-    step = _step(walk, t, trial.pace, trial.due, trial.period)
-    modes = ModeProgress(
+    event = jnp.where(trial.struck, 1, jnp.where(changed, 1 + trial.modes.changing, 0))
+    happened = jnp.arange(1, 1 + len(trial.modes.paces)) == event
+    known = jnp.sum(jnp.where(happened, trial.modes.paces, 0.0))
+    modes = trial.modes._replace(
         course=jax.lax.cond(
             trial.struck | changed, lambda: course_of(walk.scene, state), lambda: course
         ),
         changing=jnp.where(changed, 0, trial.modes.changing),
-        changed=changed,
-        begin=trial.modes.begin,
+        met=jnp.where(happened[1:], t, trial.modes.met),
+        behind=jnp.where(event > 0, event, trial.modes.behind),
     )
     return trial._replace(
         t=t,
         state=state,
-        step=jnp.where(changed, step, trial.step),
+        pace=jnp.where(known > 0.0, known, trial.pace),
         landing=jnp.where(changed, 0, trial.landing),
         modes=modes,
     )
@@ -157,7 +160,6 @@ def _after_strike(
     return trial._replace(
         t=t,
         state=state,
-        step=_step(walk, t, trial.pace, due, period),
         strike=t,
         period=period,
         due=due,
@@ -166,11 +168,12 @@ def _after_strike(
     )
 
 
-def _step(walk: RigidWalk, t: Scalar, pace: Scalar, due: Scalar, period: Scalar) -> Scalar:
-    """The next step: the pace, or what ends it where a strike is due or the walk ends [s]."""
-    left = due - t
-    hits = (left > 1e-6 * period) & (left <= _STRETCH * pace)
-    return jnp.minimum(jnp.where(hits, left, pace), walk.duration - t)
+def _along_course(walk: RigidWalk, state: Any, course: SurfaceCourse, time: Scalar) -> Any:
+    """A state so short a time later that accelerations stay as they are."""
+    _, rates = angles_and_rates(walk.scene.mechanism.structure, state)
+    half = 0.5 * time
+    middle = (rate + half * turning for rate, turning in zip(rates, course.turning, strict=True))
+    return advance(state, time, [1.0], [(*middle, *course.turning)])
 
 
 def _length(error: Scalar) -> Scalar:
@@ -213,15 +216,23 @@ def _after_free_step(
     beside = onto.near & onto.ahead & (t + onto.rest <= walk.duration)
     struck = keep & beside & happens.above & ~happens.grazes & ~happens.falls
     lands = happens.strikes | (happens.falls & lands_on_falls)
-    modes = now.modes
-    if changes is not None and modes is not None:
-        struck, lands = struck & ~happens.changes, lands | happens.changes
-        modes = modes._replace(
-            changing=jnp.where(keep & happens.changes, 1 + changes.which, 0),
-            changed=jnp.zeros_like(struck),
-        )
-    lands = keep & lands & ~struck
     pace = now.step * jnp.clip(_SAFETY / length, _MOST_SHRINK, _MOST_GROWTH)
+    modes, changed = now.modes, jnp.zeros_like(struck)
+    if changes is not None and modes is not None:
+        due, which = modes.changing, jnp.where(happens.changes, 1 + changes.which, 0)
+        alone = ~happens.strikes & ~happens.falls & ((which == 0) | (which == due))
+        changed = keep & (due > 0) & alone & ~grazes & onto.near
+        changed = changed & (t + onto.rest <= walk.duration)
+        struck = struck & (which == 0) & (due == 0)
+        lands = lands | happens.changes
+        begun = keep & (jnp.arange(1, 1 + len(modes.paces)) == modes.behind)
+        modes = modes._replace(
+            changing=jnp.where(keep, jnp.where(changed, due, which), 0),
+            changed=changed,
+            paces=jnp.where(begun, jnp.maximum(now.pace, pace), modes.paces),
+            behind=jnp.where(keep, 0, modes.behind),
+        )
+    lands = keep & lands & ~struck & ~changed
     # A step that is too long to tell what happens within it is tried again at half the length.
     pace = jnp.where(happens.unclear & (error <= 1.0), 0.5 * now.step, pace)
     back = now.step * (happens.place - 1.0)
@@ -233,7 +244,7 @@ def _after_free_step(
     after = now._replace(
         t=t,
         state=select(keep, trial, now.state),
-        step=jnp.where(lands, back, _step(walk, t, pace, now.due, now.period)),
+        step=back,
         pace=pace,
         landing=jnp.where(lands, 1, 0),
         falling=lands & happens.falls,
@@ -262,7 +273,7 @@ def _landing(walk: RigidWalk, now: RigidProgress, trial: Any, onto: StepOnto) ->
     return now._replace(
         t=t + jnp.where(falls, onto.rest, 0.0),
         state=select(falls, onto.state, trial),
-        step=jnp.where(passes, _step(walk, t, now.pace, now.due, now.period), onto.rest),
+        step=onto.rest,
         landing=jnp.where(passes, 0, now.landing + 1),
         struck=struck,
         code=code,

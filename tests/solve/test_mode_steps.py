@@ -9,7 +9,7 @@ from jaxbiped.solve._mode_steps import SurfaceCourse, mode_events, onto_surface
 
 RTOL, STEP = 1e-6, 0.5
 told = jax.jit(lambda before, after: mode_events(STEP, before, after, RTOL, jnp.asarray(0.1)))
-onto = jax.jit(lambda at, which: onto_surface(at, which, jnp.asarray(RTOL)))
+onto = jax.jit(lambda at, which: onto_surface(at, which, jnp.asarray(RTOL), jnp.asarray(STEP)))
 
 
 def falling(crossings, live=(True, True)):
@@ -60,3 +60,21 @@ def test_one_euler_step_leads_onto_a_surface_that_is_near():
     assert float(near.rest) == pytest.approx(0.05 * RTOL / 0.4, rel=1e-12)
     assert not bool(far.near)
     assert float(far.rest) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("bend", [0.0, -3.0, 3.0])
+def test_a_gap_is_met_from_farther_away_by_what_is_known_of_its_bend(bend):
+    """A parabola, which one step meets to the third order of the time that is left."""
+    rest, rate = 2e-5, -3.0
+    value = -rate * rest - 0.5 * bend * rest**2
+    there = (jnp.array([each]) for each in (value, rate, True, bend))
+    found = onto(SurfaceCourse(*there), 0)
+    assert bool(found.near)
+    assert float(found.rest) == pytest.approx(rest, abs=1e-14)
+    for far in (
+        SurfaceCourse(*(jnp.array([each]) for each in (value, rate, False, bend))),
+        SurfaceCourse(*(jnp.array([each]) for each in (value, rate, True)), jnp.zeros(0)),
+        SurfaceCourse(*(jnp.array([each]) for each in (value, rate, True, 1e4))),
+        SurfaceCourse(*(jnp.array([each]) for each in (1e2 * value, rate, True, bend))),
+    ):
+        assert not bool(onto(far, 0).near)
