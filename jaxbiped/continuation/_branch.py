@@ -99,11 +99,9 @@ class Branch(eqx.Module, Tabular):
 
     def state(self, point: int | BranchPoint | BifurcationPoint) -> WalkerState:
         """The state on the section of a gait: of the point of that number, or of a given one."""
-        if isinstance(point, int):
-            point = self.points[point]
-        if isinstance(point, BifurcationPoint):
-            point = point.point
-        return state_at(self.state_type, point.recurring)
+        found = self.points[point] if isinstance(point, int) else point
+        found = found.point if isinstance(found, BifurcationPoint) else found
+        return state_at(self.state_type, found.recurring)
 
     def scene_at(self, point: int | BranchPoint | BifurcationPoint) -> Scene | RigidScene:
         """The scene of a gait: of the point with that number, or of a given point."""

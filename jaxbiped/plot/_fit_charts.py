@@ -36,6 +36,9 @@ def fit(fitted: GaitFit) -> Figure:
 
     Returns:
         A new figure.
+
+    Raises:
+        ValueError: `fitted` is not a fit.
     """
     check_type("fitted", fitted, GaitFit)
     names = list(fitted.estimates)

@@ -48,6 +48,9 @@ def walker(scene: AnyScene, *, ax: Axes | None = None) -> Figure:
 
     Returns:
         The figure that holds `ax`, or the new one.
+
+    Raises:
+        ValueError: `scene` is not a scene of a walker.
     """
     check_type("scene", scene, AbstractWalkerScene)
     skeleton = skeleton_of(scene.mechanism)

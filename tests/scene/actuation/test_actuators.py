@@ -1,4 +1,4 @@
-"""Actuators by themselves; their torques are held by `tests/dynamics/test_actuation.py`."""
+"""Actuators against closed forms; torques in motion are in `tests/dynamics/test_actuation.py`."""
 
 import dataclasses
 
