@@ -36,6 +36,9 @@ def fit(fitted: GaitFit) -> Figure:
 
     Returns:
         A new figure.
+
+    Raises:
+        ArgumentError: `fitted` is not a `GaitFit`.
     """
     check_type("fitted", fitted, GaitFit)
     names = list(fitted.estimates)

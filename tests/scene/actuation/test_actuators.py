@@ -1,4 +1,4 @@
-"""Actuators by themselves; their torques are held by `tests/dynamics/test_actuation.py`."""
+"""Actuators alone against splines of SciPy; torques are in `tests/dynamics/test_actuation.py`."""
 
 import dataclasses
 
