@@ -93,8 +93,8 @@ def minimal_fatal_shock(
 
     Args:
         label_of: labels, whole numbers of shape (n,), of points of shape (n, d). Every label
-            that differs from the origin's counts as fatal, "unresolved" too: map the codes first
-            where a difference should not count.
+            that differs from the origin's counts as fatal, including "unresolved"; if a difference
+            should not count, map the codes first.
         origin: coordinates of the gait, shape (d,).
         scales: unit of distance along each coordinate, shape (d,).
         max_distance: scaled distance up to which rays march.
@@ -105,8 +105,8 @@ def minimal_fatal_shock(
         steps: number of steps of the march.
         normal: gradients, shape (n, d), at points of shape (n, d) near the boundary, in the units
             of the points, of any function that is constant along the boundary; either sign. NaN
-            where it is not known: such a ray is not turned.
-        improved: how many rays are turned, the nearest ones at least 0.5 rad apart.
+            where it is not known: such a ray is not rotated.
+        improved: number of rays to rotate: the nearest ones that are at least 0.5 rad apart.
         batch: maximum number of points in a call.
 
     Returns:

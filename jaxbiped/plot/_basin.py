@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
 _PENDING = "////"
-"""Over what is pending, so that it reads as missing in print without colour too."""
+"""Hatch over pending starts, which shows them as missing in print without colour."""
 _PATTERNS = ("#102A40", "#A0A0A0")
 """Colours of patterns over walking and pending."""
 _ASIDE = 2.2

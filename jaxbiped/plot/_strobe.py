@@ -19,7 +19,7 @@ from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 _SHOWN = 1.8
-"""How long a motion is shown unless told otherwise [s]."""
+"""Default duration of the motion that is shown [s]."""
 _APART = 0.1
 """Time between poses unless their number is told [s]."""
 _WIDTH, _LEAST, _MOST = 8.6, 2.8, 6.0

@@ -135,11 +135,11 @@ class RedundantWalking(AbstractWalking):
 
 
 def section_of(scene: Any, section: AbstractSection | None) -> AbstractSection:
-    """The section asked for, or the one that a scene's cycles begin at unless told otherwise.
+    """The requested section. Default: the section at which a scene's cycles begin.
 
     Raises:
-        ArgumentError: what is no section, one of a body that the state does not have, or one other
-            than heel strike for a rigid walker.
+        ArgumentError: this is not a section, its body is not in the state, or a rigid walker has a
+            section other than heel strike.
     """
     if section is not None and not isinstance(section, AbstractSection):
         raise ArgumentError(
