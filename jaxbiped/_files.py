@@ -98,8 +98,8 @@ def strict_json(
     Args:
         value: plain values, complex ones as pairs of their parts, arrays and numbers of NumPy, in
             mappings and sequences.
-        indent: of each level; all on one line unless given.
-        unknown: what stands for a number that is not finite; null unless given.
+        indent: indent of each level. Default: everything on one line.
+        unknown: value in place of numbers that are not finite. Default: null.
 
     Returns:
         The text, without a line's end.

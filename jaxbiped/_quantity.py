@@ -72,7 +72,7 @@ class Quantity(NamedTuple):
         return f"{self.words}, {self.symbol}" if self.symbol else self.words
 
     def on_axis(self, unit: str | None = None) -> str:
-        """Words, symbol and unit, its own unless given another."""
+        """Words, symbol and unit. Default: the quantity's own unit."""
         return f"{self.in_row()} ({self.unit_in_figure if unit is None else unit})"
 
 

@@ -23,7 +23,7 @@ class Tabular(abc.ABC):
     """A result that is also a table: as a dataset, a data frame, CSV or LaTeX.
 
     Attributes:
-        rows: the dimension of the dataset along which a table has its rows unless told another;
+        rows: the dimension of the dataset along which a table has its rows by default;
             empty for a single row. A property of the class.
     """
 

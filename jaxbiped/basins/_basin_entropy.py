@@ -17,11 +17,11 @@ class Entropy(NamedTuple):
         boundary: S_bb, mean entropy of the boxes with more than one label; NaN without any.
         boundary_error: standard error of that mean; NaN with fewer than two such boxes.
         box: side of a box [grid points].
-        boxes: how many boxes there are.
-        boundary_boxes: how many of them have more than one label.
-        fractal: whether S_bb > log 2. A smooth boundary parts two basins in all but a few boxes,
-            so that S_bb cannot exceed log 2: if it does, the boundary is fractal. If it does
-            not, nothing is known.
+        boxes: number of boxes.
+        boundary_boxes: number of boxes with more than one label.
+        fractal: whether S_bb > log 2. A smooth boundary separates only two basins in all but a few
+            boxes, so its S_bb cannot exceed log 2. If S_bb > log 2, the boundary is fractal;
+            otherwise, nothing is known.
     """
 
     basin: float
@@ -36,20 +36,20 @@ class Entropy(NamedTuple):
 def entropy(labels: npt.ArrayLike, *, box: int = 5) -> Entropy:
     """Basin entropy and boundary basin entropy of a grid of labels, of any dimension.
 
-    S_i = −Σ_j p_ij log p_ij, where p_ij is the part of box i that has label j. Daza, Wagemakers,
-    Georgeot, Guéry-Odelin and Sanjuán, "Basin entropy: a new tool to analyze uncertainty in
-    dynamical systems", Sci. Rep. 6 (2016) 31416, equations 2 to 4, and its log 2 criterion. The
-    values depend on the size of a box: compare only those of one size and resolution.
+    S_i = −Σ_j p_ij log p_ij, where p_ij is the fraction of box i with label j. Source, also of the
+    log 2 criterion: Daza, Wagemakers, Georgeot, Guéry-Odelin and Sanjuán, "Basin entropy: a new
+    tool to analyze uncertainty in dynamical systems", Sci. Rep. 6 (2016) 31416, equations 2 to 4.
+    The values depend on the size of a box: compare only values of one box size and resolution.
 
     Args:
-        labels: label codes. What does not fill a whole box at the far ends is left out.
-        box: side of a box [grid points], at least 2; the source takes 5.
+        labels: label codes. Points at the far ends that do not fill a whole box are left out.
+        box: side of a box [grid points], at least 2; the source uses 5.
 
     Returns:
         The two entropies [nats], and whether the boundary is fractal by the log 2 criterion.
 
     Raises:
-        ArgumentError: labels that are not allowed, or a box larger than the grid.
+        ArgumentError: labels are not allowed, or the box is larger than the grid.
 
     Examples:
         >>> import jaxbiped as jb

@@ -49,13 +49,13 @@ def fit_exponent(x: np.ndarray, y: np.ndarray, what: str) -> Exponent:
 
 
 class Dimension(NamedTuple):
-    """A box-counting dimension, with what it was fitted to.
+    """A box-counting dimension, with the counts to which it was fitted.
 
     Attributes:
         estimate: the dimension.
-        error: standard error of the fit's slope; it says nothing of a curvature of the counts.
+        error: standard error of the fit's slope; it does not include a curvature of the counts.
         sizes: sides of the boxes, shape (k,), in cells of the finest grid.
-        counts: how many boxes of each size hold a boundary, shape (k,).
+        counts: number of boxes of each size that hold a boundary, shape (k,).
     """
 
     estimate: float
@@ -67,26 +67,28 @@ class Dimension(NamedTuple):
 def boundary_dimension(
     boundary: RefinedBoundary | npt.ArrayLike, *, skip: int = 0, sides: Sequence[int] | None = None
 ) -> Dimension:
-    """N boxes of side s hold the boundary, N ~ s^−D: least squares of log N against log s.
+    """Box-counting dimension D of a boundary that N ~ s^−D boxes of side s hold.
 
-    Box counting on basins: McDonald, Grebogi, Ott and Yorke, "Fractal basin boundaries", Physica
-    D 17 (1985) 125, section 2. A box holds the boundary where the labelled points in it, those
-    on its faces included, have more than one label; of a `RefinedBoundary` where it contains one
-    of the finest boundary cells, its sizes being those of the levels.
+    D is a least-squares slope of log N against log s. Source: McDonald, Grebogi, Ott and Yorke,
+    "Fractal basin boundaries", Physica D 17 (1985) 125, section 2. A box of a label grid holds the
+    boundary if its points, including those on its faces, have more than one label. A box of a
+    `RefinedBoundary` has the size of a level, and holds the boundary if a finest boundary cell is
+    in it.
 
     Args:
         boundary: a refined boundary, or a grid of label codes of any dimension.
-        skip: how many of the largest sizes to leave out of the fit.
-        sides: sides of the boxes on a label grid [grid spacings]; unless given powers of two, up
-            to a quarter of the shortest axis. The far ends of a grid that does not hold a whole
-            number of the largest boxes are left out.
+        skip: number of the largest sizes to leave out of the fit.
+        sides: sides of the boxes on a label grid [grid spacings]. Default: powers of two, up to a
+            quarter of the shortest axis. If a grid does not hold a whole number of the largest
+            boxes, its far ends are left out.
 
     Returns:
-        The dimension with its standard error, and the boxes counted at each side.
+        The dimension with its standard error, and the number of boxes at each side.
 
     Raises:
-        ArgumentError: no boundary at three sizes, sides with a refined boundary, a side larger
-            than the grid or not dividing the largest, or an argument that is not allowed.
+        ArgumentError: fewer than three sizes hold a boundary, sides are given with a refined
+            boundary, a side exceeds the grid or does not divide the largest one, or an argument
+            is not allowed.
     """
     check_count("skip", skip, 0)
     if isinstance(boundary, RefinedBoundary):
@@ -149,8 +151,8 @@ class Uncertainty(NamedTuple):
     """The fraction of ε-uncertain starts f(ε) ~ ε^α, and the boundary's dimension d − α.
 
     Attributes:
-        exponent: α: 1 for a smooth boundary, near 0 where halving ε makes few starts certain.
-        error: standard error of the fit's slope, of α and of the dimension.
+        exponent: α: 1 for a smooth boundary, near 0 if halving ε makes few starts certain.
+        error: standard error of the fit's slope, which is that of α and of the dimension.
         dimension: d − α.
         distances: ε, shape (k,).
         fractions: f(ε), shape (k,).
@@ -168,22 +170,23 @@ def uncertainty_exponent(
 ) -> Uncertainty:
     """Uncertainty exponent from a grid of labels of d dimensions.
 
-    A point is ε-uncertain if a point ε away along an axis, either way, has another label.
-    Grebogi, McDonald, Ott and Yorke, "Final state sensitivity: an obstruction to predictability",
-    Phys. Lett. A 99 (1983) 415, who shift along one axis; here along all of the grid's.
+    A point is ε-uncertain if a point ε away along an axis, in either direction, has another label.
+    Source: Grebogi, McDonald, Ott and Yorke, "Final state sensitivity: an obstruction to
+    predictability", Phys. Lett. A 99 (1983) 415. They shift along one axis, this function along
+    all axes of the grid.
 
     Args:
         labels: label codes, any dimension.
-        distances: ε [grid spacings]; unless given powers of two, up to an eighth of the shortest
-            axis. Only points at least the largest from the grid's ends are counted.
+        distances: ε [grid spacings]. Default: powers of two, up to an eighth of the shortest axis.
+            Points nearer to the grid's ends than the largest distance are not counted.
 
     Returns:
-        The exponent with its standard error, the boundary's dimension, and the fractions at each of
+        The exponent with its standard error, the boundary's dimension, and the fraction at each of
         the k distances.
 
     Raises:
-        ArgumentError: no boundary at three distances, a distance that leaves no point to count,
-            or labels that are not allowed.
+        ArgumentError: fewer than three distances show a boundary, a distance leaves no point to
+            count, or labels are not allowed.
     """
     grid = check_label_grid(labels)
     shortest = min(grid.shape)
@@ -216,26 +219,27 @@ def sampled_uncertainty(
     samples: int = 1024,
     batch: int = 65536,
 ) -> Uncertainty:
-    """Uncertainty exponent in a box of d dimensions, by asking for labels.
+    """Uncertainty exponent in a box of d dimensions, from labels of quasi-random starts.
 
-    As Grebogi et al. (1983, see `uncertainty_exponent`), but for quasi-random starts (Sobol') in
-    the box and a direction of its own for each: a start is ε-uncertain if one of the two starts
-    ε away along it, either way, has another label. Asks for `samples` (1 + 2 k) labels.
+    The method is that of Grebogi et al. (1983, see `uncertainty_exponent`), with starts from a
+    Sobol' sequence in the box and a separate direction for each: a start is ε-uncertain if one of
+    the two starts ε away along its direction has another label. This needs `samples` (1 + 2 k)
+    labels.
 
     Args:
-        label_of: labels, whole numbers of shape (n,), of points of shape (n, d).
+        label_of: function that labels points of shape (n, d); whole numbers of shape (n,).
         lower, upper: corners of the box, shape (d,).
-        distances: ε, as parts of the box's sides, shape (k,), each below 0.5.
-        samples: how many starts.
-        batch: the most points in a call.
+        distances: ε, as fractions of the box's sides, shape (k,), each below 0.5.
+        samples: number of starts.
+        batch: maximum number of points in a call.
 
     Returns:
-        The exponent with its standard error, the boundary's dimension, and the fractions at each of
+        The exponent with its standard error, the boundary's dimension, and the fraction at each of
         the k distances.
 
     Raises:
-        ArgumentError: an argument that is not allowed, or uncertain starts at fewer than three
-            distances: take more samples, or larger distances.
+        ArgumentError: an argument is not allowed, or fewer than three distances have uncertain
+            starts: take more samples, or larger distances.
     """
     from scipy.special import ndtri
 

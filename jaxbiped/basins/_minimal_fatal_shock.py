@@ -93,20 +93,20 @@ def minimal_fatal_shock(
 
     Args:
         label_of: labels, whole numbers of shape (n,), of points of shape (n, d). Every label
-            that differs from the origin's counts as fatal, "unresolved" too: map the codes first
-            where a difference should not count.
+            that differs from the origin's counts as fatal, including "unresolved"; if a difference
+            should not count, map the codes first.
         origin: coordinates of the gait, shape (d,).
         scales: unit of distance along each coordinate, shape (d,).
         max_distance: scaled distance up to which rays march.
         tolerance: scaled distance to which the boundary is bisected.
-        directions: how many rays (both ways along every axis first, so at least 2 d, then evenly
-            over the sphere; d = 1 has two), 32 d unless given; or scaled directions of shape
-            (n, d).
+        directions: number of rays (both ways along every axis first, so at least 2 d, then evenly
+            over the sphere; d = 1 has two), or scaled directions of shape (n, d). Default: 32 d
+            rays.
         steps: number of steps of the march.
         normal: gradients, shape (n, d), at points of shape (n, d) near the boundary, in the units
             of the points, of any function that is constant along the boundary; either sign. NaN
-            where it is not known: such a ray is not turned.
-        improved: how many rays are turned, the nearest ones at least 0.5 rad apart.
+            where it is not known: such a ray is not rotated.
+        improved: number of rays to rotate: the nearest ones that are at least 0.5 rad apart.
         batch: maximum number of points in a call.
 
     Returns:
@@ -114,7 +114,7 @@ def minimal_fatal_shock(
         there.
 
     Raises:
-        ArgumentError: an argument that is not allowed, or labels or normals of a wrong shape.
+        ArgumentError: an argument is not allowed, or labels or normals have a wrong shape.
     """
     around = _surroundings(LabelOracle(label_of, batch), origin, scales)
     ways = _directions(directions, around.origin.size)

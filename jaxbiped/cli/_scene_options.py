@@ -23,7 +23,7 @@ CLEARANCES = {"stance-rotation": "StanceRotation", "always-touching": "AlwaysTou
 _OF_WALKER = ("m", "J", "l", "d", "r", "hip_mass")
 """Parameters of the seed's walker."""
 _OF_GROUND = ("slope", "g")
-"""Parameters that a published walker has its own of: None unless given."""
+"""Parameters for which a published walker has its own values. Default: None."""
 
 
 def _seed_parameters() -> dict[str, Argument]:

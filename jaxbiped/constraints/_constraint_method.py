@@ -72,7 +72,7 @@ class AbstractProjectingMethod(AbstractConstraintMethod):
 
 
 def gram(rows: list[Row], weights: list[Scalar], shift: Scalar | None = None) -> list[list[Scalar]]:
-    """J W Jᵀ + s I for a diagonal W, its lower half; s = 0 unless given."""
+    """Lower half of J W Jᵀ + s I for a diagonal W. Default: s = 0."""
     matrix = []
     for i, row in enumerate(rows):
         entries = []
@@ -123,7 +123,7 @@ class AbstractExactProjection(AbstractProjectingMethod):
 
 
 def exact_multipliers(system: Constrained, right: list[Scalar] | None = None) -> list[Scalar]:
-    """λ with (J M⁻¹ Jᵀ) λ = right, the free residual unless given."""
+    """λ with (J M⁻¹ Jᵀ) λ = right. Default of `right`: the free residual."""
     right = free_residual(system) if right is None else right
     return solve(factorise(gram(system.rows, inverse_masses(system.masses))), right)
 

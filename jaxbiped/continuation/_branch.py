@@ -112,10 +112,10 @@ class Branch(eqx.Module, Tabular):
         """The branch as a dataset for `to_netcdf` or `to_zarr`; `open_branch` restores it.
 
         Returns:
-            Along `point` the parameter, `state_…`, period, step_length, speed, peak_normal,
-            spectral_radius and multipliers with their errors, `stable` (1, 0, and −1 where the
-            errors leave it open) and `bifurcation`, SI units; the same of the special points along
-            `event`, with kind, critical multiplier and its error; all else in the attributes.
+            In SI units. Along `point`: parameter, `state_…`, period, step_length, speed,
+            peak_normal, spectral_radius and multipliers with their errors, `stable` (1, 0, or −1 if
+            the errors leave it open) and `bifurcation`. Along `event`: the same for special points,
+            with kind, critical multiplier and its error. Everything else is in the attributes.
         """
         return _branch_dataset(self)
 
@@ -228,8 +228,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
         The branch.
 
     Raises:
-        ArgumentError: the dataset is not that of a branch, belongs to another scene, or lacks a
-            variable.
+        ArgumentError: the dataset is of another kind or another scene, or lacks a variable.
     """
     scene = check_scene(scene, Scene, RigidScene)
     if "branch" not in dataset.attrs:

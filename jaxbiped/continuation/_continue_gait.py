@@ -78,7 +78,7 @@ def continue_gait(
         circle there is always an entry, "not-located" if the bifurcation was not found.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
 
     Examples:
         >>> import jaxbiped as jb

@@ -88,7 +88,7 @@ def find_isolated(
         The gaits in the order in which they were found, none twice.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
     """
     check_followed(scene)
     check_count("starts", starts)

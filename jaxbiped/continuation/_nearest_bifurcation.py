@@ -101,8 +101,8 @@ def nearest_bifurcation(
         beyond a fold belong to another gait and do not count.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled; a parameter
-            other than the slope that is zero, which no factor changes.
+        ArgumentError: an argument is not allowed, or a parameter other than the slope is zero,
+            which no factor changes; raised before anything is compiled.
     """
     scene = check_scene(scene, Scene, RigidScene)
     check_choice("along", along, parameter_names(scene))

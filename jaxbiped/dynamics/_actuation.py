@@ -103,9 +103,9 @@ class ActuatorPowers(NamedTuple):
     """Powers of a scene's actuators, leaves shaped as the state's.
 
     Attributes:
-        total: of all torques and set points on the walker, of springs and dampers too [W].
-        motors: of each motor by itself [W]: one for each actuator at the hip that has one, then one
-            for each foot.
+        total: power of all torques and set points on the walker, including springs and dampers [W].
+        motors: power of each motor [W]: one for each actuator at the hip that has a motor, then
+            one for each foot.
     """
 
     total: Scalar

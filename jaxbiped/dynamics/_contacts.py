@@ -32,7 +32,7 @@ _JUST_TOUCHING = 1e-6
 def feet(scene: CompliantScene, state: CompliantState) -> tuple[FootMotion, ...]:
     """Kinematics of all feet of a walker, in the order of its mechanism.
 
-    In redundant coordinates the root point is where the foot's own leg has it.
+    In redundant coordinates, the position of the root point is that on the foot's own leg.
 
     Args:
         scene: the walker, in minimal or redundant coordinates.

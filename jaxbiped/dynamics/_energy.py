@@ -52,12 +52,12 @@ class Powers(NamedTuple):
         gravity: power of gravity on the walker.
         indentation: power of the walker against the ground's normal reaction, F_N δ̇, summed over
             all feet, and against springs, stops and latches.
-        damper: the part of it that is lost and not stored; for a foot that touches, (F_N − elastic
-            force) δ̇.
+        damper: the part of `indentation` that is lost and not stored; for a foot that touches,
+            (F_N − elastic force) δ̇.
         friction: power lost to friction, never negative.
         actuation: power of the actuators, including springs and dampers between the legs; None for
             a passive walker.
-        motors: power of each motor by itself, as in `ActuatorPowers`; None for a passive walker.
+        motors: power of each motor, as in `ActuatorPowers`; None for a passive walker.
     """
 
     gravity: Scalar

@@ -19,13 +19,13 @@ class FootMotion(NamedTuple):
     Attributes:
         x, z: centre of the foot in the slope's frame [m].
         vx, vz: velocity of that centre [m/s].
-        penetration: δ = r − z, positive when indented, and the foot's extension where it has a
+        penetration: δ = r − z, positive when indented, plus the foot's extension if it has a
             preload [m].
-        penetration_rate: δ̇ = −vz, and the rate of the extension [m/s].
+        penetration_rate: δ̇ = −vz, plus the rate of the extension [m/s].
         slip_speed: V_T = vx + r θ̇, tangential velocity of the material point in contact [m/s].
         admitted: whether the clearance rule lets the foot touch (boolean), None for "always",
             Python's False for "never".
-        bristle: see `AbstractBristleLaw` [–]; None where friction has no memory.
+        bristle: see `AbstractBristleLaw` [–]; None if friction has no memory.
     """
 
     x: Scalar

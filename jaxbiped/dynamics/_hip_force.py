@@ -18,8 +18,9 @@ from jaxbiped.scene._scene import CompliantScene, RedundantScene
 def hip_force(scene: CompliantScene, state: PyTree) -> HipForce:
     """The reaction of the root point's hinge on the first body, in either formulation.
 
-    In minimal coordinates it does no work and is in no equation: it is what Newton's law for the
-    first body, with all that hangs on it, leaves open, m (a − g) less the ground's force.
+    In minimal coordinates, it does no work and does not occur in the equations. It is the remainder
+    of Newton's law for the first body with everything that hangs on it: m (a − g) minus the
+    ground's force.
 
     Args:
         scene: the walker, in minimal or redundant coordinates.

@@ -23,14 +23,14 @@ from jaxbiped.scene._structure import Indices
 
 
 class Impact(NamedTuple):
-    """What an impact does.
+    """Result of an impact.
 
     Attributes:
-        state: afterwards, the names of each pair exchanged: the second is again the one that
-            stands.
-        impulse_x, impulse_z: of the ground on the foot that came down [N·s].
-        lifting: speed at which the foot that stood leaves the ground afterwards [m/s]. One below
-            zero would have been held by the ground, and shared the impact.
+        state: state after the impact, with the names of each mirrored pair exchanged: the second
+            one stands again.
+        impulse_x, impulse_z: impulse of the ground on the foot that came down [N·s].
+        lifting: speed at which the foot that stood leaves the ground afterwards [m/s]. If it is
+            below zero, the ground would have held this foot, which would have shared the impact.
     """
 
     state: Any
@@ -41,21 +41,21 @@ class Impact(NamedTuple):
 
 @kept_alone
 def impact(scene: RigidScene, state: Any) -> Impact:
-    """The plastic impact of the leg that swings, the standing one being released at once.
+    """The plastic impact of the swing leg; the standing leg is released at the same moment.
 
-    The impulse acts where the new foot touches, so motions that roll about that point do not feel
-    it: the momenta of their rates are kept. What is lost is the velocity of the foot at its lowest
-    point. A push-off comes at once before: its impulse on the root point adds to these momenta.
-    Stops that are held take part; where they are not locked, those that would have to pull are
-    released, the worst first.
+    The impulse acts at the point where the new foot touches. It does not affect motions that roll
+    about that point, so the momenta of their rates are conserved; the velocity of the foot at its
+    lowest point is lost. A push-off occurs just before, and its impulse on the root point adds to
+    these momenta. Stops that are held take part. Of those that are not locked, the ones that would
+    have to pull are released, the worst first.
 
     Args:
         scene: the rigid walker.
         state: of the scene's kind, just before the impact, SI units.
 
     Returns:
-        The state just after it, sides exchanged, and the impulse [N·s], leaves shaped as the
-        state's.
+        The state just after the impact, with sides exchanged, the impulse [N·s] and the lifting
+        speed [m/s], leaves shaped as the state's.
     """
     return of_stance(scene, state, lambda old: _impact(scene, state, old))
 

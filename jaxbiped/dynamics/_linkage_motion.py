@@ -14,11 +14,11 @@ from jaxbiped.scene._linkages import LinkageScene
 class LinkageState(NamedTuple):
     """Coordinates of a linkage and their rates: tuples of n scalar leaves of any batch shape.
 
-    Body by body x, z [m] and θ [rad], or x, z and the Euler parameters cos θ/2, sin θ/2 [–].
+    Each body has x, z [m] and θ [rad], or x, z and the Euler parameters cos θ/2, sin θ/2 [–].
 
     Attributes:
-        q: coordinates, n of them.
-        v: their rates.
+        q: the n coordinates.
+        v: rates of the coordinates.
     """
 
     q: tuple[StateLeaf, ...]
@@ -26,12 +26,12 @@ class LinkageState(NamedTuple):
 
 
 class LinkageMotion(NamedTuple):
-    """How a linkage moves and what holds it together.
+    """Motion of a linkage and the forces in its joints.
 
     Attributes:
         accelerations: second derivatives of the coordinates, n entries.
-        joint_forces: force (x, z) of each joint on its body 1 [N]; on body 2 it is the opposite.
-        violation: Φ, as `Constraints` has it.
+        joint_forces: force (x, z) of each joint on its body 1 [N]; that on body 2 is the opposite.
+        violation: Φ, as in `Constraints`.
     """
 
     accelerations: list[Scalar]

@@ -48,8 +48,8 @@ def accelerations(scene: Scene, state: Any) -> Any:
         state: of the scene's kind, leaves of any common shape, SI units.
 
     Returns:
-        Of the root point, `ROOT_ax` and `ROOT_az` [m/s²], and of the bodies, `alpha_BODY` [rad/s²];
-        for `Walker` an `Accelerations`.
+        Accelerations `ROOT_ax` and `ROOT_az` of the root point [m/s²] and `alpha_BODY` of the
+        bodies [rad/s²]; an `Accelerations` for `Walker`.
     """
     at = _at(scene, state)
     structure, known, pose = at.mechanism.structure, at.known, at.pose

@@ -37,8 +37,8 @@ def push_off_impulse(scene: RigidScene, stance: Stance) -> Impulse | None:
 def push_off_work(scene: RigidScene, state: Any) -> Scalar:
     """Work of the push-off at a state just before the impact [J]; zero without one.
 
-    The impulse times the mean of the root point's velocities along it, before and after. In between
-    neither foot is held: the walker is free.
+    It is the impulse times the mean of the root point's velocities along it before and after. In
+    between, neither foot is held and the walker is free.
 
     Args:
         scene: the rigid walker.

@@ -46,11 +46,12 @@ from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 class HipForce(NamedTuple):
     """Force of the root point's hinge on the first body, leaves shaped as the state's.
 
-    On the other bodies there it is the opposite, but for what a mass of the root point takes.
+    The force on the other bodies there is the opposite, except for the share of the root point's
+    mass.
 
     Attributes:
-        x: along the slope, downhill positive [N].
-        z: along its outward normal [N].
+        x: component along the slope, downhill positive [N].
+        z: component along the slope's outward normal [N].
     """
 
     x: Scalar
@@ -58,14 +59,14 @@ class HipForce(NamedTuple):
 
 
 class Violation(NamedTuple):
-    """How far a redundant state is off its constraints, leaves shaped as the state's.
+    """Violation of the constraints by a redundant state, leaves shaped as the state's.
 
     Attributes:
-        position: largest distance at a hinge between the places that its two bodies give it [m].
-        rate: largest relative speed of these [m/s].
+        position: largest distance between the positions of a hinge on its two bodies [m].
+        rate: largest relative speed of these positions [m/s].
         normalisation: largest | cos² + sin² − 1 | of a body's Euler parameters; 0 without them.
-        angle: by how much a coupling is off, the largest [rad]; 0 without couplings.
-        angle_rate: how fast that changes, the largest [rad/s].
+        angle: largest violation of a coupling [rad]; 0 without couplings.
+        angle_rate: largest rate of such a violation [rad/s].
     """
 
     position: RealScalarLike
@@ -76,13 +77,13 @@ class Violation(NamedTuple):
 
 
 class RedundantMotion(NamedTuple):
-    """How a redundant walker moves at a state, leaves shaped as the state's.
+    """Motion of a redundant walker at a state, leaves shaped as the state's.
 
     Attributes:
-        accelerations: of the coordinates in the state's order [m/s², rad/s², 1/s²].
-        hip_force: of the root point's hinge on the first body [N].
-        minimal: the same motion in minimal coordinates, the root point half way between where the
-            bodies on it have it.
+        accelerations: accelerations of the coordinates in the state's order [m/s², rad/s², 1/s²].
+        hip_force: force of the root point's hinge on the first body [N].
+        minimal: the same motion in minimal coordinates; the root point is midway between its
+            positions on the bodies that hang on it.
     """
 
     accelerations: list[Scalar]
@@ -103,7 +104,7 @@ def with_coordinates(state: PyTree, q: list[Scalar], v: list[Scalar]) -> BodiesS
 
 @kept_alone
 def redundant_motion(scene: RedundantScene, state: BodiesState) -> RedundantMotion:
-    """Accelerations and the reaction at the root point by the scene's method.
+    """Accelerations and the reaction at the root point, with the scene's constraint method.
 
     Args:
         scene: the walker and its constraint method.
@@ -167,7 +168,7 @@ def _(scene: RedundantScene) -> VectorField:
 
 @kept_alone
 def violation(scene: RedundantScene, state: BodiesState) -> Violation:
-    """How far hinges are open and couplings are off, and how fast that changes.
+    """Violations of hinges and couplings, and their rates of change.
 
     Args:
         scene: the walker and its constraint method.

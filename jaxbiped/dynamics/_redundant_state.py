@@ -116,15 +116,15 @@ def _(scene: RedundantScene) -> type[BodiesState]:
 
 @kept_alone
 def redundant_state(scene: RedundantScene, state: MinimalState) -> BodiesState:
-    """The consistent state of a redundant scene that is the same as a minimal one.
+    """The consistent state of a redundant scene that is equivalent to a minimal state.
 
     Args:
-        scene: says how orientations are written.
-        state: of the minimal scene's kind, leaves of any batch shape.
+        scene: the redundant scene, which determines how orientations are written.
+        state: state of the minimal scene, leaves of any batch shape.
 
     Returns:
-        Of the scene's kind: for `Walker` a `RedundantState`, or an `EulerState` where the scene has
-        Euler parameters.
+        A state of the scene's kind: for `Walker` a `RedundantState`, or an `EulerState` if the
+        scene has Euler parameters.
     """
     mechanism = scene.mechanism
     structure, motion = mechanism.structure, motion_in(scene, state)
@@ -143,18 +143,18 @@ def redundant_state(scene: RedundantScene, state: MinimalState) -> BodiesState:
 
 
 def minimal_state(scene: AbstractWalkerScene, state: CompliantState) -> MinimalState:
-    """The minimal state that a redundant one stands for.
+    """The minimal state that is equivalent to a redundant state.
 
-    The root point is half way between where the bodies that hang on it have it. A minimal state is
+    The root point is midway between its positions on the bodies that hang on it. A minimal state is
     returned as it is.
 
     Args:
-        scene: says how orientations are written.
+        scene: the redundant scene, which determines how orientations are written.
         state: redundant or minimal, leaves of any common shape, SI units.
 
     Returns:
-        Of the minimal scene's kind: for `Walker` a `State`, or a `BristleState` where there are
-        bristles.
+        A state of the minimal scene's kind: for `Walker` a `State`, or a `BristleState` if there
+        are bristles.
     """
     return _minimal_state(scene, state) if is_redundant(state) else state
 

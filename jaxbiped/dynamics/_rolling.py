@@ -103,15 +103,15 @@ def rolling_rates(scene: RigidScene, state: Any) -> tuple[Scalar, ...]:
 def rolling(scene: RigidScene, state: Any) -> Any:
     """Accelerations and the ground's reaction at a state; leaves shaped as the state's.
 
-    The reaction is what the accelerations of all masses leave of the weight.
+    The reaction follows from the weight and the accelerations of all masses.
 
     Args:
         scene: the rigid walker.
         state: of the scene's kind, leaves of any common shape, SI units.
 
     Returns:
-        Accelerations `alpha_BODY` [rad/s²] of the bodies that the state has, and `force` on the
-        stance foot [N], a `FootForce`; for `Walker` a `RollingMotion`.
+        Accelerations `alpha_BODY` [rad/s²] of the bodies in the state, and `force` on the stance
+        foot [N], a `FootForce`; a `RollingMotion` for `Walker`.
     """
 
     def motion(stance: Stance) -> Any:

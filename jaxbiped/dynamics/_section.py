@@ -1,4 +1,4 @@
-"""Poincaré sections: where an orbit is looked at, once a cycle."""
+"""Poincaré sections: surfaces at which an orbit is observed, once per cycle."""
 
 import abc
 from collections.abc import Callable
@@ -26,14 +26,14 @@ from jaxbiped.scene._state_types import SomeState
 class AbstractSection(eqx.Module):
     """A surface that the orbit crosses: a function of the state rises through zero.
 
-    Of a mirrored mechanism it is looked at with the names as they are and exchanged, so that no
+    For a mirrored mechanism, it is evaluated with the names as they are and exchanged, so no
     arrival depends on which side is called the first.
 
     Attributes:
-        alternates: whether each arrival is another leg's than the one before, the first one another
-            than that which stands alone at the start.
-        names_legs: whether the mechanism's stance leg stands after an arrival, which names the
-            legs.
+        alternates: whether each arrival is of another leg than the arrival before, and the first
+            arrival of another leg than the one that stands alone at the start.
+        names_legs: whether the mechanism's stance leg stands after an arrival, which determines the
+            names of the legs.
     """
 
     alternates: ClassVar[bool] = False

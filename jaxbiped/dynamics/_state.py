@@ -82,7 +82,8 @@ def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTre
     """`state` with every leaf a floating-point array of one shape.
 
     Raises:
-        ArgumentError: not a `kind`, an entry that is not finite, or leaves of different shapes.
+        ArgumentError: this is not a `kind`, an entry is not finite, or leaves have different
+            shapes.
     """
     fields, given = getattr(kind, "_fields", ()), getattr(state, "_fields", ())
     if given and not isinstance(state, kind) and kind.__qualname__ != kind.__name__:
@@ -97,10 +98,10 @@ def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTre
 def check_leaves(state: SomeState, name: str) -> SomeState:
     """`state` with every leaf a floating-point array of one shape.
 
-    None stays where a kind of state has it.
+    Leaves that are None in a kind of state stay None.
 
     Raises:
-        ArgumentError: an entry that is not finite, or leaves of different shapes.
+        ArgumentError: an entry is not finite, or leaves have different shapes.
     """
     left_out = [name for name, default in state._field_defaults.items() if default is None]
     given = {
@@ -129,11 +130,11 @@ def _(scene: Scene) -> type[Any]:
 
 
 def state_for(scene: AbstractWalkerScene, state: PyTree, name: str = "state") -> PyTree:
-    """A checked start of the type that a scene needs: bristles are straight unless given.
+    """A checked start of the type that a scene needs. Default of bristles: straight.
 
     Raises:
-        ArgumentError: not a state, bristles where the scene has none, an entry that is not finite,
-            or leaves of different shapes.
+        ArgumentError: this is not a state, it has bristles but the scene has none, an entry is not
+            finite, or leaves have different shapes.
     """
     kind: Any = state_type(scene)
     given = getattr(state, "_fields", ())
@@ -157,14 +158,14 @@ def _(scene: RigidScene) -> type[Any]:
 
 @kept_alone
 def whole_state(scene: AbstractWalkerScene, state: Any) -> Any:
-    """The same motion in the compliant walker's coordinates, its stance foot just touching.
+    """The same motion in the compliant walker's coordinates, with the stance foot just touching.
 
     Args:
         scene: the walker, of any kind.
-        state: a rigid walker's, leaves of any common shape, SI units.
+        state: state of a rigid walker, leaves of any common shape, SI units.
 
     Returns:
-        For `Walker` a `State`, leaves shaped as the state's.
+        A state of the compliant walker (a `State` for `Walker`), leaves shaped as the state's.
     """
     z, vx, vz = of_stance(scene, state, lambda stance: stance.root[1:4])
     structure = scene.mechanism.structure
@@ -174,10 +175,11 @@ def whole_state(scene: AbstractWalkerScene, state: Any) -> Any:
 
 
 def rigid_state(state: Any) -> Any:
-    """The part of a compliant walker's state that the rigid one keeps.
+    """The part of a compliant walker's state that a rigid walker's state has.
 
     Args:
-        state: the second of each pair standing, leaves of any common shape, SI units.
+        state: state in which the second of each mirrored pair stands, leaves of any common shape,
+            SI units.
 
     Returns:
         Place of the root point, angles and rates, leaves shaped as the state's.

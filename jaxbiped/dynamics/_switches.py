@@ -19,17 +19,15 @@ class Switch(NamedTuple):
 
     Attributes:
         value: a function of the state that is zero on the surface, positive on one side.
-        live: whether the field jumps there at all near this state (boolean): friction has no
-            corner under a foot that carries nothing.
-        force_jumps: whether the field itself jumps, not its Jacobian alone. Known before
-            anything runs.
-        corner: whether the force is there on both sides and only its slope jumps, as where
-            friction peaks: a touch of it changes no derivative. Known before anything runs.
-        resets: whether the state itself jumps, and only where the value falls through zero. Known
-            before anything runs.
-        first_only: whether of motions across it first derivatives alone are followed: the force
-            jumps there, or is infinitely steep. Second ones are differences. Known before
-            anything runs.
+        live: whether the field jumps at the surface near this state (boolean): friction has no
+            corner under a foot without load.
+        force_jumps: whether the field itself jumps, and not only its Jacobian. Static.
+        corner: whether a force acts on both sides and only its slope jumps, as at the peak of
+            friction: touching the surface changes no derivative. Static.
+        resets: whether the state itself jumps, and only when the value falls through zero. Static.
+        first_only: whether only first derivatives of motions across the surface are computed,
+            because the force jumps there or is infinitely steep; second derivatives are finite
+            differences. Static, like all fields marked so: known before anything runs.
     """
 
     value: Scalar
@@ -41,10 +39,11 @@ class Switch(NamedTuple):
 
 
 def switches(scene: CompliantScene, state: CompliantState) -> tuple[Switch, ...]:
-    """Every switch of a scene: those of its feet and those of its stops.
+    """All switches of a scene: those of its feet and those of its stops.
 
-    Of a foot: touchdown, reaction leaving zero, slip at ±v0 and 0, clearance rule. Of a stop: its
-    limits, and its torque leaving zero. Springs and latches are smooth.
+    A foot has switches at touchdown, where its reaction leaves zero, at slip speeds of ±v0 and 0,
+    and for the clearance rule. A stop has switches at its limits, and where its torque leaves zero.
+    Springs and latches are smooth.
 
     Source: the seed paper, section 2.2, whose laws have these corners.
 
@@ -53,7 +52,7 @@ def switches(scene: CompliantScene, state: CompliantState) -> tuple[Switch, ...]
         state: scalar leaves, SI units.
 
     Returns:
-        The switches of each foot, then those of each stop; as many at every state of a scene.
+        The switches of each foot, then those of each stop; their number depends only on the scene.
     """
     structure, legs = scene.mechanism.structure, legs_at(scene, state)
     found: list[Switch] = []

@@ -12,14 +12,14 @@ from jaxbiped.scene._structure import Structure
 
 
 def exchange_legs(scene: AbstractWalkerScene, state: SomeState, times: int = 1) -> SomeState:
-    """The same motion with the names of mirror images exchanged; of a state of any kind.
+    """The same motion with the names of mirror images exchanged, for a state of any kind.
 
-    Of a mechanism with a turn, whose next foot is called as the one before.
+    For a mechanism with a turn, the next foot takes the name of the one before.
 
     Args:
-        scene: whose mechanism has a mirror or a turn; without one nothing is exchanged.
+        scene: a scene whose mechanism has a mirror or a turn; otherwise nothing is exchanged.
         state: leaves of any common shape, SI units.
-        times: how often; −1 undoes an exchange.
+        times: number of exchanges; −1 undoes an exchange.
 
     Returns:
         A state of the same kind.

@@ -119,7 +119,7 @@ def find_gait(
         issued if the gait grazes a switch, so that derivatives are undefined.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
 
     Examples:
         >>> import jaxbiped as jb

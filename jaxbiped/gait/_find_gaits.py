@@ -56,7 +56,7 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
         The distinct gaits, and which of them each of the n searches found.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
     """
     scene = check_scene(scene, Scene, RigidScene)
     shapes = {jnp.shape(leaf) for leaf in jtu.tree_leaves(starts)}

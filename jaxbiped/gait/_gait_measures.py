@@ -50,7 +50,7 @@ def gait_measures(
         The gait's measures, scalars in SI units.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
         RuntimeError: reverse mode is used with `Forward()`.
         TypeError: forward mode is used with `Reverse()`.
     """

@@ -79,7 +79,7 @@ def return_map(
         an arrival. Leaves have the shape of the start's.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
         RuntimeError: reverse mode is used with `Forward()`.
         TypeError: forward mode is used with `Reverse()`.
     """
@@ -166,7 +166,7 @@ def linearise_return_map(
         respect to a parameter are in units of its size.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
     """
     if system is None:
         check_type("args", args, Scene, RigidScene)

@@ -111,13 +111,13 @@ def return_map_spec(
 
     Args:
         args: the scene, or the parameters of another `system`.
-        state: on its orbits; of a redundant scene minimal, unless its returns are to be told in
-            coordinates of each leg.
-        section: the scene's own unless given.
-        solver: by name, as it is, or the usual one.
+        state: state on its orbits; minimal for a redundant scene, unless its returns are to be in
+            the coordinates of each leg.
+        section: section of the returns. Default: the scene's own.
+        solver: name of the solver, the solver itself, or None for the usual one.
         engine: one of `ENGINES`.
-        system: the user's own, where it is: nobody knows if lanes can express it.
-        steps, max_time, max_solver_steps: of the spec; `max_time` is a walker's unless given.
+        system: a user's own system, if any; it is not known whether lanes can express it.
+        steps, max_time, max_solver_steps: as in the spec. Default of `max_time`: a walker's.
 
     Raises:
         ArgumentError: a section, solver or engine that is unknown or cannot do this.
@@ -152,10 +152,10 @@ def return_map_spec(
 
 
 def arrivals_of(args: PyTree, footsteps: int | None) -> int:
-    """Arrivals at the section in so many footsteps, those of one cycle unless given.
+    """Number of arrivals at the section in this many footsteps. Default: those of one cycle.
 
     Raises:
-        ArgumentError: what is no number of whole cycles.
+        ArgumentError: the number is not one of whole cycles.
     """
     own = each = 1
     if isinstance(args, AbstractWalkerScene):

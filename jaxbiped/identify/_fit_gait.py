@@ -60,7 +60,7 @@ def fit_gait(
         large in fewer than 1 of 1,000 cases.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
 
     Examples:
         >>> import jaxbiped as jb

@@ -23,37 +23,39 @@ _ANGLE = re.compile(r"(theta_\w+)_rad")
 
 
 def read_measured(path: str | Path, scene: AbstractScene | None = None) -> list[MeasuredGait]:
-    """Reads measured gaits from a file of JSON, or from a CSV table whose header names units.
+    """Reads measured gaits from a JSON file, or from a CSV table whose header names units.
 
     A JSON file holds `{"gaits": [{"conditions": {"slope": 0.02}, "period_s": [0.441, 0.001],
     "step_length_m": …, "speed_m_s": …, "peak_normal_N": …, "angles": {"times_s": […],
     "theta_1_rad": […], "theta_2_rad": […], "deviation_rad": 0.001, "since": "mid-stance"},
-    "footsteps": 1}, …]}`, the angle of a body NAME as "theta_NAME_rad": of each measure its value
-    and its standard deviation; what was not measured is left out, single angles are null.
+    "footsteps": 1}, …]}`. Each measure has its value and its standard deviation, and the angle of a
+    body NAME is "theta_NAME_rad". Leave out what was not measured; a single missing angle is null.
 
-    A CSV file (`.csv`) has a row for each gait: measures, each with its standard deviation behind
-    `_error`, and conditions by the names of parameters. Units stand in the header, s, ms, m, cm,
-    mm, rad, deg, mrad, N and kN among them; lines that begin with # are skipped::
+    A CSV file (`.csv`) has a row for each gait. Its columns are measures, their standard deviations
+    under the same name with `_error`, and conditions under the names of parameters. The header
+    gives units, among them s, ms, m, cm, mm, rad, deg, mrad, N and kN. Lines that begin with # are
+    skipped::
 
         slope [deg],period [ms],period_error [ms],step_length [cm],step_length_error [cm]
         1.15,441.5,1,18.0,0.2
 
-    Angles have a row for each time: `time`, angles as `theta_BODY`, and `angle_error`, the standard
-    deviation of them all, once; `since` and `footsteps` are columns without units. What is the
-    same for the whole gait may be given once, in any row. Rows of several such gaits are told apart
-    by a column `gait`. An empty cell was not measured.
+    Angles have a row for each time, with the columns `time` and `theta_BODY` for each body, and
+    `angle_error` for the standard deviation of all angles. `since` and `footsteps` are columns
+    without units. A value that is the same for the whole gait may be given once, in any row. If
+    there are several such gaits, a column `gait` distinguishes their rows. An empty cell means "not
+    measured".
 
     Args:
-        path: of the file.
-        scene: the walker, whose parameters' units those of conditions in a CSV file are compared
-            with; not compared if omitted.
+        path: path of the file.
+        scene: the walker. The units of conditions in a CSV file are compared with those of its
+            parameters; if it is omitted, they are not compared.
 
     Returns:
         The gaits, in the file's order.
 
     Raises:
-        ArgumentError: a file that cannot be read, that is no JSON, or that holds something else;
-            in a table a column without its unit, or a cell that is not a number.
+        ArgumentError: the file cannot be read, is not JSON, or holds something else; in a table, a
+            column has no unit, or a cell is not a number.
     """
     if Path(path).suffix.lower() == ".csv":
         return _gaits_of_table(read_text("file", path), scene)

@@ -15,11 +15,11 @@ class Model(NamedTuple):
     """A published walker.
 
     Attributes:
-        words: what it is, and after whom.
-        make: its function in `jaxbiped.models`; without arguments, the paper's scene.
-        starts: by names of gaits, arguments of `scene.state` for a state near each: angles [rad],
-            rates, and what is held or stands.
-        rigid: whether its scene is a `RigidScene`; else it is a `Scene`.
+        words: description and source.
+        make: its function in `jaxbiped.models`; without arguments, it returns the paper's scene.
+        starts: arguments of `scene.state` for a state near each gait, by the gait's name: angles
+            [rad], rates, held parts and standing feet.
+        rigid: whether its scene is a `RigidScene`; otherwise it is a `Scene`.
     """
 
     words: str

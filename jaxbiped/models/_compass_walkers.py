@@ -15,24 +15,24 @@ _TWO_DEGREES, _THREE_DEGREES = math.radians(2.0), math.radians(3.0)
 def goswami(
     slope: "Parameter" = _THREE_DEGREES, *, mu: "Parameter" = 2.0, beta: "Parameter" = 1.0
 ) -> "jb.RigidScene":
-    """The compass gait: point masses on the legs and at the hip, point feet; 20 kg on legs of 1 m.
+    """The compass gait: point masses on the legs and at the hip, point feet; 20 kg, legs of 1 m.
 
-    The paper's angles are from the vertical: its θ_s is `theta_2` less the slope, its θ_ns is
-    `theta_1` less the slope. It prints no gravity; its numbers are those of 9.8 m/s².
+    The paper measures angles from the vertical: its θ_s is `theta_2` minus the slope, its θ_ns is
+    `theta_1` minus the slope. It does not state g; its numbers agree with 9.8 m/s².
 
     Source: Goswami, Thuilot and Espiau 1998, A study of the passive gait of a compass-like biped
     robot: symmetry and chaos, International Journal of Robotics Research 17, 1282.
 
     Args:
         slope: slope of the ground [rad]; doublings of the period begin near 4.4 degrees.
-        mu: mass at the hip, by that of a leg, above 0 [–].
-        beta: b/a, from the hip to a leg's mass by from there to the foot [–].
+        mu: mass at the hip divided by the mass of a leg, above 0 [–].
+        beta: b/a, the distance of a leg's mass from the hip divided by that from the foot [–].
 
     Returns:
         The walker on rigid feet.
 
     Raises:
-        ArgumentError: a number that is not allowed.
+        ArgumentError: a number is not allowed.
     """
     check_positive("mu", mu)
     check_positive("beta", beta)
@@ -44,24 +44,24 @@ def goswami(
 
 
 def bhounsule(slope: "Parameter | None" = None, *, round_feet: bool = False) -> "jb.RigidScene":
-    """The walkers of the public program passivewalker.m, with point feet or with round ones.
+    """The walkers of the public program passivewalker.m, with point feet or round feet.
 
-    Dimensionless: legs from the hip to the centre of a foot and gravity are 1. Angles are the
-    program's, from the slope's normal: its q1 is `theta_2`, its q2 is `theta_2` less `theta_1`.
+    Dimensionless: the legs' length from the hip to the centre of a foot and gravity are 1. The
+    program measures angles from the slope's normal: q1 is `theta_2`, q2 is `theta_2` − `theta_1`.
 
     Source: Bhounsule 2009, passivewalker.m.
 
     Args:
-        slope: gam of the program [rad]; None for its own, 0.009 with point feet and 0.01 with
-            round ones.
-        round_feet: feet of radius 0.2 and legs with a mass of 0.5 at half their length, for a hip
-            of mass 1; else points, with all of a leg's mass, a thousandth of the hip's.
+        slope: gam of the program [rad]. Default: its own value, 0.009 with point feet and 0.01
+            with round feet.
+        round_feet: True: feet of radius 0.2, and legs with a mass of 0.5 at half their length, for
+            a hip of mass 1. False: point feet that have a leg's whole mass, 0.001 of the hip's.
 
     Returns:
         The walker on rigid feet.
 
     Raises:
-        ArgumentError: a slope that is not allowed.
+        ArgumentError: the slope is not allowed.
     """
     if round_feet:
         walker = jb.Walker(m=0.5, J=0.02, l=1.2, d=0.5, r=0.2, hip_mass=1.0)
@@ -77,10 +77,10 @@ def wisse(
     torso_mass: "Parameter" = 3.0,
     torso_height: "Parameter" = 0.3,
 ) -> "jb.RigidScene":
-    """A compass walker with a torso, which bisects the angle between its legs.
+    """A compass walker with a torso that bisects the angle between its legs.
 
-    The mechanism is the paper's, a kinematic coupling at the hip; the numbers are not: the legs are
-    those of `goswami`, and the hip and the torso have 10 kg together.
+    The mechanism, a kinematic coupling at the hip, is the paper's. The numbers are not: the legs
+    are those of `goswami`, and the hip and the torso together have 10 kg.
 
     Source: Wisse, Schwab and van der Helm 2004, Passive dynamic walking model with upper body,
     Robotica 22, 681.
@@ -88,13 +88,13 @@ def wisse(
     Args:
         slope: slope of the ground [rad].
         torso_mass: mass of the torso [kg].
-        torso_height: height of its point mass above the hip [m].
+        torso_height: height of the torso's point mass above the hip [m].
 
     Returns:
         The walker on rigid feet.
 
     Raises:
-        ArgumentError: a number that is not allowed.
+        ArgumentError: a number is not allowed.
     """
     check_within("torso_mass", torso_mass, 0.0, 10.0, open_below=True)
     check_finite("torso_height", torso_height)

@@ -9,26 +9,27 @@ if TYPE_CHECKING:
 
 
 def mcgeer(slope: "Parameter | None" = None, *, knees: bool = False) -> "jb.RigidScene | jb.Scene":
-    """McGeer's walkers: straight legs on rigid round feet, or legs with knees on compliant ones.
+    """McGeer's walkers: straight legs on rigid round feet, or legs with knees on compliant feet.
 
-    Straight legs are dimensionless: a leg's mass and length and gravity are 1. The paper gives the
-    height of a leg's mass centre above the sole, 0.63, and its radius of gyration, 0.32; feet have
-    a radius of 0.3. With knees the proportions are those of a leg of 0.4 m and of 2 kg in all,
-    in SI units, because the feet have the laws of contact of `seed_scene`; stops at the knees begin
-    at 0.2 rad. Angles are the papers', from the slope's normal.
+    The walker with straight legs is dimensionless: a leg's mass and length and gravity are 1. From
+    the paper come the height of a leg's mass centre above the sole, 0.63, and its radius of
+    gyration, 0.32; the feet have a radius of 0.3. The walker with knees has SI units, because its
+    feet have the laws of contact of `seed_scene`: its proportions are scaled to legs of 0.4 m and
+    a mass of 2 kg. Stops at the knees begin at 0.2 rad. Angles are the papers', from the slope's
+    normal.
 
     Source: McGeer 1990, Passive dynamic walking, International Journal of Robotics Research 9, 62;
     McGeer 1990, Passive walking with knees, IEEE Conference on Robotics and Automation, 1640.
 
     Args:
-        slope: slope of the ground [rad]; None for 0.03, and for the paper's 0.0456 with knees.
-        knees: thighs and shanks with stops between them, instead of straight legs.
+        slope: slope of the ground [rad]. Default: 0.03, or the paper's 0.0456 with knees.
+        knees: whether legs are thighs and shanks with stops between them.
 
     Returns:
-        The walker, as a `RigidScene` with straight legs and as a `Scene` with knees.
+        The walker, a `RigidScene` with straight legs and a `Scene` with knees.
 
     Raises:
-        ArgumentError: a slope that is not allowed.
+        ArgumentError: the slope is not allowed.
     """
     if knees:
         seed = jb.seed_scene(slope=0.0456 if slope is None else slope)

@@ -1,7 +1,6 @@
 """The simplest walker: a mass on massless legs, going down a slope or pushing off on level ground.
 
-Scenes are made by public names alone, so that whoever only asks for a walker's name does not wait
-for JAX.
+Scenes are made with public names alone, so that a look at the walkers' names does not load JAX.
 """
 
 from typing import TYPE_CHECKING
@@ -16,10 +15,10 @@ _FOOT_MASS = 1e-13
 
 
 def garcia(slope: "Parameter" = 0.009) -> "jb.RigidScene":
-    """The simplest walking model: a mass at the hip, point feet, legs without mass.
+    """The simplest walking model: a mass at the hip, point feet, massless legs.
 
-    Dimensionless: the hip's mass, the legs' length and gravity are 1, and the slope is all there is
-    to choose. Angles are the paper's, from the slope's normal: θ is `theta_2`, φ is `theta_2` less
+    Dimensionless: the hip's mass, the legs' length and gravity are 1, and the slope is the only
+    parameter. Angles are the paper's, from the slope's normal: θ is `theta_2`, φ is `theta_2` minus
     `theta_1`.
 
     Source: Garcia, Chatterjee, Ruina and Coleman 1998, The simplest walking model: stability,
@@ -32,7 +31,7 @@ def garcia(slope: "Parameter" = 0.009) -> "jb.RigidScene":
         The walker on rigid feet.
 
     Raises:
-        ArgumentError: a slope that is not allowed.
+        ArgumentError: the slope is not allowed.
     """
     walker = jb.Walker(m=_FOOT_MASS, J=0.0, l=1.0, d=1.0, r=0.0, hip_mass=1.0)
     return jb.RigidScene(walker, jb.Ground(slope=slope, g=1.0))
@@ -41,8 +40,8 @@ def garcia(slope: "Parameter" = 0.009) -> "jb.RigidScene":
 def kuo(impulse: "Parameter" = 0.04, slope: "Parameter" = 0.0) -> "jb.RigidScene":
     """The simplest walking model on level ground, pushed off along its trailing leg.
 
-    Dimensionless as `garcia`. The push comes just before the foot ahead strikes; the spring at the
-    hip, by which the paper chooses speed and step length apart, is left out.
+    Dimensionless like `garcia`. The push-off occurs just before the front foot strikes. The hip
+    spring, with which the paper sets speed and step length independently, is left out.
 
     Source: Kuo 2002, Energetics of actively powered locomotion using the simplest walking model,
     Journal of Biomechanical Engineering 124, 113.
@@ -55,7 +54,7 @@ def kuo(impulse: "Parameter" = 0.04, slope: "Parameter" = 0.0) -> "jb.RigidScene
         The walker on rigid feet.
 
     Raises:
-        ArgumentError: a number that is not allowed.
+        ArgumentError: a number is not allowed.
     """
     passive = garcia(slope)
     return jb.RigidScene(passive.walker, passive.ground, (jb.actuation.PushOff(impulse),))

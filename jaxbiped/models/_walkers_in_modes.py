@@ -1,4 +1,4 @@
-"""Walkers whose feet or stops change what holds them: knees that lock, a wheel without a rim."""
+"""Walkers with changing modes of their feet or stops: knees that lock, a wheel without a rim."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -13,9 +13,10 @@ if TYPE_CHECKING:
 def hsu_chen(slope: "Parameter" = 0.0504) -> "jb.RigidScene":
     """A walker with knees and point feet: point masses on thighs, shanks and hip; legs of 1 m.
 
-    A knee locks where it is straight and stays so until its leg has struck and stood. The paper's
-    angles are from the vertical: its q1 is `theta_thigh_2` less the slope, q2 and q3 are
-    `theta_thigh_1` and `theta_shank_1` less the slope. It prints no gravity; 9.81 m/s² is taken.
+    A knee locks when it is straight, and stays locked until its leg has struck and stood. The
+    paper measures angles from the vertical: its q1 is `theta_thigh_2` minus the slope, its q2 and
+    q3 are `theta_thigh_1` and `theta_shank_1` minus the slope. It does not state g; here g is
+    9.81 m/s².
 
     Source: Hsu Chen 2007, Passive dynamic walking with knees: a point foot model, thesis, MIT.
 
@@ -26,7 +27,7 @@ def hsu_chen(slope: "Parameter" = 0.0504) -> "jb.RigidScene":
         The walker on rigid feet.
 
     Raises:
-        ArgumentError: a slope that is not allowed.
+        ArgumentError: the slope is not allowed.
     """
     walker = jb.Kneed(
         m_thigh=0.5,
@@ -49,25 +50,25 @@ def hsu_chen(slope: "Parameter" = 0.0504) -> "jb.RigidScene":
 def rimless_wheel(
     slope: "Parameter" = 0.08, *, spokes: int = 8, inertia: "Parameter" = 0.5
 ) -> "jb.RigidScene":
-    """A wheel without a rim, which rolls from spoke to spoke: a mass of 1, spokes of 1, gravity 1.
+    """A wheel without a rim that rolls from spoke to spoke; mass, spoke length and gravity are 1.
 
-    With the angle 2α between spokes, the rate ω behind an impact is η ω before it,
-    η = (inertia + cos 2α)/(inertia + 1), and the multiplier of its gait is η².
+    With the angle 2α between spokes, an impact multiplies the rate ω by
+    η = (inertia + cos 2α)/(inertia + 1), and the multiplier of the gait is η².
 
     Source: McGeer 1990, Passive dynamic walking; Coleman, Chatterjee and Ruina 1997, Motions of a
     rimless spoked wheel: a simple three-dimensional system with impacts.
 
     Args:
         slope: slope of the ground [rad].
-        spokes: how many spokes.
-        inertia: moment of inertia about the hub, above 0 [of the mass times the spokes' length
-            squared].
+        spokes: number of spokes.
+        inertia: moment of inertia about the hub, above 0 [in units of the mass times the squared
+            length of a spoke].
 
     Returns:
         The wheel on rigid feet.
 
     Raises:
-        ArgumentError: a number that is not allowed.
+        ArgumentError: a number is not allowed.
     """
     check_at_least("spokes", spokes, "3", 3)
     check_positive("inertia", inertia)

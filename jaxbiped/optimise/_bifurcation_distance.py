@@ -103,8 +103,8 @@ def bifurcation_distance(
         looser. The `outcome` reports whether there is a bifurcation.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled; a parameter
-            other than the slope that is zero, which no factor changes.
+        ArgumentError: an argument is not allowed, or a parameter other than the slope is zero,
+            which no factor changes; raised before anything is compiled.
     """
     check_choice("kind", kind, KINDS)
     check_choice("along", along, parameter_names(scene))

@@ -61,7 +61,7 @@ def variables_of(scene: Scene | RigidScene, vary: Mapping[str, tuple[float, floa
     """The variables that a mapping from names to bounds describes.
 
     Raises:
-        ArgumentError: no variable, an unknown one, or bounds that are empty or not allowed.
+        ArgumentError: there is no variable, one is unknown, or bounds are empty or not allowed.
     """
     if not isinstance(vary, Mapping) or not vary:
         raise ArgumentError(

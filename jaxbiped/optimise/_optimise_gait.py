@@ -267,7 +267,7 @@ def pareto_front(
         The front.
 
     Raises:
-        ArgumentError: an argument that is not allowed.
+        ArgumentError: an argument is not allowed.
     """
     check_objective(against, scene, "against")
     values = np.asarray(bounds, dtype=float)

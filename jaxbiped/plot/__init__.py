@@ -1,11 +1,10 @@
 """Figures and animation of simulated walks. This is their one import path.
 
-The figures of a motion take the scene and a trajectory that was saved step by step; those of a
-periodic gait take the gait; those of a law of contact take the law; those of basins take labels,
-refined boundaries or fractions; that of constraint methods takes runs; those of
-branches take branches and curves of bifurcations; those of a fit and of an optimisation take
-their results. Each draws into the axes or the figure it is given (or a new one) and returns the
-figure. None touches pyplot, so all work without a display.
+Figures of a motion take the scene and a trajectory that was saved step by step. Figures of a gait,
+a law of contact, a branch, a curve of bifurcations, a fit or an optimisation take that object.
+Figures of basins take labels, refined boundaries or fractions, and the figure of constraint methods
+takes runs. Each function draws into the given axes or figure, or into a new figure, and returns the
+figure. None of them uses pyplot, so they all work without a display.
 
 `figure_style("paper")` makes figures as wide as one column of a paper, or two; `save_figure` writes
 them as PNG, PDF and SVG with their fonts.

@@ -50,7 +50,7 @@ def animate(
         The animation, a matplotlib object.
 
     Raises:
-        ValueError: the trajectory was not saved step by step, or a number not above 0.
+        ValueError: the trajectory was not saved step by step, or a number is not above 0.
     """
     check_scene_of(trajectory, scene)
     check_positive("frames_per_second", frames_per_second)
@@ -81,7 +81,7 @@ def save_animation(animation: FuncAnimation, path: str | Path) -> Path:
         The path.
 
     Raises:
-        ArgumentError: a path where no file can be written.
+        ArgumentError: no file can be written at the path.
     """
     where = check_writable_file("path", path)
     animation.save(str(where), writer="pillow")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
 _PENDING = "////"
-"""Over what is pending, so that it reads as missing in print without colour too."""
+"""Hatch over pending starts, which shows them as missing in print without colour."""
 _PATTERNS = ("#102A40", "#A0A0A0")
 """Colours of patterns over walking and pending."""
 _ASIDE = 2.2
@@ -50,19 +50,19 @@ def basin(
 
     Args:
         labels: codes of `Label` or names (`label_names`), shape (ny, nx); row by row along y. Or a
-            labelled array, which is drawn along the axes that `names` or `x` and `y` name, its
-            first one along x unless they do; or the dataset of a `sweep`, which needs no more.
+            labelled array, which is drawn along the axes named by `names` or `x` and `y` (default:
+            its first axis along x). Or the dataset of a `sweep`, which needs no further arguments.
         x, y: coordinates along the two axes, increasing: centres, shape (nx,) and (ny,), or edges
-            of the cells, one more. Those of a labelled array unless given.
-        names, units: what the axes are, as ("angle of the stance leg", …) and ("rad", …). A
-            coordinate's or a parameter's own name, as "theta_swing", says it all by itself; so
-            does a `jaxbiped.laws.Quantity`, as those of `jaxbiped.starts.coordinate_quantities`.
-        cycle_footsteps: footsteps in the cycle of the gait that each start walks to, a shape that
-            broadcasts to (ny, nx); only for codes. Unless given, it is not said.
-        gait: which gait that is, from 0, to tell apart those of cycles alike; only for codes.
-        mark: where the gait is, in the units of the axes; of a `sweep`'s dataset the gaits that it
-            knows are marked unless this is given: along an axis that is a parameter as a curve, and
-            projected where a gait lies off the slice.
+            of the cells, one more. Default: the coordinates of a labelled array.
+        names, units: words and units of the axes, such as ("angle of the stance leg", …) and
+            ("rad", …). The name of a coordinate or parameter, such as "theta_swing", needs no unit;
+            nor does a `jaxbiped.laws.Quantity` (see `jaxbiped.starts.coordinate_quantities`).
+        cycle_footsteps: number of footsteps in the cycle of the gait that each start walks to, a
+            shape that broadcasts to (ny, nx); only for codes. Default: not shown.
+        gait: number of that gait, from 0, which distinguishes gaits with equally long cycles; only
+            for codes.
+        mark: position of the gait, in the units of the axes. Default: the gaits in the dataset of a
+            `sweep`, as curves if an axis is a parameter, and projected if they are off the slice.
         title: title above the axes.
         ax: axes to draw into. Default: a new figure.
 
@@ -70,7 +70,7 @@ def basin(
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ArgumentError: shapes that do not fit, an empty grid, coordinates that do not increase.
+        ArgumentError: shapes do not fit, the grid is empty, or coordinates do not increase.
     """
     data: Any = labels if hasattr(labels, "data_vars") else None
     marks = [] if mark is None else [GaitMark.at(mark)]
@@ -110,24 +110,24 @@ def refined_basin(
 ) -> Figure:
     """Draws the labels about a refined boundary, and outlines the cells that were halved.
 
-    Fractions are those of the full grid of the finest level, its labels filled in as by
+    Fractions are those of the full grid of the finest level, with labels filled in as by
     `RefinedBoundary.on_grid`.
 
     Args:
-        boundary: of two dimensions; x is the first.
-        names, units: what the axes are, and in which units (see `basin`).
-        codes: names of the label codes; those of `Label` unless given.
-        cells: whether to outline the boundary cells of every level but the finest, which
-            are those that were halved.
-        mark: place of the gait, in the units of the axes.
-        title: above the axes; how many labels were asked for unless given.
+        boundary: a boundary in two dimensions; x is the first.
+        names, units: words and units of the axes (see `basin`).
+        codes: names of the label codes. Default: those of `Label`.
+        cells: whether to outline the boundary cells of all levels except the finest; these cells
+            were halved.
+        mark: position of the gait, in the units of the axes.
+        title: title above the axes. Default: the number of labels that were computed.
         ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ArgumentError: not a refined boundary of two dimensions, or a code without a name.
+        ArgumentError: this is not a refined boundary of two dimensions, or a code has no name.
     """
     check_type("boundary", boundary, RefinedBoundary)
     if len(boundary.shape) != 2:

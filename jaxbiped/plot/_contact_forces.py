@@ -38,9 +38,9 @@ def contact_forces(
     """Draws the forces of the ground on all feet [N] over time.
 
     Left, the whole motion; right, one heel strike in milliseconds, with double support shaded.
-    Above, the normal force; below, the tangential one, downhill positive, where there is friction.
-    Drawn so closely that straight lines are right to 1e-5 of the largest force (see
-    `sampled_forces`), so that peaks do not depend on where the solver's steps happen to end.
+    Above, the normal force; below, if there is friction, the tangential force, downhill positive.
+    The points are so dense that straight lines between them are accurate to 1e-5 of the largest
+    force (see `sampled_forces`), so peaks do not depend on where the solver's steps end.
 
     Args:
         scene: the scene that was simulated.

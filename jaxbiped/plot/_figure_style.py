@@ -18,14 +18,14 @@ FIGURE_FORMATS = ("png", "pdf", "svg")
 
 
 class FigureStyle(NamedTuple):
-    """How figures are made.
+    """Style of figures.
 
     Attributes:
-        widths: of a figure that is one column wide, and two [inches]; each figure's own if None.
+        widths: width of figures of one column and two columns [inches]; each figure's own if None.
         font: size of the letters [points].
-        dots: per inch, where a picture is made of dots.
-        titles: whether a figure of one pair of axes has a title: captions of papers say it.
-        settings: matplotlib's, besides.
+        dots: dots per inch of pictures made of dots.
+        titles: whether a figure with one pair of axes has a title; papers have captions instead.
+        settings: further settings of matplotlib.
     """
 
     widths: tuple[float, float] | None
@@ -99,7 +99,7 @@ def figure_style(style: str = "screen", *, columns: int = 1) -> Iterator[None]:
         A context; figures made in it keep its style.
 
     Raises:
-        ArgumentError: an unknown style, or another number of columns.
+        ArgumentError: the style is unknown, or the number of columns is not 1 or 2.
 
     Examples:
         >>> import jaxbiped as jb

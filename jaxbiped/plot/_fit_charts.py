@@ -38,7 +38,7 @@ def fit(fitted: GaitFit) -> Figure:
         A new figure.
 
     Raises:
-        ValueError: `fitted` is not a fit.
+        ArgumentError: `fitted` is not a `GaitFit`.
     """
     check_type("fitted", fitted, GaitFit)
     names = list(fitted.estimates)

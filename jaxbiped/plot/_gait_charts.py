@@ -82,22 +82,21 @@ def elasticities(
 ) -> Figure:
     """Draws elasticities, d log measure / d log parameter, with error bars, the largest on top.
 
-    A bar to the right means that the measure grows with the parameter. The scale is logarithmic
-    beyond 1e-4 on either side of zero; the numbers stand at the right.
+    A bar to the right means that the measure grows with the parameter. The scale is linear up to
+    1e-4 on either side of zero, and logarithmic beyond. The numbers are at the right.
 
     Args:
         gait: a gait that was found, with its sensitivities to some parameters.
         measure: one or several of "period", "step_length", "speed", "peak_normal" and
-            "spectral_radius", a panel each. Default: all
-            whose elasticities are known.
+            "spectral_radius", a panel each. Default: all with known elasticities.
         ax: axes to draw one measure into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ValueError: no gait was found, this is a batch, a measure that is not one of those, several
-            for one pair of axes, or a gait without parameters.
+        ValueError: no gait was found, this is a batch, a measure is unknown, several are given with
+            one pair of axes, or the gait has no parameters.
     """
     check_drawable(gait)
     asked = _known(gait) if measure is None else measure

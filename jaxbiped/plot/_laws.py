@@ -41,26 +41,26 @@ def normal_law(
     approach_speed: float = 0.1,
     figure: Figure | SubFigure | None = None,
 ) -> Figure:
-    """Draws a law of the normal force: against penetration, and over a drop.
+    """Draws a law of the normal force: against penetration, and during an impact.
 
-    Left, the force [N] against penetration [mm] at a few rates. Right, the loop that force and
-    penetration run through while a mass that comes in at a speed, without gravity, is thrown
-    back; the loop's area is the energy lost, and the title tells the coefficient of restitution.
+    Left, the force [N] against penetration [mm] at a few rates. Right, the loop of force and
+    penetration while a mass hits the ground and rebounds, without gravity. The area of the loop is
+    the energy lost, and the title states the coefficient of restitution.
 
     Args:
-        law: the law, its parameters plain numbers.
+        law: the law, with plain numbers as parameters.
         depth: largest penetration on the left [m].
-        rates: rates of penetration on the left [m/s]. Unless given: minus a half, none, a half
-            and one times the rate whose damping force equals the force at rest at `depth`.
-        mass: what drops [kg].
-        approach_speed: rate of penetration as it touches [m/s].
+        rates: rates of penetration on the left [m/s]. Default: −0.5, 0, 0.5 and 1 times the rate at
+            which the damping force equals the force at rest at `depth`.
+        mass: mass that hits the ground [kg].
+        approach_speed: rate of penetration at touchdown [m/s].
         figure: empty figure or subfigure to draw into. Default: a new figure.
 
     Returns:
         The figure given, or the new one.
 
     Raises:
-        ArgumentError: no normal law, or a depth, mass or approach_speed not above 0.
+        ArgumentError: this is not a normal law, or depth, mass or approach_speed is not above 0.
     """
     check_type("law", law, AbstractNormalLaw)
     check_positive("depth", depth, "m")
@@ -84,22 +84,22 @@ def friction_law(
 ) -> Figure:
     """Draws one law of friction, or several to compare: force over load [–] against slip speed.
 
-    The scale of speeds [m/s] is linear about rest and logarithmic far from it; it passes from one
-    to the other where the rise of the force from rest slackens, which is the law's own speed (the
-    lowest one of several laws).
+    The scale of slip speeds [m/s] is linear about rest and logarithmic far from it. It changes at
+    the law's own speed, at which the rise of the force from rest slackens (with several laws, at
+    the lowest of these speeds).
 
     Args:
-        laws: the laws, their parameters plain numbers.
-        fastest: where the scale of slip speeds ends [m/s]; unless given, at a thousand times the
-            highest of the laws' own speeds, at most 1 m/s.
-        load: normal force [N]; it matters only to a law that is not proportional to it.
+        laws: the laws, with plain numbers as parameters.
+        fastest: highest slip speed [m/s]. Default: a thousand times the highest of the laws' own
+            speeds, at most 1 m/s.
+        load: normal force [N]; it matters only for a law that is not proportional to it.
         ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ArgumentError: no law of friction, or a load or fastest slip not above 0.
+        ArgumentError: this is not a law of friction, or load or fastest is not above 0.
     """
     if not laws:
         raise ArgumentError("laws is empty: give a law of friction at least.")
@@ -249,21 +249,21 @@ _POINTS = 400
 def bristle_law(
     law: AbstractBristleLaw, *, slip_speed: float = 1e-4, ax: Axes | None = None
 ) -> Figure:
-    """Draws friction over load [–] against the place of a foot that slides there and back [mm].
+    """Draws friction over load [–] against the position of a foot that slides back and forth [mm].
 
-    From straight bristles (solid), then back and there again (dashed): the loop that friction with
-    a memory makes, all at one speed and under full contact.
+    The foot slides forth from straight bristles (solid), then back and forth again (dashed), at one
+    speed and in full contact: friction with a memory makes a loop.
 
     Args:
-        law: the law, its parameters plain numbers.
-        slip_speed: of the slide [m/s].
+        law: the law, with plain numbers as parameters.
+        slip_speed: speed of the slide [m/s].
         ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ArgumentError: no law with bristles, or a slip speed not above 0.
+        ArgumentError: this is not a law with bristles, or the slip speed is not above 0.
     """
     check_type("law", law, AbstractBristleLaw)
     check_positive("slip_speed", slip_speed, "m/s")

@@ -43,14 +43,14 @@ def walker(scene: AnyScene, *, ax: Axes | None = None) -> Figure:
     """Draws a scene's walker in a stride on its slope: bodies, feet, hinges and names.
 
     Args:
-        scene: compliant or rigid, in minimal or redundant coordinates.
+        scene: the scene, compliant or rigid, in minimal or redundant coordinates.
         ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ValueError: `scene` is not a scene of a walker.
+        ArgumentError: `scene` is not a scene of a walker.
     """
     check_type("scene", scene, AbstractWalkerScene)
     skeleton = skeleton_of(scene.mechanism)
@@ -79,14 +79,14 @@ def walker(scene: AnyScene, *, ax: Axes | None = None) -> Figure:
 
 
 def notebook_html(shown: object) -> str:
-    """What a notebook shows of a gait, a branch or a scene; of anything else its `repr`.
+    """HTML with which a notebook shows a gait, a branch or a scene; the `repr` of anything else.
 
     Args:
-        shown: a `Gait`, a `Branch` or a scene. Of a batch, or under a transformation of JAX, there
-            is nothing to draw.
+        shown: a `Gait`, a `Branch` or a scene. A batch, or an object under a transformation of JAX,
+            is shown without a picture.
 
     Returns:
-        HTML with a picture inside, a few ten thousand characters.
+        HTML with an embedded picture, some ten thousand characters.
     """
     leaves = jtu.tree_leaves(shown)
     if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):

@@ -46,13 +46,13 @@ def branch(
 ) -> Figure:
     """Draws a measure of the gaits on one branch or several over the parameter.
 
-    Stable gaits are solid lines, unstable ones dashed, and dotted those whose stability the
-    multipliers' errors leave open. Colours and the width of lines tell the footsteps of a cycle,
-    marks the bifurcations. The spectral radius has a band of its errors and the line of radius 1.
-    Period and step length are those of a footstep, on average over the cycle.
+    Lines are solid for stable gaits, dashed for unstable ones, and dotted if the multipliers'
+    errors leave the stability open. The colour and width of a line show the number of footsteps of
+    a cycle; marks show bifurcations. The spectral radius has a band of its errors and a line at
+    radius 1. Period and step length are averages over the footsteps of the cycle.
 
     Args:
-        branches: of one scene along one parameter.
+        branches: one or several branches of one scene along one parameter.
         measure: "period", "step_length", "speed", "peak_normal", "spectral_radius" or a component
             of the state, such as "theta_2".
         ax: axes to draw into. Default: a new figure.
@@ -61,7 +61,8 @@ def branch(
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ArgumentError: an unknown measure, branches along several parameters, or without points.
+        ArgumentError: the measure is unknown, or branches are along several parameters or without
+            points.
     """
     given: list[Branch] = [*branches] if isinstance(branches, list | tuple) else [branches]  # type: ignore[list-item]
     for each in given:
@@ -98,14 +99,14 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
     """Draws curves of bifurcations in the plane of two parameters.
 
     Args:
-        curves: along the same two parameters.
+        curves: one or several curves along the same two parameters.
         ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ArgumentError: no curve, or curves along other parameters.
+        ArgumentError: there is no curve, or curves are along different parameters.
     """
     if len({(each.along, each.units) for each in curves}) != 1:
         raise ArgumentError("curves is not allowed: they must go along the same two parameters.")
@@ -204,16 +205,16 @@ def basin_fractions(
 ) -> Figure:
     """Draws the fraction of starts with each label against a parameter.
 
-    Lines lie in bands, Wilson's intervals of the counts (see `wilson_interval`); a label that
-    did not occur at a value counts as none of the starts there.
+    The bands around the lines are Wilson's intervals of the counts (see `wilson_interval`). A label
+    that did not occur at a value has the fraction 0 there.
 
     Args:
-        values: the parameter, increasing, shape (n,).
-        fractions: what `jaxbiped.basins.fractions` found at each value.
-        name, unit: of the parameter; its own name, as "K", says all by itself, as does a
-            `jaxbiped.laws.Quantity`.
+        values: values of the parameter, increasing, shape (n,).
+        fractions: result of `jaxbiped.basins.fractions` at each value.
+        name, unit: name and unit of the parameter. A parameter's own name, such as "K", needs no
+            unit; nor does a `jaxbiped.laws.Quantity`.
         kind: "lines", or "stacked": areas that add up to one, without bands.
-        confidence: of the bands.
+        confidence: confidence level of the bands.
         log: whether the parameter's axis is logarithmic.
         ax: axes to draw into. Default: a new figure.
 
@@ -221,8 +222,8 @@ def basin_fractions(
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ArgumentError: no value, as many values as fractions are not there, values that do not
-            increase or are not above 0 on a logarithmic axis, one value to stack, or nothing
+        ArgumentError: there is no value, the number of fractions differs, values do not increase or
+            are not above 0 on a logarithmic axis, there is only one value to stack, or nothing is
             labelled at a value.
     """
     check_choice("kind", kind, ("lines", "stacked"))

@@ -53,23 +53,23 @@ def phase_portrait(
 ) -> Figure:
     """Draws the rate of bodies [rad/s] over their angle from the slope's normal [rad].
 
-    A leg swings forward along the upper half and carries the walker along the lower one; the
-    two near-vertical ends are its heel strike (right) and its lifting (left). Faint, the whole
-    walk; strong, its last stride, from the leg's last heel strike but one to the end, where there
-    are two. Arrows tell the direction, a dot the start, a cross the end of a walk that ended.
+    A leg swings forward along the upper half and carries the walker along the lower half. The two
+    nearly vertical ends are its heel strike (right) and its lifting (left). The whole walk is
+    faint; the last stride is strong, from the leg's last heel strike but one to the end, if there
+    are two. Arrows show the direction, a dot the start, and a cross the end of a walk that ended.
 
     Args:
         scene: the scene that was simulated.
         trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
         ax: axes to draw into. Default: a new figure.
-        legs: whose bodies to draw, counted from 1: (1,), (2,) or (1, 2).
-        bodies: names of the bodies to draw, such as ("torso",), in place of these.
+        legs: numbers of the legs to draw, counted from 1: (1,), (2,) or (1, 2).
+        bodies: names of the bodies to draw instead, such as ("torso",).
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ValueError: the trajectory was not saved step by step, or a leg or a body that there is not.
+        ValueError: the trajectory was not saved step by step, or a leg or a body does not exist.
     """
     check_scene_of(trajectory, scene)
     skeleton = skeleton_of(scene.mechanism)
@@ -134,9 +134,9 @@ def _draw_body(
 def gait_orbit(gait: Gait, *, ax: Axes | None = None) -> Figure:
     """Draws the rates of all bodies [rad/s] over their angles from the slope's normal [rad].
 
-    One cycle: where it is a step, mirrored bodies are exchanged at each footstep, so the two curves
-    of an odd number of footsteps make one closed curve. The dots are the bodies on the section,
-    where the cycle begins. Arrows show the direction.
+    The figure shows one cycle. If the cycle is a step, mirrored bodies are exchanged at each
+    footstep, so the two curves of an odd number of footsteps form one closed curve. The dots are
+    the bodies on the section, where the cycle begins. Arrows show the direction.
 
     Args:
         gait: a gait that was found, of any walker.

@@ -19,7 +19,7 @@ from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 _SHOWN = 1.8
-"""How long a motion is shown unless told otherwise [s]."""
+"""Default duration of the motion that is shown [s]."""
 _APART = 0.1
 """Time between poses unless their number is told [s]."""
 _WIDTH, _LEAST, _MOST = 8.6, 2.8, 6.0
@@ -43,17 +43,17 @@ def gait_strobe(
 ) -> Figure:
     """Draws the walker at equal times, older poses fainter, over the slope as it is inclined.
 
-    The title tells which seconds are shown. Bodies are lines between their hinges, their feet and,
-    where there is neither, their mass centres; feet are circles, the thin grey line is the root
-    point's path. Gravity points down the page.
+    The title states the time interval. Bodies are lines between their hinges and feet, or to their
+    mass centres if they have neither. Feet are circles, and the thin grey line is the path of the
+    root point. Gravity points down the page.
 
     Args:
         scene: the scene that was simulated.
         trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
         ax: axes to draw into. Default: a new figure.
-        start, stop: first and last time drawn [s]; the end is 1.8 s, about four footsteps of the
-            paper's walk, after the start unless given, and never after the motion's own.
-        count: number of poses; unless given, one about every 0.1 s.
+        start, stop: first and last time drawn [s]. Default of `stop`: 1.8 s after the start, about
+            four footsteps of the paper's walk, but at most the end of the motion.
+        count: number of poses. Default: about one every 0.1 s.
 
     Returns:
         The figure that holds `ax`, or the new one.

@@ -56,15 +56,15 @@ def time_series(
     Args:
         scene: the scene that was simulated.
         trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
-        names: of the state's scalars, or angles and rates of bodies that couplings fix, of one
-            unit: `theta_torso`, `omega_shank_1`, `hip_vx`.
+        names: names of scalars of the state, or of angles and rates of bodies that couplings fix,
+            all with one unit, such as `theta_torso`, `omega_shank_1` or `hip_vx`.
         ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ArgumentError: no name, one that is not known, or names of several units.
+        ArgumentError: there is no name, one is unknown, or the names have several units.
         ValueError: the trajectory was not saved step by step.
     """
     check_scene_of(trajectory, scene)
@@ -133,14 +133,14 @@ def rigid_leg_angles(
     Args:
         scene: the walker.
         state: start of the walk.
-        duration: how long to draw [s].
+        duration: duration to draw [s].
         ax: axes to draw into. Default: a new figure.
 
     Returns:
         The figure that holds `ax`, or the new one.
 
     Raises:
-        ArgumentError: a duration not above 0.
+        ArgumentError: the duration is not above 0.
     """
     check_positive("duration", duration, "s")
     walk = rigid_walk(scene, state, duration=duration, max_arrivals=_MOST_STRIKES)
@@ -151,9 +151,9 @@ _MOST_STRIKES = 4096
 
 
 def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None) -> Figure:
-    """Draws how deep each foot that touches is in the ground [mm] over time [s].
+    """Draws the penetration of each touching foot into the ground [mm] over time [s].
 
-    A swing foot that the clearance rule lets pass under the surface does not touch: its line is
+    A swing foot that the clearance rule lets pass below the surface does not touch, so its line is
     interrupted.
 
     Args:

@@ -39,13 +39,13 @@ def work_precision(
         axis: name of the error axis, such as "state".
         cost: "cpu_s", "seconds" or "attempted".
         floor: error by which the references disagree, in the axis's units.
-        ax: where to draw; a new figure, with a legend, unless given.
+        ax: axes to draw into. Default: a new figure with a legend.
 
     Returns:
         The figure.
 
     Raises:
-        ArgumentError: an unknown cost, or no row that has the axis.
+        ArgumentError: the cost is unknown, or no row has the axis.
     """
     check_choice("cost", cost, COSTS)
     ways = list(dict.fromkeys(row["way"] for row in rows if _error(row, axis) is not None))
@@ -112,19 +112,19 @@ _FLOOR = 1e-17
 def constraint_runs(runs: Sequence[Mapping[str, Any]]) -> Figure:
     """Draws the violation, the final error and the time of each constraint method and integrator.
 
-    A row for each method, a panel for each measure on a logarithmic scale, a mark for each
-    integrator at its tolerance or step size. A run that failed stands as a cross at the right
-    edge of the panels of violation and error.
+    There is a row for each method, a panel on a logarithmic scale for each measure, and a mark for
+    each integrator at its tolerance or step size. A failed run is a cross at the right edge of the
+    panels of violation and error.
 
     Args:
-        runs: as `jaxbiped constraints --json` writes them: `method`, `integrator`, its `rtol` or
-            `dt_s` (the other is None), `ending`, `max_violation_m`, `state_error`, `wall_s_run`.
+        runs: runs as `jaxbiped constraints --json` writes them: `method`, `integrator`, its `rtol`
+            or `dt_s` (the other is None), `ending`, `max_violation_m`, `state_error`, `wall_s_run`.
 
     Returns:
         A new figure.
 
     Raises:
-        ArgumentError: no runs.
+        ArgumentError: there are no runs.
     """
     if not runs:
         raise ArgumentError("runs is empty: there must be one at least.")

@@ -153,7 +153,7 @@ def label_point(
 
 
 def legend(ax: Axes, **options: Any) -> None:
-    """A legend in small letters without a frame, within the axes unless told otherwise."""
+    """A legend in small letters without a frame. Default: within the axes."""
     ax.legend(**{"frameon": False, "fontsize": "small"} | options)
 
 

@@ -34,7 +34,7 @@ def placement(
             foot rolls.
         standing: the feet that may stand, told by a leg, by a body or as "BODY.FOOT"; the lowest of
             them stands. None for no velocity of the root point, and a height from all feet.
-        names: of the state's scalars, in their order; coordinates and rates unless given.
+        names: names of the state's scalars, in order. Default: coordinates and rates.
 
     Returns:
         The state's scalars by name, in the order of the names, all of one shape.

@@ -65,8 +65,8 @@ class Accelerations(NamedTuple):
     """Second derivatives of the coordinates, leaves shaped as the state's.
 
     Attributes:
-        hip_ax, hip_az: of the hip in the slope's frame [m/s²].
-        alpha_1, alpha_2: of the legs [rad/s²].
+        hip_ax, hip_az: acceleration of the hip in the slope's frame [m/s²].
+        alpha_1, alpha_2: angular accelerations of the legs [rad/s²].
     """
 
     hip_ax: Scalar
@@ -84,7 +84,7 @@ class RigidState(NamedTuple):
     Attributes:
         hip_x: hip position along the slope [m].
         theta_1, theta_2: angles of swing leg and stance leg [rad].
-        omega_1, omega_2: their rates [rad/s].
+        omega_1, omega_2: rates of these angles [rad/s].
     """
 
     hip_x: StateLeaf
@@ -97,8 +97,8 @@ class RigidState(NamedTuple):
 class RedundantState(NamedTuple):
     """Centre of mass and angle of each leg, and their rates: twelve scalar leaves.
 
-    The frame is that of `State`. Where the hip has a mass, half of it belongs to each leg, and the
-    centre of mass is that of both.
+    The frame is that of `State`. If the hip has a mass, half of it belongs to each leg, and the
+    centre of mass is that of the leg with this half.
 
     Attributes:
         x_1, z_1, x_2, z_2: centres of mass [m].
@@ -153,9 +153,9 @@ class RollingMotion(NamedTuple):
     """Accelerations in single support.
 
     Attributes:
-        alpha_1, alpha_2: of swing and stance leg [rad/s²].
-        force: of the ground on the stance foot, that keeps it rolling, a `FootForce` [N]. A foot
-            that it would have to pull has flown.
+        alpha_1, alpha_2: angular accelerations of swing leg and stance leg [rad/s²].
+        force: force of the ground that keeps the stance foot rolling, a `FootForce` [N]. If it
+            would have to pull, the foot has left the ground.
     """
 
     alpha_1: Scalar

@@ -130,7 +130,7 @@ def unresolved_slip(rtol: RealScalarLike, scene: PyTree) -> str:
 
 
 def rms_norm(error: PyTree) -> Scalar:
-    """Root mean square over all leaves, without gluing them into one array first.
+    """Root mean square over all leaves, without joining them into one array first.
 
     Args:
         error: numbers of any shapes, scaled by their tolerances [–].

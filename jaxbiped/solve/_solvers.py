@@ -36,7 +36,7 @@ SOLVERS: dict[str, Callable[[], diffrax.AbstractSolver[PyTree]]] = {
 
 
 def solver_named(solver: str | diffrax.AbstractSolver[PyTree]) -> diffrax.AbstractSolver[PyTree]:
-    """The solver of that name, or the solver itself where one is given.
+    """The solver with a name; a solver is returned as it is.
 
     Args:
         solver: a name in `SOLVERS`, or a diffrax solver.
@@ -45,7 +45,7 @@ def solver_named(solver: str | diffrax.AbstractSolver[PyTree]) -> diffrax.Abstra
         A diffrax solver.
 
     Raises:
-        ArgumentError: an unknown name.
+        ArgumentError: the name is unknown.
     """
     if isinstance(solver, diffrax.AbstractSolver):
         return solver
@@ -56,10 +56,10 @@ def solver_named(solver: str | diffrax.AbstractSolver[PyTree]) -> diffrax.Abstra
 def with_root_tolerances(
     solver: diffrax.AbstractSolver[PyTree], rtol: Numbers, atol: Numbers
 ) -> diffrax.AbstractSolver[PyTree]:
-    """The solver, the equations of its stages solved to these tolerances if by none of their own.
+    """The solver with these tolerances for the equations of its stages, unless it has its own.
 
-    An implicit solver of diffrax's has them from the control of its steps, which steps of one size
-    do without.
+    An implicit solver of diffrax takes its tolerances from the step-size controller, which steps of
+    constant size do not have.
     """
     root_finder = getattr(solver, "root_finder", None)
     if root_finder is None or eqx.is_inexact_array_like(root_finder.rtol):

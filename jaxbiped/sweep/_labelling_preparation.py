@@ -77,7 +77,7 @@ def labelling(
         A `RuntimeWarning` is issued if no stable gait was found.
 
     Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
+        ArgumentError: an argument is not allowed; raised before anything is compiled.
     """
     effort = effort_of(
         scene,

@@ -95,7 +95,7 @@ class WalkTrade(NamedTuple):
         return np.array([float(x) for x in walk.final]) / self.units(walk.final)
 
     def units(self, state: MinimalState | None = None) -> np.ndarray:
-        """Units of a state's components, of the start's unless given: see `sizes_of`."""
+        """Units of a state's components, see `sizes_of`. Default: those of the start."""
         _, sizes = sizes_of(self.scene, self.start if state is None else state)
         return np.array(sizes)
 
@@ -151,7 +151,7 @@ class GaitTrade(NamedTuple):
     Attributes:
         scene: the walker.
         repeats: warm runs of which the median counts.
-        guess: that start; the seed's, fitted to the scene, unless given.
+        guess: that start. Default: the seed's start, fitted to the scene.
     """
 
     scene: Scene | RigidScene | RedundantScene

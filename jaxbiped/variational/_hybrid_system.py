@@ -38,13 +38,13 @@ from jaxbiped.solve._failure_events import WATCHES, ending_events, rigid_ending
 class AbstractSystem(eqx.Module):
     """An autonomous system whose periodic orbits can be found and differentiated.
 
-    The state is a pytree of scalars, and so are the parameters `args`. Subclass it to study a
-    system of your own: the walker is only one of them, `Walking`. Numbers that are to be
-    differentiated belong in `args`; a system that holds arrays itself is XLA's, forwards only.
+    The state and the parameters `args` are pytrees of scalars. Subclass it to study a system of
+    your own; the walker is only one subclass, `Walking`. Numbers to differentiate with respect to
+    belong in `args`; a system that holds arrays itself runs on XLA and in forward mode only.
 
     Attributes:
-        cyclic_coordinates: positions of the leaves that need not return, only advance: no rate may
-            depend on them.
+        cyclic_coordinates: positions of the leaves that only advance and need not return; no rate
+            may depend on them.
     """
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = ()
@@ -58,32 +58,32 @@ class AbstractSystem(eqx.Module):
         """Surfaces across which the vector field is not smooth."""
 
     def reset_at_switch(self, args: PyTree, y: PyTree) -> PyTree:
-        """What becomes of the state at a switch that resets it; nothing unless overridden."""
+        """The state after a switch that resets it. Default: the state as it is."""
         return y
 
     def on_held(self, args: PyTree, y: PyTree) -> PyTree:
-        """The state with what is held there where it belongs; as it is unless overridden.
+        """The state with every held part at its place. Default: the state as it is.
 
-        A cycle begins with it, so that its multipliers are those of what is free to change.
+        A cycle begins with this state, so its multipliers are those of the free parts.
         """
         return y
 
     @abc.abstractmethod
     def ending(self, args: PyTree, y: PyTree) -> Scalar:
-        """Code of the `Ending` that has come, 0 where the motion goes on."""
+        """Code of the `Ending` that has occurred; 0 if the motion goes on."""
 
     @abc.abstractmethod
     def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
-        """What is done to the state at each arrival: a symmetry, an impact, or nothing."""
+        """The state after an arrival: after a symmetry, an impact, or unchanged."""
 
     def arrival(self, section: AbstractSection, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
-        """A section's value at a state just before it, and whether a crossing there counts."""
+        """The section's value at a state just before it, and whether a crossing there counts."""
         after_reset = minimal_state(args, self.reset_map(args, y))
         return section.value(args, after_reset), section.counts(args, after_reset)
 
     @abc.abstractmethod
     def load(self, args: PyTree, y: PyTree) -> Scalar | None:
-        """A quantity whose largest value along the orbit is wanted, or None."""
+        """The quantity whose largest value along the orbit is reported, or None."""
 
 
 def system_of(scene: AbstractScene) -> AbstractSystem:
@@ -135,11 +135,11 @@ class RedundantWalking(AbstractWalking):
 
 
 def section_of(scene: Any, section: AbstractSection | None) -> AbstractSection:
-    """The section asked for, or the one that a scene's cycles begin at unless told otherwise.
+    """The requested section. Default: the section at which a scene's cycles begin.
 
     Raises:
-        ArgumentError: what is no section, one of a body that the state does not have, or one other
-            than heel strike for a rigid walker.
+        ArgumentError: this is not a section, its body is not in the state, or a rigid walker has a
+            section other than heel strike.
     """
     if section is not None and not isinstance(section, AbstractSection):
         raise ArgumentError(

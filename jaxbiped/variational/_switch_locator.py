@@ -7,6 +7,7 @@ import functools
 from typing import Any, NamedTuple, cast
 
 import diffrax
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -84,9 +85,15 @@ class SwitchLocator(AbstractWrappedControl):
     rates at both ends of the step, by a cubic; a few attempts do. Where a switch comes near zero
     within a step, that ends there, lest it be crossed twice. The first step of a solve never
     counts as an arrival, so a solve may start on its section.
+
+    Attributes:
+        watch: what is looked for.
+        corners: whether steps also stop short of switches where only the slope of a force jumps,
+            for columns that cross with the Jacobian of each side.
     """
 
     watch: Watch
+    corners: bool = eqx.field(static=True, default=False)
 
     def init(self, *request: Any) -> tuple[Scalar, SwitchLocatorState]:
         first, inner = self.controller.init(*request)
@@ -191,6 +198,8 @@ class SwitchLocator(AbstractWrappedControl):
             roots = jnp.where(jnp.stack(crossed), roots, 1.0)
             first, place, which = jnp.min(roots), jnp.ones_like(span), jnp.asarray(0)
             for number, switch in enumerate(at_end[:count], 1):
+                if switch.corner and not self.corners:
+                    continue
                 root, sign = roots[number - 1], -1 if switch.corner else 1
                 other = which == 0 if switch.corner else which <= 0
                 is_first = crossed[number - 1] & (other | ((which * sign > 0) & (root < place)))

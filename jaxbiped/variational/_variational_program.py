@@ -286,7 +286,7 @@ class AdaptiveColumns:
             return jnp.maximum(rms_norm(error), columns_norm)
 
         control = step_control(given.rtol, 1e-2 * given.rtol, norm, given.units)
-        return SwitchLocator(control, self.watch)
+        return SwitchLocator(control, self.watch, corners=True)
 
 
 def _select(keep: Scalar, new: Scalar, old: Scalar) -> Scalar:

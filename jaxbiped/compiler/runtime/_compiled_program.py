@@ -137,7 +137,7 @@ class CompiledProgram:
                 from the last one on where it reads `backwards`.
             room: records that each simulation has room for.
             memory: makes the array for the records, beyond which there is what it holds.
-            threads: how many to use; the environment's or the machine's choice unless given.
+            threads: number of threads. Default: that of the environment or the machine.
             width: simulations in one vector; the results do not depend on it.
             quick: whether one thread's work is so short that nobody could interrupt it.
 

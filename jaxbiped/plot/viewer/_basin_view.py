@@ -30,15 +30,14 @@ class BasinView(AbstractPage):
 
     Attributes:
         basin: the picture, ready for JSON.
-        recordings: walks of the starts that are kept, row by row; None where one cannot be
-            simulated.
+        recordings: walks of the stored starts, row by row; None if a walk cannot be simulated.
     """
 
     basin: JsonObject
     recordings: tuple[Recording | None, ...]
 
     def sent(self) -> JsonObject:
-        """What the page is given, ready for JSON."""
+        """Data of the page, ready for JSON."""
         walks = [each and each.numbers() for each in self.recordings]
         return {"basin": self.basin, "walks": walks, "colours": view_colours()}
 
@@ -75,8 +74,8 @@ def view_basin(
         The view: `save(path)` writes it as one page of HTML, a notebook shows it in a frame.
 
     Raises:
-        ArgumentError: arguments of the wrong type, not two axes of two starts or more, a rigid
-            walker, or labels of another shape.
+        ArgumentError: an argument has the wrong type, the grid does not have two axes of at least
+            two starts, the walker is rigid, or labels have another shape.
     """
     check_type("labelling", labelling, Labelling)
     check_type("starts", starts, Grid)

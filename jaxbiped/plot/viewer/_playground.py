@@ -1,4 +1,4 @@
-"""Playgrounds: pages whose sliders simulate, in the page itself and without Python."""
+"""Playgrounds: pages with sliders that simulate in the page itself, without Python."""
 
 import base64
 import dataclasses
@@ -120,14 +120,14 @@ def _sliders(scene: Scene, inputs: dict[str, float]) -> Iterator[JsonObject]:
 
 @dataclasses.dataclass(frozen=True)
 class Playground(AbstractPage):
-    """A page that simulates itself.
+    """A page that simulates walks by itself.
 
     Attributes:
-        module: the solve as WebAssembly.
-        inputs: its numbers as the page begins, shape (n,).
-        sliders: which of them the page moves, ready for JSON.
+        module: the compiled solve as WebAssembly.
+        inputs: initial inputs of the solve, shape (n,).
+        sliders: inputs that the page's sliders change, ready for JSON.
         scene: the walker.
-        ending: the place among a solve's outputs of how it ended.
+        ending: position of the ending among the outputs of a solve.
     """
 
     _computes: ClassVar[bool] = True
@@ -138,7 +138,7 @@ class Playground(AbstractPage):
     ending: int
 
     def sent(self) -> JsonObject:
-        """What the page is given, ready for JSON."""
+        """Data of the page, ready for JSON."""
         mechanism = self.scene.mechanism
         return {
             "playground": {
@@ -163,22 +163,22 @@ class Playground(AbstractPage):
 
 
 def playground(scene: Scene, state: Any, *, footsteps: int = 5) -> Playground:
-    """A page with sliders for the slope, stiffness, damping and the start, which simulates itself.
+    """A page that simulates walks, with sliders for the slope, stiffness, damping and the start.
 
-    The lanes' program of this scene is compiled to WebAssembly, which takes some seconds. Its steps
-    are those that `simulate` takes by lanes, to the last bit.
+    The lanes program of this scene is compiled to WebAssembly, which takes some seconds. Its steps
+    are bit-for-bit those of `simulate` with the lanes engine.
 
     Args:
-        scene: the walker; of the laws of contact those of the sliders that it has are there.
-        state: where its walks start.
-        footsteps: after which they end.
+        scene: the walker. There are sliders only for the parameters that its laws of contact have.
+        state: start of the walks.
+        footsteps: number of footsteps after which a walk ends.
 
     Returns:
-        The page: `save(path)` writes it, a notebook shows it in a frame.
+        The page: `save(path)` writes it, and a notebook shows it in a frame.
 
     Raises:
-        ArgumentError: arguments of the wrong type.
-        UnknownPrimitiveError: the scene holds an operation that lanes do not have.
+        ArgumentError: an argument has the wrong type.
+        UnknownPrimitiveError: the scene contains an operation that lanes do not support.
 
     Examples:
         >>> import jaxbiped as jb

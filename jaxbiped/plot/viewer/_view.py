@@ -57,7 +57,7 @@ body {{ margin: 0; }}
 
 
 class AbstractPage(abc.ABC):
-    """What is shown as one page of HTML; a notebook shows it in a frame."""
+    """Content of one page of HTML, which a notebook shows in a frame."""
 
     _computes: ClassVar[bool] = False
     """Whether the page runs WebAssembly."""
@@ -71,11 +71,11 @@ class AbstractPage(abc.ABC):
         """Title of the page, and the height of its frame [px]."""
 
     def html(self) -> str:
-        """One page of HTML that holds everything and needs no network."""
+        """A self-contained page of HTML that needs no network."""
         return page_of(self.sent(), self._frame()[0], computes=self._computes)
 
     def save(self, path: str | Path) -> Path:
-        """Writes that page, and returns its path."""
+        """Writes the page as a file, and returns its path."""
         where = check_writable_file("path", path)
         where.write_text(self.html(), encoding="utf-8")
         return where
@@ -129,7 +129,7 @@ class View(AbstractPage):
     recordings: tuple[Recording, ...]
 
     def sent(self) -> JsonObject:
-        """What page and widget are given, ready for JSON."""
+        """Data of page and widget, ready for JSON."""
         return {
             "walks": [each.numbers() for each in self.recordings],
             "colours": view_colours(),
@@ -181,16 +181,16 @@ def view(
 
     Args:
         scene: the scene that was simulated.
-        trajectory: the motion, saved step by step; of a rigid walker with its heel strikes, by
-            `max_arrivals`.
-        start: start of a rigid walk, which is otherwise shown from its first heel strike on.
+        trajectory: the motion, saved step by step; for a rigid walker, with its heel strikes
+            (`max_arrivals`).
+        start: start of a rigid walk. Default: the walk is shown from its first heel strike on.
         name: name of the walk.
 
     Returns:
         The view. A notebook displays it, and `save(path)` writes it as one HTML page.
 
     Raises:
-        ArgumentError: arguments of the wrong type, or a rigid walk without heel strikes or start.
+        ArgumentError: an argument has the wrong type, or a rigid walk has no heel strikes or start.
         ValueError: the trajectory was not saved step by step, or this is a batch.
 
     Examples:
@@ -223,7 +223,7 @@ def side_by_side(*views: View) -> View:
         One view of all walks.
 
     Raises:
-        ArgumentError: no view, or something else.
+        ArgumentError: there is no view, or an argument is something else.
     """
     if not views:
         raise ArgumentError("views is empty, which is not allowed: give at least one.")

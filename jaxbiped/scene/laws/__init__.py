@@ -1,8 +1,8 @@
 """Laws of contact and rules of clearance: normal forces, friction, bristles.
 
-`parameter` declares what laws have for parameters, a `Quantity` is what is known of one. A law
-enters `NORMAL_LAWS` or `FRICTION_LAWS` by its `name` as it is defined. The command line has those
-of the lines below, in the order of the lines.
+`parameter` declares a parameter of a law; a `Quantity` describes it. A law enters `NORMAL_LAWS` or
+`FRICTION_LAWS` under its `name` when it is defined. The command line offers the laws imported
+below, in this order.
 """
 
 from jaxbiped._parameter_declaration import parameter as parameter

@@ -22,9 +22,9 @@ class AbstractNormalLaw(AbstractNamedPart):
     which makes the law that resembles the seed's `RistowSchafer`.
 
     Attributes:
-        jumps_at_touchdown: whether the force itself, not its derivatives alone, jumps where a
+        jumps_at_touchdown: whether the force itself, and not only its derivatives, jumps when a
             foot that comes down begins to touch. A property of the class.
-        steep_at_touchdown: whether it is infinitely steep there, in the depth or in its rate.
+        steep_at_touchdown: whether the force is infinitely steep there, in the depth or its rate.
     """
 
     catalogue: ClassVar[dict[str, Any]] = NORMAL_LAWS
@@ -34,9 +34,9 @@ class AbstractNormalLaw(AbstractNamedPart):
 
     @abc.abstractmethod
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
-        """Normal force [N], never negative, zero where `penetration` [m] is not above zero.
+        """Normal force [N], never negative, zero if `penetration` [m] is not above zero.
 
-        `rate` [m/s] is the rate of penetration, positive while the foot goes in.
+        `rate` [m/s] is the rate of penetration, positive while the foot moves into the ground.
         """
 
     @abc.abstractmethod
@@ -45,10 +45,10 @@ class AbstractNormalLaw(AbstractNamedPart):
 
     @abc.abstractmethod
     def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
-        """Functions whose zeros are where the force's first derivatives jump inside contact.
+        """Functions with zeros at which the force's first derivatives jump inside contact.
 
-        None for a law that is smooth for every `penetration` above zero. Touchdown itself is
-        known to everyone and not among them.
+        There are none if a law is smooth for every `penetration` above zero. Touchdown itself is
+        always taken into account and is not among them.
         """
 
     @abc.abstractmethod
@@ -63,9 +63,9 @@ class AbstractFrictionLaw(AbstractNamedPart):
     the law that resembles the seed's `BengisuAkay`.
 
     Attributes:
-        builds_up_over: name of the parameter that is the slip speed [m/s] over which the force
-            builds up from rest, which steps must resolve; None for a law without one. A property
-            of the class.
+        builds_up_over: name of the parameter for the slip speed [m/s] over which the force builds
+            up from rest, and which steps must resolve; None for a law without one. A property of
+            the class.
     """
 
     catalogue: ClassVar[dict[str, Any]] = FRICTION_LAWS
@@ -78,7 +78,7 @@ class AbstractFrictionLaw(AbstractNamedPart):
 
     @abc.abstractmethod
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
-        """Functions whose zeros are where a first or second derivative in the slip speed jumps."""
+        """Functions with zeros at which a first or second derivative in the slip speed jumps."""
 
 
 def power(base: Scalar, exponent: Scalar | float) -> Scalar:
@@ -114,16 +114,16 @@ def smooth_ramp(x: Scalar, width: Scalar) -> Scalar:
 
 
 class AbstractBristleLaw(AbstractNamedPart):
-    """Friction by bristles whose deflection is a state of its own, one number for each foot.
+    """Friction by bristles whose deflection is a state, with one number b for each foot.
 
-    The number is what the bristles' stiffness makes of their deflection, as a share of the normal
-    force [–]: a deflection would be too small for the tolerances of the other components. Bristles
-    work into contact with the load, w = F_N/(F_N + engaging_load), and relax out of it:
+    The number is the elastic force of the deflected bristles as a share of the normal force [–]; a
+    deflection would be too small for the tolerances of the other components. The load engages the
+    bristles with the weight w = F_N/(F_N + engaging_load); out of contact, they relax:
 
         ḃ = w (rate of the law) − (1 − w) relaxation b
 
-    so that a foot lands with straight bristles and nothing jumps as it does. With a `name` it is in
-    `FRICTION_LAWS` and has `like_seed`, as an `AbstractFrictionLaw`.
+    A foot therefore lands with straight bristles, and nothing jumps at touchdown. A law with a
+    `name` is in `FRICTION_LAWS` and has `like_seed`, like an `AbstractFrictionLaw`.
     """
 
     catalogue: ClassVar[dict[str, Any]] = FRICTION_LAWS
@@ -139,7 +139,7 @@ class AbstractBristleLaw(AbstractNamedPart):
 
     @abc.abstractmethod
     def coefficient(self, slip_speed: Scalar, bristle: Scalar) -> Scalar:
-        """Friction as a share of the normal force [–], of the sign of the slip that it opposes."""
+        """Friction as a share of the normal force [–], with the sign of the slip it opposes."""
 
     def force(self, normal_force: Scalar, slip_speed: Scalar, bristle: Scalar) -> Scalar:
         """Tangential force [N] along the slope."""
@@ -153,5 +153,5 @@ class AbstractBristleLaw(AbstractNamedPart):
         return rate - (1.0 - engaged) * relaxation * bristle
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
-        """The slip speed: a bent bristle's rate has a corner where it changes sign."""
+        """The slip speed: the rate of a bent bristle has a corner where the slip changes sign."""
         return (slip_speed,)

@@ -32,28 +32,28 @@ def normal_law_like(
     mass: Parameter = 2.0,
     g: Parameter = 9.8,
 ) -> AbstractNormalLaw:
-    """The normal law of a name that carries a mass as `RistowSchafer(K, c, n)` does.
+    """The named normal law that carries a mass as `RistowSchafer(K, c, n)` does.
 
-    The seed's law and its smooth counterpart have exactly these K, c and n. Every other stands
-    at the same penetration under the weight, with the same damping ratio of small oscillations
-    about it; Hertz's with the same penetration. Where a law has an exponent of its own to choose,
-    it is n; the others keep theirs, so their linear stiffness there differs from the seed's by
-    the quotient of the exponents, and their linear damper by its root. What is not given is the
-    seed's.
+    The seed's law and its smooth counterpart have exactly these K, c and n. Every other law has the
+    same penetration under the weight and the same damping ratio of small oscillations about it;
+    Hertz's has the same penetration. A law whose exponent can be chosen has the exponent n. The
+    others keep theirs, so their linear stiffness at that penetration differs from the seed's by the
+    quotient of the exponents, and their linear damper by its root. Default of each parameter: the
+    seed's value.
 
     Args:
         name: one of `NORMAL_LAWS`.
         K: the seed law's contact stiffness [N/mⁿ].
         c: the seed law's contact damping [N·s/m²].
         n: the seed law's exponent [–].
-        mass: what stands on the law [kg].
+        mass: mass that stands on the law [kg].
         g: gravitational acceleration [m/s²].
 
     Returns:
         The law, its parameters in SI units.
 
     Raises:
-        ArgumentError: an unknown name, or a value that is not allowed.
+        ArgumentError: the name is unknown, or a value is not allowed.
     """
     check_choice("name", name, NORMAL_LAWS)
     seed, law = RistowSchafer(K=K, c=c, n=n), cast("Any", NORMAL_LAWS[name])
@@ -72,12 +72,12 @@ def friction_law_like(
     v0: Parameter = 1e-4,
     xi: Parameter = 1000.0,
 ) -> Any:
-    """The friction law of a name that resembles `BengisuAkay` with these parameters.
+    """The named friction law that resembles `BengisuAkay` with these parameters.
 
-    The seed's law rises from rest with the slope 2 mu_static/v0, peaks at v0 and falls to
-    mu_kinetic over 1/xi beyond. The others follow it in what they have, as `like_seed` of each
-    tells; laws with one coefficient take the kinetic one, which most of a slide sees. What is not
-    given is the seed's.
+    The seed's law rises from rest with the slope 2 mu_static/v0, peaks at v0 and then falls to
+    mu_kinetic over 1/xi. The others share these features as far as they have them; `like_seed` of
+    each law states which. Laws with one coefficient use the kinetic one, which applies during most
+    of a slide. Default of each parameter: the seed's value.
 
     Args:
         name: one of `FRICTION_LAWS`.
@@ -90,7 +90,7 @@ def friction_law_like(
         The law, its parameters in SI units.
 
     Raises:
-        ArgumentError: an unknown name, or a value that is not allowed.
+        ArgumentError: the name is unknown, or a value is not allowed.
 
     Examples:
         >>> import jaxbiped as jb

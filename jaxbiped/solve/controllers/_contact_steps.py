@@ -1,15 +1,15 @@
-"""Contacts within a step: what three step-size controllers do about them.
+"""Contacts within a step: three step-size controllers that deal with them.
 
-All of it holds of stops and their limits, too. A foot that is off the ground at both ends of a step
-may touch it in between, and one that is barely in it at an end may have been deeper. No error
-estimate sees that where no stage of the step feels its force: `ShallowContact` ends the step just
-past the contact's beginning instead.
+All statements also hold for stops and their limits. A foot that is off the ground at both ends of a
+step may touch it in between, and a foot that is barely in the ground at an end may have been
+deeper. No error estimate sees this if no stage of the step feels the force: `ShallowContact` ends
+the step just past the beginning of the contact instead.
 
-The corner of the force where a foot comes down rejects steps of any size that go far past it. Size
-by size this would cost some ten attempts at every touchdown of the seed's walker: `TouchdownAhead`
-lets a step that was rejected end just past that the next time.
+At touchdown the force has a corner, because of which steps of any size that go far past it are
+rejected. Reducing the size step by step would cost some ten attempts at every touchdown of the
+seed's walker: `TouchdownAhead` lets the attempt after a rejected one end just past the touchdown.
 
-Steps of one size are not cut short: `MissedContacts` counts those that step over a contact. The
+Steps of one size are not shortened: `MissedContacts` counts those that step over a contact. The
 solve's `args` must be the scene.
 """
 
@@ -53,7 +53,7 @@ _LARGEST = 0.95
 
 
 class ShallowContact(AbstractMemorylessControl):
-    """Wraps a controller; a step in which a foot dips into the ground is tried again, to there."""
+    """Wraps a controller; a step in which a foot dips into the ground is retried up to there."""
 
     def adapt(self, attempt: Attempt) -> Adapted:
         adapted = attempt.by(self.controller)
@@ -116,7 +116,7 @@ def _part_above(
 
 
 class TouchdownAhead(AbstractMemorylessControl):
-    """Wraps a controller; what is tried after a rejected step may be longer than that says."""
+    """Wraps a controller; the attempt after a rejected step may be longer than it proposes."""
 
     def adapt(self, attempt: Attempt) -> Adapted:
         adapted = attempt.by(self.controller)
@@ -145,7 +145,7 @@ def _to_touchdown(scene: CompliantScene, span: Scalar, state: PyTree) -> Scalar:
 
 
 class MissedContacts(AbstractWrappedControl):
-    """Wraps a controller; its state carries how many contacts lie between two steps."""
+    """Wraps a controller; its state carries the number of contacts between two steps."""
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
         first, inner = self.controller.init(*request)

@@ -1,4 +1,4 @@
-"""First and last steps of a solve: their sizes, and how they meet its end as diffrax has it."""
+"""First and last steps of a solve: their sizes, and how they meet its end as in diffrax."""
 
 import jax
 import jax.numpy as jnp
@@ -20,10 +20,10 @@ def first_step(duration: Numbers, time_unit: RealScalarLike = 1.0) -> Scalar:
 
 @cached_jit  # many small operations
 def just_before_end(duration: Numbers) -> Scalar:
-    """The time from which on a step that would end there ends at `duration`, as diffrax has it.
+    """The time such that a step that would end at or after it ends at `duration`, as in diffrax.
 
-    Units are counted in the bits of the 64-bit number, which are in the numbers' own order: as
-    many steps to the number before would take XLA seconds to compile.
+    Units are counted in the bits of the 64-bit number, which have the numbers' own order: the same
+    count of steps to the preceding number would take XLA seconds to compile.
     """
     bits = jax.lax.bitcast_convert_type(duration, jnp.int64)
     below = jnp.where(duration > 0.0, bits - _CLIPPED_ULPS, bits + _CLIPPED_ULPS)
@@ -36,7 +36,7 @@ def just_before_end(duration: Numbers) -> Scalar:
 def clip_step(
     keep: Scalar, t: Scalar, next_t: Scalar, end: Numbers, almost_end: Numbers
 ) -> tuple[Scalar, Scalar]:
-    """The times at which the next step begins and ends, once it comes near `end`."""
+    """The times at which the next step begins and ends, when it comes near `end`."""
     t = jnp.minimum(t, end)
     last = jnp.where(keep, end, t + 0.5 * (end - t))
     return t, jnp.where(next_t > almost_end, last, next_t)

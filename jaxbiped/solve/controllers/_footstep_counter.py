@@ -21,8 +21,8 @@ PATIENCE = 100.0
 class FootstepLimit(AbstractWrappedControl):
     """Wraps a controller; ends the solve at the end of the step with the last heel strike.
 
-    Its state carries what no function of the walker's state can tell: which leg struck last, and
-    how many strikes there were. The solve's `args` must be the scene.
+    Its state carries what cannot be computed from the walker's state: the leg that struck last, and
+    the number of strikes. The solve's `args` must be the scene.
 
     Attributes:
         limit: number of heel strikes after which the solve ends.

@@ -25,16 +25,16 @@ _MARGIN = 1e-12
 
 
 class LocatedEnding(AbstractMemorylessControl):
-    """Wraps a controller; a step within which the solve ends is tried again, to just past that.
+    """Wraps a controller; a step in which the solve ends is retried up to just past that point.
 
-    Where to, comes from the secant of the ending's surface, which a few attempts narrow. A step
-    whose ends do not lie on both sides of it stays as it is. After the last footstep the wrapped
-    controller ends the solve. The solve's `args` must be the scene.
+    The point is located with the secant of the ending's surface, in a few attempts. A step whose
+    ends are not on opposite sides of the surface stays as it is. After the last footstep, the
+    wrapped controller ends the solve. The solve's `args` must be the scene.
 
     Attributes:
-        watch: failures that end it.
-        probe: a state near the step's end at which failures are looked for first, where that costs
-            less. None: there is none.
+        watch: failures that end the solve.
+        probe: a state near the step's end at which failures are looked for first, if that costs
+            less; None if there is no such state.
     """
 
     watch: tuple[str, ...] = eqx.field(static=True)

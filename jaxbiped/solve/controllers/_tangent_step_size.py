@@ -30,12 +30,12 @@ def step_control(
     norm: Callable[[PyTree], Scalar],
     units: Units | None = None,
 ) -> StepControl:
-    """The controller of step sizes for these tolerances, errors measured by `norm`.
+    """The step-size controller for these tolerances; `norm` measures the errors.
 
     Args:
         rtol, atol: tolerances; the absolute one in units of each leaf.
-        norm: of the errors in units of the tolerance.
-        units: of the state's leaves and of time; SI unless given.
+        norm: norm of the errors in units of the tolerance.
+        units: units of the state's leaves and of time. Default: SI.
     """
     time = 1.0 if units is None else units.time
     control = diffrax.PIDController(
@@ -54,7 +54,7 @@ class InUnits(AbstractMemorylessControl):
     """Wraps a controller; shows it states and errors in units of their own.
 
     Attributes:
-        inverse: one over the unit of each leaf of the state.
+        inverse: reciprocal of the unit of each leaf of the state.
     """
 
     inverse: PyTree

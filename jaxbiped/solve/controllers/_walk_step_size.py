@@ -1,10 +1,10 @@
-"""Step size of a walk: from the error estimate of the last attempt, the same by every engine.
+"""Step size of a walk, from the error estimate of the last attempt; the same for every engine.
 
-By the plain law of integral control. Unlike diffrax's own it lets an accepted step be followed by a
-smaller one, and a rejected one by none that is larger: where the force has corners, both save
-attempts (Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, section II.4).
-A step within which the contact changes its kind must be the more exact: the embedded estimate of
-some methods sees little of a corner of the force that a step crosses.
+The law is plain integral control. Unlike diffrax's, it allows a smaller step after an accepted one,
+and no larger step after a rejected one. If the force has corners, both save attempts (Hairer,
+Nørsett and Wanner, Solving Ordinary Differential Equations I, section II.4). A step in which the
+contact changes its kind must be more accurate, because the embedded estimate of some methods
+hardly sees a corner of the force that a step crosses.
 """
 
 import functools
@@ -58,8 +58,8 @@ def walk_control(
 
     Args:
         rtol, atol: tolerances; the absolute one in units of each leaf.
-        units: of the state's leaves and of time.
-        switch_weight: of the errors of steps that cross a switch (see `weigh_crossed`).
+        units: units of the state's leaves and of time.
+        switch_weight: factor of the errors of steps that cross a switch (see `weigh_crossed`).
     """
     control: StepControl = ErrorControl(rtol, atol, units)
     if switch_weight != 1.0:
@@ -68,13 +68,13 @@ def walk_control(
 
 
 class ErrorControl(AbstractControl):
-    """Keeps steps whose error is below the tolerance; its state is whether the last was rejected.
+    """Keeps steps with an error below the tolerance; its state is whether the last was rejected.
 
     The solve's first step must be given.
 
     Attributes:
         rtol, atol: tolerances; the absolute one in units of each leaf.
-        units: of the state's leaves and of time.
+        units: units of the state's leaves and of time.
     """
 
     rtol: RealScalarLike
@@ -83,7 +83,7 @@ class ErrorControl(AbstractControl):
 
     @property
     def norm(self) -> Callable[[PyTree], RealScalarLike]:
-        """Of errors in units of the tolerance."""
+        """Norm of errors in units of the tolerance."""
         return rms_norm
 
     def init(self, *request: Any) -> tuple[Scalar, Scalar]:
@@ -165,7 +165,7 @@ class CrossedSwitches(AbstractMemorylessControl):
     The solve's `args` must be the scene.
 
     Attributes:
-        weight: of those errors [–].
+        weight: factor of those errors [–].
     """
 
     weight: float
@@ -178,23 +178,24 @@ class CrossedSwitches(AbstractMemorylessControl):
 def weigh_crossed(
     scene: CompliantScene, weight: float, y0: PyTree, y1: PyTree, error: PyTree
 ) -> PyTree:
-    """A step's error, `weight` times where it crosses a switch of the contact.
+    """A step's error, multiplied by `weight` if the step crosses a switch of the contact.
 
     Args:
-        scene: what is simulated.
-        weight: of the error of such a step [–].
-        y0, y1: states at the step's start, and at its end or as near to it as its error.
-        error: of the step, shaped as the states.
+        scene: the simulated scene.
+        weight: factor of the error of such a step [–].
+        y0, y1: states at the step's start and at its end, or as close to its end as its error.
+        error: error of the step, shaped as the states.
     """
     factor = jnp.where(crosses(scene, y0, y1), weight, 1.0)
     return jtu.tree_map(lambda leaf: leaf * factor.astype(leaf.dtype), error)
 
 
 def crosses(scene: CompliantScene, y0: PyTree, y1: PyTree) -> Scalar:
-    """Whether a contact is of another kind at a step's end than at its start (boolean).
+    """Whether a contact is of a different kind at a step's end than at its start (boolean).
 
-    A stop is pressed or is not. A foot carries or does not, it slips this way or that, on this side
-    of friction's peak or the other, or much faster.
+    The kind of a stop is whether it is pressed. The kind of a foot is whether it carries load, in
+    which direction it slips, and whether below the slip speed of friction's peak, above it, or
+    much faster.
     """
     found = jnp.zeros(jnp.shape(y0[0]), dtype=bool)
     for before, after in zip(feet(scene, y0), feet(scene, y1), strict=True):

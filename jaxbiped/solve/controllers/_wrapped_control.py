@@ -1,4 +1,4 @@
-"""Step-size controllers that wrap another one: what all of them have in common, and two plain ones.
+"""Step-size controllers that wrap another one: their common base, and two plain ones.
 
 diffrax looks for tolerances and norm on the controller it is given, whatever that wraps.
 """
@@ -22,7 +22,7 @@ else:
 
 
 class StepControl(Protocol):
-    """What is asked of a controller of step sizes; see `diffrax.AbstractStepSizeController`."""
+    """Interface of a step-size controller; see `diffrax.AbstractStepSizeController`."""
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
         """The first step's end and the controller's state."""
@@ -32,14 +32,14 @@ class StepControl(Protocol):
 
 
 class Adapted(NamedTuple):
-    """What a controller makes of an attempt.
+    """A controller's decision on an attempt.
 
     Attributes:
         keep: whether the step is accepted.
-        t0, t1: the next one's ends [s].
+        t0, t1: ends of the next step [s].
         jump: whether a jump was passed.
         memory: the controller's state.
-        result: diffrax's.
+        result: diffrax's result code.
     """
 
     keep: Scalar
@@ -51,14 +51,14 @@ class Adapted(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """An attempted step, as diffrax tells a controller of it.
+    """An attempted step, as diffrax passes it to a controller.
 
     Attributes:
-        t0, t1: its ends [s].
-        y0, y1: states there.
-        args: those of the solve: of a walk the scene.
-        error: its estimate, shaped as a state.
-        order: of the error.
+        t0, t1: ends of the step [s].
+        y0, y1: states at these ends.
+        args: arguments of the solve; the scene for a walk.
+        error: estimate of the step's error, shaped as a state.
+        order: order of the error.
         memory: the controller's state.
     """
 
@@ -72,23 +72,23 @@ class Attempt(NamedTuple):
     memory: Any
 
     def by(self, controller: StepControl, **changes: Any) -> Adapted:
-        """What a controller makes of it, or of the same with these changes."""
+        """A controller's decision on the attempt, with these changes."""
         return Adapted(*controller.adapt_step_size(*self._replace(**changes)))
 
 
 class AbstractControl(_Control):  # type: ignore[type-arg]
-    """What every controller of this project is for diffrax."""
+    """Base of this project's controllers, in the form that diffrax takes."""
 
     @abc.abstractmethod
     def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
+        """The first step's end and the controller's state, as diffrax requires."""
 
     @abc.abstractmethod
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step."""
 
     def wrap(self, direction: RealScalarLike) -> Self:
-        """As diffrax asks; direction makes no difference, for walks are never solved backwards."""
+        """As diffrax requires; direction has no effect, because no walk is solved backwards."""
         return self
 
     def adapt_step_size(self, *step: Any) -> Adapted:
@@ -96,10 +96,10 @@ class AbstractControl(_Control):  # type: ignore[type-arg]
 
 
 def try_again(attempt: Attempt, adapted: Adapted, again: Scalar, target: Scalar) -> Adapted:
-    """The same where a step is not tried `again`.
+    """The same decision if a step is not tried `again`.
 
-    Where it is, the next one ends at the `target` at the latest, and the controller knows what it
-    did before.
+    If it is, the next step ends at the `target` at the latest, and the controller keeps its earlier
+    state.
     """
     sooner = jnp.where(adapted.keep, target, jnp.minimum(adapted.t1, target))
     return adapted._replace(
@@ -111,33 +111,33 @@ def try_again(attempt: Attempt, adapted: Adapted, again: Scalar, target: Scalar)
 
 
 class AbstractWrappedControl(AbstractControl):
-    """Leaves every step's size to another controller, and adds something of its own.
+    """Leaves every step's size to another controller, and adds behaviour of its own.
 
     Attributes:
-        controller: decides every step's size.
+        controller: controller that decides every step's size.
     """
 
     controller: StepControl
 
     @property
     def rtol(self) -> RealScalarLike:
-        """The wrapped controller's; steps of one size have no tolerances."""
+        """The wrapped controller's relative tolerance; steps of one size have none."""
         return getattr(self.controller, "rtol", 0.0)
 
     @property
     def atol(self) -> RealScalarLike:
-        """The same of the absolute one."""
+        """The wrapped controller's absolute tolerance; steps of one size have none."""
         return getattr(self.controller, "atol", 0.0)
 
     @property
     def norm(self) -> Callable[[PyTree], RealScalarLike]:
-        """Of errors in units of the tolerance."""
+        """Norm of errors in units of the tolerance."""
         norm: Callable[[PyTree], RealScalarLike] = getattr(self.controller, "norm", rms_norm)
         return norm
 
 
 class AbstractMemorylessControl(AbstractWrappedControl):
-    """Wraps a controller, whose state is all that is carried from step to step."""
+    """Wraps a controller and carries nothing but that controller's state from step to step."""
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
         return self.controller.init(*request)
@@ -146,10 +146,10 @@ class AbstractMemorylessControl(AbstractWrappedControl):
 class Extremes(AbstractWrappedControl):
     """Wraps a controller; keeps the least and largest values at the ends of the accepted steps.
 
-    Exact for every solver, and without room for the steps themselves. The start counts as an end.
+    This is exact for every solver and does not store the steps. The start counts as an end.
 
     Attributes:
-        function: of (args, state).
+        function: function of (args, state) whose values are compared.
     """
 
     function: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
@@ -171,7 +171,7 @@ class Extremes(AbstractWrappedControl):
 def widened_extremes(
     keep: Scalar, extremes: Sequence[PyTree], values: PyTree
 ) -> tuple[PyTree, PyTree]:
-    """Least and largest values with those at the end of a step, where that is kept."""
+    """Least and largest values, including those at the end of a step if it is kept."""
 
     def chosen(choose: Callable[[Scalar, Scalar], Scalar], old: PyTree) -> PyTree:
         return jtu.tree_map(lambda a, b: jnp.where(keep, choose(a, b), a), old, values)
@@ -181,13 +181,13 @@ def widened_extremes(
 
 
 class GivenFirstStep(AbstractWrappedControl):
-    """Wraps a controller; brings the first step's size itself, and the solve's `dt0` is None.
+    """Wraps a controller and supplies the first step's size; the solve's `dt0` is None.
 
-    diffrax checks a size that it is given by a call back to Python, and a program with such a call
-    cannot be kept on disk. Sizes are checked before a solve begins.
+    diffrax checks a given size by a call back to Python, and a program with such a call cannot be
+    kept on disk. Here, sizes are checked before a solve begins.
 
     Attributes:
-        size: of the first step, or of all where the controller keeps it [s].
+        size: size of the first step [s], or of all steps if the controller keeps it.
     """
 
     size: RealScalarLike

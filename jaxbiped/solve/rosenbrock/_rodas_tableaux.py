@@ -41,7 +41,7 @@ class Rodas3P(AbstractRosenbrock):
 
 class Rodas4(AbstractRosenbrock):
     """Fourth order, six stages, L-stable, stiffly accurate; dense output of third order.
-    On stiff Prothero-Robinson problems of second order only.
+    Only second order on stiff Prothero-Robinson problems.
 
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, section VI.4 (RODAS).
     """
@@ -147,8 +147,8 @@ _LAST_ROW = (
 
 
 class Rodas5P(AbstractRosenbrock):
-    """Fifth order, eight stages, L-stable, stiffly accurate, of fourth order on Prothero-Robinson
-    problems however stiff; dense output of fourth order.
+    """Fifth order, eight stages, L-stable, stiffly accurate, fourth order on Prothero-Robinson
+    problems of any stiffness; dense output of fourth order.
 
     Source: Steinebach, BIT Numerical Mathematics 63:27 (2023).
     """

@@ -37,7 +37,7 @@ class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
 
     Attributes:
         t0, t1: ends of the step [s].
-        y0, y1: the solution there.
+        y0, y1: the solution at these ends.
         coefficients: k_1, k_2, … of the polynomial, each shaped as the solution.
     """
 
@@ -68,7 +68,7 @@ class AbstractMemorylessSolver(diffrax.AbstractAdaptiveSolver):  # type: ignore[
     """A one-step solver that carries nothing from step to step.
 
     Attributes:
-        term_structure: as diffrax asks of its solvers.
+        term_structure: as in `diffrax.AbstractSolver`.
     """
 
     term_structure: ClassVar = diffrax.AbstractTerm
@@ -84,14 +84,14 @@ class AbstractMemorylessSolver(diffrax.AbstractAdaptiveSolver):  # type: ignore[
 class AbstractRosenbrock(AbstractMemorylessSolver):
     """A Rosenbrock method: every step solves a few linear systems with one exact Jacobian.
 
-    Works on any pytree of real arrays. Where the leaves are scalars, entries of the Jacobian
-    that are zero by structure are left out, and a second-order system is reduced to the size of
-    its velocities. A subclass only declares its tableau.
+    It accepts any pytree of real arrays. If the leaves are scalars, entries of the Jacobian that
+    are zero by structure are left out, and a second-order system is reduced to the size of its
+    velocities. A subclass only declares its tableau.
 
     Attributes:
         tableau: the method's coefficients.
-        switch_weight: how often the error estimate of a walk's step counts that crosses a switch.
-        interpolation_cls: as diffrax asks of its solvers.
+        switch_weight: factor of the error estimate of a walk's step that crosses a switch.
+        interpolation_cls: as in `diffrax.AbstractSolver`.
     """
 
     tableau: AbstractClassVar[RosenbrockTableau]

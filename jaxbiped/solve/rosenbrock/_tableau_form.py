@@ -1,4 +1,4 @@
-"""Form of a Rosenbrock method: what its tableau holds."""
+"""Form of a Rosenbrock method: the coefficients of its tableau."""
 
 from typing import NamedTuple, TypeAlias
 
@@ -15,14 +15,14 @@ class RosenbrockTableau(NamedTuple):
     Source of the form: Hairer and Wanner, Solving Ordinary Differential Equations II, eq. IV.7.25.
 
     Attributes:
-        order: of convergence.
+        order: order of convergence.
         gamma: diagonal coefficient γ.
         a: rows a_ij of the stages from the second on.
         c: rows c_ij of the stages from the second on.
         alpha: times α_i of the stages.
         gammas: coefficients γ_i of the time derivative.
-        dense: rows that make the coefficients of the dense output from the stages.
-        error: weights that make the error estimate from the stages; u_s where left empty.
+        dense: rows that map the stages to the coefficients of the dense output.
+        error: weights of the stages in the error estimate. Default: the estimate is u_s.
     """
 
     order: int
@@ -36,15 +36,15 @@ class RosenbrockTableau(NamedTuple):
 
 
 def end_weights(tableau: RosenbrockTableau) -> Row:
-    """Weights of the stages that make the new value from the old."""
+    """Weights of the stages in the change of the value over the step."""
     return (*tableau.a[-1], 1.0)
 
 
 def error_weights(tableau: RosenbrockTableau) -> Row:
-    """Weights of the stages that make the error estimate."""
+    """Weights of the stages in the error estimate."""
     return tableau.error or last_stage(tableau)
 
 
 def last_stage(tableau: RosenbrockTableau) -> Row:
-    """Weights of the stages that make the last one alone."""
+    """Weights that select the last stage."""
     return (*[0.0] * (len(tableau.alpha) - 1), 1.0)

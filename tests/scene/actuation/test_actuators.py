@@ -1,4 +1,4 @@
-"""Actuators against closed forms; torques in motion are in `tests/dynamics/test_actuation.py`."""
+"""Actuators alone against splines of SciPy; torques are in `tests/dynamics/test_actuation.py`."""
 
 import dataclasses
 

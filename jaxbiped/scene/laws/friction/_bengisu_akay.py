@@ -10,7 +10,7 @@ from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, smooth_ramp
 
 
 class AbstractPeakedFriction(AbstractFrictionLaw):
-    """Friction that peaks at the slip speed v0 and decays beyond, with the rate xi.
+    """Friction that peaks at the slip speed v0 and decays above it with the rate xi.
 
     Attributes (leaves of any batch shape):
         mu_static: static coefficient, reached at v0 [–].
@@ -19,7 +19,7 @@ class AbstractPeakedFriction(AbstractFrictionLaw):
         xi: Stribeck rate, the decay above v0 [s/m].
 
     Raises:
-        ArgumentError: a coefficient or xi below 0, or v0 not above 0.
+        ArgumentError: a coefficient or xi is below 0, or v0 is not above 0.
     """
 
     builds_up_over: ClassVar[str | None] = "v0"
@@ -37,8 +37,8 @@ class BengisuAkay(AbstractPeakedFriction):
     - s < v0: F = F_S − (F_S/v0²)(s − v0)²
     - s ≥ v0: F = F_C + (F_S − F_C) exp(−xi (s − v0))
 
-    Source: the seed paper, section 2.2, after Bengisu and Akay. Its printed first branch lost a
-    minus sign, a square and a bracket; this reading alone is zero at rest and continuous at v0.
+    Source: the seed paper, section 2.2, after Bengisu and Akay. The printed first branch lacks a
+    minus sign, a square and a bracket; only this reading is zero at rest and continuous at v0.
     """
 
     name: ClassVar[str] = "bengisu-akay"
@@ -72,7 +72,7 @@ class SmoothBengisuAkay(AbstractPeakedFriction):
     - |u| ≥ 1: F = F_C + (F_S − F_C) exp(−xi R(s − v0)), R a C² ramp from zero that equals its
       argument from v0 on.
 
-    From 2 v0 on it is the original. `docs/laws.md` tells how much it changes the gait.
+    From 2 v0 on it is the original. `docs/laws.md` shows how much it changes the gait.
     """
 
     name: ClassVar[str] = "smooth-bengisu-akay"

@@ -17,19 +17,19 @@ _DAHL_GIVE = 4e-4
 class Dahl(AbstractBristleLaw):
     """Ḟ = σ0 V_T (1 − (F/F_C) sgn V_T), here with F = b F_N and F_C = mu F_N.
 
-    It bends before it slips and forgets exponentially over a slip of mu/sigma_0. No Stribeck peak,
-    no viscous part. Its stress–strain curve is that of Dahl's exponent one.
+    The bristles bend before they slip, and forget exponentially over a slip of mu/sigma_0. There is
+    no Stribeck peak and no viscous part. The stress–strain curve has Dahl's exponent one.
 
     Source: Dahl, "Solid friction damping of mechanical vibrations", AIAA J. 14 (1976).
 
     Attributes (leaves of any batch shape):
         mu: coefficient of friction [–].
-        sigma_0: stiffness of the bristles for each newton of load [1/m].
+        sigma_0: stiffness of the bristles per newton of load [1/m].
         engaging_load: normal force at which bristles are half in contact [N].
-        relaxation: rate at which they straighten out of contact [1/s].
+        relaxation: rate at which bristles straighten out of contact [1/s].
 
     Raises:
-        ArgumentError: a parameter not above 0, or relaxation below 0.
+        ArgumentError: relaxation is below 0, or another parameter is not above 0.
     """
 
     name: ClassVar[str] = "dahl"
@@ -51,11 +51,12 @@ class Dahl(AbstractBristleLaw):
 
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
-        """The kinetic coefficient, on bristles that give by 4e-4 m, mu/sigma_0, before they slip.
+        """The kinetic coefficient, with bristles that bend by mu/sigma_0 = 4e-4 m before they slip.
 
-        They have no damping and ring, faster and longer the stiffer they are: so soft, the seed's
-        walk takes nearly five times as many steps as with the seed's law, and `find_gait` finds
-        its gait. With less than about 2e-4 m it does so by accuracy="tight" only.
+        The bristles are undamped and ring; the stiffer they are, the faster and longer they ring.
+        With these soft bristles, the seed's walk takes nearly five times as many steps as with the
+        seed's law, and `find_gait` finds its gait. Below about 2e-4 m, `find_gait` finds it only
+        with accuracy="tight".
         """
         stiffness = by_numpy(lambda _, mu: mu / _DAHL_GIVE, seed.mu_kinetic)
         return cls(mu=seed.mu_kinetic, sigma_0=stiffness)
@@ -68,7 +69,7 @@ _MASS_PER_LOAD = 0.05
 
 
 class LuGre(AbstractBristleLaw):
-    """Bristles with damping and a Stribeck peak, every part in proportion to the load.
+    """Bristles with damping and a Stribeck peak, with every part proportional to the load.
 
     With the deflection z = b/σ0, g(V) = mu_kinetic + (mu_static − mu_kinetic) exp(−(V/v_s)²):
 
@@ -76,22 +77,22 @@ class LuGre(AbstractBristleLaw):
     - F = F_N (σ0 z + σ1 ż + σ2 V_T)
 
     Source: Canudas de Wit, Olsson, Åström, Lischinsky, IEEE Trans. Automatic Control 40 (1995);
-    in proportion to the load after Canudas de Wit and Tsiotras (1999). The original has forces in
-    place of coefficients, whose bristles would be infinitely stiff where the load vanishes.
+    proportional to the load after Canudas de Wit and Tsiotras (1999). The original has forces in
+    place of coefficients, so its bristles would be infinitely stiff where the load vanishes.
 
     Attributes (leaves of any batch shape):
         mu_static: coefficient of slow steady slip [–].
         mu_kinetic: coefficient of fast slip [–].
         v_s: Stribeck speed [m/s].
-        sigma_0: stiffness of the bristles for each newton of load [1/m].
-        sigma_1: their damping [s/m].
-        sigma_2: viscous friction [s/m].
+        sigma_0: stiffness of the bristles per newton of load [1/m].
+        sigma_1: damping of the bristles per newton of load [s/m].
+        sigma_2: viscous friction per newton of load [s/m].
         engaging_load: normal force at which bristles are half in contact [N].
-        relaxation: rate at which they straighten out of contact [1/s].
+        relaxation: rate at which bristles straighten out of contact [1/s].
 
     Raises:
-        ArgumentError: a coefficient, v_s, sigma_0 or engaging_load not above 0; sigma_1, sigma_2
-            or relaxation below 0.
+        ArgumentError: a coefficient, v_s, sigma_0 or engaging_load is not above 0; or sigma_1,
+            sigma_2 or relaxation is below 0.
     """
 
     name: ClassVar[str] = "lugre"
@@ -125,7 +126,7 @@ class LuGre(AbstractBristleLaw):
 
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
-        """Both coefficients and the fall over 1/xi, on bristles that give by 1e-5 m before slip.
+        """Both coefficients and the fall over 1/xi, with bristles that bend by 1e-5 m before slip.
 
         Their damping is critical for 1 kg that carries 20 N, and sigma_2 = 0.
         """

@@ -13,7 +13,7 @@ from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
 
 class Frictionless(AbstractFrictionLaw):
-    """No tangential force. The equations of motion leave friction out altogether."""
+    """No tangential force. The equations of motion contain no friction terms."""
 
     name: ClassVar[str] = "frictionless"
 
@@ -25,21 +25,21 @@ class Frictionless(AbstractFrictionLaw):
 
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
-        """The law itself: there is nothing to take from the seed's."""
+        """The law itself, which has no parameters to match the seed's."""
         return cls()
 
 
 class Viscous(AbstractFrictionLaw):
-    """F = k F_N V_T, opposing V_T. Smooth everywhere and without bound.
+    """F = k F_N V_T, opposing V_T. Smooth everywhere and unbounded.
 
-    Proportional to the load, unlike the viscous term of a lubricated joint, so that it fades with
-    contact: a foot that carries nothing feels no friction.
+    Unlike the viscous term of a lubricated joint, the force is proportional to the load, so it
+    vanishes with contact: a foot without load has no friction.
 
     Attributes (leaves of any batch shape):
         k: friction per load and slip speed [s/m].
 
     Raises:
-        ArgumentError: k below 0.
+        ArgumentError: k is below 0.
     """
 
     name: ClassVar[str] = "viscous"
@@ -53,19 +53,19 @@ class Viscous(AbstractFrictionLaw):
 
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
-        """mu_static F_N at the seed's v0, and without bound beyond."""
+        """mu_static F_N at the seed's v0, and unbounded above it."""
         return cls(k=by_numpy(lambda _, mu, v0: mu / v0, seed.mu_static, seed.v0))
 
 
 class RegularisedCoulomb(AbstractFrictionLaw):
-    """F = mu F_N tanh(V_T / v_d), opposing V_T. Smooth everywhere, no Stribeck peak.
+    """F = mu F_N tanh(V_T / v_d), opposing V_T. Smooth everywhere, without a Stribeck peak.
 
     Attributes (leaves of any batch shape):
         mu: coefficient of friction [–].
         v_d: slip speed over which the force builds up [m/s].
 
     Raises:
-        ArgumentError: mu below 0 or v_d not above 0.
+        ArgumentError: mu is below 0, or v_d is not above 0.
     """
 
     name: ClassVar[str] = "coulomb"
@@ -86,7 +86,7 @@ class RegularisedCoulomb(AbstractFrictionLaw):
 
 
 class Threlfall(AbstractFrictionLaw):
-    """Dry friction that builds up exponentially and is held from v0 on.
+    """Dry friction that builds up exponentially up to v0 and is constant above.
 
     With F_C = mu F_N and s = |V_T|:
 
@@ -94,14 +94,15 @@ class Threlfall(AbstractFrictionLaw):
     - s > v0: F = F_C (1 − e⁻³), about 0.95 F_C
 
     Source: Threlfall, Mechanism and Machine Theory 13 (1978) 475. Publications differ above v0:
-    some take F_C. This is the continuous reading.
+    some use F_C. This is the continuous reading.
 
     Attributes (leaves of any batch shape):
-        mu: coefficient of friction; a twentieth more than what is reached [–].
-        v0: slip speed from which the force is constant [m/s].
+        mu: coefficient of friction; a twentieth more than the largest share of the load reached
+            [–].
+        v0: slip speed above which the force is constant [m/s].
 
     Raises:
-        ArgumentError: mu below 0 or v0 not above 0.
+        ArgumentError: mu is below 0, or v0 is not above 0.
     """
 
     name: ClassVar[str] = "threlfall"
@@ -123,12 +124,12 @@ class Threlfall(AbstractFrictionLaw):
 
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
-        """The kinetic coefficient, from rest with the slope 3 mu/v0 and held from v0 on."""
+        """The kinetic coefficient, with the slope 3 mu/v0 at rest, constant above v0."""
         return cls(mu=seed.mu_kinetic, v0=seed.v0)
 
 
 class Ambrosio(AbstractFrictionLaw):
-    """Dry friction that sets in at v0, rises in proportion and is held from v1 on.
+    """Dry friction that starts at v0, rises linearly to v1 and is constant above.
 
     With F_C = mu F_N and s = |V_T|:
 
@@ -143,10 +144,10 @@ class Ambrosio(AbstractFrictionLaw):
     Attributes (leaves of any batch shape):
         mu: coefficient of friction [–].
         v0: slip speed up to which there is no friction [m/s].
-        v1: slip speed from which there is all of it [m/s].
+        v1: slip speed above which the force is constant [m/s].
 
     Raises:
-        ArgumentError: mu below 0, v0 not above 0 or v1 not above v0.
+        ArgumentError: mu is below 0, v0 is not above 0, or v1 is not above v0.
     """
 
     name: ClassVar[str] = "ambrosio"
@@ -169,5 +170,5 @@ class Ambrosio(AbstractFrictionLaw):
 
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
-        """The kinetic coefficient, from v0/2 to v0 with the slope 2 mu/v0."""
+        """The kinetic coefficient, reached from v0/2 to v0 with the slope 2 mu/v0."""
         return cls(mu=seed.mu_kinetic, v0=by_numpy(lambda _, v0: 0.5 * v0, seed.v0), v1=seed.v0)

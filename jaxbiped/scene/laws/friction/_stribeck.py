@@ -15,13 +15,13 @@ from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 class AbstractStribeckCurve(AbstractFrictionLaw):
     """Friction with the coefficient μ = mu_kinetic + (mu_static − mu_kinetic) exp(−(|V_T|/v_s)^p).
 
-    For p = 1 the second derivative jumps at rest and for p < 1 it is without bound there; above,
-    the law has no switch.
+    At rest, the second derivative jumps for p = 1 and is unbounded for p < 1; for p > 1, the law
+    has no switch.
 
     Attributes (leaves of any batch shape):
-        mu_static: static coefficient, which the curve starts from [–].
-        mu_kinetic: kinetic coefficient, which the curve falls to [–].
-        v_s: Stribeck speed, over which it falls [m/s].
+        mu_static: static coefficient, from which the curve starts [–].
+        mu_kinetic: kinetic coefficient, to which the curve falls [–].
+        v_s: Stribeck speed, over which the curve falls [m/s].
         p: exponent of the fall, usually from 0.5 to 2 [–].
     """
 
@@ -31,10 +31,10 @@ class AbstractStribeckCurve(AbstractFrictionLaw):
     p: Parameter = parameter("exponent of the fall", "$p$", positive=True)
 
     def coefficient(self, slip_speed: Scalar) -> Scalar:
-        """μ [–], even in V_T and at rest mu_static.
+        """μ [–], even in V_T and equal to mu_static at rest.
 
-        Its slope at rest is reported as zero, which is what matters in a product with a factor
-        that vanishes there: for p < 1 it has none.
+        Its slope at rest is reported as zero, although for p < 1 there is none: μ is multiplied by
+        a factor that vanishes there.
         """
         speed = jnp.abs(slip_speed)
         slips = speed > 0.0
@@ -43,7 +43,7 @@ class AbstractStribeckCurve(AbstractFrictionLaw):
         return self.mu_kinetic + (self.mu_static - self.mu_kinetic) * decay
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
-        """Rest, where p ≤ 1; for a steeper p a function that has no zero."""
+        """Rest for p ≤ 1; for a larger p, a function without a zero."""
         return (jnp.where(self.p <= 1.0, slip_speed, 1.0),)
 
     @staticmethod
@@ -60,8 +60,8 @@ class Stribeck(AbstractStribeckCurve):
     F = F_N (μ tanh(V_T/v_d) + k_v V_T), opposing V_T, with the curve μ of `AbstractStribeckCurve`
     and its parameters.
 
-    The tanh regularises rest. Where v_d is well below v_s (p = 2) the peak lies at a few v_d and
-    reaches all but mu_static. The viscous part is proportional to the load, so that it fades with
+    The tanh regularises rest. If v_d is well below v_s (p = 2), the peak lies at a few v_d and
+    nearly reaches mu_static. The viscous part is proportional to the load, so it vanishes with
     contact.
 
     Source: Bo and Pavelescu, Wear 82 (1982) 277; Armstrong-Hélouvry, Dupont and Canudas de Wit,
@@ -72,7 +72,7 @@ class Stribeck(AbstractStribeckCurve):
         v_d: slip speed over which friction builds up from rest [m/s].
 
     Raises:
-        ArgumentError: a coefficient or k_v below 0, or v_s, p or v_d not above 0.
+        ArgumentError: a coefficient or k_v is below 0, or v_s, p or v_d is not above 0.
     """
 
     name: ClassVar[str] = "stribeck"
@@ -99,10 +99,10 @@ class Andersson(AbstractStribeckCurve):
     Source: Andersson, Söderberg and Björklund, Tribology International 40 (2007) 580.
 
     Attributes (leaves of any batch shape):
-        k: how sharply friction builds up from rest [s/m].
+        k: sharpness with which friction builds up from rest [s/m].
 
     Raises:
-        ArgumentError: a coefficient below 0, or v_s, p or k not above 0.
+        ArgumentError: a coefficient is below 0, or v_s, p or k is not above 0.
     """
 
     name: ClassVar[str] = "andersson"
@@ -123,24 +123,24 @@ class BrownMcPhee(AbstractFrictionLaw):
     F = F_N (mu_dynamic tanh(4u) + (mu_static − mu_dynamic) u/(¼u² + ¾)²)
     + mu_v V_T tanh(4 F_N/N_t), opposing V_T, with u = V_T/v_t.
 
-    The peak at v_t is mu_static F_N but for the tanh, which lacks 0.07 per cent of mu_dynamic
-    there. Published as continuously differentiable; written in the signed u it is smooth.
-    The viscous part is not proportional to the load; it fades below N_t.
+    The peak at v_t is mu_static F_N, except that the tanh lacks 0.07 per cent of mu_dynamic there.
+    The law was published as continuously differentiable; written in the signed u, it is smooth.
+    The viscous part is not proportional to the load; it vanishes below N_t.
 
     Source: Brown and McPhee, Journal of Computational and Nonlinear Dynamics 11 (2016) 054502.
 
     Attributes (leaves of any batch shape):
-        mu_static: static coefficient, reached at v_t; at least mu_dynamic, for one far below it
-            would make the friction push the foot along [–].
+        mu_static: static coefficient, reached at v_t; at least mu_dynamic, because with a
+            coefficient far below it friction would push the foot along [–].
         mu_dynamic: dynamic coefficient, reached far above v_t [–].
         v_t: slip speed of the peak [m/s].
         mu_v: viscous coefficient [N·s/m].
-        N_t: load from which the viscous part acts in full [N]. None: there is no viscous part,
-            and nothing of it in the compiled program.
+        N_t: load above which the viscous part acts in full [N]. None: there is no viscous part,
+            and the compiled program does not contain it.
 
     Raises:
-        ArgumentError: mu_dynamic or mu_v below 0, mu_static below mu_dynamic, v_t or N_t not
-            above 0, or a mu_v above 0 without N_t.
+        ArgumentError: mu_dynamic or mu_v is below 0, mu_static is below mu_dynamic, v_t or N_t is
+            not above 0, or mu_v is above 0 without N_t.
     """
 
     name: ClassVar[str] = "brown-mcphee"

@@ -20,7 +20,7 @@ class Hertz(AbstractNormalLaw):
         n: exponent [–].
 
     Raises:
-        ArgumentError: K not above 0 or n below 1.
+        ArgumentError: K is not above 0, or n is below 1.
     """
 
     name: ClassVar[str] = "hertz"
@@ -34,13 +34,13 @@ class Hertz(AbstractNormalLaw):
         """The law that carries the weight of `mass` [kg] at `penetration` [m].
 
         Args:
-            mass: what stands on the law [kg].
-            penetration: how deep it stands [m].
+            mass: mass that stands on the law [kg].
+            penetration: penetration under its weight [m].
             g: gravitational acceleration [m/s²].
             n: exponent [–].
 
         Raises:
-            ArgumentError: mass, penetration or g not above 0, or n below 1.
+            ArgumentError: mass, penetration or g is not above 0, or n is below 1.
         """
         K, _ = matched_to_weight(mass=mass, penetration=penetration, g=g, n=n)
         return cls(K=K, n=n)
@@ -59,7 +59,7 @@ class Hertz(AbstractNormalLaw):
 
     @classmethod
     def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
-        """The same penetration under the weight, and the seed's exponent."""
+        """The law with the seed's exponent and the same penetration under the weight."""
         return cls.from_weight(
             mass=standing.mass, penetration=standing.penetration, g=standing.g, n=seed.n
         )
@@ -80,7 +80,7 @@ def hertz_stiffness(
     Source: Hertz 1882; Johnson, Contact Mechanics (1985), chapter 4.
 
     Args:
-        radius: of the sphere, R [m].
+        radius: radius of the sphere, R [m].
         modulus: Young's modulus of the sphere, E₁ [Pa].
         poisson: Poisson's ratio of the sphere, ν₁ [–].
         ground_modulus: Young's modulus of the plane, E₂ [Pa].
@@ -90,8 +90,8 @@ def hertz_stiffness(
         K [N/m^1.5], a scalar or the shape that the arguments broadcast to.
 
     Raises:
-        ArgumentError: a radius or modulus not above 0, or a Poisson's ratio that no isotropic
-            material has: not above −1, or above 1/2.
+        ArgumentError: the radius or a modulus is not above 0, or a Poisson's ratio is not that of
+            an isotropic material (not above −1, or above 1/2).
     """
     radius, modulus, poisson, ground_modulus, ground_poisson = (
         as_float(value) for value in (radius, modulus, poisson, ground_modulus, ground_poisson)

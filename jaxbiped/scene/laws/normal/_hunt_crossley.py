@@ -1,8 +1,8 @@
 """Hunt and Crossley's law, and its damping factor χ from restitution by eight formulas.
 
-None realises its e exactly over the whole range: the two oldest and Lankarani and Nikravesh's hold
-near e = 1, the later ones also for soft impacts. tests/scene/laws/test_restitution.py tells what
-each gives.
+None of them yields its e exactly over the whole range: the two oldest and that of Lankarani and
+Nikravesh hold near e = 1, the later ones also for soft impacts. The restitution of each is listed
+in tests/scene/laws/test_restitution.py.
 """
 
 from collections.abc import Callable, Mapping
@@ -68,9 +68,9 @@ class HuntCrossley(AbstractHertzianLaw):
     """F_N = K δⁿ (1 + hysteresis δ̇) while δ > 0, never below zero (no adhesion).
 
     The literature writes χ/v⁻ for the hysteresis, with a factor χ that depends on the restitution
-    and the approach speed v⁻. In a walker v⁻ is a state of the contact and no constant, so here
-    the quotient is the parameter; `from_restitution` gives it from both. The reaction reaches
-    zero at δ̇ = −1/hysteresis; a foot that nothing pulls out never gets so fast.
+    and the approach speed v⁻. In a walker, v⁻ is a state of the contact and not a constant, so the
+    parameter here is the quotient; `from_restitution` computes it from both. The reaction reaches
+    zero at δ̇ = −1/hysteresis; a foot that is not pulled out never moves so fast.
 
     Source: Hunt and Crossley, Journal of Applied Mechanics 42 (1975) 440.
 
@@ -80,7 +80,7 @@ class HuntCrossley(AbstractHertzianLaw):
         n: exponent [–].
 
     Raises:
-        ArgumentError: K not above 0, hysteresis below 0 or n below 1.
+        ArgumentError: K is not above 0, hysteresis is below 0, or n is below 1.
     """
 
     name: ClassVar[str] = "hunt-crossley"
@@ -98,10 +98,10 @@ class HuntCrossley(AbstractHertzianLaw):
         formula: str = "flores",
         n: Parameter = 1.5,
     ) -> Self:
-        """The law meant to give the restitution `e` to an impact at `approach_speed`.
+        """The law that approximates the restitution `e` of an impact at `approach_speed`.
 
-        How near the restitution of such an impact comes to e depends on the formula: for
-        e = 0.5 from 0.47 (Flores) to 0.80 (Lee and Wang).
+        How close the restitution of such an impact is to e depends on the formula: for e = 0.5, it
+        ranges from 0.47 (Flores) to 0.80 (Lee and Wang).
 
         Args:
             K: contact stiffness [N/mⁿ].
@@ -111,8 +111,8 @@ class HuntCrossley(AbstractHertzianLaw):
             n: exponent [–].
 
         Raises:
-            ArgumentError: an unknown formula, an e that it does not allow, K or approach_speed
-                not above 0, or n below 1.
+            ArgumentError: the formula is unknown or does not allow e, K or approach_speed is not
+                above 0, or n is below 1.
         """
         check_choice("formula", formula, RESTITUTION_FORMULAS)
         speed = as_float(approach_speed)
@@ -128,7 +128,7 @@ class HuntCrossley(AbstractHertzianLaw):
         return pushing(penetration, self.K * power(depth, self.n) * (1.0 + self.hysteresis * rate))
 
     def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
-        """The reaction over K δⁿ."""
+        """The reaction divided by K δⁿ."""
         return (1.0 + self.hysteresis * rate,)
 
     @classmethod

@@ -23,8 +23,8 @@ from jaxbiped.scene.laws.normal._weight_on_law import AbstractHertzianLaw
 class RistowSchafer(AbstractHertzianLaw):
     """F_N = K δⁿ + c δ δ̇ while δ > 0, never below zero (no adhesion).
 
-    Source: the seed paper, section 2.2, after Ristow and Schäfer et al. The reaction leaves zero
-    at δ̇ = −(K/c) δⁿ⁻¹, while the foot is still indented.
+    Source: the seed paper, section 2.2, after Ristow and Schäfer et al. The reaction leaves zero at
+    δ̇ = −(K/c) δⁿ⁻¹, while the foot is still in the ground.
 
     Attributes (leaves of any batch shape):
         K: contact stiffness [N/mⁿ].
@@ -32,7 +32,7 @@ class RistowSchafer(AbstractHertzianLaw):
         n: exponent of the contact law [–].
 
     Raises:
-        ArgumentError: K not above 0, c below 0 or n below 1.
+        ArgumentError: K is not above 0, c is below 0, or n is below 1.
     """
 
     name: ClassVar[str] = "ristow-schafer"
@@ -49,7 +49,7 @@ class RistowSchafer(AbstractHertzianLaw):
         return pushing(penetration, self.K * power(depth, self.n) + self.c * depth * rate)
 
     def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
-        """The reaction over the penetration: it leaves zero where this does."""
+        """The reaction divided by the penetration, which leaves zero where the reaction does."""
         depth = depth_in_contact(penetration)
         return (self.K * power(depth, self.n - 1.0) + self.c * rate,)
 
@@ -60,11 +60,11 @@ class RistowSchafer(AbstractHertzianLaw):
 
 
 class Standing(NamedTuple):
-    """How a mass stands on the seed's law, computed where it is asked for.
+    """How a mass stands on the seed's law, computed when it is needed.
 
     Attributes:
-        law: the seed's.
-        mass: what stands there [kg].
+        law: the seed's law.
+        mass: mass that stands on it [kg].
         g: gravitational acceleration [m/s²].
     """
 
@@ -74,16 +74,16 @@ class Standing(NamedTuple):
 
     @property
     def penetration(self) -> Scalar:
-        """How deep it stands [m]."""
+        """Penetration under its weight [m]."""
         return _rest_penetration(self.mass, self.g, self.law.K, self.law.n)
 
     @property
     def damping_ratio(self) -> Scalar:
-        """Of small oscillations about that [–]."""
+        """Damping ratio of small oscillations about that penetration [–]."""
         return _damping_ratio(self.penetration, self.mass, self.g, self.law.c, self.law.n)
 
     def arguments(self) -> dict[str, Scalar]:
-        """Of `from_weight`."""
+        """Arguments of `from_weight`."""
         names = ("mass", "penetration", "damping_ratio", "g")
         return {name: getattr(self, name) for name in names}
 
@@ -106,9 +106,9 @@ _GAUSS = [(0.5 * (1.0 + float(x)), 0.5 * float(w)) for x, w in zip(_NODES, _WEIG
 class SmoothRistowSchafer(AbstractNormalLaw):
     """`RistowSchafer` made twice continuously differentiable, with the same K, c and n.
 
-    Penetration passes through a C² ramp of width `depth_width` and the force through one of
-    width `force_width`; above both widths the law is the original, and it is exactly zero out of
-    contact. `docs/laws.md` tells how much that changes the gait.
+    The penetration is passed through a C² ramp of width `depth_width`, and the force through one of
+    width `force_width`. Above both widths, the law is the original; out of contact, it is exactly
+    zero. `docs/laws.md` shows how much this changes the gait.
 
     Attributes (leaves of any batch shape):
         K: contact stiffness [N/mⁿ].
@@ -118,7 +118,7 @@ class SmoothRistowSchafer(AbstractNormalLaw):
         force_width: force over which the clamp at zero is rounded [N].
 
     Raises:
-        ArgumentError: K or a width not above 0, c below 0 or n below 1.
+        ArgumentError: K or a width is not above 0, c is below 0, or n is below 1.
     """
 
     name: ClassVar[str] = "smooth-ristow-schafer"

@@ -12,11 +12,11 @@ from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, Abstrac
 
 
 class AbstractMatchedLaw(AbstractDampedLaw):
-    """A damped law that is made like the seed's by how a mass stands on it."""
+    """A damped law that resembles the seed's in how a mass stands on it."""
 
     @classmethod
     def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
-        """The same penetration under the weight, with the same damping ratio about it."""
+        """The law with the same penetration under the weight and the same damping ratio there."""
         return cls.from_weight(**standing.arguments())
 
 
@@ -24,7 +24,7 @@ class KelvinVoigt(AbstractMatchedLaw):
     """F_N = K δ + D δ̇ while δ > 0, never below zero (no adhesion).
 
     The damper acts at once, so the force jumps by D δ̇ at touchdown: `jumps_at_touchdown`. It
-    comes back to zero at δ̇ = −(K/D) δ, while the foot is still indented.
+    returns to zero at δ̇ = −(K/D) δ, while the foot is still in the ground.
 
     Source: Goldsmith, Impact (1960).
 
@@ -33,7 +33,7 @@ class KelvinVoigt(AbstractMatchedLaw):
         D: contact damping [N·s/m].
 
     Raises:
-        ArgumentError: K not above 0 or D below 0.
+        ArgumentError: K is not above 0, or D is below 0.
     """
 
     name: ClassVar[str] = "kelvin-voigt"
@@ -64,9 +64,9 @@ class KelvinVoigt(AbstractMatchedLaw):
 class KuwabaraKono(AbstractMatchedLaw, AbstractHertzianLaw):
     """F_N = K δ^{3/2} + gamma δ^{1/2} δ̇ while δ > 0, never below zero (no adhesion).
 
-    Weakly damped, the restitution falls with the approach speed as 1 − e ∝ (v⁻)^{1/5}. The force
-    begins as δ^{1/2}, so its slope is without bound just past touchdown. It comes back to zero at
-    δ̇ = −(K/gamma) δ, while the foot is still indented.
+    With weak damping, the restitution falls with the approach speed as 1 − e ∝ (v⁻)^{1/5}. The
+    force begins as δ^{1/2}, so its slope is unbounded just after touchdown. It returns to zero at
+    δ̇ = −(K/gamma) δ, while the foot is still in the ground.
 
     Source: Kuwabara and Kono, Japanese Journal of Applied Physics 26 (1987) 1230.
 
@@ -75,7 +75,7 @@ class KuwabaraKono(AbstractMatchedLaw, AbstractHertzianLaw):
         gamma: contact damping [N·s/m^1.5].
 
     Raises:
-        ArgumentError: K not above 0 or gamma below 0.
+        ArgumentError: K is not above 0, or gamma is below 0.
     """
 
     name: ClassVar[str] = "kuwabara-kono"
@@ -99,9 +99,9 @@ class KuwabaraKono(AbstractMatchedLaw, AbstractHertzianLaw):
 class Tsuji(AbstractMatchedLaw, AbstractHertzianLaw):
     """F_N = K δ^{3/2} + gamma δ^{1/4} δ̇ while δ > 0, never below zero (no adhesion).
 
-    A mass m that drops onto it leaves with a restitution that depends on gamma/√(m K) alone, not
-    on the speed. The force begins as δ^{1/4}, so its slope is without bound just past touchdown.
-    It comes back to zero at δ̇ = −(K/gamma) δ^{5/4}, while the foot is still indented.
+    The restitution of a mass m that drops onto it depends only on gamma/√(m K), not on the speed.
+    The force begins as δ^{1/4}, so its slope is unbounded just after touchdown. It returns to zero
+    at δ̇ = −(K/gamma) δ^{5/4}, while the foot is still in the ground.
 
     Source: Tsuji, Tanaka and Ishida, Powder Technology 71 (1992) 239.
 
@@ -110,7 +110,7 @@ class Tsuji(AbstractMatchedLaw, AbstractHertzianLaw):
         gamma: contact damping [N·s/m^1.25].
 
     Raises:
-        ArgumentError: K not above 0 or gamma below 0.
+        ArgumentError: K is not above 0, or gamma is below 0.
     """
 
     name: ClassVar[str] = "tsuji"

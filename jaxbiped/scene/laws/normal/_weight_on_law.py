@@ -13,10 +13,10 @@ from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, hertz_energy, 
 
 
 class AbstractDampedLaw(AbstractNormalLaw):
-    """A normal law of a stiffness K, a damping coefficient of its own, and perhaps an exponent n.
+    """A normal law with a stiffness K, its own damping coefficient, and perhaps an exponent n.
 
     Attributes:
-        exponent: of the stiffness, unless n is told. A property of the class.
+        exponent: default exponent of the stiffness. A property of the class.
     """
 
     exponent: ClassVar[float] = 1.5
@@ -24,7 +24,7 @@ class AbstractDampedLaw(AbstractNormalLaw):
     @staticmethod
     @abc.abstractmethod
     def damping_coefficient(damper: Scalar, penetration: Scalar, weight: Scalar) -> Scalar:
-        """The law's coefficient whose linear damper is `damper` [N·s/m] at rest.
+        """The law's coefficient with the linear damper `damper` [N·s/m] at rest.
 
         The weight [N] rests at the penetration [m].
         """
@@ -39,17 +39,18 @@ class AbstractDampedLaw(AbstractNormalLaw):
         g: Parameter = 9.8,
         **n: Parameter,
     ) -> Self:
-        """The law on which a mass stands and oscillates as told.
+        """The law on which a mass has this penetration and this damping ratio.
 
         Args:
-            mass: what stands on the law [kg].
-            penetration: how deep it stands [m].
-            damping_ratio: of small oscillations about that [–].
+            mass: mass that stands on the law [kg].
+            penetration: penetration under its weight [m].
+            damping_ratio: damping ratio of small oscillations about that penetration [–].
             g: gravitational acceleration [m/s²].
-            n: exponent [–], for a law that has one as a parameter; 1.5 unless given.
+            n: exponent [–], for a law that has one as a parameter. Default: 1.5.
 
         Raises:
-            ArgumentError: mass, penetration or g not above 0, damping_ratio below 0, n below 1.
+            ArgumentError: mass, penetration or g is not above 0, damping_ratio is below 0, or n is
+                below 1.
         """
         told = {"n": cls.exponent, **n}
         K, damper = matched_to_weight(
@@ -60,7 +61,7 @@ class AbstractDampedLaw(AbstractNormalLaw):
 
 
 class AbstractHertzianLaw(AbstractDampedLaw):
-    """A damped law whose elastic part is Hertz's, K δⁿ; its exponent is n, where it has one."""
+    """A damped law with Hertz's elastic part, K δⁿ; its exponent is n, if it has one."""
 
     K: eqx.AbstractVar[Parameter]
 
@@ -79,13 +80,14 @@ def matched_to_weight(
     damping_ratio: Parameter = 0.0,
     n: Parameter = 1.5,
 ) -> tuple[Scalar, Scalar]:
-    """The stiffness K [N/mⁿ] and the damper d [N·s/m] that hold a mass at rest as told.
+    """The stiffness K [N/mⁿ] and damper d [N·s/m] for this penetration and damping ratio.
 
     K δⁿ carries the weight m g at the penetration δ. There the linear stiffness is
     k = dF/dδ = n m g/δ, and the linear damper is d = dF/dδ̇ = 2 ζ √(k m).
 
     Raises:
-        ArgumentError: mass, penetration or g not above 0, damping_ratio below 0 or n below 1.
+        ArgumentError: mass, penetration or g is not above 0, damping_ratio is below 0, or n is
+            below 1.
     """
     mass, penetration, g, damping_ratio, n = (
         as_float(value) for value in (mass, penetration, g, damping_ratio, n)
