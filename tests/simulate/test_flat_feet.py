@@ -168,6 +168,29 @@ def walk(y, footsteps):
     return strikes, y
 
 
+SEED, LOCKED = jb.seed_scene(), jb.models.hsu_chen()
+OF_SEED = dict(theta_1=-0.24, theta_2=0.24, omega_1=-1.09, omega_2=-1.64)
+OF_LOCKED = jb.models.MODELS["hsu-chen"].starts["gait"]
+
+
+@pytest.mark.parametrize(
+    ("walker", "start"),
+    [
+        (jb.RigidScene(SEED.walker, SEED.ground), OF_SEED),
+        (LOCKED, OF_LOCKED),
+        (scene(), START),
+    ],
+)
+@pytest.mark.parametrize("times", [1.0, 8.0])
+def test_a_walk_that_the_ground_would_have_to_hold_down_is_told(walker, start, times):
+    """Its leg turns so fast that a real foot would fly."""
+    fast = {name: value * times if "omega" in name else value for name, value in start.items()}
+    walk = jb.simulate(walker, walker.state(**fast), duration=1e-3)
+    flies = jb.dynamics.rigid_checks(walker, walk.final).flies
+    assert bool(flies.all()) is (times > 1.0)
+    assert int(walk.pulls) == (int(walk.accepted) if times > 1.0 else 0)
+
+
 NAMES, KINDS = ("leg_1", "leg_2", "foot_1", "foot_2"), ("theta", "omega")
 
 
