@@ -111,15 +111,18 @@ def forces(y, leg, stands):
 
 
 def landed(y, leg, stands):
-    """Behind the plastic impact of what stands then, without what would have to pull."""
+    """Behind the plastic impact of the one set of these that neither pulls nor penetrates."""
     q, rates = y[:6], y[6:]
     mass, _ = mass_and_load(q, rates)
-    rows, _ = contacts(q, rates, leg, stands)
-    after, impulses = held(mass, mass @ rates, rows, np.zeros(len(rows)))
-    up = impulses[[1, *range(2, len(rows))]]
-    if len(stands) > 1 and up.min() < 0.0:
-        return landed(y, leg, (stands[1 - int(np.argmin(up))],))
-    return np.concatenate([q, after]), stands
+    found = []
+    for chosen in {(where,) for where in stands} | {stands}:
+        rows, _ = contacts(q, rates, leg, chosen)
+        after, impulses = held(mass, mass @ rates, rows, np.zeros(len(rows)))
+        leaves = [contacts(q, rates, leg, [w])[0][1] @ after for w in set(stands) - set(chosen)]
+        if min([*impulses[1:], *leaves]) >= -1e-12:
+            found.append((np.concatenate([q, after]), chosen))
+    (only,) = found
+    return only
 
 
 def height(y, leg, where):
