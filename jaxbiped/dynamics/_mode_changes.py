@@ -202,31 +202,42 @@ def _changed(
 
 
 def settled(scene: RigidScene, state: Any, leg: int, least: Scalar | float = 0.0) -> Any:
-    """The state without what would have to pull: first one foot of two, then limits of stops.
+    """The state without what would have to pull: limits of stops, and one foot of two.
 
     `leg`: the one that stands; `least`: as of `change_mode`.
     """
-    stance, modes = stance_on(scene, state, leg), rigid_modes(scene.mechanism)
-    g, mechanism = scene.ground.g, scene.mechanism
-    if stance.stands:
-        assert stance.mode is not None
-        first, second = stance.stands
-        loads = foot_loads(scene, stance, turning_of(scene, stance))
-        bearing = least * (mechanism.total_mass * g)
-        lifts = first & second & (jnp.minimum(*loads) < bearing)
-        less = loads[0] < loads[1]
-        stays = first & ~(lifts & less), second & ~(lifts & ~less)
-        stands = modes.standing(leg, stays, state.mode)
-        state = with_mode(scene, state, stance.mode._replace(stands=stands))
-        stance = stance_on(scene, state, leg)
+    found, stance = _pressed(scene, state, leg, least), stance_on(scene, state, leg)
+    if not stance.stands:
+        return found
+    assert stance.mode is not None
+    first, second = stance.stands
+    loads = foot_loads(scene, *_turned(scene, found, leg))
+    bearing = least * (scene.mechanism.total_mass * scene.ground.g)
+    lifts = first & second & (jnp.minimum(*loads) < bearing)
+    less = loads[0] < loads[1]
+    stays = first & ~(lifts & less), second & ~(lifts & ~less)
+    stands = rigid_modes(scene.mechanism).standing(leg, stays, state.mode)
+    tipped = with_mode(scene, state, stance.mode._replace(stands=stands))
+    return select(lifts, _pressed(scene, tipped, leg, least), found)
+
+
+def _turned(scene: RigidScene, state: Any, leg: int) -> tuple[Stance, Turning]:
+    stance = stance_on(scene, state, leg)
+    return stance, turning_of(scene, stance)
+
+
+def _pressed(scene: RigidScene, state: Any, leg: int, least: Scalar | float) -> Any:
+    """The state without limits that would have to pull on feet that stay."""
+    mechanism, modes = scene.mechanism, rigid_modes(scene.mechanism)
     if not modes.limits:
         return state
-    turning, mode = turning_of(scene, stance), stance.mode
+    stance, turning = _turned(scene, state, leg)
+    mode = stance.mode
     assert turning.holds is not None
     assert mode is not None
     count = len(stance.held) - len(modes.limits)
     loose = [*[False] * count, *_loose(modes, mode)]
-    pressed = least * (g / mechanism.height) - ROUNDING
+    pressed = least * (scene.ground.g / mechanism.height) - ROUNDING
     held = turning.holds.pressed(turning.unheld, stance.held, loose, pressed)
     return with_mode(scene, state, mode._replace(held=tuple(held[count:])))
 

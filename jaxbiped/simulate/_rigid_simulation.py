@@ -43,6 +43,7 @@ from jaxbiped.solve._rigid_progress import (
     RigidProgress,
     RigidWalk,
     initial_progress,
+    is_pulled,
     state_with_hip,
 )
 from jaxbiped.solve._rigid_steps import attempt_step, ending_of
@@ -190,6 +191,7 @@ class RigidSimulation(eqx.Module):
             rejected=found.rejected,
             arrivals=arrivals_among(rows, found.footsteps, state),
             grazes=found.grazes,
+            pulls=found.pulls,
             mode_history=history,
             engine=self.engine,
         )
@@ -211,6 +213,7 @@ class RigidSolved(NamedTuple):
     accepted: Scalar
     rejected: Scalar
     grazes: Scalar
+    pulls: Scalar
     begin: Scalar | None
 
 
@@ -226,12 +229,16 @@ def rigid_program(records: bool, waits: bool, embedded: bool = False) -> Program
 
     def finish(walk: RigidWalk, now: RigidProgress) -> RigidSolved:
         code = ending_of(walk, now, jnp.asarray(waits))
-        counts = (now.footsteps, now.accepted, now.rejected, now.grazes)
+        counts = (now.footsteps, now.accepted, now.rejected, now.grazes, now.pulls)
         begin = getattr(walk.state, "mode", None)
         begin = begin if now.modes is None else now.modes.begin
         return RigidSolved(now.t, state_with_hip(walk, now), code, *counts, begin)
 
-    attempt = functools.partial(attempt_step, embedded=embedded)
+    def attempt(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Scalar]:
+        after, over = attempt_step(walk, now, embedded=embedded)
+        pulled = (after.accepted > now.accepted) & is_pulled(walk, after)
+        return after._replace(pulls=now.pulls + jnp.where(pulled, 1, 0)), over
+
     return Program(initial_progress, attempt, finish, record=_record if records else None)
 
 

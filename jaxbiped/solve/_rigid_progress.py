@@ -6,8 +6,8 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._mode_changes import change_mode
-from jaxbiped.dynamics._rolling import rolling_rates
-from jaxbiped.dynamics._stance import of_stance
+from jaxbiped.dynamics._rolling import ground_force, rolling_rates
+from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._mode_steps import SurfaceCourse, course_of, has_modes
 
@@ -52,6 +52,7 @@ class RigidProgress(NamedTuple):
         struck: whether the last attempt ended by a heel strike.
         footsteps: how many so far.
         grazes: steps so far of which the tolerance does not tell whether the foot came down.
+        pulls: steps so far behind which the walker `is_pulled`, where they are counted.
         accepted, rejected: attempted steps so far, by what became of them.
         code: of the `Ending` that came, 0 for none.
         modes: what is known of mode changes; None where only one mode can occur.
@@ -70,6 +71,7 @@ class RigidProgress(NamedTuple):
     struck: Scalar
     footsteps: Scalar
     grazes: Scalar
+    pulls: Scalar
     accepted: Scalar
     rejected: Scalar
     code: Scalar
@@ -129,6 +131,7 @@ def initial_progress(walk: RigidWalk) -> RigidProgress:
         struck=no,
         footsteps=none,
         grazes=none,
+        pulls=none,
         accepted=none,
         rejected=none,
         code=none,
@@ -166,6 +169,15 @@ def state_with_hip(walk: RigidWalk, now: RigidProgress) -> Any:
 def root_place(walk: RigidWalk, state: Any) -> Scalar:
     """Where the root point is from the place of the standing foot at its body's angle 0 [m]."""
     return of_stance(walk.scene, state, lambda stance: stance.root.x)
+
+
+def is_pulled(walk: RigidWalk, now: RigidProgress) -> Scalar:
+    """Whether the ground has to pull on the leg that stands, where a real foot would fly."""
+
+    def load(stance: Stance) -> Scalar:
+        return ground_force(walk.scene, stance, now.rates).normal
+
+    return (now.landing == 0) & (of_stance(walk.scene, now.state, load) < 0.0)
 
 
 def shifted(state: Any, distance: Scalar) -> Any:

@@ -73,6 +73,9 @@ class Trajectory(eqx.Module, Generic[SomeState]):
         grazes: how often the swing foot of a rigid walker reached the ground, or missed it, by less
             than the tolerance resolves; these events do not count as heel strikes. None for other
             models.
+        pulls: number of steps of a rigid walker after which the ground would have to pull on the
+            standing foot. A real foot would fly there; the walk goes on as if it were held. None
+            for other models.
         mode_history: the modes of a rigid walker, a `ModeHistory`, if more than one can occur.
         scene_key: a number that identifies the scene; measures and figures use it to refuse another
             scene.
@@ -93,6 +96,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     error: ErrorEstimate | None = None
     missed_contacts: Int[Array, "..."] | None = None
     grazes: Int[Array, "..."] | None = None
+    pulls: Int[Array, "..."] | None = None
     mode_history: ModeHistory | None = None
     scene_key: Float[Array, "..."] | None = None
     engine: str = eqx.field(static=True, default="xla")

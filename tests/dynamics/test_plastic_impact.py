@@ -1,19 +1,25 @@
-"""Plastic impacts, against an enumeration of all that may be held, in maximal coordinates."""
+"""What is held in impacts and at rest, against an enumeration of all that may be held.
+
+In maximal coordinates.
+"""
 
 import itertools
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._mode_changes import settled, with_mode
 from jaxbiped.dynamics._plastic_impact import Grip, plastic_impact
 from jaxbiped.dynamics._stance import stance_on
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._modes import Mode
 from jaxbiped.scene._rigid_feet import rigid_modes
 from tests.dynamics.test_modes import HEEL_TOE, couples
 from tests.dynamics.test_rolling_mechanisms import rigid, sole_of, whole
-from tests.mechanisms import SLOPE
+from tests.mechanisms import SLOPE, G
 from tests.random_mechanisms import maximal_accelerations
 
 MIRROR = (("leg_1", "leg_2"), ("foot_1", "foot_2"))
@@ -48,9 +54,12 @@ def drawn(seed):
     return jax.tree.map(np.float64, state), tuple(map(np.bool_, held))
 
 
-def allowed(state, held):
-    """Of all sets of contacts and limits those with no pull and no penetration: their rates."""
-    motion, limits = whole(SCENE, state), rigid_modes(WALKER).limits
+def allowed(motion, held, before):
+    """Of all sets of contacts and limits those with no pull and no penetration.
+
+    Each with what becomes of `before`, rates or accelerations.
+    """
+    limits = rigid_modes(WALKER).limits
     count = 2 + len(motion.rates)
     still = motion._replace(vx=0.0, vz=0.0, rates=(0.0,) * (count - 2))
     free = maximal_accelerations(BARE, still, SLOPE, 0.0)
@@ -70,7 +79,6 @@ def allowed(state, held):
         rows[i] = np.array([0.0, 0.0, *(limit.gap.of(e) for e in np.eye(count - 2))])
         given = couples(SCENE, still, [limit], [1.0])
         answers[i] = maximal_accelerations(BARE, still, SLOPE, 0.0, given) - free
-    before = np.array([motion.vx, motion.vz, *motion.rates])
     able = [i for i, each in enumerate(held) if each]
     feet = [(2,), (3,), (2, 3)]
     subsets = [s for n in range(len(able) + 1) for s in itertools.combinations(able, n)]
@@ -84,7 +92,7 @@ def allowed(state, held):
         others = {(2, 1), (3, 1), *able} - set(presses)
         leaves = [rows[each] @ after for each in others]
         if min([*impulses[1:], *leaves]) >= -TOLERANCE:
-            found.append((stand, after[2:]))
+            found.append((stand, stay, after[2:]))
     return found
 
 
@@ -93,14 +101,43 @@ def test_an_impact_holds_the_one_set_that_neither_pulls_nor_penetrates():
     sets = set()
     for seed in range(150):
         state, held = drawn(seed)
-        expected = allowed(state, held)
+        motion = whole(SCENE, state)
+        expected = allowed(motion, held, np.array([motion.vx, motion.vz, *motion.rates]))
         rates, impulse, stands, _ = struck(SCENE, state, held)
         sets.add(expected[0][0] if expected else ())
         if not expected:
             assert any(stands)
             continue
-        for stand, after in expected:
+        for stand, _, after in expected:
             np.testing.assert_allclose(rates, after, atol=1e-8)
             assert tuple(k for k, each in zip((2, 3), stands, strict=True) if each) == stand
         assert float(impulse.z) > -TOLERANCE
     assert sets == {(), (2,), (3,), (2, 3)}
+
+
+@host_jit()
+def rested(scene, state, held):
+    """Which feet and limits hold a flat foot and limits that are held, at rest, as they are."""
+    modes, yes = rigid_modes(WALKER), state.mode == state.mode
+    mode = Mode((yes, yes), held, (~yes,) * len(modes.locks))
+    found = modes.decoded(jnp, settled(scene, with_mode(scene, state, mode), 1).mode)
+    return found.stands, found.held
+
+
+def test_forces_hold_the_one_set_that_neither_pulls_nor_penetrates():
+    """A stop that pulls is let go before it can lift an end of the flat foot."""
+    sets, random = set(), np.random.default_rng(0)
+    for seed in range(150):
+        state, held = drawn(seed)
+        # What is held is at rest, the leg that swings only if a stop holds it.
+        leg = 0.0 if held[2] or held[3] else random.uniform(-9.0, 9.0)
+        foot = leg if held[0] else random.uniform(-9.0, 9.0)
+        rates = dict(omega_leg_1=leg, omega_foot_1=foot, omega_leg_2=0.0, omega_foot_2=0.0)
+        state = state._replace(**{name: np.float64(rate) for name, rate in rates.items()})
+        motion = whole(SCENE, state)
+        expected = allowed(motion, held, maximal_accelerations(BARE, motion, SLOPE, G))
+        stands, stay = (np.flatnonzero(each) for each in rested(SCENE, state, held))
+        assert [(stand, kept) for stand, kept, _ in expected] == [(tuple(2 + stands), tuple(stay))]
+        sets.add((tuple(2 + stands), len(stay)))
+    assert {each for each, _ in sets} == {(2,), (3,), (2, 3)}
+    assert {count for _, count in sets} >= {0, 1, 2}

@@ -60,3 +60,16 @@ def test_what_five_links_are_timed_by_is_right(tmp_path):
     assert all(row["error_median"] < 1e-3 for row in numbers["rates"]["rows"] if "rtol" in row)
     assert numbers["rates"]["floor"] is None or numbers["rates"]["floor"] < 1e-7
     assert 0.0 < numbers["exponent"] < 1.2
+
+
+def test_what_rigid_walks_with_knees_are_timed_by_walks(tmp_path):
+    bare = {"attempted steps of a walk", "processor time over the seed's"}
+    numbers, figures = drawn_run("modes_speed", tmp_path, unitless=bare)
+    seed, *kneed = numbers["rows"]
+    assert seed["ratio"] == 1.0
+    assert [row["walked"] for row in numbers["rows"]] == [1.0] * 3
+    # Of each footstep at least the strike is landed on, and with knees the knee's lock too.
+    assert all(row["accepted"] > seed["accepted"] > numbers["footsteps"] for row in kneed)
+    _, right = figures["modes_speed.png"].axes
+    shown = [bar.get_height() for bar in right.patches]
+    assert shown == [row["ratio"] for row in numbers["rows"]]
