@@ -1,4 +1,4 @@
-"""Actuators by themselves; their torques are held by `tests/dynamics/test_actuation.py`."""
+"""Actuators by themselves, against torques and set points by hand."""
 
 import dataclasses
 
