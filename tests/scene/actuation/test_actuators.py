@@ -1,4 +1,4 @@
-"""Actuators by themselves, against torques and set points by hand."""
+"""Actuators by themselves, against SciPy's splines and set points by hand."""
 
 import dataclasses
 
