@@ -7,6 +7,7 @@ NumPy before one: the command line refuses without them.
 
 import contextlib
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
@@ -30,6 +31,14 @@ class ResourceError(RuntimeError):
 
     The same call works once the cause is removed.
     """
+
+
+def warn(sentence: str, category: type[Warning] = RuntimeWarning) -> None:
+    """Warns at the line of the caller's code that called the package."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] == "jaxbiped":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(sentence, category, stacklevel=level)
 
 
 def is_number(value: object) -> bool:

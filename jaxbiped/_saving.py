@@ -7,14 +7,13 @@ import path of its class and the values of its fields; nothing is pickled.
 
 import io
 import json
-import warnings
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, warn
 from jaxbiped._encoding import Decoder, Encoder
 from jaxbiped._files import check_writable_file, failure_kind, user_path
 from jaxbiped._identity import provenance, source_digests
@@ -110,11 +109,9 @@ def load(path: str | Path) -> Any:
     before, now = own.get("user_code", {}), source_digests(read.found.values())
     changed = sorted(name for name in now if before.get(name) != now[name])
     if changed:
-        warnings.warn(
+        warn(
             f"path = {str(path)!r} was saved with another source of {', '.join(changed)}: the "
             "numbers are the same, but what is computed from them may differ.",
-            RuntimeWarning,
-            stacklevel=2,
         )
     return value
 

@@ -2,10 +2,9 @@
 
 import json
 import math
-import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, warn
 from jaxbiped._types import JsonObject
 
 if TYPE_CHECKING:
@@ -69,7 +68,7 @@ class LabelErrors(NamedTuple):
     def warn(self) -> None:
         """Issues a `RuntimeWarning` where the accuracy is not met."""
         if not self.met:
-            warnings.warn(self.sentence(), RuntimeWarning, stacklevel=3)
+            warn(self.sentence())
 
 
 def label_errors(found: "xarray.Dataset") -> LabelErrors:

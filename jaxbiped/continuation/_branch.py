@@ -235,8 +235,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
         raise ArgumentError("dataset is not allowed: it must be that of a branch.")
     settings = json.loads(dataset.attrs["branch"])
     own = scene_identity(scene)
-    difference = difference_of({name: settings.get(name) for name in own}, own)
-    if difference is not None:
+    if difference := difference_of({name: settings.get(name) for name in own}, own):
         raise ArgumentError(
             f"scene is not allowed: it differs from the branch's own in {difference}."
         )

@@ -1,13 +1,13 @@
 """Provenance of a gait: how a search came to it and what else it saw, also in a sentence."""
 
 import dataclasses
-import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._checks import warn
 from jaxbiped._ending import Ending, NamedCode
 from jaxbiped._types import Scalar
 from jaxbiped.gait._fixed_point_search import Search
@@ -138,11 +138,12 @@ def explain_search(scene: AbstractScene, gait: "Gait") -> str:
 
 def unknown_derivatives(gait: "Gait") -> str:
     """Why derivatives of a gait are not known, without a full stop; nothing where they are."""
-    if int(gait.grazes):
+    if times := int(gait.grazes):
         return (
-            f"the gait grazes a switch {int(gait.grazes)} times, as a foot that barely touches the "
-            "ground or misses it, by less than the tolerance resolves: its multipliers are those "
-            "of one side, its sensitivities are not known"
+            f"the gait grazes a switch {times} {'time' if times == 1 else 'times'}, as a foot that "
+            "barely touches the ground or misses it, or a joint that barely reaches its stop, by "
+            "less than the tolerance resolves: its multipliers are those of one side, its "
+            "sensitivities are not known"
         )
     if gait.outcome is Search.FOUND and np.any(np.isnan(np.asarray(gait.sensitivities.period))):
         return (
@@ -156,7 +157,7 @@ def warn_of_unknown(gait: "Gait") -> None:
     """Warns of a gait whose derivatives are not known."""
     told = unknown_derivatives(gait)
     if gait.outcome is Search.FOUND and told:
-        warnings.warn(told + ".", RuntimeWarning, stacklevel=3)
+        warn(told + ".")
 
 
 def _search_sentence(gait: "Gait") -> str:

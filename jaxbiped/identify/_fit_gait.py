@@ -1,12 +1,18 @@
 """Identification of a scene's parameters from measured gaits."""
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_choice, check_count, check_finite, check_type
+from jaxbiped._checks import (
+    ArgumentError,
+    check_choice,
+    check_count,
+    check_finite,
+    check_type,
+    warn,
+)
 from jaxbiped._progress import stage
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.gait._gait import Gait
@@ -85,12 +91,10 @@ def fit_gait(
         descent = Descent(scene, bounds, gaits, accuracy, engine, now, near)
         fit = descent.run(int(max_evaluations))
     if fit.ending is FitEnding.CONVERGED and fit.p_value < UNLIKELY:
-        warnings.warn(
+        warn(
             f"the model does not fit the data: chi squared is {fit.chi_squared:.3g} at "
             f"{fit.freedom} degrees of freedom (p = {fit.p_value:.1g}), so that standard errors "
             "and intervals mean nothing.",
-            RuntimeWarning,
-            stacklevel=2,
         )
     return fit
 

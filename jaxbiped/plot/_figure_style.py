@@ -190,7 +190,10 @@ class StyledFigure(Figure):
 
     def savefig(self, fname: Any, **options: Any) -> None:
         """Writes it, with fonts embedded."""
-        with mpl.rc_context(_EMBEDDED):
+        with mpl.rc_context(self._chosen.settings() | _EMBEDDED):
+            # Axes of equal scales move within the first layout; drawing lays out once more.
+            if layout := self.get_layout_engine():
+                layout.execute(self)
             super().savefig(fname, **{"dpi": self._chosen.style.dots} | options)
 
 

@@ -1,7 +1,6 @@
 """Parameters of a scene by name, and the identity of a scene that is made of them."""
 
 import dataclasses
-import warnings
 from collections.abc import Mapping
 from typing import Any, TypeAlias, TypeVar
 
@@ -10,7 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._checks import ArgumentError, check_choice, warn
 from jaxbiped._identity import identity
 from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._quantity import Quantity
@@ -171,11 +170,10 @@ def with_parameters(scene: SomeScene, values: Mapping[str, Parameter]) -> SomeSc
         changed = _untied(with_parameters(changed, paired))
         values = {name: value for name, value in values.items() if name not in leaves}
         leaves = apart
-        warnings.warn(
+        warn(
             f"{', '.join(values)}: the sides differ, so the mirror is dropped, and a cycle of the "
             "walk is a stride instead of a step.",
             UserWarning,
-            stacklevel=2,
         )
     changed = _replace(changed, {leaves[name][0]: value for name, value in values.items()})
     return scene.with_minimal(changed) if isinstance(scene, AbstractScene) else changed

@@ -7,7 +7,6 @@ as wrong by chance, nothing is seen.
 """
 
 import dataclasses
-import warnings
 from typing import Any, NamedTuple, TypeAlias
 
 import jax
@@ -16,7 +15,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, warn
 from jaxbiped._ending import Ending
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._simulation import Simulation
@@ -167,11 +166,9 @@ def warn_of_missed_contacts(run: Simulation, walk: Trajectory) -> None:
     missed = walk.missed_contacts
     if run.dt is None or missed is None or isinstance(missed, jax.core.Tracer) or not int(missed):
         return
-    warnings.warn(
+    warn(
         f"dt = {float(run.dt):g} steps over contacts: a foot dips into the ground and leaves it "
         f"between two steps, {int(missed)} times; take shorter steps, or tolerances.",
-        RuntimeWarning,
-        stacklevel=3,
     )
 
 
@@ -195,11 +192,9 @@ def warn_of_long_steps(run: Simulation, walk: Trajectory) -> None:
             break
     else:
         return
-    warnings.warn(
+    warn(
         f"dt = {float(run.dt):g} is too long: with steps of {float(dt):g} s {found}; take shorter "
         "steps, or tolerances.",
-        RuntimeWarning,
-        stacklevel=3,
     )
 
 

@@ -1,7 +1,5 @@
 """Motion of a linkage in gravity."""
 
-import warnings
-
 import diffrax
 import jax
 import jax.numpy as jnp
@@ -17,6 +15,7 @@ from jaxbiped._checks import (
     check_not_negative,
     check_positive,
     check_type,
+    warn,
 )
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, as_float
@@ -128,11 +127,9 @@ def _warn_of_long_steps(
         apart = np.max(np.abs(np.array(course)[:, -1] - np.array(found)))
         change = max(change, float(apart / size) if size > 0.0 else 0.0)
     if not change <= _LONG:
-        warnings.warn(
+        warn(
             f"dt = {dt:g} is too long: with steps of {_LONGER * dt:g} s the relative change of the "
             f"final state is {change:.2g}; take shorter steps, or tolerances.",
-            RuntimeWarning,
-            stacklevel=4,
         )
 
 

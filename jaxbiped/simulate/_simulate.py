@@ -1,13 +1,12 @@
 """Simulation of a scene from a start: the door for every kind of scene, and its short names."""
 
-import warnings
 from collections.abc import Callable
 from typing import Any, Literal
 
 import diffrax
 from jaxtyping import Array, PyTree
 
-from jaxbiped._checks import check_type
+from jaxbiped._checks import check_type, warn
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Parameter
 from jaxbiped.dynamics._linkage_motion import LinkageState
@@ -153,7 +152,7 @@ def simulate(
     if wanted is not None:
         return accurate_walk(run, wanted)
     if rtol is not None and dt is None and (said := unresolved_slip(rtol, scene.minimal)):
-        warnings.warn(f"{said}.", RuntimeWarning, stacklevel=2)
+        warn(f"{said}.")
     walk = run()
     if dt is not None:
         warn_of_missed_contacts(run, walk)

@@ -1,7 +1,6 @@
 """Checked request to simulate, which can be compiled and run at other tolerances."""
 
 import dataclasses
-import warnings
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -21,6 +20,7 @@ from jaxbiped._checks import (
     check_type,
     check_unbatched,
     traced_rules,
+    warn,
 )
 from jaxbiped._types import Numbers, Scalar, as_array, as_float
 from jaxbiped.compiler import BY_NAME, Request
@@ -193,7 +193,7 @@ class Simulation(eqx.Module):
         """Compiles what is not compiled yet, and runs."""
         if self.adjoint is not None:
             if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(self)):
-                warnings.warn(_OF_STEPS, RuntimeWarning, stacklevel=3)
+                warn(_OF_STEPS)
             walk = _run(self)
         else:
             walk = with_derivatives(self, _run, moving=_moving, slopes=_slopes)

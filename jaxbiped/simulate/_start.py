@@ -1,6 +1,5 @@
 """Start of a simulation, and what else is asked of it, checked."""
 
-import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -17,6 +16,7 @@ from jaxbiped._checks import (
     check_positive,
     check_unbatched,
     holds_somewhere,
+    warn,
 )
 from jaxbiped._jax_versions import untraced
 from jaxbiped._types import Scalar
@@ -211,15 +211,15 @@ def check_start_height(scene: Scene | RedundantScene, state: Any) -> None:
             f"touches at {root} = {height + depth:.9g}."
         )
     if stored > 0.0 and depth > _TOLD_DEPTH * length:
-        warnings.warn(
+        warn(
             f"foot {foot} starts {depth:.3g} m below the ground; it just touches at "
             f"{root} = {height + depth:.9g}.",
-            stacklevel=2,
+            UserWarning,
         )
     if passed and max(passed) > _TOLD_ANGLE:
-        warnings.warn(
+        warn(
             f"a stop is passed by {max(passed):.3g} rad at the start: begin within its limits.",
-            stacklevel=2,
+            UserWarning,
         )
 
 

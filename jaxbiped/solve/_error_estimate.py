@@ -1,6 +1,5 @@
 """Error estimate of a result: its error bars, and what was done to have them."""
 
-import warnings
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
@@ -10,7 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_positive
+from jaxbiped._checks import ArgumentError, check_positive, warn
 from jaxbiped._types import JsonObject
 
 LOOSER = 10.0
@@ -126,7 +125,7 @@ def refine(
         bars, float(relative), float(wanted), float(tolerance), rounds, met, "" if met else reason
     )
     if not met:
-        warnings.warn(shortfall(error), RuntimeWarning, stacklevel=4)
+        warn(shortfall(error))
     return result, error
 
 

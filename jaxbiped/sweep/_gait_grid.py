@@ -2,14 +2,13 @@
 
 import contextlib
 import time
-import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, warn
 from jaxbiped._files import strict_json
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import variables_of
@@ -68,12 +67,10 @@ class GaitGrid:
         """Warns where gaits' derivatives are not determined, as `find_gait` does of one."""
         count = int(np.sum(self._dataset["grazes"].data > 0))
         if count:
-            warnings.warn(
+            warn(
                 f"{count} of the gaits graze a switch (`grazes`), as a foot that barely touches "
                 "the ground or misses it: their multipliers are those of one side, their "
                 "sensitivities are not known.",
-                RuntimeWarning,
-                stacklevel=3,
             )
 
     def flush(self) -> None:
@@ -145,10 +142,8 @@ def _load(path: Path, empty: "xarray.Dataset") -> "xarray.Dataset":
         whole = all(each.nchunks_initialized == each.nchunks for each in arrays)
         whole = whole or not bool(stored[_DONE].any())
     if not whole:
-        warnings.warn(
+        warn(
             f"store = {str(path)!r} was damaged: its gaits are searched again.",
-            RuntimeWarning,
-            stacklevel=4,
         )
         return empty
     missing = sorted(set(map(str, empty.data_vars)) - set(map(str, stored.data_vars)))

@@ -3,14 +3,13 @@
 And the labelling as a function of coordinates, as the analyses of basins ask for it.
 """
 
-import warnings
 from collections.abc import Mapping, Sequence
 
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type
+from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type, warn
 from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.basins._labels import Doubt, Label
 from jaxbiped.gait._search_starts import default_guess
@@ -94,11 +93,9 @@ def labelling(
     missing = sum(not row for row in family.rows)
     if missing:
         of = f" for {missing} of {len(family.rows)} combinations of the parameters"
-        warnings.warn(
+        warn(
             f"no stable gait was found{of if values else ''}: starts that walk there are labelled "
             "unresolved until one is met (see `with_gaits_met`).",
-            RuntimeWarning,
-            stacklevel=2,
         )
     return Labelling(scene, family, effort)
 
@@ -258,10 +255,8 @@ def label_at(
         labelled = labelling(batch.states, parameters=batch.parameters)
         remain = np.sum(labelled.doubt == int(Doubt.REMAINS)) if labelled.doubt is not None else 0
         if remain:
-            warnings.warn(
+            warn(
                 f"{remain} of {len(points)} labels remain in doubt at the finest tolerance.",
-                RuntimeWarning,
-                stacklevel=2,
             )
         found = labelled.label.astype(int)
         return (found != int(Label.WALKING)).astype(int) if failing else found

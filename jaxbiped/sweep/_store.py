@@ -4,13 +4,13 @@ One on a disk is continued where a killed run left off.
 """
 
 import contextlib
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jaxbiped._checks import warn
 from jaxbiped._files import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.sweep._store_files import SETTINGS, continue_store, note, open_store, writing
@@ -97,11 +97,9 @@ class Store:
                 self._mark(chunk, 0)
                 lost += 1
         if lost:
-            warnings.warn(
+            warn(
                 f"store = {str(self.path)!r}: {lost} of its chunks were lost or damaged; their "
                 "starts are labelled again.",
-                RuntimeWarning,
-                stacklevel=4,
             )
 
     def behind(self, mark: int = COMPLETE) -> np.ndarray:

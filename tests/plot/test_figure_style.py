@@ -201,3 +201,17 @@ def assert_fits(figure):
             across = min(box.x1, other.x1) - max(box.x0, other.x0)
             up = min(box.y1, other.y1) - max(box.y0, other.y0)
             assert min(across, up) < 1.0
+
+
+def test_axes_of_equal_scales_leave_room_for_their_title_in_the_file(tmp_path):
+    figure = style.new_figure(8.0, 4.2)
+    left, right = figure.subplots(1, 2)
+    for k in range(4):
+        left.plot([0.0, 1.0], label=f"shank_{k}")
+    style.dress(left, "left", "x", "y")
+    style.legend_below(left, columns=4)  # wider than its axes, which the layout makes room for
+    right.set_aspect("equal")
+    style.dress(right, "a title\nof two lines", "x", "y")
+    figure.savefig(tmp_path / "both.png")
+    top = right.get_tightbbox(figure.canvas.get_renderer()).y1
+    assert top <= figure.bbox.y1

@@ -37,6 +37,7 @@ def test_a_contact_between_two_steps_is_told():
     assert missed == 1
     assert error > 1e-3
     assert len(told) == 1  # walks by longer steps miss it, too
+    assert told[0].filename == __file__  # the caller's line, not one of the package
 
 
 @pytest.mark.parametrize(("depth", "dt"), [(DEPTH, SHORT), (-DEPTH, LONG)])

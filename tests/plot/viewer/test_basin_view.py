@@ -54,8 +54,8 @@ def test_a_start_that_is_picked_shows_its_walk(basin, browser, tmp_path):
     ring = "return Number(document.querySelector('.ring').getAttribute('cx'))"
 
     def assert_shows_its_start():
-        told = page.find(".picture .told").text
-        angle, rate = map(float, re.findall(r"\) (-?[\d.]+)", told))
+        told = page.find(".picture .told").text.replace("−", "-")
+        angle, rate = map(float, re.findall(r"\): (-?[\d.]+)", told))
         page.run(REWIND)
         reading = page.find(".reading").text.replace("−", "-")
         shown = float(re.search(r"leg 1: (-?[\d.]+)", reading)[1])

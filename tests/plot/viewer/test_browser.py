@@ -70,6 +70,16 @@ def assert_is_there(page, walk):
     return shown["time"]
 
 
+def test_the_last_number_of_an_axis_is_not_cut(walk, browser, tmp_path):
+    short = jb.simulate(walk[0], jb.seed_state(), duration=0.15, engine="lanes")
+    browser.open(jb.plot.view(walk[0], short).save(tmp_path / "short.html"), width=800)
+    right = """return [...document.querySelectorAll(".chart")].map((chart) => {
+      const edge = (each) => each.getBoundingClientRect().right;
+      return edge(chart) - Math.max(...[...chart.querySelectorAll(".axes text")].map(edge));
+    });"""
+    assert min(browser.run(right)) >= 0.0
+
+
 def test_it_weighs_little_and_shows_its_first_frame_within_a_second(page, file):
     assert file.stat().st_size < 1.5e6
     painted = []

@@ -107,6 +107,8 @@ def test_a_slider_leads_to_another_walk(playground, browser, tmp_path):
         assert f"after {float(end):.2f} s" in browser.run(TOLD)
         wider = "return document.documentElement.scrollWidth - window.innerWidth"
         assert browser.run(wider) <= 0
+        # The first record is that of the first step, 2 µs after the start.
+        assert browser.find(".chart .axes text").text == "0.0"
         assert browser.nameless() == []
         told = browser.find('[data-leaf=".scene.ground.slope"]').get_attribute("aria-valuetext")
         assert told == "0.0300 rad"

@@ -6,8 +6,8 @@ import { setColours, showWalks } from "./view.js";
 
 const TALL = 340;
 const HELP =
-  "Press a start, or move with the arrow keys, to see its walk. " +
-  "Walks are kept of an even choice of the starts: the nearest of them is shown.";
+  "Click on a start, or move with the arrow keys, to see its walk. " +
+  "This page holds the walks of evenly spaced starts and shows that of the nearest.";
 
 /** The picture with its legend, and the walk of the start that is picked below it. */
 export class Basin {
@@ -105,9 +105,9 @@ export class Basin {
     this.at = { c, r, i, j };
     this.mark();
     const label = basin.names[this.cells[j * basin.x.length + i]];
-    const across = `${basin.xLabel} ${basin.x[i].toPrecision(4)}`;
-    const along = `${basin.yLabel} ${basin.y[j].toPrecision(4)}`;
-    this.told.textContent = `${across}, ${along}: ${label}.`;
+    const told = (words, value) => `${words}: ${value.toPrecision(4).replace("-", "−")}`;
+    const place = `${told(basin.xLabel, basin.x[i])}, ${told(basin.yLabel, basin.y[j])}`;
+    this.told.textContent = `${place}; ${label}.`;
     this.shown?.stop();
     const walk = sent.walks[r * basin.columns.length + c];
     const autoplay = this.shown !== null;

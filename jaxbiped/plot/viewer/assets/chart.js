@@ -97,8 +97,9 @@ export class Chart {
     const ticksX = niceTicks(...this.ranges.x, this.inner / 45);
     for (const { at, text } of ticksX) {
       const x = this.px(at);
+      const within = Math.min(x, this.width - 4 * text.length);
       parts.push(svg("line", { x1: x, x2: x, y1: top, y2: bottom }));
-      parts.push(svg("text", { x, y: bottom + 14, "text-anchor": "middle" }, text));
+      parts.push(svg("text", { x: within, y: bottom + 14, "text-anchor": "middle" }, text));
     }
     for (const { at, text } of niceTicks(...this.ranges.y, (bottom - top) / 32)) {
       const y = this.py(at);
@@ -130,14 +131,14 @@ export class Chart {
   }
 }
 
-/** Round numbers within a range, about so many, with their text. */
+/** Round numbers within a range, about so many, with their text; a walk's first step is no gap. */
 function niceTicks(low, high, count) {
   const rough = (high - low) / Math.max(count, 2);
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((k) => k * power).find((each) => each >= rough) ?? 10 * power;
   const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   const ticks = [];
-  for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; n++) {
+  for (let n = Math.ceil(low / step - 1e-3); n * step <= high + 1e-9 * step; n++) {
     ticks.push({ at: n * step, text: fixed(n * step, digits) });
   }
   return ticks;

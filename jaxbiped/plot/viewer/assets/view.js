@@ -98,8 +98,8 @@ function marksNote(walk) {
   const marks = "Marks under the slope: footprints; ticks: every 0.1 m.";
   if (!tellsForces(walk)) return marks;
   return (
-    "Arrows: forces of the ground on the feet, 0.3 of its height for the walker's weight of " +
-    `${fixed(walk.weight, 1)} N, cut at 1.1 heights. ${marks}`
+    "Arrows: forces of the ground on the feet. A force equal to the walker's weight, " +
+    `${fixed(walk.weight, 1)} N, is 0.3 walker heights long; none is longer than 1.1 heights. ${marks}`
   );
 }
 
