@@ -30,7 +30,9 @@ def test_coefficients_and_rates_are_the_formulas(law):
     slip, bristle = np.meshgrid([*-size, 0.0, *size], [-0.4, -1e-2, 0.0, 0.2, 0.45])
     told = law.coefficient(slip, bristle), law.rate(slip, bristle)
     for found, expected in zip(told, friction_shares(law, 1.0, slip, bristle), strict=True):
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+        # At the largest coefficient a rate is the rounding of two large terms that cancel.
+        rounding = max(1e-12, 1e-15 * np.abs(expected).max())
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=rounding)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=name)
