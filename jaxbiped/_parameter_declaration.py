@@ -87,6 +87,15 @@ def _tuple(values: Parameter | Iterable[Parameter]) -> tuple[Scalar, ...]:
     return tuple(map(as_float, [values] if one else values))
 
 
+def with_fields(piece: Any, **fields: object) -> Any:
+    """A piece with other fields, unchecked."""
+    # Not by `copy.copy`: equinox would hold the new one for ever, as one that is being made.
+    changed = object.__new__(type(piece))
+    for name, value in (vars(piece) | fields).items():
+        object.__setattr__(changed, name, value)
+    return changed
+
+
 class AbstractPart(eqx.Module):
     """A part of a scene, whose parameters are checked when it is made."""
 

@@ -1,14 +1,17 @@
 """The trip of a scene through the package: which files it enters in one call of a door.
 
-    python -m tests.scene_trip
+    python -m tests.scene_trip [-v]
 
-Nothing is compiled yet, so that all that traces a program of the scene is on its way. A file is
-entered when a function of it is called from another file with a scene among its arguments. A climb
-is an entry into a file that lies above the caller's: one that imports it, directly or not. An entry
-into a file that was entered before is a return.
+Each door is called in a process of its own in which nothing is compiled yet, so that all that
+traces a program of the scene is on its way. A file is entered when a function of it is called from
+another file with a scene among its arguments. A climb is an entry into a file that lies above the
+caller's: one that imports it, directly or not. An entry into a file that was entered before is a
+return.
 """
 
+import json
 import os
+import subprocess
 import sys
 import tempfile
 import threading
@@ -88,12 +91,22 @@ class Trip:
         return len(seen), climbs, returns
 
 
+def trip_through(name):
+    """The entries of a scene through a door, in a process with nothing compiled or kept."""
+    with tempfile.TemporaryDirectory() as nothing_kept:
+        place = os.environ | {"JAXBIPED_CACHE": nothing_kept}
+        command = [sys.executable, "-m", "tests.scene_trip", name]
+        told = subprocess.run(command, env=place, check=True, capture_output=True, text=True)
+    trip = Trip()
+    trip.entries = [tuple(entry) for entry in json.loads(told.stdout)]
+    return trip
+
+
 def main():
     below = above(imports())
     print(f"{'door':12s} files climbs returns")
-    for name, door in DOORS.items():
-        trip = Trip()
-        trip.run(door)
+    for name in DOORS:
+        trip = trip_through(name)
         files, climbs, returns = trip.counts(below)
         print(f"{name:12s} {files:5d} {climbs:6d} {returns:7d}")
         if "-v" in sys.argv:
@@ -102,6 +115,9 @@ def main():
 
 
 if __name__ == "__main__":
-    with tempfile.TemporaryDirectory() as nothing_kept:
-        os.environ["JAXBIPED_CACHE"] = nothing_kept
+    if sys.argv[-1] in DOORS:
+        own = Trip()
+        own.run(DOORS[sys.argv[-1]])
+        print(json.dumps(own.entries))
+    else:
         main()

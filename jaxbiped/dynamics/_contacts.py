@@ -1,4 +1,4 @@
-"""Contacts: where the feet are and how they move, which touch, and the ground's forces on them."""
+"""Contacts: the feet, which of them touch, the forces on them, and all gaps that may close."""
 
 from typing import NamedTuple, cast
 
@@ -9,8 +9,9 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import load_shares, preload
 from jaxbiped.dynamics._footfalls import FootMotion, leg_depth, standing_leg, touches
+from jaxbiped.dynamics._joint_loads import Pressed, stop_limits
 from jaxbiped.dynamics._legs import LegMotion, leg_motions
-from jaxbiped.dynamics._redundant_state import CompliantState, poses_of
+from jaxbiped.dynamics._redundant_state import CompliantState, motion_in, poses_of
 from jaxbiped.dynamics._symmetry import images
 from jaxbiped.dynamics._tree import Pose, point_motion
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
@@ -21,7 +22,7 @@ from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene._state_types import SomeState
 from jaxbiped.scene._structure import Structure
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
-from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
+from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw, AbstractNormalLaw
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
 _JUST_TOUCHING = 1e-6
@@ -248,3 +249,34 @@ def hip_motion(
     return HipMotion(
         (angles[first], angles[second]), (rates[first], rates[second]), (loads[0], loads[1])
     )
+
+
+class Gap(NamedTuple):
+    """A gap between two parts that press on each other where it is closed.
+
+    Attributes:
+        penetration: positive where it is closed [m, at a stop rad].
+        penetration_rate: its rate [m/s, rad/s].
+        admitted: whether they may touch; None for "always", False for "never", as of a `Foot`.
+    """
+
+    penetration: Scalar
+    penetration_rate: Scalar
+    admitted: Scalar | bool | None
+
+
+def limits_of(
+    scene: CompliantScene, state: CompliantState
+) -> tuple[tuple[AbstractNormalLaw, Pressed], ...]:
+    """Every limit of the stops of a scene with its law."""
+    motion = motion_in(scene, state)
+    return stop_limits(scene.mechanism, motion, scene.ground.slope)
+
+
+def gaps(scene: CompliantScene, state: CompliantState) -> tuple[Gap, ...]:
+    """All gaps of a scene: those of its feet, then those of its stops."""
+    under = [
+        Gap(foot.penetration, foot.penetration_rate, foot.admitted) for foot in feet(scene, state)
+    ]
+    at_stops = [Gap(limit.penetration, limit.rate, None) for _, limit in limits_of(scene, state)]
+    return (*under, *at_stops)

@@ -6,14 +6,12 @@ multiplied away a step's linear system has these zeros, too.
 """
 
 import abc
-from collections.abc import Callable
 from typing import TypeAlias
 
 import equinox as eqx
-import jax
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, Time, VectorField
+from jaxbiped._types import Scalar, Time
 from jaxbiped.linalg._sparse_lu import SparseMatrix
 
 Residual: TypeAlias = dict[int, Scalar]
@@ -38,25 +36,3 @@ class AbstractImplicitField(eqx.Module):
     @abc.abstractmethod
     def residual(self, y: PyTree, rates: PyTree, args: PyTree) -> Residual:
         """F(y) − M(y) ẏ for rates that are given, shaped as the state."""
-
-
-class _TracedOnce(AbstractImplicitField):
-    rates: Callable[..., PyTree] = eqx.field(static=True)
-    masses: Callable[..., SparseMatrix] = eqx.field(static=True)
-    balance: Callable[..., Residual] = eqx.field(static=True)
-
-    def __call__(self, t: Time, y: PyTree, args: PyTree) -> PyTree:
-        return self.rates(t, y, args)
-
-    def mass_matrix(self, y: PyTree, args: PyTree) -> SparseMatrix:
-        return self.masses(y, args)
-
-    def residual(self, y: PyTree, rates: PyTree, args: PyTree) -> Residual:
-        return self.balance(y, rates, args)
-
-
-def traced_once(field: VectorField) -> VectorField:
-    """The same field, compiled by itself: traced once, not at each of its many uses."""
-    if isinstance(field, AbstractImplicitField):
-        return _TracedOnce(jax.jit(field), jax.jit(field.mass_matrix), jax.jit(field.residual))
-    return jax.jit(field)

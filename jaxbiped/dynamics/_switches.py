@@ -6,9 +6,8 @@ No step may straddle one: derivatives taken through it would be wrong.
 from typing import NamedTuple
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._contacts import feet, foot_force, legs_at
+from jaxbiped.dynamics._contacts import feet, foot_force, legs_at, limits_of
 from jaxbiped.dynamics._footfalls import FootMotion, touches
-from jaxbiped.dynamics._gaps import limits_of
 from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw

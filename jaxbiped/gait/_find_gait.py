@@ -184,7 +184,7 @@ def find_gait(
     columns = select_parameters(modelled, None)[1] if runs_by_lanes(spec) else ()
     problem = FixedPointProblem(spec, scene, columns, start, precision, how)
     asked = problem._replace(active=active, method=None)
-    origin = single_stage_origin(modelled, start, FoundBy.START if guess is None else FoundBy.GUESS)
+    origin = single_stage_origin(problem, FoundBy.START if guess is None else FoundBy.GUESS)
     staged = guess is None and max_evaluations is None and method == "newton"
     if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(problem)):
         if staged:
@@ -232,7 +232,7 @@ def _search_on(
 
     staged = search_in_stages(search_from, problem, scout, first, now)
     found = walks_only(first) if staged.best is None else staged.best.found
-    return found, origin_of(staged, scene.minimal, start)
+    return found, origin_of(staged, problem)
 
 
 def _check_start(

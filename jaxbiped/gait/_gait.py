@@ -233,7 +233,7 @@ def summarise_gait(
         unit_multiplier_error=stability.unit_error,
         sensitivities=jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes),
         sensitivity_errors=jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors),
-        elasticities=elasticities_of(problem.args, problem.active, measures, slopes),
+        elasticities=elasticities_of(problem, measures, slopes),
     )
     off = jnp.stack(recurring_leaves(errors.state))
     is_found = found.ending == int(Search.FOUND)

@@ -23,7 +23,6 @@ from jaxbiped.gait._search_starts import default_guess, rolling_starts
 from jaxbiped.gait._settled_walks import Walks
 from jaxbiped.gait._walk_waves import is_far_from_seed, state_rows, walks_of
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.scene._walker import Walker
 from jaxbiped.solve._units import recurring_sizes
 
@@ -152,17 +151,17 @@ def search_in_stages(
     return Staged(ordered[0] if ordered else None, tuple(ordered[1:]), branch, line)
 
 
-def origin_of(staged: Staged, scene: Scene | RigidScene, start: WalkerState) -> Origin:
-    """What a search in stages tells of itself; `scene` in minimal coordinates."""
+def origin_of(staged: Staged, problem: FixedPointProblem) -> Origin:
+    """What a search in stages tells of itself."""
     by = FoundBy.START if staged.best is None else staged.best.by
-    plain = single_stage_origin(scene, start, by)
-    columns: PyTree = np.full((MOST_OTHERS, 3 + len(start)), np.nan)
+    plain = single_stage_origin(problem, by)
+    columns: PyTree = np.full((MOST_OTHERS, 3 + len(problem.guess)), np.nan)
     for row, each in zip(columns, staged.others, strict=False):
         last = each.found.last
         row[:3] = float(last.period), float(last.advance[0]), each.radius
         row[3:] = 0.0, *np.asarray(each.found.recurring).tolist()
     period, length, radius, *state = columns.T
-    others = OtherGait(period, length, radius, type(start)(*state))
+    others = OtherGait(period, length, radius, type(problem.guess)(*state))
     if staged.branch is None or staged.line is None:
         return plain._replace(others=others)
     branch = staged.branch

@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._state_quantities import state_of_recurring
-from jaxbiped.gait._fixed_point_search import crossings_of
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, crossings_of
 from jaxbiped.gait._orbit_derivatives import Orbit, Slopes, change_terms
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.linalg._small_matrices import solve
@@ -102,10 +102,8 @@ def measure_slopes(orbit: Orbit, measures: Measures, slopes: Slopes, radius: Sca
     return Measures(period, length, speed, slopes.peak, radius, state)
 
 
-def elasticities_of(
-    scene: PyTree, active: tuple[int, ...], measures: Measures, slopes: Measures
-) -> Measures:
-    leaves = jtu.tree_leaves(scene)
+def elasticities_of(problem: FixedPointProblem, measures: Measures, slopes: Measures) -> Measures:
+    leaves, active = jtu.tree_leaves(problem.args), problem.active
     zero = (jnp.stack([leaves[i] for i in active]) if active else jnp.zeros(0)) == 0.0
 
     def relative(value: Scalar, slope: Scalar) -> Scalar:

@@ -8,10 +8,10 @@ import equinox as eqx
 import jax
 import jax.tree_util as jtu
 
+from jaxbiped._parameter_declaration import with_fields
 from jaxbiped._types import as_float
 from jaxbiped.scene._joint_parts import Motor
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._mirror import with_fields
 from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene.actuation._abstract_actuator import Actuation

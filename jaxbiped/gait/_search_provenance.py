@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import warn
 from jaxbiped._ending import Ending, NamedCode
 from jaxbiped._types import Scalar
-from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._clearance import AlwaysTouching
@@ -90,15 +90,15 @@ class Origin(NamedTuple):
     nearest: AbstractScene
 
 
-def single_stage_origin(scene: AbstractScene, start: WalkerState, found_by: FoundBy) -> Origin:
+def single_stage_origin(problem: FixedPointProblem, found_by: FoundBy) -> Origin:
     """Of a search that had but one stage."""
     missing: PyTree = np.full(MOST_OTHERS, np.nan)
     return Origin(
         found_by=code_array(found_by),
-        others=OtherGait(missing, missing, missing, jtu.tree_map(lambda _: missing, start)),
+        others=OtherGait(missing, missing, missing, jtu.tree_map(lambda _: missing, problem.guess)),
         branch_end=code_array(BranchEnd.NOT_FOLLOWED),
         branch_walk_ending=code_array(0),
-        nearest=jtu.tree_map(lambda leaf: np.full(np.shape(leaf), np.nan), scene),
+        nearest=jtu.tree_map(lambda leaf: np.full(np.shape(leaf), np.nan), problem.args.minimal),
     )
 
 

@@ -5,14 +5,13 @@ from typing import Any
 import equinox as eqx
 
 from jaxbiped._checks import ArgumentError, check_type, holds_somewhere
-from jaxbiped._parameter_declaration import check_parameters, parameter
+from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
 from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.constraints._linkage import Linkage, LinkAngle, LinkBody, Pin
 from jaxbiped.scene._bodies import Body, Point
 from jaxbiped.scene._joint_parts import Coupling
 from jaxbiped.scene._mechanism import Mechanism, mechanism_of
-from jaxbiped.scene._mirror import with_fields
 from jaxbiped.scene._structure import Angle
 
 

@@ -12,7 +12,7 @@ import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._jax_versions import current_trace
-from jaxbiped._parameter_declaration import check_parameters, parameter
+from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
 from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.caching._caches import OfObjects
 from jaxbiped.scene._bodies import Body, Foot, check_name
@@ -35,7 +35,6 @@ from jaxbiped.scene._mirror import (
     joint_twins,
     symmetric_part,
     whole_part,
-    with_fields,
 )
 from jaxbiped.scene._structure import Indices, Structure
 from jaxbiped.scene._turn import (

@@ -9,6 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._parameter_declaration import with_fields
 from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Latch, Motor, Spring, Stop
 from jaxbiped.scene._structure import Angle, Indices
 
@@ -182,15 +183,6 @@ def whole_part(part: Any) -> Any:
         return part
     assert part.upper is not None  # both limits were given
     return with_fields(part, lower=-part.upper)
-
-
-def with_fields(piece: Any, **fields: object) -> Any:
-    """A piece with other fields, unchecked."""
-    # Not by `copy.copy`: equinox would hold the new one for ever, as one that is being made.
-    changed = object.__new__(type(piece))
-    for name, value in (vars(piece) | fields).items():
-        object.__setattr__(changed, name, value)
-    return changed
 
 
 def check_same_both_ways(part: AbstractJointPart) -> None:

@@ -11,14 +11,13 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, warn
 from jaxbiped._identity import identity
-from jaxbiped._parameter_declaration import parameter_infos
+from jaxbiped._parameter_declaration import parameter_infos, with_fields
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import JsonObject, Parameter, Scalar
 from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._bodies import Point
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._mechanism_names import path_texts
-from jaxbiped.scene._mirror import with_fields
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 SomeScene = TypeVar("SomeScene", bound=eqx.Module)

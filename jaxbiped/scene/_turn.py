@@ -8,11 +8,11 @@ import jax
 import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._parameter_declaration import with_fields
 from jaxbiped._types import by_numpy
 from jaxbiped.scene._bodies import Body, Foot, OwnHinge, Point
 from jaxbiped.scene._joint_parts import AbstractJointPart, Motor, Spring
 from jaxbiped.scene._mechanism_pieces import number_of
-from jaxbiped.scene._mirror import with_fields
 from jaxbiped.scene._structure import Indices, Structure, Turn
 
 

@@ -23,9 +23,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._projection import check_independent
 from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
-from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._contacts import feet, limits_of
 from jaxbiped.dynamics._footfalls import touches
-from jaxbiped.dynamics._gaps import limits_of
 from jaxbiped.dynamics._redundant_motion import coordinates_of
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import state_for

@@ -12,6 +12,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
+from jaxbiped._parameter_declaration import with_fields
 from jaxbiped._types import Scalar, Time
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._contacts import feet, legs_at
@@ -27,7 +28,6 @@ from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._strike_surfaces import FALL_ANGLE, lean, uprightness
 from jaxbiped.scene._clearance import AbstractClearance, StanceRotation
-from jaxbiped.scene._mirror import with_fields
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.scene._structure import Structure

@@ -11,9 +11,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._contacts import Gap, feet, gaps
 from jaxbiped.dynamics._footfalls import any_of, touches
-from jaxbiped.dynamics._gaps import Gap, gaps
 from jaxbiped.dynamics._redundant_state import motion_in
 from jaxbiped.scene._scene import CompliantScene, Scene
 from jaxbiped.scene._state_types import State

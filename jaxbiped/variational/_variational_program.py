@@ -12,7 +12,6 @@ from jaxtyping import PyTree
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import Program
-from jaxbiped.dynamics._implicit_field import traced_once
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._first_and_last_step import clip_step, first_step
 from jaxbiped.solve.controllers._tangent_step_size import step_control
@@ -30,6 +29,7 @@ from jaxbiped.variational._tangents import (
     VariationalSolution,
     Watch,
     along_columns_in_turn,
+    traced_once,
 )
 
 

@@ -57,20 +57,15 @@ def summary():
 
     patch = pytest.MonkeyPatch()
     patch.setattr(_gait, "nodes_of", lambda *_: (jnp.zeros((1, 1)), start))
-    origin = single_stage_origin(scene, start, FoundBy.GUESS)
+    problem = FixedPointProblem(spec, scene, active, start, Precision(0.0, 0.0))
+    origin = single_stage_origin(problem, FoundBy.GUESS)
 
     @jax.jit
     def summarised(ending):
         orbit = both(ending)
         patch.setattr(_gait, "orbit_of", lambda *_, **__: orbit)
         patch.setattr(_gait, "with_parameter_columns", lambda *given: given[-1])
-        return _gait.summarise_gait.__wrapped__(
-            FixedPointProblem(spec, scene, active, start, Precision(0.0, 0.0)),
-            orbit.found,
-            NAMES,
-            True,
-            origin,
-        )
+        return _gait.summarise_gait.__wrapped__(problem, orbit.found, NAMES, True, origin)
 
     yield summarised
     patch.undo()

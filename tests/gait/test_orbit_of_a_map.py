@@ -116,7 +116,8 @@ def test_sensitivities_are_differences_of_fixed_points(linear, monkeypatch):
         seven = slopes._replace(recurring=jnp.concatenate([slopes.recurring, jnp.zeros((4, 2))]))
         found = measure_slopes(SimpleNamespace(), measured, seven, radius)
         values = Measures(2.0, *[4.0] * 4, jnp.asarray(8.0))
-        relative = elasticities_of((1.0, 0.0), (0, 1), values, found._replace(state=found.period))
+        of = problem._replace(args=(1.0, 0.0))
+        relative = elasticities_of(of, values, found._replace(state=found.period))
         return slopes.recurring, found, relative, terms
 
     last = linearised(linear, x, P)

@@ -101,9 +101,8 @@ def test_a_gait_that_is_seen_twice_or_is_no_walk_is_told_once_or_not(monkeypatch
     # What a walk itself settles on is one, however deep.
     told, _ = staged(monkeypatch, NOTHING, walking=[found(0.5, sound=False)])
     assert told.best.by is FoundBy.WALKING
-    origin = origin_of(
-        staged(monkeypatch, found(1.5), scattered=[found(1.2, 0.7)])[0], SCENE, START
-    )
+    problem = FixedPointProblem(None, SCENE, (), START, None)
+    origin = origin_of(staged(monkeypatch, found(1.5), scattered=[found(1.2, 0.7)])[0], problem)
     assert float(origin.others.period[0]) == 0.5
     assert float(origin.others.spectral_radius[0]) == pytest.approx(1.5)
     assert np.isnan(origin.others.period[1:]).all()

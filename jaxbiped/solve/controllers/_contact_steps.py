@@ -21,7 +21,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._gaps import Gap, gaps
+from jaxbiped.dynamics._contacts import Gap, gaps
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic

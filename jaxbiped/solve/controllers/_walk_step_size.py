@@ -19,9 +19,8 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, RealScalarLike, Scalar
-from jaxbiped.dynamics._contacts import feet, foot_force
+from jaxbiped.dynamics._contacts import feet, foot_force, limits_of
 from jaxbiped.dynamics._footfalls import FootMotion
-from jaxbiped.dynamics._gaps import limits_of
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 from jaxbiped.solve._accuracy import rms_norm

@@ -1,0 +1,16 @@
+"""The trip of a scene through each door, against the files and climbs that it may take."""
+
+import pytest
+
+from tests.scene_trip import above, imports, trip_through
+
+MOST = {"simulate": (25, 2), "find_gait": (25, 4), "labelling": (34, 5)}
+"""Files entered, and climbs back to a file above."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("door", MOST)
+def test_a_scene_passes_through_few_files(door):
+    files, climbs, _ = trip_through(door).counts(above(imports()))
+    assert 10 < files <= MOST[door][0]
+    assert climbs <= MOST[door][1]
