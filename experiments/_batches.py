@@ -20,7 +20,7 @@ def rolling_on(scene: jb.RigidScene, states: jb.dynamics.RigidState) -> jb.dynam
     return states._replace(theta_1=-states.theta_2)
 
 
-def labelling_of(model: str, **options: Any) -> jb.Labelling:
+def labelling_of(model: str, **options: Any) -> jb.labels.Labelling:
     """Of the seed's walker, "compliant" or "rigid"."""
     return jb.labelling(rigid_seed() if model == "rigid" else jb.seed_scene(), **options)
 
@@ -33,14 +33,14 @@ def starts_of(scene: Any, count: int) -> jb.starts.Sample:
     return jb.starts.sample(scene, bounds, count, method="uniform")
 
 
-def swept(labelling: jb.Labelling, count: int, **options: Any) -> Callable[[], Any]:
+def swept(labelling: jb.labels.Labelling, count: int, **options: Any) -> Callable[[], Any]:
     """A sweep of starts, to be run and timed; in memory unless a store is given."""
     starts, how = starts_of(labelling.scene, count), {"chunk": 16384} | options
     return lambda: jb.sweep(labelling, starts, look_for_gaits=False, **how)
 
 
 @functools.cache  # its gait is found once
-def _labelling(model: str, how: tuple[tuple[str, Any], ...]) -> jb.Labelling:
+def _labelling(model: str, how: tuple[tuple[str, Any], ...]) -> jb.labels.Labelling:
     return labelling_of(model, **dict(how))
 
 

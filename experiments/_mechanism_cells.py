@@ -47,7 +47,7 @@ class Trial:
         return jb.simulate(self.scene, self.start, footsteps=4)
 
     @functools.cached_property
-    def labelling(self) -> jb.Labelling:
+    def labelling(self) -> jb.labels.Labelling:
         """A labelling that knows the gait."""
         return jb.labelling(self.scene, guess=self.gait.measures.state, footsteps=15)
 
@@ -73,7 +73,7 @@ def accurate_walk(trial: Trial) -> float:
 
 
 def ledger(trial: Trial) -> float:
-    books = jb.energy_ledger(trial.scene, trial.walk)
+    books = jb.measure.energy_ledger(trial.scene, trial.walk)
     return float(abs(books.residual[0]) / books.gravity_work[0])
 
 
@@ -155,7 +155,9 @@ def basin(trial: Trial) -> float:
 
 
 def shock(trial: Trial) -> float:
-    return float(jb.nearest_failure(trial.labelling, gradients=False, tolerance=1e-3).distance)
+    return float(
+        jb.labels.nearest_failure(trial.labelling, gradients=False, tolerance=1e-3).distance
+    )
 
 
 def optimum(trial: Trial) -> float:
@@ -212,7 +214,7 @@ def operations(trial: Trial) -> int:
 
 
 def dataset(trial: Trial) -> int:
-    return len(jb.trajectory_dataset(trial.scene, trial.walk).data_vars)
+    return len(jb.measure.trajectory_dataset(trial.scene, trial.walk).data_vars)
 
 
 def picture(trial: Trial) -> int:

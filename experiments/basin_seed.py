@@ -82,7 +82,7 @@ def measures(codes):
 def refined(labelling, cells, levels):
     """The slice's boundaries, halved so many times from a coarse grid."""
     lower, upper = zip(THETA, OMEGA, strict=True)
-    label = jb.label_at(labelling, ("theta_swing", "omega_swing"))
+    label = jb.labels.label_at(labelling, ("theta_swing", "omega_swing"))
     cells = (cells, cells)
     return jb.basins.refine_boundary(label, lower, upper, cells, levels=levels, batch=16384)
 
@@ -136,7 +136,7 @@ def push(labelling, way):
     """The smallest push that takes the walker off its gait, by rays and what they are turned to."""
     began = time.perf_counter()
     how = dict(max_distance=FARTHEST, tolerance=TOLERANCE) | PUSHES[way]
-    found = jb.nearest_failure(labelling, **how)
+    found = jb.labels.nearest_failure(labelling, **how)
     return {
         "way": way,
         "distance": found.distance,

@@ -70,7 +70,7 @@ def labelling_of(slope, **options):
 
 def labels_at(labelling):
     """A function that labels points (n, 2): stance angle and rate just after a strike."""
-    return jb.label_at(labelling, ("theta_stance", "omega_stance"), follow=just_struck)
+    return jb.labels.label_at(labelling, ("theta_stance", "omega_stance"), follow=just_struck)
 
 
 def fraction_of(labelling, side):

@@ -119,7 +119,7 @@ def _swing(angle, by):
         jb.constraints.Pin((0.0, 0.1), (0.0, 0.0), 0),
     )
     linkage = jb.constraints.Linkage((body,), (joint,))
-    scene = jb.LinkageScene(linkage, jb.constraints.Baumgarte())
+    scene = jb.dynamics.LinkageScene(linkage, jb.constraints.Baumgarte())
     zero = jnp.zeros_like(angle)
     place = (0.1 * jnp.sin(angle), -0.1 * jnp.cos(angle), angle)
     start = jb.dynamics.LinkageState(place, (zero, zero, zero))

@@ -14,6 +14,7 @@ import importlib as _importlib
 import os as _os
 import pathlib as _pathlib
 import sys as _sys
+import warnings as _warnings
 from types import ModuleType as _ModuleType
 from typing import Any as _Any
 
@@ -32,6 +33,17 @@ _HOMES = {
 
 __all__ = list(_HOMES)
 
+_MOVED = {
+    "dynamics": ("LinkageScene", "walker_linkage"),
+    "labels": (
+        *("Attractor", "Family", "Labelled", "Labelling"),
+        *("label_at", "nearest_failure", "with_gaits_met"),
+    ),
+    "laws": ("parameter",),
+    "measure": ("energy_ledger", "trajectory_dataset"),
+}
+"""Names that were here before, by the namespace that they lie in; they warn and still work."""
+
 
 class _Package(_ModuleType):
     """This package, in which the functions `simulate` and `sweep` go before packages so named."""
@@ -48,6 +60,14 @@ _sys.modules[__name__].__class__ = _Package
 def __getattr__(name: str) -> _Any:
     home = _HOMES.get(name)
     if home is None:
+        for space, names in _MOVED.items():
+            if name in names:
+                _warnings.warn(
+                    f"jaxbiped.{name} is deprecated: it is jaxbiped.{space}.{name}.",
+                    DeprecationWarning,
+                    stacklevel=2,
+                )
+                return getattr(__getattr__(space), name)
         raise AttributeError(f"module 'jaxbiped' has no attribute {name!r}")
     if home == __name__:
         return _importlib.import_module(f"{__name__}.{name}")

@@ -18,6 +18,7 @@ from jaxbiped import plot as plot
 from jaxbiped.scene import actuation as actuation
 from jaxbiped.scene import laws as laws
 from jaxbiped.solve import solvers as solvers
+from jaxbiped.sweep import labels as labels
 from jaxbiped.sweep import starts as starts
 
 # Memory.
@@ -39,9 +40,7 @@ from jaxbiped.scene._joint_parts import Spring as Spring
 from jaxbiped.scene._joint_parts import Stop as Stop
 from jaxbiped.scene._kneed import Kneed as Kneed
 from jaxbiped.scene._mechanism import Mechanism as Mechanism
-from jaxbiped._parameter_declaration import parameter as parameter
 from jaxbiped.scene._ready_scenes import ladder as ladder
-from jaxbiped.scene._linkages import LinkageScene as LinkageScene
 from jaxbiped.scene._parameter_access import parameter_names as parameter_names
 from jaxbiped.scene._parameter_access import parameter_quantities as parameter_quantities
 from jaxbiped.scene._parameter_access import parameter_values as parameter_values
@@ -52,7 +51,6 @@ from jaxbiped.scene._scene import Scene as Scene
 from jaxbiped.scene._ready_scenes import seed_scene as seed_scene
 from jaxbiped.scene._torso_walker import WithTorso as WithTorso
 from jaxbiped.scene._walker import Walker as Walker
-from jaxbiped.scene._linkages import walker_linkage as walker_linkage
 
 # States and the sections that they cross.
 from jaxbiped.dynamics._section import HeelStrike as HeelStrike
@@ -75,8 +73,6 @@ from jaxbiped.solve._engine_names import ENGINES as ENGINES
 from jaxbiped.solve._trajectory import Trajectory as Trajectory
 
 # Measures of a walk.
-from jaxbiped.measure._dataset import trajectory_dataset as trajectory_dataset
-from jaxbiped.measure._energy_ledger import energy_ledger as energy_ledger
 from jaxbiped.measure._footsteps import footsteps as footsteps
 
 # Periodic gaits and gradients.
@@ -93,17 +89,10 @@ from jaxbiped.continuation._continue_gait import continue_gait as continue_gait
 from jaxbiped.identify._fit_gait import fit_gait as fit_gait
 
 # Basins and sweeps.
-from jaxbiped.sweep._attractor import Attractor as Attractor
 from jaxbiped.sweep._workers import cluster_executor as cluster_executor
 from jaxbiped.sweep._workers import local_executor as local_executor
-from jaxbiped.sweep._gait_family import Family as Family
 from jaxbiped.sweep._gait_sweep import gait_sweep as gait_sweep
-from jaxbiped.sweep._labelling_preparation import label_at as label_at
-from jaxbiped.sweep._labelling_loop import Labelled as Labelled
-from jaxbiped.sweep._labelling import Labelling as Labelling
-from jaxbiped.sweep._nearest_failure import nearest_failure as nearest_failure
 from jaxbiped.sweep._labelling_preparation import labelling as labelling
-from jaxbiped.sweep._labelling_preparation import with_gaits_met as with_gaits_met
 from jaxbiped.sweep._sweep import sweep as sweep
 
 # Optimisation.

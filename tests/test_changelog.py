@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import jaxbiped as jb
 from tests.public_names import find, is_there
 
 ROOT = Path(__file__).parents[1]
@@ -22,11 +23,16 @@ def rows_below(title):
 
 RENAMED = [(old.strip("`"), new.strip("`")) for old, new in rows_below("### Renamed\n")]
 GONE = [old.strip("`") for old, _ in rows_below("### Gone\n")]
-MOVED = [
-    (name, space.strip("`"))
-    for space, names in rows_below("### Moved under the same name\n")
-    for name in re.findall(r"`(\w+)`", names)
-]
+
+
+def moved(title):
+    """Names and their new namespaces in the table below a title."""
+    rows = ((names, space.strip("`")) for space, names in rows_below(title))
+    return [(name, space) for names, space in rows for name in re.findall(r"`(\w+)`", names)]
+
+
+MOVED = moved("### Moved under the same name\n")
+DEPRECATED = moved("### Moved, the old name deprecated\n")
 
 
 def _arguments(name):
@@ -37,6 +43,7 @@ def test_the_tables_are_found():
     assert len(RENAMED) >= 12
     assert len(GONE) >= 3
     assert len(MOVED) > 130
+    assert len(DEPRECATED) == 12
 
 
 @pytest.mark.parametrize(("old", "new"), RENAMED)
@@ -61,6 +68,13 @@ def test_what_is_gone_is_not_there(name):
 def test_what_moved_is_in_its_namespace_alone(name, space):
     assert is_there(f"{space}.{name}")
     assert not is_there(f"jb.{name}")
+
+
+@pytest.mark.parametrize(("name", "space"), DEPRECATED)
+def test_what_moved_in_this_release_still_works_with_a_warning(name, space):
+    with pytest.warns(DeprecationWarning, match=f"it is {space}.".replace("jb", "jaxbiped")):
+        assert getattr(jb, name) is find(f"{space}.{name}")
+    assert name not in jb.__all__
 
 
 def test_the_first_section_is_of_this_version():

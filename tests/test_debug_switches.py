@@ -44,7 +44,7 @@ def _pendulum():
     joint = jb.constraints.Pin((0.0, 0.1), (0.0, 0.0), 0)
     linkage = jb.constraints.Linkage((body,), (joint,))
     start = jb.dynamics.LinkageState((0.1 * np.sin(0.5), -0.1 * np.cos(0.5), 0.5), (0.0,) * 3)
-    scene = jb.LinkageScene(linkage, jb.constraints.Index1())
+    scene = jb.dynamics.LinkageScene(linkage, jb.constraints.Index1())
     return jb.swing(scene, start, times=np.array([0.0, 0.1])).state
 
 
@@ -71,8 +71,8 @@ CALLS = {
         jnp.asarray([1e6, -1.0])
     ),
     "footsteps": lambda: _numbers_of(jb.footsteps(SCENE, _walk())),
-    "energy_ledger": lambda: jb.energy_ledger(SCENE, _walk()),
-    "trajectory_dataset": lambda: jb.trajectory_dataset(SCENE, _walk()).hip_x.values,
+    "energy_ledger": lambda: jb.measure.energy_ledger(SCENE, _walk()),
+    "trajectory_dataset": lambda: jb.measure.trajectory_dataset(SCENE, _walk()).hip_x.values,
     "view": lambda: len(jb.plot.view(SCENE, _walk()).html()) > 0,
     "rigid_walk": lambda: _rolled().state,
     "rigid_ledger": lambda: jb.measure.rigid_ledger(RIGID, _rolled()),

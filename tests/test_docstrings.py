@@ -94,7 +94,7 @@ def _examples():
 
 
 COMPILING = {
-    "jb.continue_gait", "jb.simulate", "jb.footsteps", "jb.energy_ledger", "jb.find_gait",
+    "jb.continue_gait", "jb.simulate", "jb.footsteps", "jb.measure.energy_ledger", "jb.find_gait",
     "jb.rigid_walk", "jb.fit_gait", "jb.optimise_gait",
 }  # fmt: skip
 """Functions whose examples compile a walk or a gait."""
@@ -102,7 +102,14 @@ EXAMPLES = list(_examples())
 
 
 def test_the_most_used_functions_have_examples():
-    used = {"simulate", "footsteps", "energy_ledger", "find_gait", "rigid_walk", "with_parameters"}
+    used = {
+        "simulate",
+        "footsteps",
+        "measure.energy_ledger",
+        "find_gait",
+        "rigid_walk",
+        "with_parameters",
+    }
     assert {f"jb.{name}" for name in used} <= {each.id for each in EXAMPLES}
 
 

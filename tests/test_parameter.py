@@ -33,7 +33,9 @@ SCENES = {
     },
     **{name: jb.RedundantScene(SEED, method) for name, method in METHODS.items()},
     "rigid": jb.RigidScene(SEED.walker, SEED.ground),
-    "linkage": jb.LinkageScene(jb.walker_linkage(SEED.walker), jb.constraints.Index1()),
+    "linkage": jb.dynamics.LinkageScene(
+        jb.dynamics.walker_linkage(SEED.walker), jb.constraints.Index1()
+    ),
 }
 
 

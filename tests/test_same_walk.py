@@ -23,9 +23,9 @@ OTHERS = {
 }
 TAKES = {
     "footsteps": jb.footsteps,
-    "energy_ledger": jb.energy_ledger,
+    "energy_ledger": jb.measure.energy_ledger,
     "cost_of_transport": jb.measure.cost_of_transport,
-    "trajectory_dataset": jb.trajectory_dataset,
+    "trajectory_dataset": jb.measure.trajectory_dataset,
     "view": jb.plot.view,
     "gait_strobe": jb.plot.gait_strobe,
     "animate": jb.plot.animate,
@@ -71,8 +71,8 @@ def test_the_key_of_a_scene_is_the_same_however_it_is_computed(walk):
     assert jax.grad(lambda K: scene_key(jb.with_parameters(SCENE, {"K": K})))(1e6) == 0.0
     # What rounding alone makes another scene is none.
     near = jb.with_parameters(SCENE, {"m": 1.0 + 1e-15})
-    assert jb.energy_ledger(near, walk).gravity_work == pytest.approx(
-        jb.energy_ledger(SCENE, walk).gravity_work
+    assert jb.measure.energy_ledger(near, walk).gravity_work == pytest.approx(
+        jb.measure.energy_ledger(SCENE, walk).gravity_work
     )
 
 

@@ -30,7 +30,7 @@ SCENES = {
         jb.seed_scene().friction, actuation=jb.actuation.HipTorque(torque=0.1),
     ),
     "own law": dataclasses.replace(jb.seed_scene(), friction=saved_parts.Grip(5000.0)),
-    "linkage": jb.walker_linkage(jb.seed_scene().walker),
+    "linkage": jb.dynamics.walker_linkage(jb.seed_scene().walker),
 }  # fmt: skip
 
 
@@ -69,7 +69,7 @@ def test_a_walk_is_the_same_between_its_steps_too_and_belongs_to_its_scene(seed_
     kept = again(tmp_path, now)
     np.testing.assert_array_equal(kept.period_s, now.period_s)
     assert kept.leg.tolist() == now.leg.tolist()
-    dataset = jb.trajectory_dataset(scene, walk)
+    dataset = jb.measure.trajectory_dataset(scene, walk)
     assert again(tmp_path, dataset).identical(dataset)
 
 

@@ -148,7 +148,7 @@ def test_footsteps_have_rows_and_none_has_a_header(seed_walk):
 
 
 def test_rows_of_any_dataset_go_along_several_dimensions(seed_walk):
-    dataset = jb.trajectory_dataset(*seed_walk)
+    dataset = jb.measure.trajectory_dataset(*seed_walk)
     rows = rows_of(jb.measure.to_csv(dataset, ("foot", "time")))
     assert len(rows) == dataset.sizes["foot"] * dataset.sizes["time"]
     assert [rows[0][name] for name in ("foot", "leg", "time [s]")] == ["1", "1", "0.0"]

@@ -112,7 +112,7 @@ def _compliant_numbers(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
         legs = scene.mechanism.structure.legs
         struck = jb.measure.heel_strikes(scene, walk).foot[1:]
         rows = [{"leg": legs[leg - 1]} | row for leg, row in zip(struck, rows, strict=True)]
-        ledger = jb.energy_ledger(scene, walk)
+        ledger = jb.measure.energy_ledger(scene, walk)
     numbers: JsonObject = {
         "ending": ending_name(scene, walk),
         "steps": rows,
@@ -204,7 +204,7 @@ def write_outputs(scene: Any, walk: "jb.Trajectory[Any]", output: OutputOptions)
     assert output.out is not None
     # The numbers first: no picture that fails takes them away.
     data = output.out / "trajectory.nc"
-    jb.trajectory_dataset(scene, walk).to_netcdf(data)
+    jb.measure.trajectory_dataset(scene, walk).to_netcdf(data)
     figures = _motion_figures(scene, walk) | {
         "penetrations": lambda: jb.plot.penetrations(scene, walk),
         "contact_forces": lambda: jb.plot.contact_forces(scene, walk),

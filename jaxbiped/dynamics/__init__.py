@@ -41,6 +41,8 @@ from jaxbiped.dynamics._state import whole_state as whole_state
 from jaxbiped.dynamics._switches import Switch as Switch
 from jaxbiped.dynamics._switches import switches as switches
 from jaxbiped.dynamics._symmetry import exchange_legs as exchange_legs
+from jaxbiped.scene._linkages import LinkageScene as LinkageScene
+from jaxbiped.scene._linkages import walker_linkage as walker_linkage
 from jaxbiped.scene._state_types import Accelerations as Accelerations
 from jaxbiped.scene._state_types import BristleState as BristleState
 from jaxbiped.scene._state_types import EulerState as EulerState

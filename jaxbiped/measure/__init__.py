@@ -5,8 +5,10 @@ from jaxbiped._table_rows import to_dataframe as to_dataframe
 from jaxbiped._table_rows import to_latex as to_latex
 from jaxbiped.measure._cost_of_transport import CostOfTransport as CostOfTransport
 from jaxbiped.measure._cost_of_transport import cost_of_transport as cost_of_transport
+from jaxbiped.measure._dataset import trajectory_dataset as trajectory_dataset
 from jaxbiped.measure._energy_ledger import EnergyLedger as EnergyLedger
 from jaxbiped.measure._energy_ledger import RigidLedger as RigidLedger
+from jaxbiped.measure._energy_ledger import energy_ledger as energy_ledger
 from jaxbiped.measure._energy_ledger import rigid_ledger as rigid_ledger
 from jaxbiped.measure._footsteps import Footsteps as Footsteps
 from jaxbiped.measure._footsteps import HeelStrikes as HeelStrikes

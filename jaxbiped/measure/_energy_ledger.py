@@ -85,7 +85,7 @@ def energy_ledger(
         >>> scene = jb.seed_scene()
         >>> how = dict(footsteps=2, accuracy="draft", engine="lanes")
         >>> walk = jb.simulate(scene, jb.seed_state(), **how)
-        >>> books = jb.energy_ledger(scene, walk)
+        >>> books = jb.measure.energy_ledger(scene, walk)
         >>> books.gravity_work.round(3), books.damper_loss.round(3)
         (array([0.195]), array([0.071]))
     """

@@ -174,8 +174,8 @@ def test_one_leg_heavier_as_a_program():
 class KneedOfMyOwn(eqx.Module):
     """Thighs and shanks, McGeer's proportions, with a stop at the knee."""
 
-    m_thigh: jax.Array = jb.parameter("thigh mass", "", "kg", positive=True)
-    epsilon: jax.Array = jb.parameter("knee angle at the stop", "", "rad")
+    m_thigh: jax.Array = jb.laws.parameter("thigh mass", "", "kg", positive=True)
+    epsilon: jax.Array = jb.laws.parameter("knee angle at the stop", "", "rad")
     stop: jb.laws.RistowSchafer
 
     def mechanism(self):

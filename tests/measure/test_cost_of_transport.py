@@ -37,7 +37,7 @@ def rolled():
 
 def test_the_ledger_closes_with_actuators(driven):
     scene, walk = driven
-    books = jb.energy_ledger(scene, walk)
+    books = jb.measure.energy_ledger(scene, walk)
     assert abs(books.residual[0]) < 5e-9
     assert books.actuation_work[0] > 1e3 * abs(books.residual[0])
     lost = books.damper_loss + books.friction_loss
@@ -47,7 +47,7 @@ def test_the_ledger_closes_with_actuators(driven):
 
 def test_the_column_of_a_passive_walk_is_zero():
     walk = jb.simulate(SEED, START, footsteps=2, accuracy="draft", engine="lanes")
-    books = jb.energy_ledger(SEED, walk)
+    books = jb.measure.energy_ledger(SEED, walk)
     assert books._fields == (*PASSIVE_LEDGER, "actuation_work")
     assert books.actuation_work.tolist() == [0.0]
     powers = jb.dynamics.powers(SEED, START)
@@ -104,7 +104,7 @@ def test_costs_count_motors_where_they_drive(driven, rolled):
     scene, walk = driven
     found = jb.measure.cost_of_transport(scene, walk)
     strikes = jb.measure.heel_strikes(scene, walk).time_s
-    books = jb.energy_ledger(scene, walk, strikes)
+    books = jb.measure.energy_ledger(scene, walk, strikes)
     np.testing.assert_allclose(found.gravity_work, books.gravity_work, rtol=1e-12)
     weight = float(scene.walker.total_mass * scene.ground.g)
     np.testing.assert_allclose(

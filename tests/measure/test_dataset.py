@@ -12,7 +12,7 @@ import jaxbiped as jb
 
 def test_round_trip_through_a_file(seed_walk, tmp_path):
     scene, walk = seed_walk
-    dataset = jb.trajectory_dataset(scene, walk)
+    dataset = jb.measure.trajectory_dataset(scene, walk)
     dataset.to_netcdf(tmp_path / "walk.nc")
     with xarray.open_dataset(tmp_path / "walk.nc") as read:
         np.testing.assert_array_equal(read.theta_1, walk.state.theta_1)
@@ -37,10 +37,10 @@ def test_a_frictionless_walk_has_no_tangential_force():
     seed = jb.seed_scene()
     scene = jb.Scene(seed.walker, seed.ground, seed.normal, jb.laws.Frictionless())
     fall = jb.simulate(scene, jb.seed_state(), duration=0.1)
-    assert "tangential_force" not in jb.trajectory_dataset(scene, fall)
+    assert "tangential_force" not in jb.measure.trajectory_dataset(scene, fall)
     batch = fall.__class__(fall.t[None], fall.state, fall.ending, 0, 0, None)
     with pytest.raises(ValueError, match="batch"):
-        jb.trajectory_dataset(scene, batch)
+        jb.measure.trajectory_dataset(scene, batch)
 
 
 _SEED = dict(K=1e6, c=1e7, n=1.5, mass=2.0), dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1e3)
@@ -67,7 +67,7 @@ def test_every_law_goes_into_a_file(name, short_walk, tmp_path):
         straight = np.zeros_like(state.hip_x)
         state = jb.dynamics.BristleState(**state._asdict(), bristle_1=straight, bristle_2=straight)
     motion = dataclasses.replace(short_walk, state=state, scene_key=None)
-    jb.trajectory_dataset(scene, motion).to_netcdf(tmp_path / "walk.nc")
+    jb.measure.trajectory_dataset(scene, motion).to_netcdf(tmp_path / "walk.nc")
     ((part, law),) = _LAWS[name].items()
     known = {field: value for field, value in vars(law).items() if value is not None}
     with xarray.open_dataset(tmp_path / "walk.nc") as read:
@@ -80,13 +80,15 @@ def test_every_law_goes_into_a_file(name, short_walk, tmp_path):
 
 def test_a_rigid_walker_is_refused(seed_walk):
     with pytest.raises(jb.ArgumentError, match="scene = a RigidScene"):
-        jb.trajectory_dataset(jb.ladder()["rigid"], seed_walk[1])
+        jb.measure.trajectory_dataset(jb.ladder()["rigid"], seed_walk[1])
 
 
 def test_actuators_are_told_by_their_places(short_walk):
     spline = jb.actuation.HipSpline([0.1, 0.2], reaction="trunk")
     scene = dataclasses.replace(jb.seed_scene(), actuation=(jb.actuation.HipSpring(k=0.3), spline))
-    told = jb.trajectory_dataset(scene, dataclasses.replace(short_walk, scene_key=None)).attrs
+    told = jb.measure.trajectory_dataset(
+        scene, dataclasses.replace(short_walk, scene_key=None)
+    ).attrs
     assert told["actuation_1"] == "HipSpring"
     assert told["actuation_1.k"] == 0.3
     assert "actuation_1.theta_0" not in told
@@ -95,4 +97,4 @@ def test_actuators_are_told_by_their_places(short_walk):
     units = json.loads(told["parameter_units"])
     assert units["actuation_1.k"] == "N m/rad"
     assert units["actuation_2.torque_1"] == "N m"
-    assert "actuation" not in jb.trajectory_dataset(jb.seed_scene(), short_walk).attrs
+    assert "actuation" not in jb.measure.trajectory_dataset(jb.seed_scene(), short_walk).attrs

@@ -14,7 +14,7 @@ SCENE = jb.ladder()["rigid"]
 
 def test_the_ledger_closes_at_the_tight_setting(seed_walk):
     scene, walk = seed_walk
-    ledger = jb.energy_ledger(scene, walk)
+    ledger = jb.measure.energy_ledger(scene, walk)
     assert abs(ledger.residual[0]) < 1e-6 * ledger.gravity_work[0]
     assert ledger.friction_loss[0] > 0.0
 
@@ -25,7 +25,7 @@ def test_the_residual_follows_the_tolerance():
     residuals = []
     for rtol in tolerances:
         walk = jb.simulate(scene, jb.seed_state(), duration=2.0, rtol=rtol)
-        ledger = jb.energy_ledger(scene, walk)
+        ledger = jb.measure.energy_ledger(scene, walk)
         residuals.append(abs(ledger.residual[0]) / ledger.gravity_work[0])
     assert np.all(residuals < 10.0 * tolerances)
     assert np.all(np.diff(residuals) < -0.8 * np.array(residuals[:-1]))
@@ -35,15 +35,15 @@ def test_the_residual_follows_the_tolerance():
 @pytest.mark.slow
 def test_parts_are_those_of_an_independent_solve(seed_walk):
     """Not only their sum: what goes into one part could be missing in another."""
-    ledger = jb.energy_ledger(*seed_walk)
+    ledger = jb.measure.energy_ledger(*seed_walk)
     for name, expected in independent_walk(2.0, 1e-11).ledger.items():
         assert getattr(ledger, name)[0] == pytest.approx(expected, abs=1e-7), name
 
 
 def test_parts_add_up_to_the_whole(seed_walk):
     scene, walk = seed_walk
-    whole = jb.energy_ledger(scene, walk)
-    parts = jb.energy_ledger(scene, walk, np.array([0.0, 0.3, 1.0, float(walk.t[-1])]))
+    whole = jb.measure.energy_ledger(scene, walk)
+    parts = jb.measure.energy_ledger(scene, walk, np.array([0.0, 0.3, 1.0, float(walk.t[-1])]))
     for total, pieces in zip(whole, parts, strict=True):
         assert pieces.shape == (3,)
         assert pieces.sum() == pytest.approx(total[0], abs=1e-9)
@@ -57,13 +57,13 @@ def test_gravitys_work_is_its_potential(seed_walk):
     scene, walk = seed_walk
     flows = sample(scene, walk, powers, np.zeros(0))
     work = flows.integral(flows.values.gravity).sum()
-    assert work == pytest.approx(jb.energy_ledger(scene, walk).gravity_work[0], rel=1e-7)
+    assert work == pytest.approx(jb.measure.energy_ledger(scene, walk).gravity_work[0], rel=1e-7)
 
 
 @pytest.mark.parametrize("times", [[1.0, 0.5], [0.2, 1.0, 0.5, 1.5], [0.5], [[0.2, 0.5]]])
 def test_times_that_do_not_increase_are_refused(seed_walk, times):
     with pytest.raises(jb.ArgumentError, match="2 or more increasing numbers"):
-        jb.energy_ledger(*seed_walk, np.array(times))
+        jb.measure.energy_ledger(*seed_walk, np.array(times))
 
 
 def test_what_a_change_of_mode_takes_is_the_energy_beside_it(monkeypatch):

@@ -77,14 +77,14 @@ def test_ledgers_of_footsteps_close(walked):
     weight = float(scene.mechanism.total_mass) * 9.8
     assert np.all(np.abs(steps.energy_residual_J) < 1e-4 * weight * steps.length_m * 0.03)
     cost = jb.measure.cost_of_transport(scene, walk, np.array([0.0, float(walk.t[-1])]))
-    ledger = jb.energy_ledger(scene, walk)
+    ledger = jb.measure.energy_ledger(scene, walk)
     np.testing.assert_allclose(cost.gravity_work, ledger.gravity_work, rtol=1e-9)
     np.testing.assert_allclose(cost.cost, ledger.gravity_work / (weight * cost.distance))
 
 
 def test_a_dataset_has_feet_and_parameters_by_name(walked, tmp_path):
     scene, walk = walked
-    jb.trajectory_dataset(scene, walk).to_netcdf(tmp_path / "walk.nc")
+    jb.measure.trajectory_dataset(scene, walk).to_netcdf(tmp_path / "walk.nc")
     structure = scene.mechanism.structure
     with xarray.open_dataset(tmp_path / "walk.nc") as read:
         assert read.foot.values.tolist() == list(structure.feet_told)

@@ -165,7 +165,7 @@ def test_costs_of_driven_walkers_are_those_of_the_ledger(which):
     else:
         walk = jb.simulate(scene, state, footsteps=3, accuracy="tight", engine="lanes")
         ends = jb.measure.heel_strikes(scene, walk).time_s
-        books = jb.energy_ledger(scene, walk, ends)
+        books = jb.measure.energy_ledger(scene, walk, ends)
         loss, work = books.damper_loss[-1], books.actuation_work[-1]
         assert known.values["friction_loss"] == pytest.approx(books.friction_loss[-1], rel=1e-4)
     cost = jb.measure.cost_of_transport(scene, walk)

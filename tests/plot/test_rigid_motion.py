@@ -66,7 +66,12 @@ def test_figures_draw_rigid_walks(wheel):
     normal = recorded.channels["normal_8"]
     assert normal[0] > 0.0
     assert normal[-1] == 0.0
-    for refused in (jb.plot.contact_forces, jb.plot.penetrations, jb.footsteps, jb.energy_ledger):
+    for refused in (
+        jb.plot.contact_forces,
+        jb.plot.penetrations,
+        jb.footsteps,
+        jb.measure.energy_ledger,
+    ):
         with pytest.raises(jb.ArgumentError, match="RigidScene is not allowed"):
             refused(scene, walk)
     none = jb.simulate(scene, walk.final, duration=0.1)

@@ -20,10 +20,10 @@ SEED = jb.seed_scene()
 class OwnKneed(eqx.Module):
     """McGeer's knees, as a user would write them: thighs and shanks by numbers of his own."""
 
-    m_thigh: float = jb.parameter("thigh mass", "$m_t$", "kg", positive=True)
-    m_shank: float = jb.parameter("shank mass", "$m_s$", "kg", positive=True)
-    g: float = jb.parameter("a length that a ground's name has", "$g$", "m")
-    epsilon: float = jb.parameter("knee angle at the stop", "", "rad")
+    m_thigh: float = jb.laws.parameter("thigh mass", "$m_t$", "kg", positive=True)
+    m_shank: float = jb.laws.parameter("shank mass", "$m_s$", "kg", positive=True)
+    g: float = jb.laws.parameter("a length that a ground's name has", "$g$", "m")
+    epsilon: float = jb.laws.parameter("knee angle at the stop", "", "rad")
     stop: jb.laws.AbstractNormalLaw
 
     def mechanism(self):

@@ -26,7 +26,7 @@ def _by_lanes(name):
 @pytest.mark.parametrize("name", WALKERS)
 def test_ledgers_close(name):
     scene, _, walk = _by_lanes(name)
-    books = jb.energy_ledger(scene, walk)
+    books = jb.measure.energy_ledger(scene, walk)
     assert abs(float(books.residual[0])) < 1e-7
     assert float(books.damper_loss[0]) > 0.0
     assert float(books.friction_loss[0]) > 0.0

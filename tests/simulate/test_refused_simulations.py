@@ -14,7 +14,7 @@ SCENE, STATE = jb.seed_scene(), jb.seed_state()
 ROLLING = jb.dynamics.rigid_state(STATE)
 STILL = hanging(0.5, rates=(0.0,))
 START = hanging(0.5, -0.8, rates=(1.0, 2.0))
-SEVERAL = jb.LinkageScene(pinned_pendulum(), jb.constraints.Standard())
+SEVERAL = jb.dynamics.LinkageScene(pinned_pendulum(), jb.constraints.Standard())
 
 
 def walked(**how):
@@ -30,7 +30,7 @@ def rolled(**how):
 
 
 def swung(state=STILL, **how):
-    scene = jb.LinkageScene(one_leg(), jb.constraints.Index1())
+    scene = jb.dynamics.LinkageScene(one_leg(), jb.constraints.Index1())
     return jb.swing(scene, state, **{"times": [0.0, 3.0], **how})
 
 

@@ -41,7 +41,7 @@ def swings():
     """One leg of the pendulum by every method in explicit Euler steps of 1e-4 s."""
     how = dict(times=TIMES, solver="euler", dt=1e-4)
     return {
-        name: jb.swing(jb.LinkageScene(one_leg(), kind()), ONE_LEG_START, **how)
+        name: jb.swing(jb.dynamics.LinkageScene(one_leg(), kind()), ONE_LEG_START, **how)
         for name, kind in jb.constraints.CONSTRAINT_METHODS.items()
     }
 
@@ -67,14 +67,14 @@ def test_the_pendulum_by_seven_methods(swings, angles):
 )
 def test_a_swing_that_does_not_finish_says_why(how, ending):
     """Explicit steps far too long for constraints that are pulled back at 1e20 1/s run away."""
-    scene = jb.LinkageScene(one_leg(), jb.constraints.Baumgarte(a=1e20, b=1e20))
+    scene = jb.dynamics.LinkageScene(one_leg(), jb.constraints.Baumgarte(a=1e20, b=1e20))
     found = jb.swing(scene, ONE_LEG_START, times=TIMES, **how)
     assert found.outcome is ending
     assert repr(found).startswith(f"Trajectory({ending}, engine=xla, shape=(201,), dtype=float64")
 
 
 def test_projected_steps_agree_with_scipy(angles):
-    scene = jb.LinkageScene(pinned_pendulum("euler"), jb.constraints.Index1())
+    scene = jb.dynamics.LinkageScene(pinned_pendulum("euler"), jb.constraints.Index1())
     found = jb.swing(scene, with_euler_parameters(START), times=TIMES, solver="dopri5", rtol=1e-8)
     for k, expected in enumerate(angles):
         cosine, sine = (found.state.q[4 * k + i][-1] for i in (2, 3))
@@ -83,7 +83,7 @@ def test_projected_steps_agree_with_scipy(angles):
 
 def test_a_four_bar_keeps_its_energy_and_its_joints():
     linkage = four_bar()
-    scene = jb.LinkageScene(linkage, jb.constraints.DirectCorrection())
+    scene = jb.dynamics.LinkageScene(linkage, jb.constraints.DirectCorrection())
     found = jb.swing(scene, four_bar_state(1.1, 3.0), times=TIMES, solver="dopri5", rtol=1e-9)
     assert float(jnp.max(found.violation[-1])) < 1e-14
     energy = jnp.zeros_like(found.t)
@@ -99,7 +99,7 @@ def test_a_four_bar_keeps_its_energy_and_its_joints():
 def test_a_joint_said_twice(name, angles):
     """Singular: methods with a penalty share the load between the two, the others say so."""
     method = jb.constraints.CONSTRAINT_METHODS[name]()
-    scene = jb.LinkageScene(pinned_pendulum(twice=True), method)
+    scene = jb.dynamics.LinkageScene(pinned_pendulum(twice=True), method)
     how = dict(times=TIMES[:11], solver="euler", dt=1e-3)
     if method.needs_independent:
         with pytest.raises(
@@ -107,7 +107,7 @@ def test_a_joint_said_twice(name, angles):
         ):
             jb.swing(scene, START, **how)
         return
-    plain = jb.LinkageScene(pinned_pendulum(), method)
+    plain = jb.dynamics.LinkageScene(pinned_pendulum(), method)
     start = jax.tree.map(jnp.asarray, START)
     once, twice = (jb.dynamics.linkage_motion(each, start) for each in (plain, scene))
     np.testing.assert_allclose(
@@ -121,7 +121,7 @@ def test_a_joint_said_twice(name, angles):
 
 def end_of(distance, adjoint):
     """A leg's angle after projected Runge–Kutta steps, by where the pin is in it."""
-    scene = jb.LinkageScene(one_leg(distance), jb.constraints.Index1())
+    scene = jb.dynamics.LinkageScene(one_leg(distance), jb.constraints.Index1())
     # The start has to be put on the constraints of the length.
     how = dict(times=TIMES[:51:50], solver="runge2", dt=1e-2, max_solver_steps=64)
     return jb.swing(scene, ONE_LEG_START, adjoint=adjoint, **how).state.q[2][-1]
@@ -166,7 +166,7 @@ def one_leg_angle(time):
     [("euler", 0.02, True), ("euler", 1e-3, True), ("rodas4", 0.2, True), ("rodas4", 0.02, False)],
 )
 def test_steps_of_one_size_that_are_too_long_are_told(solver, dt, long, recwarn):
-    scene = jb.LinkageScene(one_leg(), jb.constraints.Index1())
+    scene = jb.dynamics.LinkageScene(one_leg(), jb.constraints.Index1())
     found = jb.swing(scene, STILL, times=[0.0, 3.0], solver=solver, dt=dt)
     told = any(f"dt = {dt:g} is too long" in str(each.message) for each in recwarn)
     assert told is long
@@ -175,14 +175,14 @@ def test_steps_of_one_size_that_are_too_long_are_told(solver, dt, long, recwarn)
 
 
 def test_an_implicit_method_of_diffrax_keeps_projected_constraints():
-    scene = jb.LinkageScene(one_leg(), jb.constraints.Index1())
+    scene = jb.dynamics.LinkageScene(one_leg(), jb.constraints.Index1())
     found = jb.swing(scene, STILL, times=[3.0], solver="kvaerno5", accuracy="tight")
     assert float(found.state.q[2][-1]) == pytest.approx(one_leg_angle(3.0), abs=1e-7)
     assert float(found.violation[-1]) < 1e-12
 
 
 def test_an_implicit_solver_takes_steps_of_one_size_also_by_simulate():
-    scene = jb.LinkageScene(one_leg(), jb.constraints.Index1())
+    scene = jb.dynamics.LinkageScene(one_leg(), jb.constraints.Index1())
     how = dict(solver="kvaerno5", dt=0.01)
     found = jb.swing(scene, STILL, times=[3.0], **how)
     assert float(found.state.q[2][-1]) == pytest.approx(one_leg_angle(3.0), abs=1e-4)

@@ -21,5 +21,5 @@ def by_formula(monkeypatch):
         return Labelled(label, whole - 1, whole, whole, column, 10.0 * column, column, column,
                         whole + 7, np.zeros((count, 4)))  # fmt: skip
 
-    monkeypatch.setattr(jb.Labelling, "_label_once", follow)
+    monkeypatch.setattr(jb.labels.Labelling, "_label_once", follow)
     return asked

@@ -78,10 +78,10 @@ def test_every_label_but_walking_is_a_failure(monkeypatch):
     codes = np.array([int(Label.WALKING), 1, int(Label.STUMBLED), int(Label.UNRESOLVED), 9])
     monkeypatch.setattr(_nearest_failure, "minimal_fatal_shock", shock)
     monkeypatch.setattr(
-        jb.Labelling, "__call__", lambda *_, **__: SimpleNamespace(label=codes), raising=True
+        jb.labels.Labelling, "__call__", lambda *_, **__: SimpleNamespace(label=codes), raising=True
     )
     knows = with_attractor(LABELLING)
-    found = jb.nearest_failure(knows, gradients=False, max_distance=0.7)
+    found = jb.labels.nearest_failure(knows, gradients=False, max_distance=0.7)
     assert asked["found"].tolist() == [0, 1, 1, 1, 1]
     np.testing.assert_array_equal(asked["origin"], np.zeros(4))
     np.testing.assert_array_equal(asked["scales"], np.ones(4))

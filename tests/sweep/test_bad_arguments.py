@@ -57,7 +57,7 @@ def of_parameters(values, count=1):
         (lambda: jb.sweep(LABEL, grid(SCENE, {"hip_vx": [0.5]}), chunk=0), "chunk = 0"),
         (lambda: jb.sweep(LABEL, [1.0]), "starts = .* AbstractStarts"),
         (lambda: jb.sweep(LABEL, given(states(*[0] * 8))), "starts is empty"),
-        (lambda: jb.with_gaits_met(LABEL, None, count=0), "count = 0"),
+        (lambda: jb.labels.with_gaits_met(LABEL, None, count=0), "count = 0"),
         (lambda: grid(SCENE, {"theta": [0.1]}), "coordinate = 'theta' is not known"),
         (lambda: grid(SCENE, {}), "name at least one"),
         (lambda: grid(SCENE, {"hip_vx": []}), r"hip_vx has values of shape \(0,\)"),

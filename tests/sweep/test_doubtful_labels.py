@@ -121,6 +121,6 @@ def test_labels_that_the_draft_has_wrong_are_put_right():
     assert (found.doubt[place] == jb.basins.Doubt.SETTLED).any()
     assert ours.settings()["effort"]["wanted"] == 1e-3
     assert "wanted" not in draft.settings()["effort"]
-    code = jb.label_at(ours, tuple(bounds))
+    code = jb.labels.label_at(ours, tuple(bounds))
     points = np.stack([starts.at(ours, numbers).columns[name] for name in bounds], axis=1)
     np.testing.assert_array_equal(code(points[:4]), found.label[:4])

@@ -103,7 +103,9 @@ def test_starts_just_within_the_radius_converge(simplest, seed):
         states = type(gait.state)(np.zeros(16), *points.T)
         # Without a gait to compare with, all of 30 footsteps are walked.
         walked = gaitless(labelling.scene, gait.state, footsteps=30)
-        walked = jb.Labelling(walked.scene, walked.family, walked.effort._replace(gap_share=0.0))
+        walked = jb.labels.Labelling(
+            walked.scene, walked.family, walked.effort._replace(gap_share=0.0)
+        )
         final = walked(states)
         assert np.all(final.footsteps == 30)
         assert np.all(gait.distance(final.final) < 1e-2 * gait.radius)
@@ -151,7 +153,10 @@ def test_both_engines_give_the_same_labels(simplest, monkeypatch, no_disk_cache)
     # More starts than slots, so that slots are filled anew.
     states = simplest_grid(simplest.scene, 7).batch(simplest, 0, 49).states
     states = states._replace(theta_2=np.where(np.arange(49) == 11, np.nan, states.theta_2))
-    ours, theirs = simplest(states), jb.Labelling(simplest.scene, simplest.family, effort)(states)
+    ours, theirs = (
+        simplest(states),
+        jb.labels.Labelling(simplest.scene, simplest.family, effort)(states),
+    )
     for name in ("label", "gait", "cycle_footsteps", "footsteps"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), err_msg=name)
     walks = ours.label == jb.basins.Label.WALKING
@@ -175,7 +180,7 @@ def test_a_gait_of_two_footsteps_is_met_and_named(beyond_doubling):
     states = stacked([simplest_state(0.23 + 0.001 * i, -0.23 - 0.001 * i) for i in range(3)])
     before = beyond_doubling(states)
     assert (before.names[0], before.cycle_footsteps[0]) == ("unresolved", 2)
-    known = jb.with_gaits_met(beyond_doubling, jb.starts.GivenStarts(states))
+    known = jb.labels.with_gaits_met(beyond_doubling, jb.starts.GivenStarts(states))
     (gait,) = known.family.rows[0]
     assert gait.cycle_footsteps == 2
     radius = abs(gait.multipliers[0])
@@ -185,7 +190,7 @@ def test_a_gait_of_two_footsteps_is_met_and_named(beyond_doubling):
     assert (found.gait[0], found.cycle_footsteps[0]) == (0, 2)
     # The last cycle of a walk that ends near a gait shrinks as its largest multiplier says.
     small = known.family._replace(rows=((gait._replace(radius=1e-5),),))
-    found = jb.Labelling(known.scene, small, known.effort)(states)
+    found = jb.labels.Labelling(known.scene, small, known.effort)(states)
     assert found.names[0] == "walking period-2"
     assert found.rate[0] == pytest.approx(np.sqrt(radius), rel=0.03)
 

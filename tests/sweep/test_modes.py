@@ -48,7 +48,7 @@ def test_the_radius_of_certain_attraction_is_measured(labelling):
 
 
 def test_the_nearest_failure_keeps_what_is_held(labelling):
-    found = jb.nearest_failure(labelling, gradients=False, tolerance=1e-3)
+    found = jb.labels.nearest_failure(labelling, gradients=False, tolerance=1e-3)
     gait = labelling.family.rows[0][0]
     push = dict(zip(gait.state._fields[1:], found.push, strict=True))
     assert push["theta_thigh_2"] == pytest.approx(push["theta_shank_2"], abs=1e-12)
@@ -71,7 +71,7 @@ def test_starts_about_the_gait_come_back(labelling, gait):
 def test_a_wheel_that_is_too_slow_rolls_back():
     """The boundary is where its energy lifts the hub just over the top."""
     labelling = jb.labelling(jb.models.rimless_wheel())
-    found = jb.nearest_failure(labelling, gradients=False, tolerance=1e-4)
+    found = jb.labels.nearest_failure(labelling, gradients=False, tolerance=1e-4)
     theta, omega = found.boundary_point
     ahead = theta - 3.0 * np.pi / 8.0 + np.pi / 8.0 - 0.08
     assert 0.75 * omega**2 == pytest.approx(1.0 - np.cos(ahead), abs=1e-3)

@@ -16,7 +16,7 @@ def labelling():
 
 @pytest.fixture(scope="module")
 def found(labelling):
-    return {way: jb.nearest_failure(labelling, gradients=way) for way in (False, True)}
+    return {way: jb.labels.nearest_failure(labelling, gradients=way) for way in (False, True)}
 
 
 def _fails(labelling, points):
@@ -58,16 +58,16 @@ def test_labels_at_points(labelling):
     gait = labelling.family.rows[0][0]
     names = ("omega_stance", "theta_swing")
     here = np.array([[gait.state.omega_2, gait.state.theta_1], [0.0, gait.state.theta_1]])
-    codes = jb.label_at(labelling, names)(here)
+    codes = jb.labels.label_at(labelling, names)(here)
     assert list(codes) == [jb.basins.Label.WALKING, jb.basins.Label.FELL_BACK]
-    assert list(jb.label_at(labelling, names, failing=True)(here)) == [0, 1]
+    assert list(jb.labels.label_at(labelling, names, failing=True)(here)) == [0, 1]
     with pytest.raises(jb.ArgumentError, match=r"points has shape \(2, 1\)"):
-        jb.label_at(labelling, names)(here[:, :1])
+        jb.labels.label_at(labelling, names)(here[:, :1])
     with pytest.raises(jb.ArgumentError, match="'knee' is not known"):
-        jb.label_at(labelling, ("knee",))
+        jb.labels.label_at(labelling, ("knee",))
 
 
 def test_without_a_gait_there_is_nothing_to_push_off(labelling):
     family = labelling.family._replace(rows=((),))
     with pytest.raises(jb.ArgumentError, match="no stable gait"):
-        jb.nearest_failure(jb.Labelling(labelling.scene, family, labelling.effort))
+        jb.labels.nearest_failure(jb.labels.Labelling(labelling.scene, family, labelling.effort))

@@ -38,7 +38,7 @@ def test_tolerances_are_tightened_until_the_errors_are_what_was_asked_for(
     """At tolerances that are `wrong` the witnesses see different errors: many are overlooked."""
     labelling = gaitless(SCENE, simplest_state(*STABLE), rtol=None, accuracy=0.03)
     effort = labelling.effort._replace(rtol=1e-4)
-    labelling = jb.Labelling(SCENE, labelling.family, effort)
+    labelling = jb.labels.Labelling(SCENE, labelling.family, effort)
     starts = jb.starts.grid(SCENE, {"theta_stance": np.linspace(0.1, 0.3, 1000)})
     layout = Layout.of(starts, 500, doubts=True)
     results, solved = Store.in_memory(layout, {}, {}), []

@@ -308,7 +308,7 @@ def test_a_directory_without_permission_is_told(tmp_path, monkeypatch):
 def test_memory_is_bounded_by_the_chunk(tmp_path, by_formula, monkeypatch):
     """A grid of 400 million starts: what is made of it at once, and what a store of it takes."""
     starts = grid(count=20_000, omegas=np.linspace(-0.3, -0.1, 20_000))
-    path, label = tmp_path / "store", jb.Labelling._label_once
+    path, label = tmp_path / "store", jb.labels.Labelling._label_once
 
     class Enough(BaseException):
         pass
@@ -318,7 +318,7 @@ def test_memory_is_bounded_by_the_chunk(tmp_path, by_formula, monkeypatch):
             raise Enough
         return label(*arguments)
 
-    monkeypatch.setattr(jb.Labelling, "_label_once", counting)
+    monkeypatch.setattr(jb.labels.Labelling, "_label_once", counting)
     with pytest.raises(Enough):
         swept(path, starts, chunk=512)
     assert by_formula == [512] * 3

@@ -36,7 +36,7 @@ def test_labels_do_not_depend_on_the_chunks(late, monkeypatch):
     for chunk in (1, 3, 16):
         same_results(jb.sweep(LABELLING, STARTS, chunk=chunk), whole)
     if not late:
-        known = jb.with_gaits_met(LABELLING, STARTS)
+        known = jb.labels.with_gaits_met(LABELLING, STARTS)
         batch = STARTS.batch(known, 0, STARTS.size)
         found = known(batch.states)
         np.testing.assert_array_equal(found.label, whole.label.values.ravel())
@@ -69,7 +69,7 @@ def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, write
 
 def test_positions_of_gaits_follow_when_more_are_met():
     def gait(length):
-        return jb.Attractor(length, *[np.zeros(0)] * 10)
+        return jb.labels.Attractor(length, *[np.zeros(0)] * 10)
 
     rows = ((),), ((gait(1),), (gait(2),)), ((gait(1), gait(1)), (gait(2),))
     few, one, two = (LABELLING.family._replace(rows=each) for each in rows)

@@ -28,7 +28,9 @@ def _never_met(seen, *, wanted, rtol):
 
 def test_labels_are_those_of_a_tight_solve_whatever_the_chunks():
     whole = jb.sweep(LABELLING, STARTS)
-    known = jb.with_gaits_met(gaitless(SCENE, simplest_state(*STABLE), accuracy="tight"), STARTS)
+    known = jb.labels.with_gaits_met(
+        gaitless(SCENE, simplest_state(*STABLE), accuracy="tight"), STARTS
+    )
     exact = known(STARTS.batch(known, 0, STARTS.size).states)
     certain = whole.doubt.values.ravel() != int(jb.basins.Doubt.REMAINS)
     np.testing.assert_array_equal(whole.label.values.ravel()[certain], exact.label[certain])

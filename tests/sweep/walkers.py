@@ -20,7 +20,9 @@ def gaitless(scene, state, **options):
     effort = effort_of(scene, **{**settings, **options})
     state = jtu.tree_map(np.asarray, state)
     scales = component_scales(scene, state)[None]
-    return jb.Labelling(scene, jb.Family((), np.zeros((1, 0)), ((),), (state,), scales), effort)
+    return jb.labels.Labelling(
+        scene, jb.labels.Family((), np.zeros((1, 0)), ((),), (state,), scales), effort
+    )
 
 
 def with_attractor(labelling):
@@ -30,11 +32,11 @@ def with_attractor(labelling):
     metric = np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0][:-1]
     point = np.array([[float(leaf) for leaf in state[1:]]])
     multipliers, model = np.full(size - 1, 0.5), 0.5 * np.eye(size - 1)
-    gait = jb.Attractor(
+    gait = jb.labels.Attractor(
         1, 3.88, 0.398, state, multipliers, metric, 0.75, 1e-2, model, metric[:2], point
     )
     family = labelling.family._replace(rows=((gait,),))
-    return jb.Labelling(labelling.scene, family, labelling.effort)
+    return jb.labels.Labelling(labelling.scene, family, labelling.effort)
 
 
 def stacked(states):

@@ -72,7 +72,7 @@ def test_forces_and_energies_are_those_of_the_walk(seed_walk):
         shown = np.interp(t, found.t, normal)
         assert np.abs(shown - force.normal).max() < 0.15 * weight
         assert normal.max() == pytest.approx(peak, rel=0.02)
-    books = jb.energy_ledger(scene, walk)
+    books = jb.measure.energy_ledger(scene, walk)
     assert found.channels["supplied"][-1] == pytest.approx(float(books.gravity_work[0]))
     lost = float(books.damper_loss[0] + books.friction_loss[0])
     assert found.channels["lost"][-1] == pytest.approx(lost, rel=1e-5)
