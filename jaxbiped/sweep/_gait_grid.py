@@ -14,8 +14,10 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._tables import variables_of
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state_quantities import recurring_names
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._gait_table import gait_coordinates, gait_entries
+from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.sweep._store_files import SETTINGS, continue_store, open_store, writing
 
 if TYPE_CHECKING:
@@ -71,6 +73,17 @@ class GaitGrid:
                 f"{count} of the gaits graze a switch (`grazes`), as a foot that barely touches "
                 "the ground or misses it: their multipliers are those of one side, their "
                 "sensitivities are not known.",
+            )
+
+    def warn_of_missing(self) -> None:
+        """Warns of points without a gait, and says how they were searched."""
+        missing = self._dataset["ending"].data != int(Search.FOUND)
+        if count := int(np.sum(missing)):
+            alone = int(np.sum(missing & (self._dataset["found_by"].data != int(FoundBy.GUESS))))
+            warn(
+                f"no gait was found at {count} of the {missing.size} points (`ending`): {alone} of "
+                f"them were searched without a guess, the other {count - alone} by Newton's method "
+                "from gaits of neighbours or from the seed's start."
             )
 
     def flush(self) -> None:

@@ -17,8 +17,10 @@ from jaxbiped._identity import provenance
 from jaxbiped._progress import stage
 from jaxbiped._types import as_float
 from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.scene._parameter_access import (
     parameter_quantities,
     parameter_values,
@@ -28,7 +30,8 @@ from jaxbiped.scene._parameter_access import (
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._gait_grid import open_gait_grid
-from jaxbiped.sweep._gait_waves import LARGE, GaitWaves, Place, rows_of
+from jaxbiped.sweep._gait_waves import GaitWaves, rows_of
+from jaxbiped.sweep._grid_waves import LARGE, Place
 from jaxbiped.sweep._store_files import store_path, what_is_kept
 from jaxbiped.sweep.starts._coordinates import parameter_axes
 
@@ -59,12 +62,13 @@ def gait_sweep(
     The search begins without a guess at the point nearest to the scene's own parameters, and
     proceeds outwards. Each point starts from an extrapolation of its neighbours' gaits, so one
     branch is followed. If that gives no stable gait, Newton's method starts from the neighbours,
-    and then the point is searched without a guess; a stable gait that this finds is followed to the
+    and then the point is searched without a guess; a gait that this finds is followed to the
     neighbours.
 
     With the lanes engine, a grid of 64 points or more is searched in waves, all points of a wave at
     once: first a coarse lattice from its middle outwards, then finer ones from interpolated states.
-    Points of the finer lattices are searched without a guess only if no gait was found.
+    If a search without a guess finds nothing better there, it also speaks for the points up to two
+    strides of the coarse lattice away, except those between two points with a better gait.
 
     Args:
         scene: the walker; parameters that are not swept keep their values.
@@ -79,8 +83,9 @@ def gait_sweep(
     Returns:
         A dataset along the swept parameters, in SI units: the measures, `state_…`, multipliers,
         `sensitivity_…` with errors along `parameter`, `ending`, `found_by` and `branch_end` (codes,
-        with names in the attributes), and `grazes` (see `Gait`). NaN where no gait was found. A
-        `RuntimeWarning` is issued if gaits graze a switch.
+        with names in the attributes), and `grazes` (see `Gait`). NaN where no gait was found; a
+        `RuntimeWarning` says at how many points, and how they were searched (`found_by` is that of
+        the last search). Another is issued if gaits graze a switch.
 
     Raises:
         ArgumentError: an argument is not allowed (raised before anything is compiled); or the store
@@ -123,6 +128,9 @@ def gait_sweep(
                 first if place == centre else find_gait(scene_at(place), engine=engine, **options)
             )
 
+        def start_at(place: Place) -> np.ndarray:
+            return np.array(recurring_leaves(default_guess(scene_at(place))), float)
+
         def find(places: Sequence[Place], guesses: np.ndarray) -> Iterator[tuple[slice, Gait]]:
             if at_once:
                 columns = zip(values, np.transpose(places), strict=True)
@@ -139,7 +147,8 @@ def gait_sweep(
             first, values, quantities, settings, provenance(scene), path, any_version=any_version
         )
         try:
-            GaitWaves(grid, (centre, first), find, search_alone, now).run()
+            GaitWaves(grid, (centre, first), find, start_at, search_alone, now).run()
+            grid.warn_of_missing()
             if at_once:
                 grid.warn_of_grazing()
             return grid.dataset()

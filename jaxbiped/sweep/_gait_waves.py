@@ -2,13 +2,12 @@
 
 On a large grid a coarse lattice comes first, breadth first from one point; then each finer lattice
 at once, from interpolation between the points that are known. Newton's method begins where the
-neighbours point to; where that leads to no stable gait, at neighbours; and only then without a
-guess.
+neighbours point to; where that leads to no stable gait, at neighbours. Only then is a point
+searched without a guess, which takes longest: in a region without gaits not each of them.
 """
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import jax.tree_util as jtu
 import numpy as np
@@ -18,138 +17,21 @@ from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.sweep._gait_grid import GaitGrid
-
-Place: TypeAlias = tuple[int, ...]
-"""Indices of a point."""
-
-LARGE = 64
-"""Points from which on a grid is large."""
-_COARSEST = 12
-"""Points of the coarse lattice along the longest axis, about."""
-_STENCILS: tuple[dict[int, float], ...] = (
-    {-3: -1 / 16, -1: 9 / 16, 1: 9 / 16, 3: -1 / 16},
-    {-1: 0.5, 1: 0.5},
-    {-1: 1.5, -3: -0.5},
-    {1: 1.5, 3: -0.5},
-    {-1: 1.0},
-    {1: 1.0},
+from jaxbiped.sweep._grid_waves import (
+    LARGE,
+    Place,
+    Wave,
+    extrapolated,
+    interpolated,
+    neighbours,
+    waves,
 )
-"""Weights of points so many steps away for the point between them, the best first."""
-
-
-class Wave(NamedTuple):
-    """Points none of which needs another.
-
-    Attributes:
-        places: the points.
-        stride: steps along an axis between neighbours on the wave's lattice.
-        fills: whether the points lie between those of the lattice that is twice as coarse; else
-            beyond those of the waves before.
-    """
-
-    places: list[Place]
-    stride: int
-    fills: bool
-
-
-def waves(shape: Sequence[int], first: Place) -> list[Wave]:
-    """All points of a grid in the order in which they are searched; `first` is the first wave."""
-    stride = 1
-    if np.prod(shape) >= LARGE:
-        while 2 * stride * _COARSEST <= max(shape):
-            stride *= 2
-    found = [Wave(each, stride, False) for each in rings(shape, first, stride)]
-    while stride > 1:
-        stride //= 2
-        coarser = set(_lattice(shape, first, 2 * stride))
-        places = [place for place in _lattice(shape, first, stride) if place not in coarser]
-        found.append(Wave(places, stride, True))
-    return found
-
-
-def neighbours(place: Place, shape: Sequence[int], stride: int = 1) -> Iterator[Place]:
-    """The points next to one, one axis after the other."""
-    for axis, size in enumerate(shape):
-        for step in (-stride, stride):
-            moved = place[axis] + step
-            if 0 <= moved < size:
-                yield (*place[:axis], moved, *place[axis + 1 :])
-
-
-def rings(shape: Sequence[int], first: Place, stride: int = 1) -> Iterator[list[Place]]:
-    """The lattice's points by how many strides they are away."""
-    seen, ring = {first}, [first]
-    while ring:
-        yield ring
-        following = []
-        for place in ring:
-            for near in neighbours(place, shape, stride):
-                if near not in seen:
-                    seen.add(near)
-                    following.append(near)
-        ring = following
-
-
-def extrapolated(states: np.ndarray, wave: Wave) -> np.ndarray:
-    """Where the points of a wave beyond the known ones may lie: on from the nearest two, or one.
-
-    `states` has shape (*grid, m), NaN where nothing is known; the result (n, m).
-    """
-    shape = states.shape[:-1]
-    found = np.full((len(wave.places), states.shape[-1]), np.nan)
-    for k, place in enumerate(wave.places):
-        best = None
-        for near in neighbours(place, shape, wave.stride):
-            if np.isnan(states[near][0]):
-                continue
-            beyond = tuple(2 * a - b for a, b in zip(near, place, strict=True))
-            inside = all(0 <= i < size for i, size in zip(beyond, shape, strict=True))
-            if inside and not np.isnan(states[beyond][0]):
-                best = 2.0 * states[near] - states[beyond]
-                break
-            best = states[near] if best is None else best
-        if best is not None:
-            found[k] = best
-    return found
-
-
-def interpolated(states: np.ndarray, first: Place, wave: Wave) -> np.ndarray:
-    """Where the points of a wave between the known ones may lie, as `extrapolated`.
-
-    By cubic polynomials along one axis after the other, by lower ones where points are missing.
-    """
-    coarse = np.full_like(states, np.nan)
-    known = tuple(slice(i % (2 * wave.stride), None, 2 * wave.stride) for i in first)
-    coarse[known] = states[known]
-    for axis, begin in enumerate(first):
-        rows = np.moveaxis(coarse, axis, 0)[begin % wave.stride :: wave.stride]
-        odd = (begin // wave.stride + 1) % 2
-        rows[odd::2] = _between(rows, odd)
-    return coarse[tuple(np.transpose(wave.places))]
-
-
-def _between(rows: np.ndarray, odd: int) -> np.ndarray:
-    """Values in every second row, from `odd` on, by the rows between them."""
-    margin = np.full((3, *rows.shape[1:]), np.nan)
-    padded = np.concatenate([margin, rows, margin])
-    count = len(rows[odd::2])
-    best = np.full((count, *rows.shape[1:]), np.nan)
-    for stencil in _STENCILS:
-        value = sum(
-            weight * padded[3 + odd + step : 3 + odd + step + 2 * count - 1 : 2]
-            for step, weight in stencil.items()
-        )
-        best = np.where(np.isnan(best), value, best)
-    return best
-
-
-def _lattice(shape: Sequence[int], first: Place, stride: int) -> Iterator[Place]:
-    axes = [range(i % stride, size, stride) for i, size in zip(first, shape, strict=True)]
-    return itertools.product(*axes)
-
 
 _TRIES = 2
 """Neighbours from which a point is searched again."""
+_REACH = 2
+"""How far a search without a guess that found nothing speaks for others, in the coarse lattice's
+strides: those are not searched so."""
 
 Find: TypeAlias = Callable[[Sequence[Place], np.ndarray], Iterator[tuple[slice, Gait]]]
 """Which of the points, and the gaits, with a first axis, to which Newton's method leads from the
@@ -164,11 +46,16 @@ class GaitWaves:
         grid: GaitGrid,
         first: tuple[Place, Gait],
         find: Find,
+        start_at: Callable[[Place], np.ndarray],
         search_alone: Callable[[Place], Gait],
         now: Stage,
     ) -> None:
-        """`first` is the gait at one point; `now` counts the points that are done."""
+        """`first` is the gait at one point; `now` counts the points that are done.
+
+        `start_at` gives the start, without `ROOT_x`, of a search that has no neighbours' gaits.
+        """
         self._grid, self._now, self._search_alone, self._find_from = grid, now, search_alone, find
+        self._start_at = start_at
         self._first, gait = first
         # What is known so far: states, NaN where no gait is, and whether the gaits are stable.
         self._states = np.full_like(grid.states(), np.nan)
@@ -176,6 +63,7 @@ class GaitWaves:
         self._stable = np.zeros(self._shape, dtype=bool)
         self._doubtful: dict[Place, Gait | None] = {}
         self._tried: dict[Place, list[Place]] = {}
+        self._in_vain: list[Place] = []
         if not grid.is_done(self._first):
             if bool(gait.stable):
                 grid.write([self._first], rows_of(gait, None))
@@ -188,10 +76,16 @@ class GaitWaves:
         for wave in plan:
             self._search(wave)
         self._spread()
-        coarse = {place for wave in plan if not wave.fills for place in wave.places}
+        untried = [place for place, gait in self._doubtful.items() if gait is None]
+        self._find(untried, np.array([self._start_at(place) for place in untried]))
+        self._spread()
+        reach = _REACH * plan[0].stride if np.prod(self._shape) >= LARGE else 0
         for place in [place for wave in plan for place in wave.places]:
-            if place in self._doubtful:
-                self._settle(place, alone=place in coarse)
+            if place in self._doubtful and self._is_worth_a_search(place, reach):
+                self._search_without_guess(place)
+        for place, best in self._doubtful.items():
+            self._grid.write([place], rows_of(best, None))
+            self._count(1)
 
     def _search(self, wave: Wave) -> None:
         """One wave; what it finds is known after it."""
@@ -266,22 +160,34 @@ class GaitWaves:
             stable = [n for n in near if np.isfinite(self._states[n][0])]
         return stable[0] if stable else None
 
-    def _settle(self, place: Place, *, alone: bool) -> None:
-        """Writes what is best at a doubtful point, searched without a guess where need be."""
-        best = self._doubtful[place]
-        if alone or not _is_found(best):
-            gait = self._search_alone(place)
-            if bool(gait.stable):
-                self._keep([place], rows_of(gait, None))
-                self._spread()
-                return
-            best = best if _is_found(best) else gait
-        assert best is not None
-        self._doubtful.pop(place)
-        self._grid.write([place], rows_of(best, None))
-        if _is_found(best):
-            self._states[place] = np.stack(recurring_leaves(best.measures.state))
-        self._count(1)
+    def _search_without_guess(self, place: Place) -> None:
+        gait = self._search_alone(place)
+        if bool(gait.stable):
+            self._keep([place], rows_of(gait, None))
+        else:
+            self._in_vain.append(place)
+            self._doubt(place, gait)
+            self._grid.write([place], rows_of(self._doubtful[place], None))
+        self._spread()
+
+    def _is_worth_a_search(self, place: Place, reach: int) -> bool:
+        """Whether no search without a guess nearby says what one here would come to.
+
+        Such a search is worth it wherever a point has less than those on two opposite sides of it.
+        """
+        own = self._rank(place)
+        for axis, size in enumerate(self._shape):
+            sides = [(*place[:axis], place[axis] + k, *place[axis + 1 :]) for k in (-1, 1)]
+            if 0 < place[axis] < size - 1 and min(map(self._rank, sides)) > own:
+                return True
+        return not any(
+            self._rank(other) <= own and max(abs(np.subtract(place, other))) <= reach
+            for other in self._in_vain
+        )
+
+    def _rank(self, place: Place) -> int:
+        """0 without a gait, 1 with an unstable one, 2 with a stable one."""
+        return int(np.isfinite(self._states[place][0])) + int(self._stable[place])
 
 
 def _is_found(gait: Gait | None) -> bool:

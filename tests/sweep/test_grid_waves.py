@@ -1,9 +1,14 @@
 """Waves of a grid, against a partition of its points, and guesses against cubics."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
-from jaxbiped.sweep._gait_waves import extrapolated, interpolated, neighbours, rings, waves
+import jaxbiped as jb
+from jaxbiped._progress import Stage
+from jaxbiped.sweep._gait_waves import GaitWaves
+from jaxbiped.sweep._grid_waves import extrapolated, interpolated, neighbours, rings, waves
 
 SHAPES = [((100, 100), (37, 80)), ((97,), (3,)), ((30, 5, 7), (0, 4, 6)), ((8, 8), (7, 0))]
 
@@ -56,3 +61,79 @@ def test_rings_are_of_points_equally_far_away():
     for distance, ring in enumerate(found):
         assert all(abs(i - 1) + abs(j - 2) == distance for i, j in ring)
     assert set(neighbours((0, 0), (4, 5))) == {(1, 0), (0, 1)}
+
+
+class Measured(NamedTuple):
+    state: jb.dynamics.RigidState
+
+
+class FakeGait(NamedTuple):
+    ending: np.ndarray
+    stable: np.ndarray
+    measures: Measured
+
+
+def _gait(found, stable=True, count=None):
+    shape = () if count is None else (count,)
+    state = jb.dynamics.RigidState(*[np.full(shape, 1.0)] * 5)
+    return FakeGait(np.where(found, 0, 2), np.asarray(found) & stable, Measured(state))
+
+
+class FakeGrid:
+    """Of what a sweep writes, the endings."""
+
+    def __init__(self, shape):
+        self.ending = np.full(shape, -1)
+
+    def states(self):
+        return np.full((*self.ending.shape, 4), np.nan)
+
+    def is_done(self, place):
+        return False
+
+    def write(self, places, gaits):
+        self.ending[tuple(np.transpose(places))] = gaits.ending
+
+
+def _swept(truth, hidden, first):
+    """Endings of a sweep, and where it searched without a guess.
+
+    Gaits are where `truth` is; Newton's method misses those that are `hidden`, at first even those
+    of neighbours.
+    """
+    grid, alone = FakeGrid(truth.shape), []
+
+    def find(places, guesses):
+        at = tuple(np.transpose(places))
+        found = truth[at] & ~hidden[at] & (guesses[:, 0] == 1.0)
+        yield slice(0, len(places)), _gait(found, count=len(places))
+
+    def search_alone(place):
+        alone.append(place)
+        return _gait(truth[place])
+
+    begun = first, _gait(np.asarray(True))
+    GaitWaves(
+        grid, begun, find, lambda _: np.zeros(4), search_alone, Stage("sweeping", None, "gaits", 0)
+    ).run()
+    return grid.ending, alone
+
+
+def test_a_region_without_gaits_is_not_searched_point_by_point():
+    truth = np.zeros((81, 65), dtype=bool)
+    truth[:, :33] = True
+    ending, alone = _swept(truth, np.zeros_like(truth), (40, 10))
+    np.testing.assert_array_equal(ending == 0, truth)
+    # A search speaks for the points up to 8 away.
+    assert len(alone) <= np.ceil(81 / 9) * np.ceil(32 / 9)
+    far = np.abs(np.argwhere(~truth)[:, None] - np.array(alone)).max(axis=-1).min(axis=1)
+    assert far.max() <= 8
+
+
+def test_holes_and_islands_are_searched():
+    truth, hidden = np.zeros((40, 40), dtype=bool), np.zeros((40, 40), dtype=bool)
+    truth[:, :20] = truth[10:25, 25:40] = True
+    hidden[7, 9] = hidden[30, 3:5] = True  # a hole in the waves, and one of two points
+    ending, alone = _swept(truth, hidden, (20, 5))
+    np.testing.assert_array_equal(ending == 0, truth)
+    assert len(alone) < 30
