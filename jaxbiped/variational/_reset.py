@@ -1,19 +1,18 @@
 """Reset of a state at a switch, as by an impact, and what becomes of its columns."""
 
-from collections.abc import Callable
-
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
+from jaxbiped.variational._tangents import Seeded, Watch, active_leaves, with_active
 
 
 def behind_reset(
-    reset: Callable[[PyTree, PyTree], PyTree],
+    watch: Watch,
     met: Scalar,
+    past: Scalar,
     state: PyTree,
     columns: list[Scalar],
     args: Seeded,
@@ -21,24 +20,28 @@ def behind_reset(
 ) -> tuple[PyTree, list[Scalar]]:
     """The state behind a switch that resets it, and its columns there.
 
-    Columns are those where all motions meet the switch, so that the reset's own derivative is all
-    that changes them.
+    It is that on the switch: the little time past it is taken back. Columns are those where all
+    motions meet the switch, so that the reset's own derivative is all that changes them.
 
     Args:
-        reset: of (args, state).
+        watch: the field, and the reset of (args, state).
         met: whether the switch was met (boolean); else nothing changes.
+        past: how long before [s]; so short that the state moves along its rates.
         state: just past the switch.
         columns: of the directions of the state, then of those of parameters, shapes (n, c).
         args: the arguments and their active leaves.
         sizes: by how much each of the last columns moves its parameter.
     """
-    leaves, structure = jtu.tree_flatten(state)
-    q = active_leaves(args)
+    reset, structure, q = watch.reset, jtu.tree_structure(state), active_leaves(args)
+    assert reset is not None
 
     def behind(leaves: list[Scalar], q: list[Scalar]) -> list[Scalar]:
         return jtu.tree_leaves(reset(with_active(args, q), jtu.tree_unflatten(structure, leaves)))
 
     def after() -> tuple[PyTree, list[Scalar]]:
+        rates = watch.field(jnp.zeros_like(past), state, args.args)
+        leaves = jtu.tree_leaves(jtu.tree_map(lambda leaf, rate: leaf - past * rate, state, rates))
+
         def along(each: tuple[Scalar, Scalar]) -> Scalar:
             return jnp.stack(jax.jvp(behind, (leaves, q), tuple(map(list, each)))[1])
 

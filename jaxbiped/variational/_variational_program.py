@@ -136,10 +136,10 @@ class AdaptiveColumns:
         columns, peaks, peak_shifts = now.columns, now.peak_columns, now.peak_shifts
         new_columns, shifts = self._met(given, now, landed, new_columns, step)
         if self.watch.reset is not None:
-            met, seeded = keep & (landed.crossed_field > 0), self._seeded(given)
-            state, new_columns = behind_reset(
-                self.watch.reset, met, state, new_columns, seeded, given.sizes
-            )
+            seeded, past = self._seeded(given), landed.past
+            met = keep & (landed.crossed_field > 0)
+            behind = behind_reset(self.watch, met, past, state, new_columns, seeded, given.sizes)
+            (state, new_columns), t = behind, jnp.where(met, t - past, t)
         if self.watch.peak is None:
             columns = tuple(_select(keep, a, b) for a, b in zip(new_columns, columns, strict=True))
             peaks, peak_shifts = columns, shifts

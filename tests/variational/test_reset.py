@@ -39,12 +39,14 @@ def exact(y, v, level, bounce, time):
 
 
 @jax.jit
-def through_the_bounce(state, by_state, met):
+def through_the_bounce(state, by_state, met, past=0.0):
     args = Seeded((jnp.asarray(LEVEL), jnp.asarray(BOUNCE)), jnp.eye(2), jnp.ones(2), (0, 1))
     columns, shifts = (by_state, jnp.zeros((2, 2))), (jnp.zeros(2), jnp.zeros(2))
     meeting = meeting_at(WATCH, state, args, jnp.asarray(1))
     columns, shifts = meet(meeting, columns, shifts, jnp.asarray(SIZES))
-    after, columns = behind_reset(bounced, met, state, columns, args, jnp.asarray(SIZES))
+    after, columns = behind_reset(
+        WATCH, met, jnp.asarray(past), state, columns, args, jnp.asarray(SIZES)
+    )
     return after, at_fixed_time(field(0.0, after, args.args), columns, shifts)
 
 
@@ -60,3 +62,7 @@ def test_a_bounce_carries_the_columns_of_the_exact_motion():
     np.testing.assert_allclose(np.concatenate(columns), slopes, rtol=1e-13, atol=1e-13)
     np.testing.assert_allclose(after, (LEVEL, -BOUNCE * speed), rtol=1e-15)
     np.testing.assert_array_equal(through_the_bounce(state, by_state, False)[0], state)
+    late = 1e-11
+    past_level = state[0] + late * state[1], state[1] - late * G
+    on_level, _ = through_the_bounce(past_level, by_state, True, late)
+    np.testing.assert_allclose(on_level, after, rtol=0.0, atol=1e-15)
