@@ -38,6 +38,8 @@ from jaxbiped.compiler.runtime._machine_code import (
 from jaxbiped.compiler.runtime._program import Graph, Outline, Program, graph_of, outline_of
 
 _T = TypeVar("_T")
+_LONG = 8000
+"""Operations of an attempt from which on it counts as long."""
 _KIND = "programs"
 _TRACING = threading.Lock()
 _KNOWING = threading.Lock()
@@ -56,6 +58,7 @@ class Signature(NamedTuple):
         row: numbers in each row of the stream that it reads.
         recorded: numbers in each record, `records` whether it makes any.
         maps: whether it loops over entries of arrays.
+        long: whether an attempt is so long that its instructions do not stay in the caches.
         backwards: whether it reads streams from the last row on.
     """
 
@@ -67,6 +70,7 @@ class Signature(NamedTuple):
     recorded: int
     records: bool
     maps: bool
+    long: bool
     backwards: bool
 
 
@@ -200,6 +204,7 @@ class Kernel:
             recorded=len(graph.recorded),
             records=graph.recording is not None,
             maps=any(value.op == "map" for value in graph.body.values),
+            long=len(graph.body.values) > _LONG,
             backwards=program.backwards,
         )
         if self.digest is not None:
