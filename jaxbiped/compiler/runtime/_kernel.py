@@ -5,6 +5,7 @@ traces it.
 """
 
 import dataclasses
+import math
 import threading
 import weakref
 from collections.abc import Callable
@@ -78,13 +79,14 @@ class Kernel:
     """What runs a program for inputs of one structure.
 
     Attributes:
-        inputs: pytree of shapes and dtypes.
+        inputs: pytree of shapes and dtypes; `size` how many numbers they are.
         digest: fingerprint of the program and its inputs; None where it has none.
         begun: what began to be compiled for it in the background.
     """
 
     def __init__(self, program: Program | None, inputs: PyTree, digest: str | None) -> None:
         self._program, self.inputs, self.digest = program, inputs, digest
+        self.size = sum(math.prod(leaf.shape) for leaf in jtu.tree_leaves(inputs))
         self.begun: dict[tuple[str, int], object] = {}
         self._code: dict[int, MachineCode] = {}
         self._ptx: dict[str, str] = {}
