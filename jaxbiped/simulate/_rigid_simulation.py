@@ -171,7 +171,7 @@ class RigidSimulation(eqx.Module):
         """Solves it."""
         state = self.walk.state
         moded = rigid_modes(self.scene.mechanism).any
-        program = rigid_program(moded or self.max_arrivals > 0, self.waits, self.embedded)
+        program = rigid_program(self.max_arrivals > 0, moded, self.waits, self.embedded)
         room = _ROWS + 8 * self.max_arrivals if moded else self.max_arrivals
         request = Request(program, self.walk, room=room, quick=True)
         found, recorded, _ = BY_NAME[self.engine].run(request)
@@ -218,11 +218,12 @@ class RigidSolved(NamedTuple):
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def rigid_program(records: bool, waits: bool, embedded: bool = False) -> Program:
+def rigid_program(strikes: bool, modes: bool, waits: bool, embedded: bool = False) -> Program:
     """The program of a `RigidWalk`.
 
     Args:
-        records: whether time and state after each strike are recorded.
+        strikes: whether time and state after each strike are recorded.
+        modes: whether every change of mode is recorded, with its state where strikes are.
         waits: whether the duration only bounds the wait for footsteps.
         embedded: whether steps go on with the embedded solution; see `rolling_step`.
     """
@@ -239,16 +240,16 @@ def rigid_program(records: bool, waits: bool, embedded: bool = False) -> Program
         pulled = (after.accepted > now.accepted) & is_pulled(walk, after)
         return after._replace(pulls=now.pulls + jnp.where(pulled, 1, 0)), over
 
-    return Program(initial_progress, attempt, finish, record=_record if records else None)
+    def record(
+        walk: RigidWalk, now: RigidProgress, time: Scalar
+    ) -> tuple[Scalar, list[Scalar]]:
+        happens = now.struck if now.modes is None else now.struck | now.modes.changed
+        if not strikes:
+            return happens, [now.t, now.state.mode]
+        flag = [jnp.where(now.struck, 1.0, 0.0)] if modes else []
+        return happens, [now.t, *flag, *state_with_hip(walk, now)]
 
-
-def _record(walk: RigidWalk, now: RigidProgress, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-    row = [now.t, *state_with_hip(walk, now)]
-    if not hasattr(walk.state, "mode"):
-        return now.struck, row
-    struck = jnp.where(now.struck, 1.0, 0.0)
-    happens = now.struck if now.modes is None else now.struck | now.modes.changed
-    return happens, [now.t, struck, *row[1:]]
+    return Program(initial_progress, attempt, finish, record if strikes or modes else None)
 
 
 def _moving(run: RigidSimulation) -> tuple[PyTree, PyTree, PyTree]:

@@ -60,7 +60,7 @@ def history_of(scene: RigidScene, begin: Scalar, rows: Numbers, total: Numbers) 
     Args:
         scene: what walked.
         begin: its first mode.
-        rows: of a time and a state behind each change of mode and each heel strike, shape (n, c).
+        rows: of a time and, last, a mode behind each change of mode and each heel strike, (n, c).
         total: how many rows there are.
     """
     structure, modes = scene.mechanism.structure, rigid_modes(scene.mechanism)

@@ -224,7 +224,7 @@ def test_a_compiled_program_that_somebody_has_is_found_again():
     walk = RigidWalk(rigid, default_guess(rigid), *[jnp.ones(())] * 4)
 
     def program():
-        return LaneEngine().compile(Request(rigid_program(True, False), walk))
+        return LaneEngine().compile(Request(rigid_program(True, False, False), walk))
 
     held = program()
     jb.clear_caches()

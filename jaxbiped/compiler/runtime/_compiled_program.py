@@ -69,7 +69,7 @@ class CompiledProgram:
     @property
     def size(self) -> int:
         """How many numbers the inputs of one simulation are."""
-        return sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(self.kernel.inputs))
+        return self.kernel.size
 
     def check(self) -> None:
         """Waits until it is traced, or known to have been.

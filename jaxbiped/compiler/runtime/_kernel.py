@@ -5,6 +5,7 @@ traces it.
 """
 
 import dataclasses
+import math
 import threading
 import weakref
 from collections.abc import Callable
@@ -38,6 +39,8 @@ from jaxbiped.compiler.runtime._machine_code import (
 from jaxbiped.compiler.runtime._program import Graph, Outline, Program, graph_of, outline_of
 
 _T = TypeVar("_T")
+_LONG = 8000
+"""Operations of an attempt from which on it counts as long."""
 _KIND = "programs"
 _TRACING = threading.Lock()
 _KNOWING = threading.Lock()
@@ -56,6 +59,7 @@ class Signature(NamedTuple):
         row: numbers in each row of the stream that it reads.
         recorded: numbers in each record, `records` whether it makes any.
         maps: whether it loops over entries of arrays.
+        long: whether an attempt is so long that its instructions do not stay in the caches.
         backwards: whether it reads streams from the last row on.
     """
 
@@ -67,6 +71,7 @@ class Signature(NamedTuple):
     recorded: int
     records: bool
     maps: bool
+    long: bool
     backwards: bool
 
 
@@ -74,13 +79,14 @@ class Kernel:
     """What runs a program for inputs of one structure.
 
     Attributes:
-        inputs: pytree of shapes and dtypes.
+        inputs: pytree of shapes and dtypes; `size` how many numbers they are.
         digest: fingerprint of the program and its inputs; None where it has none.
         begun: what began to be compiled for it in the background.
     """
 
     def __init__(self, program: Program | None, inputs: PyTree, digest: str | None) -> None:
         self._program, self.inputs, self.digest = program, inputs, digest
+        self.size = sum(math.prod(leaf.shape) for leaf in jtu.tree_leaves(inputs))
         self.begun: dict[tuple[str, int], object] = {}
         self._code: dict[int, MachineCode] = {}
         self._ptx: dict[str, str] = {}
@@ -200,6 +206,7 @@ class Kernel:
             recorded=len(graph.recorded),
             records=graph.recording is not None,
             maps=any(value.op == "map" for value in graph.body.values),
+            long=len(graph.body.values) > _LONG,
             backwards=program.backwards,
         )
         if self.digest is not None:

@@ -208,7 +208,8 @@ class LaneRun(NamedTuple):
                 rows = list(np.asarray(stream))
             outputs, recorded = self._run(own, rows, self.room, width)
             found.append([outputs, *(recorded or ())])
-        return [np.concatenate(each) for each in zip(*found, strict=True)]
+        # A single part stays as it is: a copy of many records takes as long as making them.
+        return found[0] if len(found) == 1 else [np.concatenate(e) for e in zip(*found, strict=True)]
 
     def outputs(self, numbers: np.ndarray) -> list[np.ndarray]:
         """Outputs alone; their records are then known."""

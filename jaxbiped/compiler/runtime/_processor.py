@@ -186,13 +186,14 @@ class HostProcessor(AbstractProcessor):
         """A thread that has only one simulation is faster with it alone.
 
         Where there are many, two of the host's vectors side by side: while one waits, the other one
-        is computed. What a map loops over fills the caches instead.
+        is computed. What a map loops over fills the caches instead, and so does a long program.
         """
         if count <= threads:
             return 1
         if count < _MANY * threads * host().width:
             return host().width
-        return host().width * (1 if kernel.signature.maps else 2)
+        signature = kernel.signature
+        return host().width * (1 if signature.maps or signature.long else 2)
 
     def prepare(self, kernel: Kernel, width: int) -> None:
         kernel.code(width)
