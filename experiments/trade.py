@@ -40,12 +40,12 @@ PANELS = (
     ("walk", "energy", "cpu_s", "Energy ledger"),
     ("batch", "state", "cpu_s", "State, a batch"),
     ("basin", "labels", "cpu_s", "Wrong labels of 4096 starts"),
-    ("basin", "walking", "cpu_s", "Starts wrong about walking or not, of 4096"),
-    ("slopes", "slopes", "cpu_s", "State's slopes by K, c, ξ"),
+    ("basin", "walking", "cpu_s", "Starts of 4096 that are wrongly labelled as walking or not"),
+    ("slopes", "slopes", "cpu_s", "Derivatives of the state, with respect to K, c, ξ"),
     ("gait", "period", "cpu_s", "Gait's period"),
     ("gait", "multiplier", "cpu_s", "Largest multiplier"),
-    ("gait", "gradient", "cpu_s", "Period's gradient by K, c, ξ"),
-    ("stepping", "gradient", "attempted", "Period's gradient by K, by stepping"),
+    ("gait", "gradient", "cpu_s", "Derivatives of the period, with respect to K, c, ξ"),
+    ("stepping", "gradient", "attempted", "Derivative of the period, by choice of steps"),
     ("smoothed laws", "state", "attempted", "State after 2 s, smoothed laws"),
     ("v0 ten times wider", "state", "attempted", "State after 2 s, v0 ten times wider"),
     ("rigid gait", "multiplier", "cpu_s", "Largest multiplier, rigid walker"),
@@ -82,7 +82,8 @@ def main(options: TradeOptions):
         "rows": {group: [row.numbers() for row in found] for group, found in rows.items()},
         "at_equal_error": {group: comparison(found) for group, found in rows.items()},
     }
-    return rounded(numbers) | {"picture": draw(options, rows, floors)}
+    told = rounded(numbers)
+    return told | {"picture": draw(options, told)}
 
 
 def rounded(tree):
@@ -122,20 +123,20 @@ def comparison(rows):
     }
 
 
-def draw(options, rows, floors):
-    """The panels of the groups that have errors."""
+def draw(options, numbers):
+    """The panels of the groups that have errors, from the study's written numbers."""
+    rows, floors = numbers["rows"], numbers["floors"]
 
     def has_errors(group, axis):
-        return any(row.outcome == "ok" and row.errors.get(axis) for row in rows.get(group, ()))
+        return any(row["outcome"] == "ok" and row["errors"].get(axis) for row in rows.get(group, ()))
 
     shown = [panel for panel in PANELS if has_errors(*panel[:2])]
     lines = -(-len(shown) // COLUMNS)
     figure = new_figure(15.0, 4.4 * lines)
     axes = figure.subplots(lines, COLUMNS, squeeze=False).ravel()
     for ax, (group, axis, cost, title) in zip(axes, shown, strict=False):
-        told = [row.numbers() for row in rows[group]]
         floor = floors.get(group, {}).get(axis)
-        jb.plot.work_precision(told, axis, cost=cost, floor=floor, ax=ax)
+        jb.plot.work_precision(rows[group], axis, cost=cost, floor=floor, ax=ax)
         ax.set_title(title, loc="left")
         ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7, frameon=False)
     for ax in axes[len(shown) :]:

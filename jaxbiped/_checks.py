@@ -34,9 +34,9 @@ class ResourceError(RuntimeError):
 
 
 def warn(sentence: str, category: type[Warning] = RuntimeWarning) -> None:
-    """Warns at the line of the caller's code that called the package."""
-    frame, level = sys._getframe(1), 2
-    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] == "jaxbiped":
+    """Warns at the line of the caller's code that called the package, or made a module of it."""
+    frame, level, inside = sys._getframe(1), 2, {"jaxbiped", "equinox", "dataclasses"}
+    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in inside:
         frame, level = frame.f_back, level + 1
     warnings.warn(sentence, category, stacklevel=level)
 

@@ -5,13 +5,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_increasing, check_type
-from jaxbiped._types import Scalar
-from jaxbiped.dynamics._energy import energies, is_driven, powers
-from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.measure._energy_ledger import rigid_ledger
-from jaxbiped.measure._footsteps import heel_strikes
-from jaxbiped.measure._samples import evaluate_at, kept_strikes, places_of_standing, sample
+from jaxbiped.measure._footsteps import driving_works, heel_strikes
+from jaxbiped.measure._samples import kept_strikes, places_of_standing
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
@@ -89,28 +86,5 @@ def cost_of_transport(
         if times is not None:
             check_increasing("times", times, 2)
         ends = heel_strikes(scene, walk).time_s if times is None else np.asarray(times)
-        distance, gravity, motors = _compliant(scene, walk, ends)
+        distance, gravity, motors = driving_works(scene, walk, ends)
     return CostOfTransport((motors + gravity) / (weight * distance), motors, gravity, distance)
-
-
-def _compliant(
-    scene: Scene, walk: Trajectory, ends: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Distance [m], gravity's work and the motors' [J] between times."""
-    count = max(len(ends) - 1, 0)
-    if count == 0:
-        nothing = np.zeros(0)
-        return nothing, nothing, nothing
-    place = evaluate_at(scene, walk, _root_place, ends)
-    gravity = -np.diff(evaluate_at(scene, walk, energies, ends).gravitational)
-    driven = np.zeros(count)
-    if is_driven(scene):
-        flows = sample(scene, walk, powers, ends)
-        for power in flows.values.motors:
-            driven += flows.totals(flows.positive_integral(power), ends)
-    return np.diff(place), gravity, driven
-
-
-def _root_place(scene: Scene, state: Any) -> Scalar:
-    """Place of the root point along the slope [m]."""
-    return getattr(minimal_state(scene, state), scene.mechanism.structure.coordinates[0])

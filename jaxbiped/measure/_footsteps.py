@@ -11,9 +11,11 @@ from jaxtyping import PyTree
 from jaxbiped._checks import check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, Tabular, variables_of
-from jaxbiped._types import Numbers
+from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._contacts import Contacts, contacts
+from jaxbiped.dynamics._energy import energies, is_driven, powers
 from jaxbiped.dynamics._footfalls import landings, standing_leg
+from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._samples import Samples, at_steps, evaluate_at, moments_of_change, sample
 from jaxbiped.scene._scene import RedundantScene, Scene
@@ -64,7 +66,7 @@ class Footsteps(Tabular):
         peak_normal_N: largest normal force on a foot [N].
         max_penetration_m: largest penetration of a foot that touches [m].
         double_support_s: time from the first strike until a single leg carries the load again [s].
-        cost_of_transport: energy lost over weight times length [–].
+        cost_of_transport: see `jaxbiped.measure.cost_of_transport` [–].
         energy_residual_J: residual of the step's energy ledger [J].
         leg: name of the leg that strikes.
     """
@@ -178,7 +180,7 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     time = strikes.time_s
     period, length = np.diff(time), np.diff(strike_places(scene, trajectory, strikes))
     loads = sample(scene, trajectory, contacts, time)
-    ledger = energy_ledger(scene, trajectory, time)
+    distance, gravity, motors = driving_works(scene, trajectory, time)
     weight = float(scene.mechanism.total_mass) * float(scene.ground.g)
     return Footsteps(
         time_s=time[1:],
@@ -188,10 +190,33 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
         peak_normal_N=_largest(_normal(loads.values), loads, time),
         max_penetration_m=_largest(_depth(loads.values), loads, time),
         double_support_s=_double_support(scene, trajectory, time, loads),
-        cost_of_transport=(ledger.damper_loss + ledger.friction_loss) / (weight * length),
-        energy_residual_J=ledger.residual,
+        cost_of_transport=(motors + gravity) / (weight * distance),
+        energy_residual_J=energy_ledger(scene, trajectory, time).residual,
         leg=leg,
     )
+
+
+def driving_works(
+    scene: Scene, walk: Trajectory, ends: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Distance [m], gravity's work and the motors' [J] between times."""
+    count = max(len(ends) - 1, 0)
+    if count == 0:
+        nothing = np.zeros(0)
+        return nothing, nothing, nothing
+    place = evaluate_at(scene, walk, _root_place, ends)
+    gravity = -np.diff(evaluate_at(scene, walk, energies, ends).gravitational)
+    driven = np.zeros(count)
+    if is_driven(scene):
+        flows = sample(scene, walk, powers, ends)
+        for power in flows.values.motors:
+            driven += flows.totals(flows.positive_integral(power), ends)
+    return np.diff(place), gravity, driven
+
+
+def _root_place(scene: Scene, state: Any) -> Scalar:
+    """Place of the root point along the slope [m]."""
+    return getattr(minimal_state(scene, state), scene.mechanism.structure.coordinates[0])
 
 
 def strike_places(scene: Scene, trajectory: Trajectory, strikes: HeelStrikes) -> np.ndarray:

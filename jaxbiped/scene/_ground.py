@@ -4,8 +4,11 @@ import math
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 
+from jaxbiped._checks import warn
 from jaxbiped._parameter_declaration import AbstractPart, parameter
 from jaxbiped._types import Parameter, Scalar
 
@@ -44,6 +47,21 @@ class SteppedGround(eqx.Module):
     g: Parameter
     drop: Scalar
     leg: int = eqx.field(static=True)
+
+
+def warn_if_steep(ground: Ground, friction: object) -> None:
+    """Warns of a slope whose tangent exceeds every coefficient of friction: a walker slides."""
+    known = (getattr(friction, name, None) for name in ("mu", "mu_static", "mu_kinetic"))
+    largest = [mu for mu in known if mu is not None]
+    if not largest or any(isinstance(each, jax.core.Tracer) for each in (ground.slope, *largest)):
+        return
+    slope, mu = np.max(np.abs(ground.slope)), max(float(np.max(each)) for each in largest)
+    if 0.0 < mu < np.tan(slope):
+        warn(
+            f"slope = {slope:g} rad is steeper than friction can hold, whose coefficient is at "
+            f"most {mu:g} (up to {np.arctan(mu):.3g} rad): every walker slides; is the slope in "
+            "degrees?"
+        )
 
 
 def drop_under(ground: object, leg: int) -> Scalar | None:

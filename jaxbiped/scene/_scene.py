@@ -14,7 +14,7 @@ from jaxbiped.constraints._constraint_methods import Index1, method_named
 from jaxbiped.constraints._linkage import ORIENTATIONS, Linkage
 from jaxbiped.scene._abstract_scene import AbstractMinimalScene, AbstractWalkerScene
 from jaxbiped.scene._clearance import AbstractClearance, AlwaysTouching, OneFoot
-from jaxbiped.scene._ground import Ground
+from jaxbiped.scene._ground import Ground, warn_if_steep
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._linkages import check_loaded_bodies, walker_linkage
 from jaxbiped.scene._modes import limits_named
@@ -89,6 +89,7 @@ class Scene(AbstractMinimalScene):
         check_type("friction", self.friction, AbstractFrictionLaw, AbstractBristleLaw)
         check_type("clearance", self.clearance, AbstractClearance)
         check_actuation(self.actuation, "compliant")
+        warn_if_steep(self.ground, self.friction)
         mechanism = self.mechanism
         if isinstance(self.clearance, OneFoot):
             check_choice("clearance.leg", self.clearance.leg, mechanism.structure.legs)

@@ -110,6 +110,7 @@ def test_costs_count_motors_where_they_drive(driven, rolled):
     np.testing.assert_allclose(
         found.cost, (found.motor_work + books.gravity_work) / (weight * found.distance)
     )
+    np.testing.assert_array_equal(jb.footsteps(scene, walk).cost_of_transport, found.cost)
     # The pulse brakes, the spring's damper loses: what motors do is more than all work.
     assert (found.motor_work > books.actuation_work).all()
     between = jb.measure.cost_of_transport(scene, walk, times=strikes[[0, -1]])

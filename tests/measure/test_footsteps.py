@@ -28,7 +28,7 @@ def test_the_walk_settles_at_its_gait(settled):
 
 def test_cost_of_transport_of_the_gait_is_the_slope(settled):
     _, _, steps = settled
-    assert steps.cost_of_transport[-1] == pytest.approx(np.sin(0.02), rel=1e-4)
+    assert steps.cost_of_transport[-1] == pytest.approx(np.sin(0.02), rel=1e-6)
 
 
 def test_legs_alternate_and_times_increase(settled):

@@ -1,6 +1,7 @@
 """Scenes of any kind, against their leaves and a kind of one's own."""
 
 import dataclasses
+import warnings
 from typing import ClassVar
 
 import equinox as eqx
@@ -170,3 +171,15 @@ def test_a_scene_takes_any_mechanism_and_knows_its_rules():
         scene_of("unequal", actuation=jb.actuation.HipSpring(k=1.0))
     with pytest.raises(jb.ArgumentError, match="walker"):
         scene_of("torso", walker=3.0)
+
+
+def test_a_slope_that_no_friction_holds_is_asked_about_at_the_callers_line():
+    asked = r"slope = 1\.15 rad .* at most 0\.5 .* in degrees\?"
+    with pytest.warns(RuntimeWarning, match=asked) as told:
+        scene = jb.seed_scene(slope=1.15)
+        dataclasses.replace(scene, normal=scene.normal)
+    assert [each.filename for each in told] == [__file__, __file__]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        jb.seed_scene(slope=0.46)
+        dataclasses.replace(scene, friction=jb.laws.Frictionless())
