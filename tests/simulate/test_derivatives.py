@@ -170,15 +170,42 @@ def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name, draft):
     law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
     scene = eqx.tree_at(lambda scene: scene.normal, jb.seed_scene(), law)
 
-    def end(rate, accuracy="tight"):
+    def end(rate, **how):
         state = jb.seed_state()._replace(omega_2=rate)
-        walk = jb.simulate(scene, state, duration=0.6, save="end", accuracy=accuracy)
+        walk = jb.simulate(scene, state, duration=0.6, save="end", **how)
         return jnp.stack([walk.final.hip_x, walk.final.theta_1, walk.final.omega_1])
 
     rate = jb.seed_state().omega_2
-    right = _central(end, rate, 1e-4)
-    for accuracy, error in (("draft", draft), ("balanced", draft / 4.0)):
-        told = jax.jacfwd(lambda rate, accuracy=accuracy: end(rate, accuracy))(rate)
+    right = _central(partial(end, rtol=1e-12), rate, 1e-4)
+    for accuracy, error in (("draft", draft), ("balanced", draft / 4.0), ("tight", 1e-5)):
+        told = jax.jacfwd(partial(end, accuracy=accuracy))(rate)
+        np.testing.assert_allclose(told, right, atol=error * np.max(np.abs(right)))
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        dict(slope=0.0077, K=4e7, c=1.3e6, mu_static=0.05, mu_kinetic=0.05, v0=2e-6, xi=7.5),
+        dict(slope=0.032, K=8e7, c=2.8e7, mu_static=5.0, mu_kinetic=1.0, v0=1.6e-6, xi=440.0),
+        dict(slope=0.089, K=4e7, c=1.5e7, mu_static=1.0, mu_kinetic=1.0, v0=6.4e-6, xi=7e4),
+    ],
+    ids=["little friction", "peak five times as high", "no peak"],
+)
+def test_steep_friction_on_stiff_ground(numbers):
+    """With respect to relative changes of the slope, the stiffness and the build-up speed."""
+    names = ("slope", "K", "v0")
+    scene, values = jb.seed_scene(**numbers), jnp.array([numbers[name] for name in names])
+
+    def end(shares, **how):
+        moved = jb.with_parameters(scene, dict(zip(names, values * shares, strict=True)))
+        walk = jb.simulate(moved, START, footsteps=1, save="end", **how)
+        return jnp.concatenate([walk.t, *map(jnp.atleast_1d, walk.final)])
+
+    step = 1e-5 * jnp.eye(3)
+    ends = jax.vmap(partial(end, rtol=1e-12))(jnp.concatenate([1.0 + step, 1.0 - step]))
+    right = (ends[:3] - ends[3:]).T / 2e-5
+    for accuracy, error in (("balanced", 1e-3), ("tight", 3e-5)):
+        told = jax.jacfwd(partial(end, accuracy=accuracy))(jnp.ones(3))
         np.testing.assert_allclose(told, right, atol=error * np.max(np.abs(right)))
 
 
