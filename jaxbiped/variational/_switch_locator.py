@@ -35,6 +35,10 @@ NEAR = 1e-11
 before it, for a step's last stage lies on the other side, where the Jacobian may be any size."""
 _BEFORE = 1e-3
 """How far before, as a share of the way to it."""
+_LAST, _LEFT = 1e-8, 0.1
+"""Longest last step to where derivatives are read [s], at the section or a largest load, and the
+share of the way that each step before leaves. A step's error in a stiff component of the state
+turns the rates by that error times the component's own rate, and so moves the time that is read."""
 
 
 class SwitchLocatorState(NamedTuple):
@@ -123,11 +127,13 @@ class SwitchLocator(AbstractWrappedControl):
         crossed, first, place = self._crossings(span, scene, before, after, known)
         before_first, before_switch = span * first, span * place
         far = span - before_first > jnp.maximum(_OVERSHOOT * before_first, 4.0 * MARGIN)
-        again = crossed.any & (far | ((crossed.which != 0) & (span > 2.0 * NEAR)))
+        is_far = crossed.read & (before_first > _LAST)
+        again = crossed.any & (far | is_far | ((crossed.which != 0) & (span > 2.0 * NEAR)))
         past_first = before_first * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
         # Whatever else comes first, the step ends on this side of the switch.
         short_of_switch = jnp.minimum(past_first, before_switch * (1.0 - _BEFORE))
         approaches = (crossed.which != 0) & (before_switch > NEAR)
+        past_first = jnp.where(is_far, before_first * (1.0 - _LEFT), past_first)
         target = t0 + jnp.where(approaches, short_of_switch, past_first)
         target = cast(Scalar, jax.lax.stop_gradient(target))
         adapted = try_again(attempt, adapted, again, target)
@@ -187,7 +193,7 @@ class SwitchLocator(AbstractWrappedControl):
         if turns is not None:
             any_crossed = any_crossed | jnp.any(turns.touches)
 
-        def locate() -> tuple[Scalar, Scalar, Scalar]:
+        def locate() -> tuple[Scalar, Scalar, Scalar, Scalar]:
             parts = []
             for state, found in ((before, at_start), (after, at_end)):
                 rate = watch.field(jnp.zeros_like(span), state, scene)
@@ -197,6 +203,7 @@ class SwitchLocator(AbstractWrappedControl):
             roots = StepCubic(parts[0], parts[2], parts[1], parts[3]).sign_change()
             roots = jnp.where(jnp.stack(crossed), roots, 1.0)
             first, place, which = jnp.min(roots), jnp.ones_like(span), jnp.asarray(0)
+            read = jnp.min(roots[count:], initial=1.0) <= first
             for number, switch in enumerate(at_end[:count], 1):
                 if switch.corner and not self.corners:
                     continue
@@ -207,12 +214,13 @@ class SwitchLocator(AbstractWrappedControl):
                 which = jnp.where(is_first, sign * number, which)
             if turns is not None:
                 touch = jnp.min(jnp.where(turns.touches, turns.places, 1.0))
+                read = read & (touch > first)
                 first = jnp.minimum(first, touch)
-            return first, place, which
+            return first, place, which, read
 
-        part, place, which = jnp.ones_like(span), jnp.ones_like(span), jnp.asarray(0)
+        part, place, which, read = jnp.ones_like(span), jnp.ones_like(span), jnp.asarray(0), none
         if crossed:
-            part, place, which = fusion_barrier(any_crossed, locate)
+            part, place, which, read = fusion_barrier(any_crossed, locate)
             part, place = (jnp.where(any_crossed, each, 1.0) for each in (part, place))
             which = jnp.where(any_crossed, which, 0)
         found = _Crossed(
@@ -222,6 +230,7 @@ class SwitchLocator(AbstractWrappedControl):
             arrives,
             none if turns is None else turns.graze,
             which,
+            read & any_crossed,
         )
         return found, part, place
 
@@ -282,6 +291,7 @@ class _Crossed(NamedTuple):
     section: Scalar
     graze: Scalar
     which: Scalar
+    read: Scalar
 
     @property
     def field(self) -> Scalar:

@@ -9,6 +9,7 @@ from reference.mechanism_gait import checked_cycle
 from reference.mechanism_pieces import Field, pieces_at
 
 import jaxbiped as jb
+from jaxbiped.solve._accuracy import Precision
 from tests.mechanism_numbers import directions_of, tree_of
 
 CASES = cases()
@@ -87,3 +88,19 @@ def test_a_derivative_through_corners_of_friction_keeps_no_error_of_the_crossing
         case.scene, case.guess, accuracy="tight", parameters=("c",), radius_sensitivities=False
     )
     assert float(gait.sensitivities.period[0]) == pytest.approx(-6.27446239523e-11, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_derivatives_of_the_peak_fall_with_the_tolerance():
+    """Against another method's. The foot sticks at 1e7/s: a state that a step leaves off what
+    friction slows to so fast has rates that are off by more, and by these the peak's time."""
+    case = CASES["torso on a spring"]
+
+    def peak(accuracy, solver="rodas4"):
+        how = dict(accuracy=accuracy, solver=solver, parameters=("slope", "n"))
+        gait = jb.find_gait(case.scene, case.guess, radius_sensitivities=False, **how)
+        return np.asarray(gait.elasticities.peak_normal)
+
+    exact = peak(Precision(1e-10, 1e-10), "rodas5p")
+    for rtol in (1.8e-9, 5.6e-10, 3.2e-10):
+        np.testing.assert_allclose(peak(Precision(rtol, 10.0 * rtol)), exact, rtol=2e-9)
