@@ -14,6 +14,7 @@ from jaxtyping import ArrayLike
 
 from jaxbiped._checks import ArgumentError, check_type, is_number, traced_rules
 from jaxbiped._types import SomeTree, as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import OfObjects
 
 SomeModule = TypeVar("SomeModule", bound=eqx.Module)
@@ -53,8 +54,11 @@ def where_allowed(
     rules: list[ArrayLike], tree: SomeTree, otherwise: float = float("nan")
 ) -> SomeTree:
     """The tree, its numbers others where one of the rules (see `traced_rules`) does not hold."""
-    if not rules:
-        return tree
+    return _kept(rules, tree, otherwise) if rules and jtu.tree_leaves(tree) else tree
+
+
+@cached_jit  # many small operations
+def _kept(rules: list[ArrayLike], tree: SomeTree, otherwise: float) -> SomeTree:
     kept = jnp.all(jnp.stack(rules))
     return jtu.tree_map(
         lambda leaf: jnp.where(kept, leaf, jnp.asarray(otherwise, jnp.result_type(leaf))), tree

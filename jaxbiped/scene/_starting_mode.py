@@ -1,12 +1,17 @@
 """Mode of a start on rigid feet, from its angles and rates: what stands, and what is held."""
 
+import functools
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._types import Parameter, Scalar, as_float, by_numpy
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.scene._couplings import angles_and_rates_named
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode, Modes, limits_named
@@ -93,29 +98,41 @@ def check_mode(mechanism: Mechanism, modes: Modes, slope: Parameter, state: Any)
     Raises:
         ArgumentError: such a state, where it is known.
     """
-    leaves, tree = jtu.tree_flatten(mechanism)
-    names, known = list(state._fields), len(state)
+    given = (mechanism, slope, state)
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(given)):
+        holds_somewhere(_is_misheld(modes, *given))
+        return
+    leaves, tree = jtu.tree_flatten(given)
 
-    def found(numpy: Any, slope: Any, *numbers: Any) -> tuple[Any, ...]:
-        values = dict(zip(names, numbers[:known], strict=True))
-        placed: Mechanism = jtu.tree_unflatten(tree, numbers[known:])
-        angles, rates = angles_and_rates_named(placed, slope, values)
-        held = modes.decoded(numpy, values["mode"]).held
-        gaps = [limit.distance(placed, angles, slope) for limit in modes.limits]
-        closing = [limit.gap.of(rates) for limit in modes.limits]
-        return (*held, *gaps, *closing)
+    def found(numpy: Any, *leaves: Any) -> list[tuple[Any, Any, Any]]:
+        return _misheld(numpy, modes, *jtu.tree_unflatten(tree, leaves))
 
-    parts = by_numpy(found, as_float(slope), *state, *leaves)
-    count = len(modes.limits)
-    held, gaps, closing = (parts[k * count : (k + 1) * count] for k in range(3))
-    for limit, stays, gap, rate in zip(modes.limits, held, gaps, closing, strict=True):
-        off = stays & ((abs(gap) > _DRIFT) | (abs(rate) > _DRIFT))
-        if holds_somewhere(off | (gap < -_DRIFT)):
+    for limit, (wrong, gap, rate) in zip(modes.limits, by_numpy(found, *leaves), strict=True):
+        if wrong.any():
             raise ArgumentError(
                 f"state.mode = {state.mode} is not allowed: the stop {limit.name!r} is {gap} rad "
                 f"off its limit and moves at {rate} rad/s, so that it is passed or cannot be held; "
                 "make the state with scene.state(...)."
             )
+
+
+@cached_jit  # many small operations
+def _is_misheld(modes: Modes, mechanism: Mechanism, slope: Scalar, state: Any) -> Scalar:
+    found = _misheld(jnp, modes, mechanism, slope, state)
+    return functools.reduce(operator.or_, (wrong for wrong, _, _ in found), jnp.asarray(False))
+
+
+def _misheld(
+    numpy: Any, modes: Modes, mechanism: Mechanism, slope: Any, state: Any
+) -> list[tuple[Any, Any, Any]]:
+    """For each limit whether it is passed, or held but off or moving; its gap, and the rate."""
+    angles, rates = angles_and_rates_named(mechanism, slope, state._asdict())
+    held, found = modes.decoded(numpy, state.mode).held, []
+    for limit, stays in zip(modes.limits, held, strict=True):
+        gap, rate = limit.distance(mechanism, angles, slope), limit.gap.of(rates)
+        off = stays & ((abs(gap) > _DRIFT) | (abs(rate) > _DRIFT))
+        found.append((off | (gap < -_DRIFT), gap, rate))
+    return found
 
 
 def _height(numpy: Any, mechanism: Mechanism, foot: int, angles: Any, rates: Any) -> Any:

@@ -122,17 +122,16 @@ class RigidSimulation(eqx.Module):
                 scene.mechanism.height,
                 scene.ground.g,
             )
-        walk = RigidWalk(
-            scene=scene,
-            state=state,
-            duration=as_float(longest),
-            footsteps=as_float(0 if footsteps is None else int(footsteps)),
-            rtol=as_float(tolerance),
-            max_attempts=as_float(asked.max_solver_steps),
-        )
+        others = footsteps or 0, tolerance, asked.max_solver_steps
+
+        def cast(leaf: Any) -> Scalar:
+            return as_float(leaf).astype(dtype)
+
+        # In the precision of the start, as a compliant walk has it. A scene that is formed anew
+        # makes its mechanism anew.
+        scene = scene if narrow is None else jtu.tree_map(cast, scene)
         return RigidSimulation(
-            # In the precision of the start, as a compliant walk has it.
-            jtu.tree_map(lambda leaf: leaf.astype(dtype), walk),
+            RigidWalk(scene, state, cast(longest), *map(cast, others)),
             waits=duration is None,
             embedded=False,
             max_arrivals=0 if section is None else int(asked.max_arrivals),
@@ -240,9 +239,7 @@ def rigid_program(strikes: bool, modes: bool, waits: bool, embedded: bool = Fals
         pulled = (after.accepted > now.accepted) & is_pulled(walk, after)
         return after._replace(pulls=now.pulls + jnp.where(pulled, 1, 0)), over
 
-    def record(
-        walk: RigidWalk, now: RigidProgress, time: Scalar
-    ) -> tuple[Scalar, list[Scalar]]:
+    def record(walk: RigidWalk, now: RigidProgress, time: Scalar) -> tuple[Scalar, list[Scalar]]:
         happens = now.struck if now.modes is None else now.struck | now.modes.changed
         if not strikes:
             return happens, [now.t, now.state.mode]

@@ -204,12 +204,11 @@ class LaneRun(NamedTuple):
         found = []
         for part in parts:
             own, rows = self._own_and_rows(numbers[part])
-            if stream is not None:
-                rows = list(np.asarray(stream))
+            rows = rows if stream is None else list(np.asarray(stream))
             outputs, recorded = self._run(own, rows, self.room, width)
             found.append([outputs, *(recorded or ())])
-        # A single part stays as it is: a copy of many records takes as long as making them.
-        return found[0] if len(found) == 1 else [np.concatenate(e) for e in zip(*found, strict=True)]
+        columns = zip(*found, strict=True)
+        return [each[0] if len(each) == 1 else np.concatenate(each) for each in columns]
 
     def outputs(self, numbers: np.ndarray) -> list[np.ndarray]:
         """Outputs alone; their records are then known."""
