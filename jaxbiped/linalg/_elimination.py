@@ -9,6 +9,7 @@ needs those before, `simulate` took 4.1 s to compile instead of 2.6.
 
 from typing import NamedTuple, TypeAlias
 
+import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
@@ -70,6 +71,49 @@ def solution(matrix: Scalar, right: Scalar) -> Scalar:
     return jnp.stack(found[::-1])
 
 
+class PivotedFactors(NamedTuple):
+    """L and U of a square matrix with the exchanges of its rows.
+
+    Attributes:
+        exchanged: for each column, whether the row at its place was exchanged with each one below.
+        heads: how much of a pivot's row was taken from each one below.
+        pivots: the pivots; `upper` what is right of each in its row, over the pivot.
+    """
+
+    exchanged: list[list[Scalar]]
+    heads: list[list[Scalar]]
+    pivots: list[Scalar]
+    upper: list[Scalar]
+
+    def solve(self, right: Scalar) -> Scalar:
+        """What the matrix's inverse takes to a vector (n,)."""
+        left = list(right)
+        for k, pivot in enumerate(self.pivots):
+            for i, larger in enumerate(self.exchanged[k], k + 1):
+                below = left[i]
+                left[i] = jnp.where(larger, left[k], below)
+                left[k] = jnp.where(larger, below, left[k])
+            left[k] = left[k] / pivot
+            for i, head in enumerate(self.heads[k], k + 1):
+                left[i] = left[i] - head * left[k]
+        found: list[Scalar] = []
+        for row, value in zip(reversed(self.upper), reversed(left), strict=True):
+            found.append(value - row @ jnp.stack(found[::-1]) if found else value)
+        return jnp.stack(found[::-1])
+
+
+def pivoted(matrix: Scalar) -> PivotedFactors:
+    """The factors of a matrix (n, n), by Gauss with partial pivoting."""
+    rows, found = list(matrix), PivotedFactors([], [], [], [])
+    for k in range(len(rows)):
+        found.exchanged.append([larger[0] for larger in _largest_first(rows, k)])
+        found.pivots.append(rows[k][0])
+        found.upper.append(rows[k][1:] / rows[k][0])
+        found.heads.append([row[0] for row in rows[k + 1 :]])
+        rows[k + 1 :] = [row[1:] - row[0] * found.upper[k] for row in rows[k + 1 :]]
+    return found
+
+
 class BlockFactors(NamedTuple):
     """L and U of a matrix of square blocks, n rows in all. Only those of a block change places.
 
@@ -114,20 +158,37 @@ class BlockFactors(NamedTuple):
         return jnp.split(right, len(self.inverses))
 
 
-def factorise(matrix: Scalar, size: int) -> BlockFactors:
-    """The factors of a matrix (n, n) of square blocks of so many rows."""
-    count = len(matrix) // size
-    left = [jnp.split(row, count, axis=1) for row in jnp.split(matrix, count)]
-    found = BlockFactors([[] for _ in left], [], [])
-    for k in range(count):
-        first, *rest = left.pop(0)
-        found.inverses.append(_invert(first))
-        found.upper.append(rest)
-        for i, row in enumerate(left):
-            head = row.pop(0) @ found.inverses[k]
-            found.lower[k + 1 + i].append(head)
-            row[:] = [entry - head @ above for entry, above in zip(row, rest, strict=True)]
+def factorise(columns: Scalar) -> BlockFactors:
+    """The factors of a matrix of m × m square blocks, by its columns (n, m, m, n).
+
+    Column a of the block in row i and column l of blocks is `columns[a, i, l]`. They are worked on
+    side by side: by lanes in vectors.
+    """
+    found = BlockFactors([[] for _ in range(columns.shape[1])], [], [])
+    while columns.shape[1]:
+        found.upper.append(list(jnp.moveaxis(columns[:, 0, 1:], 0, -1)))
+        inverse, heads, columns = _eliminate_first(columns)
+        found.inverses.append(inverse)
+        for row, head in zip(found.lower[len(found.inverses) :], heads, strict=True):
+            row.append(head)
     return found
+
+
+def _eliminate_first(columns: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """The inverse of the first block, those of L below it, and columns of what is then left."""
+    factors, below = pivoted(columns[:, 0, 0].T), jnp.moveaxis(columns[:, 1:, 0], 0, -1)
+
+    def inverted(unit: Scalar) -> tuple[Scalar, Scalar]:
+        own = factors.solve(unit)
+        return own, below @ own
+
+    found = jax.lax.map(inverted, jnp.eye(len(columns)))
+    inverse, heads = (jnp.moveaxis(each, 0, -1) for each in found)
+
+    def left(column: Scalar) -> Scalar:
+        return column[1:, 1:] - jnp.einsum("iab,lb->ila", heads, column[0, 1:])
+
+    return inverse, heads, jax.lax.map(left, columns)
 
 
 def _delete_row_and_column(part: Scalar, blocks: list[Scalar], known: list[Scalar]) -> Scalar:
@@ -137,17 +198,19 @@ def _delete_row_and_column(part: Scalar, blocks: list[Scalar], known: list[Scala
     return part
 
 
-def _invert(block: Scalar) -> Scalar:
-    return jnp.stack([jnp.stack(row) for row in inverse([list(row) for row in block])])
+def _largest_first(rows: list[Scalar], k: int) -> list[Scalar]:
+    """Brings the row with the largest first entry to place `k`, of those from there on.
 
-
-def _largest_first(rows: list[Scalar], k: int) -> None:
-    """Brings the row with the largest first entry to place `k`, of those from there on."""
+    Whether each row behind it was exchanged, one after the other.
+    """
+    exchanged = []
     for i in range(k + 1, len(rows)):
         larger = jnp.abs(rows[i][..., :1]) > jnp.abs(rows[k][..., :1])
         above, below = rows[k], rows[i]
         rows[k] = jnp.where(larger, below, above)
         rows[i] = jnp.where(larger, above, below)
+        exchanged.append(larger)
+    return exchanged
 
 
 def matmul(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:

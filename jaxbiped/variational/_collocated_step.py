@@ -127,15 +127,17 @@ class Stages(NamedTuple):
         weights = cast(Scalar, RADAU * share)
         d, k = order.direct, len(order.kept)
         by_direct, by_kept = jacobians[..., :d], jacobians[..., d:]
-        blocks = weights[:, None, :, None] * jnp.swapaxes(by_kept, 0, 1)[None]
-        if d:
-            # A direct component follows its rate: the equation of a second derivative.
-            once = weights[:, :, None, None] * by_direct[None]
-            twice = jnp.einsum("ijka,jl->ikla", once, weights)
-            no_direct = jnp.zeros((3, k, 3, k - d))
-            blocks = blocks + jnp.concatenate([twice, no_direct], axis=-1)
-        matrix = jnp.eye(3 * k) - blocks.reshape(3 * k, 3 * k)
-        return Stages(order, weights, by_direct, factorise(matrix, k))
+        # A direct component follows its rate: the equation of a second derivative.
+        twice = weights[:, :, None] * weights
+        follows = jnp.concatenate([by_direct, jnp.zeros((3, k, k - d))], axis=-1)
+
+        def column(each: tuple[Scalar, ...]) -> Scalar:
+            unit, own, follows = each
+            blocks = weights[:, :, None] * own + jnp.einsum("ijl,jk->ilk", twice, follows)
+            return jnp.eye(3)[..., None] * unit - blocks
+
+        columns = jnp.eye(k), jnp.moveaxis(by_kept, -1, 0), jnp.moveaxis(follows, -1, 0)
+        return Stages(order, weights, by_direct, factorise(jax.lax.map(column, columns)))
 
     def solve(self, right: Scalar, forcing: Scalar) -> Scalar:
         """u of (I − A ⊗ J) u = r + (A ⊗ I) b, shape (3, c); r (3, c), b of the kept (3, k)."""

@@ -96,7 +96,8 @@ def test_by_blocks(size, count):
             matrix[k : k + size, k : k + size] += np.eye(size)[::-1] * 2.0
             matrix[k, k] *= 0.0 if size > 1 else 1.0
         right = rng.normal(size=n)
-        factors = factorise(jnp.asarray(matrix), size)
+        blocks = matrix.reshape(count, size, count, size)
+        factors = factorise(jnp.asarray(np.transpose(blocks, (3, 0, 2, 1))))
         for found, whole in (
             (factors.solve(jnp.asarray(right)), matrix),
             (factors.solve_transposed(jnp.asarray(right)), matrix.T),

@@ -1,5 +1,6 @@
 """Graph code generation: LLVM's text, each value one vector over the lanes."""
 
+import contextlib
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -253,10 +254,12 @@ class GraphWriter:
         if regular is not None:
             (pointer, offset), stride = regular
             return self.text.address(pointer, kind, offset * self.width), stride
-        pointer = self.room(kind, padded)
-        for i, value in enumerate(row):
-            at = self.text.address(pointer, kind, i * self.width)
-            self.text.store(self.use(value), at, kind, self.width)
+        pointer, known = self.room(kind, padded), all(value.constant is not None for value in row)
+        # Constants are written once, where memory is allocated.
+        with self.text.writing_at_entry() if known else contextlib.nullcontext():
+            for i, value in enumerate(row):
+                at = self.text.address(pointer, kind, i * self.width)
+                self.text.store(self.use(value), at, kind, self.width)
         return pointer, 1
 
     def regular_row(self, row: Sequence[Value]) -> tuple[Place, int] | None:

@@ -61,6 +61,13 @@ class FunctionBuilder:
         self.label = label
 
     @contextmanager
+    def writing_at_entry(self) -> Iterator[None]:
+        """What is written within runs once, behind all that is allocated so far."""
+        self.lines, self.allocations = self.allocations, self.lines
+        yield
+        self.lines, self.allocations = self.allocations, self.lines
+
+    @contextmanager
     def scope(self) -> Iterator[None]:
         """What is loaded within is forgotten after."""
         self._scopes.append({})

@@ -116,8 +116,8 @@ def product(
         free = [axis for axis in range(array.ndim) if axis not in (*first, *last)]
         sizes = [array.shape[axis] for axis in free]
         moved = np.transpose(array, (*first, *free, *last))
-        count = math.prod(array.shape[axis] for axis in first)
-        return moved.reshape(count, math.prod(sizes), -1), sizes
+        count, terms = (math.prod(array.shape[axis] for axis in axes) for axes in (first, last))
+        return moved.reshape(count, math.prod(sizes), terms), sizes
 
     left, left_sizes = ordered(a, a_batch, a_summed)
     right, right_sizes = ordered(b, b_batch, b_summed)

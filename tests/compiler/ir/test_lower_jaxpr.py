@@ -40,7 +40,8 @@ def _nested(x):
 
 def _mapped(x):
     columns = jnp.stack([x * k for k in range(11)])
-    found = jax.lax.map(lambda c: (jnp.sin(c) + x, c * c), columns)
+    pairs = columns, jnp.arange(1.0, 12.0)
+    found = jax.lax.map(lambda pair: (jnp.sin(pair[0]) + x, pair[0] * pair[1]), pairs)
     return jnp.max(found[0]) + jnp.sum(found[1])
 
 
@@ -63,8 +64,8 @@ def _long_body(x):
 
 def _arrays(x):
     matrix = jnp.stack([jnp.stack([x, x + 1.0, 2.0 * x]), jnp.stack([x * x, 1.0 - x, x])])
-    both = matrix @ jnp.arange(6.0).reshape(3, 2)
-    return jnp.concatenate([both.ravel(), matrix[:, ::-1].T.reshape(-1)[1:4]])
+    both, none = (part @ jnp.arange(6.0).reshape(3, 2) for part in (matrix, matrix[:0]))
+    return jnp.concatenate([both.ravel(), none.ravel(), matrix[:, ::-1].T.reshape(-1)[1:4]])
 
 
 def _padded(x):
