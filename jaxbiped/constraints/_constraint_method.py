@@ -44,9 +44,11 @@ class AbstractConstraintMethod(AbstractPart):
 
     Attributes:
         needs_independent: whether repeated constraints make the method singular.
+        projects: whether it also corrects the state after every step. A property of the class.
     """
 
     needs_independent: AbstractClassVar[bool]
+    projects: ClassVar[bool] = False
 
     @abc.abstractmethod
     def multipliers(self, system: Constrained) -> list[Scalar]:
@@ -60,6 +62,7 @@ class AbstractProjectingMethod(AbstractConstraintMethod):
         iterations: number of corrections of the positions after each step.
     """
 
+    projects: ClassVar[bool] = True
     iterations: eqx.AbstractVar[int]
 
     @abc.abstractmethod

@@ -144,7 +144,7 @@ def _solve(
     most: int,
     adjoint: diffrax.AbstractAdjoint,
 ) -> Trajectory[LinkageState]:
-    if isinstance(scene.method, AbstractProjectingMethod):
+    if scene.method.projects:
         solver = wrap_projected(solver, _correct_step, adjoint)
     off = _distance(constraints_of(scene.linkage, *state))
     start = LinkageState(*map(tuple, nearest_consistent(scene.linkage, *state)))

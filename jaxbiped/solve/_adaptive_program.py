@@ -22,7 +22,6 @@ from jaxbiped.dynamics._consistent_state import project
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._fusion_barrier import without_barriers
-from jaxbiped.solve._projected_solver import projects
 from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._first_and_last_step import clip_step, first_step
@@ -137,7 +136,7 @@ class AdaptiveSolve:
             y1, error, dense, last = step_of(
                 self.solver.tableau, term, now.t, now.next_t, now.state, solve.scene
             )
-            if projects(solve.scene):
+            if solve.scene.redundant and solve.scene.method.projects:
                 y1 = project(solve.scene, y1)
         if self.solver.switch_weight != 1.0:
             # The last stage knows the contact there; at the new value it would cost as much again.

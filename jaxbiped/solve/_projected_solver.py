@@ -11,12 +11,9 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import BoolScalarLike, RealScalarLike, Time
-from jaxbiped.constraints._constraint_method import (
-    AbstractConstraintMethod,
-    AbstractProjectingMethod,
-)
+from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.dynamics._consistent_state import project
-from jaxbiped.scene._scene import CompliantScene, RedundantScene
+from jaxbiped.scene._scene import RedundantScene
 
 _Solver = TypeVar("_Solver", bound=diffrax.AbstractSolver[PyTree])
 
@@ -32,8 +29,7 @@ def check_adjoint(
     method: AbstractConstraintMethod, adjoint: diffrax.AbstractAdjoint | None
 ) -> None:
     """Raises `ArgumentError` for an adjoint that would not see a method's projections."""
-    projects = isinstance(method, AbstractProjectingMethod)
-    if projects and adjoint is not None and type(adjoint) not in _SCAN_KINDS:
+    if method.projects and adjoint is not None and type(adjoint) not in _SCAN_KINDS:
         raise ArgumentError(
             f"adjoint = {type(adjoint).__name__} is not allowed for method = "
             f"{type(method).__name__}, which projects after each step: choose one that sees the "
@@ -116,15 +112,8 @@ def wrap_projected(
     return cast("_Solver", Projected(solver, project))  # as adaptive as what it wraps
 
 
-def projects(scene: CompliantScene) -> bool:
-    """Whether the scene's method projects after each step."""
-    if not isinstance(scene, RedundantScene):
-        return False
-    return isinstance(scene.method, AbstractProjectingMethod)
-
-
 def with_projection(
     scene: RedundantScene, solver: _Solver, adjoint: diffrax.AbstractAdjoint | None = None
 ) -> _Solver:
     """The solver, wrapped where the scene's method projects after each step."""
-    return wrap_projected(solver, project, adjoint) if projects(scene) else solver
+    return wrap_projected(solver, project, adjoint) if scene.method.projects else solver

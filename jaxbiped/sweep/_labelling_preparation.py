@@ -72,7 +72,8 @@ def labelling(
             for starts that are nearer to a boundary than the tolerance.
 
     Returns:
-        A `Labelling`: call it with starts, or pass it to `sweep`, `label_at` or `nearest_failure`.
+        A `Labelling`: call it with starts, or pass it to `sweep` or to functions of
+        `jaxbiped.labels`, such as `label_at` or `nearest_failure`.
         A `RuntimeWarning` is issued if no stable gait was found.
 
     Raises:
@@ -95,7 +96,7 @@ def labelling(
         of = f" for {missing} of {len(family.rows)} combinations of the parameters"
         warn(
             f"no stable gait was found{of if values else ''}: starts that walk there are labelled "
-            "unresolved until one is met (see `with_gaits_met`).",
+            "unresolved until one is met (see `jaxbiped.labels.with_gaits_met`).",
         )
     return Labelling(scene, family, effort)
 
