@@ -124,7 +124,7 @@ def _one_line(message: Warning | str, *_: Any) -> str:
 
 
 def _check_platforms() -> None:
-    """Raises `ArgumentError` where JAX is told to compute on what is not there."""
+    """Raises `ArgumentError` if JAX is set to a platform that does not exist here."""
     told = os.environ.get("JAX_PLATFORMS", "")
     if not told:
         return
