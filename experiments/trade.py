@@ -128,7 +128,9 @@ def draw(options, numbers):
     rows, floors = numbers["rows"], numbers["floors"]
 
     def has_errors(group, axis):
-        return any(row["outcome"] == "ok" and row["errors"].get(axis) for row in rows.get(group, ()))
+        return any(
+            row["outcome"] == "ok" and row["errors"].get(axis) for row in rows.get(group, ())
+        )
 
     shown = [panel for panel in PANELS if has_errors(*panel[:2])]
     lines = -(-len(shown) // COLUMNS)

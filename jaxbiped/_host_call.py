@@ -128,7 +128,7 @@ def _array(address: int) -> np.ndarray:
 
 
 def _handle(address: int) -> int | None:
-    """XLA's handler: None, or the error that it is told."""
+    """What the handler returns to XLA: None, or an error."""
     frame = ctypes.cast(address, POINTER(_CallFrame)).contents
     if frame.extension:
         _tell_version(frame)

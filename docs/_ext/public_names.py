@@ -5,11 +5,13 @@ methods that they document, and constants with the string below their assignment
 """
 
 import ast
+import functools
 import importlib
 import inspect
 import itertools
 import operator
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -109,8 +111,32 @@ def as_markup(
     lines[:] = text.split("\n")
 
 
+def as_listed(objects: Mapping[str, Any], link: re.Match[str]) -> str:
+    """A link back from a page of source, to its name as the page that it leads to lists it.
+
+    Sphinx keeps one package for each module, but names of a module may be public in two.
+    """
+    page, parts = link["page"], link["name"].split(".")
+    listed = [name for name, each in objects.items() if page.endswith(f"/{each.docname}.html")]
+    for count in range(len(parts), 0, -1):
+        tail = ".".join(["", *parts[-count:]])
+        for name in listed:
+            if f".{name}".endswith(tail):
+                return f'href="{page}#{name}"'
+    return link[0]
+
+
+def mend_links(app: Sphinx, page: str, _: str, context: dict[str, Any], *__: Any) -> None:
+    """Links back from pages of source, as the reference lists the names."""
+    if page.startswith("_modules/jaxbiped"):
+        mend = functools.partial(as_listed, app.env.get_domain("py").objects)
+        pattern = r'href="(?P<page>[^"#]+)#(?P<name>jaxbiped[^"]+)"'
+        context["body"] = re.sub(pattern, mend, context["body"])
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Adds the directive, and the reading of docstrings."""
+    """Adds the directive, the reading of docstrings, and the links back from source."""
     app.add_directive("public-names", PublicNames)
     app.connect("autodoc-process-docstring", as_markup, priority=100)
+    app.connect("html-page-context", mend_links)
     return {"parallel_read_safe": True}

@@ -8,6 +8,7 @@ import operator
 import os
 import re
 import sys
+import warnings
 from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any
@@ -97,6 +98,7 @@ def _run(given: list[str]) -> None:
         print(version("jaxbiped"))
         return
     tell_stages()
+    usual, warnings.formatwarning = warnings.formatwarning, _one_line
     try:
         command = _with_home(command)
         command.check()
@@ -112,10 +114,17 @@ def _run(given: list[str]) -> None:
     except (ArgumentError, ResourceError, OSError) as error:
         print(f"jaxbiped: {error}", file=sys.stderr)
         sys.exit(2 if isinstance(error, ArgumentError) else 1)
+    finally:
+        warnings.formatwarning = usual
+
+
+def _one_line(message: Warning | str, *_: Any) -> str:
+    """A warning as a command tells it: no line of the caller's code is of use there."""
+    return f"jaxbiped: warning: {message}\n"
 
 
 def _check_platforms() -> None:
-    """Raises `ArgumentError` where JAX is told to compute on what is not there."""
+    """Raises `ArgumentError` if JAX is set to a platform that does not exist here."""
     told = os.environ.get("JAX_PLATFORMS", "")
     if not told:
         return

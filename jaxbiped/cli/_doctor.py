@@ -123,7 +123,7 @@ class Truth(NamedTuple):
 
 
 def self_test() -> tuple[Truth, ...]:
-    """Free fall and its derivative by lanes, and a published gait of rigid feet."""
+    """Free fall and its derivative with the lanes engine, and a published gait on rigid feet."""
     height, derivative = _fall()
     return (
         Truth("height after free fall [m]", 2.0 - 0.5 * 9.8 * _FALL**2, height, 1e-9),

@@ -224,7 +224,7 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         return jb.RedundantScene(scene, method, self.orientation)
 
     def _own_scene(self) -> Any:
-        """The published scene, or else the seed's, on the ground that was told."""
+        """The published scene, or else the seed's, on the ground that the options give."""
         model = MODELS.get(self.walker)
         if model is None:
             values = self.values

@@ -82,10 +82,10 @@ class Trade(options.Command):
     def _measure(
         self, name: str, trade: "WalkTrade | GaitTrade"
     ) -> "tuple[list[Row], Truth | None]":
-        """Rows of all ways, and the truth that they are told against; no rows without one."""
+        """Rows of all methods, and the reference of their errors; no rows without a reference."""
         from jaxbiped.trade import Way
 
-        with stage(f"solving the {name} by the references"):
+        with stage(f"solving the {name} with the reference methods"):
             truth = trade.truth()
         if truth is None:
             return [], None
@@ -95,7 +95,7 @@ class Trade(options.Command):
             for setting, rtol in self._settings(name, trade.scene)
         ]
         rows = []
-        with stage(f"measuring the {name}", total=len(ways), unit="ways") as now:
+        with stage(f"measuring the {name}", total=len(ways), unit="methods") as now:
             for way in ways:
                 rows.append(trade.row(way, truth))
                 now.update()

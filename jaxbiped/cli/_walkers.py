@@ -86,7 +86,7 @@ def usual_start(told: str) -> Mapping[str, float]:
 
 
 def walker_of(option: str, told: str, seed: Any) -> Any:
-    """The walker that was told; `seed` is the seed's walker with its parameters.
+    """The walker that an option names; `seed` is the seed's walker with its parameters.
 
     Raises:
         ArgumentError: a file that cannot be run, or what is no walker there.

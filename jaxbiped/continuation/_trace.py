@@ -28,7 +28,7 @@ OF_ENDINGS = {
     Ending.TIMED_OUT: "no touch: no footstep comes (timed out)",
     Ending.STUMBLED: "scuffing: the foot behind comes down (stumbled)",
 }
-"""Endings of the walk beyond that are told in more words."""
+"""Endings of the walk beyond a branch that are explained in more words."""
 _UNLOADED = 1e-3
 """Share of the weight on the stance foot from which it carries nothing."""
 _SLIDES = 1.5

@@ -19,7 +19,7 @@ from jaxbiped.scene._structure import Angle, Structure, weighted
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 _ROOT_E = 1.6487212707001282
-"""√e, which makes a latch's largest torque the one that it is told to have."""
+"""√e, the factor with which a latch's largest torque is its parameter `torque`."""
 
 
 def angle_value(angle: Angle, values: tuple[Scalar, ...], vertical: Scalar | None) -> Scalar:

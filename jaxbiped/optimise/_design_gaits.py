@@ -1,4 +1,4 @@
-"""Gaits of designs: of one, of many as one batch by lanes, of an ensemble under scatter."""
+"""Gaits of designs: of one, of many as one batch of lanes, of an ensemble under scatter."""
 
 import itertools
 from collections.abc import Mapping

@@ -126,7 +126,7 @@ def has_titles() -> bool:
 
 
 def letter_size() -> float:
-    """Size of the letters, in parts of the usual one, by which sizes in inches are told."""
+    """Font size relative to the usual one, with which sizes in inches are scaled."""
     return float(mpl.rcParams["font.size"]) / FIGURE_STYLES["screen"].font
 
 

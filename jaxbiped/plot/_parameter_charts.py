@@ -109,7 +109,9 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
         ArgumentError: there is no curve, or curves are along different parameters.
     """
     if len({(each.along, each.units) for each in curves}) != 1:
-        raise ArgumentError("curves is not allowed: they must go along the same two parameters.")
+        raise ArgumentError(
+            "curves must hold at least one curve, all along the same two parameters."
+        )
     ax = style.axes_or_new(ax, 6.4, 4.4)
     for k, curve in enumerate(curves):
         marker, words = _MARKS[curve.kind]

@@ -21,7 +21,7 @@ from jaxbiped.solve._trajectory import Trajectory
 _SHOWN = 1.8
 """Default duration of the motion that is shown [s]."""
 _APART = 0.1
-"""Time between poses unless their number is told [s]."""
+"""Default time between poses [s]."""
 _WIDTH, _LEAST, _MOST = 8.6, 2.8, 6.0
 """Width of a new figure, and between what its height lies [inches]."""
 _LABELS = (0.8, 0.9)

@@ -83,7 +83,7 @@ def row_label(name: str | Quantity) -> str:
 
 
 def quantity_of(name: str | Quantity) -> Quantity | None:
-    """That of a name of the table, also where it is told from its namesake as `part.name`."""
+    """The entry of a name in the table, also for a name such as `part.name`."""
     if not isinstance(name, str):
         return name
     return QUANTITIES.get(name.rpartition(".")[2]) or state_quantity(name)

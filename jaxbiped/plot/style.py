@@ -260,7 +260,7 @@ _WALKING_PATTERNS = ("", "....", "ooo", "xxx", "+++", "***")
 _MARKERS = "D^vPX*<>d."
 _ORDER = list(_LABEL_COLOURS)
 GAIT_SUFFIX = ", gait {gait}"
-"""Said after the name of what walks, where several gaits are told apart."""
+"""What follows the word for walking if several gaits are distinguished."""
 
 
 def label_colour(name: str) -> str:

@@ -55,7 +55,7 @@ def _leaf_name(path: tuple[Any, ...]) -> str:
 
 
 def path_texts(path: tuple[Any, ...]) -> list[str]:
-    """Names along a path; an entry of several is told by its number, from 1 on."""
+    """Names along a path; an entry of several is numbered from 1."""
     texts: list[str] = []
     for key in path:
         if isinstance(key, jtu.SequenceKey) and texts:

@@ -222,6 +222,6 @@ def _are_opposite(one: Any, other: Any) -> bool:
 
 
 def _words(piece: Any) -> str:
-    """How a piece is told from others of its kind."""
+    """What distinguishes a piece from others of its kind."""
     own = getattr(piece, "body", None) or getattr(piece, "angle", None) or piece.name
     return repr(own if isinstance(own, str) else dict(own))

@@ -69,7 +69,7 @@ def check_rolls(mechanism: Mechanism) -> None:
 
 
 def check_stands(structure: Structure, standing: str | Sequence[str] | None) -> Indices:
-    """Numbers of the feet that are told to stand, of the leg that does.
+    """Numbers of the feet that are named as standing, all of one leg.
 
     Raises:
         ArgumentError: other feet.

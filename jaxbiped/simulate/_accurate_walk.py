@@ -1,4 +1,4 @@
-"""Accurate walks: other solves of a walk, its witnesses, tell how far it may be wrong.
+"""Accurate walks: other solves of a walk, its witnesses, estimate its error.
 
 A wanted accuracy has two: the same method at a looser tolerance, and another method. Steps of one
 size control no error and have two as well, of other sizes: where steps are too long the walk goes

@@ -40,9 +40,9 @@ _HIGHEST = 100.0
 
 
 _TOLD_DEPTH = 0.01
-"""Penetration of a foot that touches, in units of the walker's height, that is told."""
+"""Penetration of a foot that is reported, in units of the walker's height."""
 _TOLD_ANGLE = 0.1
-"""Angle by which a stop is passed [rad] that is told."""
+"""Angle beyond a stop that is reported [rad]."""
 
 
 class Options(NamedTuple):

@@ -1,1 +1,1 @@
-"""Stiff solves through diffrax and by lanes."""
+"""Stiff solves with diffrax and with the lanes engine."""

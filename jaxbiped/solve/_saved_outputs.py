@@ -1,4 +1,4 @@
-"""Saved outputs of a solve by lanes, and how they are found within a step."""
+"""Saved outputs of a solve in the lanes engine, and how they are found within a step."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -16,7 +16,7 @@ Values = Mapping[str, np.ndarray]
 """What a solve gave, by the name of the error axis."""
 _AT_LEAST_ONE = ("multiplier",)
 _IN_UNITS = ("state", "step_time")
-"""Axes whose values are told in the scene's units already."""
+"""Axes whose values have the scene's units already."""
 
 
 class Truth(NamedTuple):
@@ -179,7 +179,7 @@ def row_of(
     attempted: int | None = None,
     rejected: int | None = None,
 ) -> Row:
-    """The row of a solve, told against the truth.
+    """The row of a solve, with its errors against the reference.
 
     Args:
         way: method and engine.

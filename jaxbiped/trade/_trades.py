@@ -60,7 +60,7 @@ class WalkTrade(NamedTuple):
         return truth_of(first, second)
 
     def row(self, way: Way, truth: Truth) -> Row:
-        """The row of one way: by lanes with its heel strikes and its energy ledger.
+        """The row of one method; with the lanes engine, its heel strikes and energy ledger too.
 
         Through XLA, where a walk saved step by step compiles as long again, the state alone.
         """

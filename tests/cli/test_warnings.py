@@ -1,7 +1,11 @@
 """What `jaxbiped walk` warns of, against walks that have it."""
 
+import sys
+import warnings
+
 import pytest
 
+from jaxbiped.cli import main
 from tests.cli.commands import numbers_of
 
 pytestmark = pytest.mark.slow
@@ -56,3 +60,17 @@ def test_steps_of_one_size_that_are_too_long(capsys):
     assert (numbers["solver"]["dt"], numbers["solver"]["rtol"]) == (1e-3, None)
     (warning,) = numbers["warnings"]
     assert "--dt" in warning
+
+
+def test_a_warning_is_one_line_without_the_line_of_the_program(capsys, monkeypatch):
+    monkeypatch.setattr(warnings, "showwarning", _as_python_shows)  # pytest records them otherwise
+    usual = warnings.formatwarning
+    with pytest.raises(SystemExit):
+        main(["walk", "--slope", "1.15", "--duration", "0.2", "--json", "-"])
+    (line,) = (each for each in capsys.readouterr().err.splitlines() if "degrees" in each)
+    assert line.startswith("jaxbiped: warning: slope = 1.15 rad is steeper than friction can hold")
+    assert warnings.formatwarning is usual
+
+
+def _as_python_shows(message, category, filename, lineno, file=None, line=None):
+    sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))

@@ -74,6 +74,19 @@ def test_every_picture_of_the_gallery_leads_to_its_script(site):
         assert f"{picture.stem.partition('-')[0]}.py" in page
 
 
+def test_source_leads_back_to_the_names_that_the_reference_lists(site):
+    back = re.compile(r'class="viewcode-back" href="([^"#]+)#([^"]+)"')
+    links = [
+        ((page.parent / file).resolve(), name)
+        for page in site.glob("_modules/jaxbiped/**/*.html")
+        for file, name in back.findall(page.read_text())
+    ]
+    pages = {page: page.read_text() for page, _ in links}
+    dead = [name for page, name in links if f'id="{name}"' not in pages[page]]
+    assert len(links) > 100
+    assert dead == []
+
+
 def test_mathematics_is_on_the_page_and_nothing_is_loaded_from_a_network(site):
     assert (site / "docs" / "model.html").read_text().count("<math ") > 20
     loaded = r"""<(?:script|link|img|iframe)\b[^>]*\b(?:src|href)=["']?https?://"""

@@ -69,7 +69,7 @@ class GraphWriter:
         width: int | None = None,
         known: Callable[[Value], None] = lambda value: None,
     ) -> None:
-        """Writes all of a block that is needed; `known` is told what has been computed."""
+        """Writes all of a block that is needed; `known` receives what has been computed."""
         width = self.width if width is None else width
         for value in block.values:
             if value not in self.needed or id(value) in self.needed.absorbed:
