@@ -1,6 +1,7 @@
 """Public functions under JAX's debugging switches, against what they give without."""
 
 import contextlib
+import tempfile
 
 import equinox as eqx
 import jax
@@ -9,11 +10,15 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from tests.mechanisms import scene_of, start_of
 
 pytestmark = pytest.mark.slow
 
 SCENE, START = jb.seed_scene(), jb.seed_state()
 RIGID, ROLLING = jb.ladder()["rigid"], jb.dynamics.rigid_state(START)
+KNEED = jb.models.hsu_chen()
+BENT = KNEED.state(**next(iter(jb.models.MODELS["hsu-chen"].starts.values())))
+TORSO = scene_of("torso")
 SWITCHES = {
     "debug_nans": True,
     "numpy_rank_promotion": "raise",
@@ -51,6 +56,17 @@ def _pendulum():
 def _of_stiffness(K):
     scene = jb.with_parameters(SCENE, {"K": K})
     return jb.simulate(scene, START, duration=0.02, save="end", engine="lanes")
+
+
+def _best():
+    how = dict(vary={"d": (0.09, 0.11)}, maximise="speed", iterations=2)
+    return jb.optimise_gait(RIGID, **how)
+
+
+def _loaded():
+    with tempfile.TemporaryDirectory() as folder:
+        jb.save(f"{folder}/gait.npz", jb.find_gait(RIGID))
+        return jb.load(f"{folder}/gait.npz").measures
 
 
 CALLS = {
@@ -98,9 +114,23 @@ CALLS = {
             jb.identify.MeasuredGait({"period": (0.44378, 1e-4)}),
         ).estimates
     ),
-    "optimise_gait": lambda: (
-        jb.optimise_gait(RIGID, vary={"d": (0.09, 0.11)}, maximise="speed", iterations=2).variables
+    "optimise_gait": lambda: _best().variables,
+    "certify": lambda: jb.optimise.certify(_best(), starts=4).optimality,
+    "nearest_bifurcation": lambda: jb.continuation.nearest_bifurcation(
+        RIGID, jb.find_gait(RIGID), "slope"
     ),
+    "a mechanism": lambda: (
+        jb.simulate(
+            TORSO, start_of("torso", TORSO), duration=0.02, save="end", accuracy="draft"
+        ).final
+    ),
+    "locking knees": lambda: jb.simulate(KNEED, BENT, footsteps=1).final,
+    "their derivative": lambda: jax.jacfwd(
+        lambda slope: (
+            jb.simulate(jb.with_parameters(KNEED, {"slope": slope}), BENT, footsteps=1).final
+        )
+    )(jnp.asarray(0.0504)),
+    "save and load": _loaded,
     "swing": _pendulum,
 }
 
