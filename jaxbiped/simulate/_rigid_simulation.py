@@ -273,6 +273,8 @@ def _slopes(
         strikes = again.t
     end = found.t[-1], found.ending
     slopes = rigid_slopes_of(run.walk, strikes, count, *end, places=places, active=active)
+    # Another solve may tell what this one cannot: it then differentiates another walk.
+    slopes = jtu.tree_map(lambda leaf: jnp.where(found.grazes > 0, jnp.nan, leaf), slopes)
     if len(strikes) == kept:
         return slopes
     # Of the strikes only those that are kept, then the end.
