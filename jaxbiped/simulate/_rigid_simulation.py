@@ -260,7 +260,7 @@ def _slopes(
     active: tuple[int, ...],
 ) -> Slopes:
     assert found.arrivals is not None
-    count, kept = found.arrivals.total, run.max_arrivals
+    count, kept, grazes = found.arrivals.total, run.max_arrivals, jnp.asarray(found.grazes)
     strikes = found.arrivals.t
     known = [each for each in (count, run.walk.footsteps) if not isinstance(each, jax.core.Tracer)]
     room = int(known[0]) if known and int(known[0]) else _ROOM
@@ -271,6 +271,8 @@ def _slopes(
         strikes = again.t
     end = found.t[-1], found.ending
     slopes = rigid_slopes_of(run.walk, strikes, count, *end, places=places, active=active)
+    # Another solve may tell what this one cannot: it then differentiates another walk.
+    slopes = jtu.tree_map(lambda leaf: jnp.where(grazes > 0, jnp.nan, leaf), slopes)
     if len(strikes) == kept:
         return slopes
     # Of the strikes only those that are kept, then the end.

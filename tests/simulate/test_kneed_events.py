@@ -132,3 +132,27 @@ def test_a_knee_that_is_moved_while_it_is_held_is_refused(changed):
 
     endings, _ = jax.vmap(walked)(np.array([getattr(good, name), value]))
     assert endings.tolist() == [int(jb.Ending.WALKING), int(jb.Ending.SOLVER_FAILED)]
+
+
+@pytest.mark.slow
+def test_a_stop_that_is_just_touched_has_no_derivative_and_is_counted():
+    """Between shanks that swing up to the stop and those that turn back before it."""
+    scene = hsu_chen()
+    start = scene.state(**STRAIGHT | dict(theta_shank_1=-0.34), **RATES, held="shank_2")
+
+    def walk(rate):
+        state = start._replace(omega_shank_1=rate)
+        return jb.simulate(scene, state, footsteps=9, duration=0.12, accuracy="tight")
+
+    low, high = 0.0, 8.0
+    while high - low > 1e-13:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if len(walk(middle).modes) > 1 else (middle, high)
+    slope = jax.jacfwd(lambda rate: walk(rate).final.omega_shank_1)
+    assert int(walk(low).grazes) > 0
+    assert np.isnan(slope(low))
+    for away in (-1e-4, 1e-4):
+        rate, h = low + away, 1e-5
+        ends = [float(walk(rate + sign * h).final.omega_shank_1) for sign in (-1.0, 1.0)]
+        assert int(walk(rate).grazes) == 0
+        assert float(slope(rate)) == pytest.approx((ends[1] - ends[0]) / (2.0 * h), rel=1e-4)
