@@ -1,20 +1,15 @@
-"""Branch of gaits along a homotopy, from its first scene towards the one asked for.
+"""Branch of gaits along a homotopy, from its first scene towards the one asked for."""
 
-Under `jit` and `vmap` the fitted start is tried first. Where no stable gait comes of it, the seed
-scene's gait is followed along the line, each search beginning where those before point to.
-"""
-
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any
 
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, as_float, select
+from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state_quantities import state_of_recurring
 from jaxbiped.gait._fixed_point_search import (
@@ -22,22 +17,23 @@ from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
     Search,
-    search,
-    walks_only,
 )
-from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, follow_branch, homotopy_to
+from jaxbiped.gait._homotopy import (
+    BranchEnd,
+    FollowedBranch,
+    Homotopy,
+    follow_branch,
+    line_from_model,
+)
 from jaxbiped.gait._poincare_map import (
     linearised_return,
-    recurring_components,
     seed_directions,
     state_with,
 )
 from jaxbiped.gait._pseudo_arclength import Change
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
-from jaxbiped.gait._search_provenance import FoundBy, Origin
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.gait._walk_waves import is_far_from_seed, walks_of
-from jaxbiped.linalg._small_matrices import eigenpairs
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.scene._walker import Walker
 from jaxbiped.solve._accuracy import Precision
@@ -60,7 +56,12 @@ def state_at(kind: type, point: np.ndarray) -> WalkerState:
 
 
 def branch_along(
-    line: Homotopy, search: Searching, problem: FixedPointProblem, like: WalkerState
+    line: Homotopy,
+    search: Searching,
+    problem: FixedPointProblem,
+    like: WalkerState,
+    *,
+    begins_at_model: bool = False,
 ) -> FollowedBranch:
     """The branch of gaits from a line's first scene.
 
@@ -69,12 +70,14 @@ def branch_along(
         search: Newton's method, for the first gait and behind kinks of the branch.
         problem: of cycles of one footstep, in minimal coordinates.
         like: a state of the scenes.
+        begins_at_model: whether the first scene's legs are a model's; else its gait may be sought
+            from there, too.
     """
     begin: Any = line.first
     start = default_guess(begin)
     first = search(problem._replace(args=begin, guess=start), _TURNS)
     if int(first.ending) != int(Search.FOUND) and not isinstance(begin.walker, Walker):
-        for point in (row for walks in walks_of(begin, list) for row in walks.settled()):
+        for point in _likely_gaits(begin, begins_at_model, search, problem, like):
             there = state_at(type(start), point)
             first = search(problem._replace(args=begin, guess=there), _TURNS)
             if int(first.ending) == int(Search.FOUND):
@@ -106,6 +109,23 @@ def branch_along(
             break
         branch = tail
     return branch
+
+
+def _likely_gaits(
+    begin: Any,
+    is_model: bool,
+    search: Searching,
+    problem: FixedPointProblem,
+    like: WalkerState,
+) -> Iterator[np.ndarray]:
+    """Points near which a line's first scene may have its gait: settled walks, a model's branch."""
+    for walks in walks_of(begin, list):
+        yield from walks.settled()
+    from_model = None if is_model else line_from_model(begin)
+    if from_model is not None:
+        branch = branch_along(from_model, search, problem, like, begins_at_model=True)
+        if branch.end is BranchEnd.REACHED:
+            yield branch.points[-1]
 
 
 def _beyond(
@@ -150,146 +170,3 @@ def _scene_along(
     )
     by_s = once.jacobian[:, m:] @ (line.slopes(s) / sizes)
     return once.recurring - point, once.jacobian[:, :m] - jnp.eye(m), by_s, once.code
-
-
-_FIRST_STEP, _LARGEST_STEP, _LEAST_STEP = 0.05, 0.3, 1e-3
-"""Steps along the line: the first, at most, and at which it is given up."""
-_FLOOR, _JUMP, _ASIDE = 0.1, 0.2, 0.5
-"""Size below which components count as of one size; how far, relative to it, the first step may
-lead, and others aside from where they pointed, in units of their length: else it is another gait's
-branch that they came to."""
-_MOST_SEARCHES = 80
-
-
-class _Way(NamedTuple):
-    """How far along the line a search is.
-
-    Attributes:
-        s: of the next search; negative for the search from the fitted start, at the end of the
-            line.
-        step: from the last gait that was found on the line.
-        latest_point, before: points of the last gait found on the line and of the one before it,
-            with their places `at`, shape (2,).
-        ahead: the point that the next search begins from.
-        best: the gait to be returned, `radius` its spectral radius, infinite where there is none.
-        origin: what will be told.
-        searches: how many there were.
-        over: whether there is nothing left to do.
-    """
-
-    s: Scalar
-    step: Scalar
-    latest_point: Scalar
-    before: Scalar
-    at: Scalar
-    ahead: Scalar
-    best: Found
-    radius: Scalar
-    origin: Origin
-    searches: Scalar
-    over: Scalar
-
-
-def search_along(problem: FixedPointProblem, origin: Origin) -> tuple[Found, Origin]:
-    """The traced search: from the guess, and along the line from the seed's scene where need be."""
-    line, system = homotopy_to(problem.args), problem.spec.system
-    # Origins have scenes of the problem's own kind.
-    own: PyTree = jtu.tree_structure(problem.args)
-    if line is None or jtu.tree_structure(line.last) != own:
-        return walks_only(search(problem)), origin
-    fitted = recurring_components(system, problem.guess)
-    first = recurring_components(system, default_guess(line.first.minimal))
-
-    def run(way: _Way) -> Found:
-        there = line.at(jnp.where(way.s < 0.0, 1.0, way.s))
-        return search(problem._replace(args=there, guess=problem.state(way.ahead)), ~way.over)
-
-    shape = jax.eval_shape(lambda: search(problem, jnp.asarray(True)))
-    no_return = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
-    begin = _Way(
-        s=jnp.asarray(-1.0),
-        step=jnp.asarray(_FIRST_STEP),
-        latest_point=fitted,
-        before=fitted,
-        at=jnp.zeros(2),
-        ahead=fitted,
-        best=no_return,
-        radius=jnp.asarray(jnp.inf),
-        origin=jax.tree.map(jnp.asarray, origin),
-        searches=jnp.asarray(0),
-        over=jnp.asarray(False),
-    )
-    end = jax.lax.while_loop(
-        lambda way: ~way.over,
-        lambda way: select(way.over, way, _after(way, run(way), line, first)),
-        begin,
-    )
-    return walks_only(end.best), end.origin
-
-
-def _after(way: _Way, latest: Found, line: Homotopy, first: Scalar) -> _Way:
-    """One search further; `first` is where that of the seed's gait begins."""
-    from_start, from_seed = way.s < 0.0, way.s == 0.0
-    found = latest.ending == int(Search.FOUND)
-    found &= from_start | from_seed | _is_ahead(way, latest.recurring)
-    radius = jnp.where(found & latest.sound, _radius(latest), jnp.inf)
-    at_end = from_start | (way.s == 1.0)
-    # What the fitted start gave is kept where nothing better comes, found or not.
-    better = from_start | (at_end & (radius < way.radius))
-    on_line = found & ~from_start
-    at = jnp.where(on_line, jnp.stack([jnp.where(from_seed, 0.0, way.at[1]), way.s]), way.at)
-    # The first gait on the line has none before it.
-    before = jnp.where(
-        on_line, jnp.where(from_seed, latest.recurring, way.latest_point), way.before
-    )
-    latest_point = jnp.where(on_line, latest.recurring, way.latest_point)
-    grown = jnp.minimum(jnp.where(from_seed, way.step, 1.5 * way.step), _LARGEST_STEP)
-    step = jnp.where(from_start, way.step, jnp.where(found, grown, 0.4 * way.step))
-    lost = ~found & ~from_start
-    given_up = lost & (from_seed | (step < _LEAST_STEP)) | (way.searches >= _MOST_SEARCHES)
-    over = (from_start & found & (radius < 1.0)) | (found & (way.s == 1.0)) | given_up
-    end = jnp.where(from_seed, int(BranchEnd.NO_BEGINNING), int(BranchEnd.BREAKS_OFF))
-    end = jnp.where(lost & (latest.code != 0), int(BranchEnd.WALK_ENDS), end)
-    end = jnp.where(found, int(BranchEnd.UNFINISHED), end)
-    end = jnp.where(found & (way.s == 1.0), int(BranchEnd.REACHED), end)
-    followed = over & ~from_start
-    s = jnp.where(from_start, 0.0, jnp.minimum(at[1] + step, 1.0))
-    share = (s - at[1]) / jnp.where(at[1] > at[0], at[1] - at[0], 1.0)
-    ahead = jnp.where(from_start, first, latest_point + share * (latest_point - before))
-    origin = way.origin._replace(
-        found_by=jnp.where(better & ~from_start, int(FoundBy.CONTINUATION), way.origin.found_by),
-        branch_end=jnp.where(followed, end, way.origin.branch_end),
-        branch_walk_ending=jnp.where(followed & lost, latest.code, way.origin.branch_walk_ending),
-        nearest=select(followed & ~from_seed, line.at(at[1]).minimal, way.origin.nearest),
-    )
-    return _Way(
-        s=s,
-        step=step,
-        latest_point=latest_point,
-        before=before,
-        at=at,
-        ahead=ahead,
-        best=select(better, latest, way.best),
-        radius=jnp.where(better, radius, way.radius),
-        origin=origin,
-        searches=way.searches + 1,
-        over=over,
-    )
-
-
-def _is_ahead(way: _Way, point: Scalar) -> Scalar:
-    """Whether a point lies where those before it on the line point to."""
-
-    def distance(a: Scalar, b: Scalar) -> Scalar:
-        return jnp.max(jnp.abs(a - b) / (_FLOOR + jnp.abs(way.latest_point)))
-
-    aside, length = distance(point, way.ahead), distance(point, way.latest_point)
-    return jnp.where(way.at[1] > way.at[0], aside < _ASIDE * length + 0.01, length < _JUMP)
-
-
-def _radius(found: Found) -> Scalar:
-    """Largest absolute value of a Floquet multiplier: on the section the trivial one is zero."""
-    jacobian = found.last.jacobian[:, : found.recurring.shape[0]]
-    finite = jnp.all(jnp.isfinite(jacobian))
-    values, _ = eigenpairs(jnp.where(finite, jacobian, 0.0))
-    return jnp.where(finite, jnp.max(jnp.abs(values)), jnp.inf)

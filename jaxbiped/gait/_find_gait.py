@@ -19,7 +19,6 @@ from jaxbiped.dynamics._consistent_state import consistent_state
 from jaxbiped.dynamics._redundant_state import BodiesState, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._accurate_gait import accurate_gait
-from jaxbiped.gait._branch_along import search_along
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
@@ -32,6 +31,7 @@ from jaxbiped.gait._gait import Gait, summarise_gait
 from jaxbiped.gait._guess_free_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes
+from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._search_compilation import compile_once
 from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_unknown
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
@@ -87,8 +87,10 @@ def find_gait(
             Newton's method from the seed's start, fitted to the scene's legs; forward walks from
             many starts (lanes engine only); continuation from the seed's scene, or from the same
             walker relaxed (straight, passive, hardly any mass outside its legs); Newton's method
-            from scattered starts. The result is then the stable gait, or the one of smallest
-            spectral radius. Under `jit` and `vmap`, only the first and the third stage are tried.
+            from scattered starts. Where there is nothing to relax, continuation begins at legs of
+            the seed's or McGeer's kneed walker and comes before the walks. The result is the
+            stable gait, or the one of smallest spectral radius. Under `jit` and `vmap`, only the
+            first stage and continuation from the seed's scene are tried.
         footsteps: number of footsteps of a cycle. Default: the smallest possible number, one for a
             mirrored walker and those of a stride for unequal legs. If a gait without a guess closes
             after fewer footsteps than requested, the search goes on for a longer cycle;

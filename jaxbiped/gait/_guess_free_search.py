@@ -10,6 +10,7 @@ from jaxbiped._progress import Stage, stage
 from jaxbiped.gait._branch_along import Searching, branch_along, state_at
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, cycle_of
 from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, homotopy_to
+from jaxbiped.gait._relaxation import relaxed
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._search_provenance import (
     MOST_OTHERS,
@@ -124,23 +125,36 @@ def search_in_stages(
             if has_stable():
                 return
 
+    def follow() -> None:
+        nonlocal line, branch
+        with stage("following the seed's gait to this scene"):
+            line = line or homotopy_to(modelled)
+            if line is not None:
+                branch = branch_along(
+                    line,
+                    search,
+                    problem._replace(spec=scout),
+                    start,
+                    begins_at_model=begins_at_model,
+                )
+            if branch is not None and branch.end is BranchEnd.REACHED:
+                try_all([branch.points[-1]], FoundBy.CONTINUATION)
+
     add(first, FoundBy.START)
+    begins_at_model = line is not None and relaxed(walker) is None
+    if begins_at_model and not has_stable():
+        follow()
     if not has_stable():
         walk()
     shorter = [each for each in seen if not each.is_whole]
     if shorter and not has_stable():
         for each in shorter:
             try_all(_push_off(each.found, sizes), FoundBy.SCATTERED_STARTS)
-    elif not has_stable() and not (line and any(each.by is FoundBy.WALKING for each in seen)):
-        with stage("following the seed's gait to this scene"):
-            line = line or homotopy_to(modelled)
-            if line is not None:
-                branch = branch_along(line, search, problem._replace(spec=scout), start)
-            if branch is not None and branch.end is BranchEnd.REACHED:
-                known = len(seen)
-                try_all([branch.points[-1]], FoundBy.CONTINUATION)
-                if len(seen) > known and not has_stable():
-                    walk(most=1)
+    elif not has_stable() and not (line and (branch or any(s.by is FoundBy.WALKING for s in seen))):
+        known = len(seen)
+        follow()
+        if len(seen) > known and not has_stable():
+            walk(most=1)
     if not has_stable():
         with stage(f"searching from {_SCATTERED} scattered starts"):
             scattered = state_rows(rolling_starts(modelled, _SCATTERED, spread=0.5, seed=2))

@@ -22,7 +22,7 @@ from jaxbiped.gait._pseudo_arclength import (
     follow,
     locate,
 )
-from jaxbiped.gait._relaxation import relaxed, seed_like
+from jaxbiped.gait._relaxation import like_model, relaxed, seed_like
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._walker import Walker
@@ -68,14 +68,20 @@ def _interpolate(a: Scalar, b: Scalar, s: Scalar | float) -> tuple[Scalar, Scala
 def homotopy_to(scene: AbstractWalkerScene) -> Homotopy | None:
     """The line to `scene` from the seed's scene, its laws made to resemble the seed's.
 
-    For a walker of other bodies it begins at the same walker relaxed (see `relaxed`); None where
-    there is nothing to relax.
+    For a walker of other bodies it begins at the same walker relaxed (see `relaxed`); where there
+    is nothing to relax, as `line_from_model`. None where there is no such line.
 
     Numbers of laws that are not in the catalogue stay those of `scene`. Its actuators are idle.
     """
     if isinstance(scene.walker, Walker):
         return Homotopy(scene.with_minimal(seed_like(scene.minimal)), scene)
     both = relaxed(scene) if isinstance(scene, Scene) else None
+    return line_from_model(scene) if both is None else Homotopy(*both)
+
+
+def line_from_model(scene: AbstractWalkerScene) -> Homotopy | None:
+    """The line from the walker with the legs of a model whose gait is known (see `like_model`)."""
+    both = like_model(scene) if isinstance(scene, Scene) else None
     return None if both is None else Homotopy(*both)
 
 

@@ -1,8 +1,9 @@
 """Relaxed walkers: the scenes from which a homotopy begins, whose gait is known or easily found."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
-from typing import Any, TypeVar, cast
+import functools
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple, TypeVar, cast
 
 import equinox as eqx
 import jax
@@ -10,7 +11,8 @@ import jax.tree_util as jtu
 
 from jaxbiped._parameter_declaration import with_fields
 from jaxbiped._types import as_float
-from jaxbiped.scene._joint_parts import Motor
+from jaxbiped.models._mcgeer import mcgeer
+from jaxbiped.scene._joint_parts import Motor, Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -49,6 +51,104 @@ def relaxed(scene: Scene) -> tuple[Scene, Scene] | None:
         ground = dataclasses.replace(scene.ground, slope=seed_scene().ground.slope)
         first = dataclasses.replace(first, ground=ground, actuation=_idle(scene))
     return jtu.tree_map(as_float, first), jtu.tree_map(as_float, last)
+
+
+def like_model(scene: Scene) -> tuple[Scene, Scene] | None:
+    """A scene with legs of a model of the same kind, and the given one; None without a model.
+
+    They have the scene's size and weight, and the model's slope and laws of contact in proportion.
+    Springs and latches hardly do anything.
+    """
+    mechanism, model = scene.mechanism, _model_of(scene.mechanism)
+    if model is None:
+        return None
+    size, own = _sizes(scene, model), model.mechanism
+    weak = {
+        k
+        for k, j in zip(mechanism.structure.joint_pieces, mechanism.joints, strict=True)
+        if not isinstance(j, Stop)
+    }
+    pieces = [_weakened(piece) if k in weak else piece for k, piece in enumerate(mechanism.pieces)]
+    for k, like in _leg_pieces(mechanism, own):
+        pieces[k] = _piece_like(pieces[k], like, size)
+    root_mass = None if mechanism.root_mass is None else size.mass * own.root_mass
+    begin = dataclasses.replace(
+        scene,
+        walker=with_fields(mechanism, pieces=tuple(pieces), root_mass=root_mass),
+        ground=dataclasses.replace(scene.ground, slope=model.ground.slope),
+        normal=_normal_like(scene.normal, model.normal, size, size.force, size.length),
+        friction=_friction_like(scene.friction, model.friction, size),
+        actuation=_idle(scene),
+    )
+    last = dataclasses.replace(scene, walker=mechanism)
+    return jtu.tree_map(as_float, begin), jtu.tree_map(as_float, last)
+
+
+class _Sizes(NamedTuple):
+    """Masses, lengths and times of a walker in a model's, by its weight, its height and gravity."""
+
+    mass: Any
+    length: Any
+    time: Any
+
+    @property
+    def force(self) -> Any:
+        return self.mass * self.length / self.time**2
+
+
+def _sizes(scene: Scene, model: Scene) -> _Sizes:
+    mine, theirs = scene.mechanism, model.mechanism
+    length = mine.height / theirs.height
+    time = (length * model.ground.g / scene.ground.g) ** 0.5
+    return _Sizes(mine.total_mass / theirs.total_mass, length, time)
+
+
+def _model_of(mechanism: Mechanism) -> Any:
+    """The scene of the model with the same kind of legs; None where there is none."""
+    kind, models = _kind_of_legs(mechanism), (seed_scene(), mcgeer(knees=True))
+    return next((each for each in models if _kind_of_legs(each.mechanism) == kind), None)
+
+
+def _kind_of_legs(mechanism: Mechanism) -> tuple[object, ...]:
+    """By legs, how many bodies bear each foot, all of them the leg's own; and whether stops act."""
+    structure = mechanism.structure
+    chains = [[structure.chains[structure.feet[k]] for k in feet] for feet in structure.feet_of_leg]
+    lengths = [
+        [len(chain) * all(structure.leg_of_body(j) == leg for j in chain) for chain in own]
+        for leg, own in enumerate(chains)
+    ]
+    return lengths, any(isinstance(part, Stop) for part in mechanism.joints)
+
+
+def _leg_pieces(mechanism: Mechanism, model: Mechanism) -> Iterator[tuple[int, Any]]:
+    """Numbers of the pieces of legs and their stops, each with the model's in its place."""
+    structure, own = mechanism.structure, model.structure
+    for mine, theirs in zip(structure.feet_of_leg, own.feet_of_leg, strict=True):
+        for k, like in zip(mine, theirs, strict=True):
+            yield structure.foot_pieces[k], model.pieces[own.foot_pieces[like]]
+            chains = structure.chains[structure.feet[k]], own.chains[own.feet[like]]
+            for j, body in zip(*chains, strict=True):
+                yield structure.body_pieces[j], model.pieces[own.body_pieces[body]]
+    stops = [part for part in model.joints if isinstance(part, Stop)]
+    for k, part in zip(structure.joint_pieces, mechanism.joints, strict=True):
+        if isinstance(part, Stop) and stops:
+            yield k, stops[0]
+
+
+def _piece_like(piece: Any, like: Any, size: _Sizes) -> Any:
+    """A piece with a model's numbers; one that the model lacks vanishes."""
+    units = dict(mass=size.mass, inertia=size.mass * size.length**2, radius=size.length)
+    units |= dict(along=size.length, ahead=size.length, upper=1.0, lower=1.0)
+    changed: dict[str, Any] = {}
+    for name, value in vars(piece).items():
+        other = getattr(like, name, None)
+        if name in ("centre", "at") and value is not None and other is not None:
+            changed[name] = _piece_like(value, other, size)
+        elif name == "law" and other is not None:
+            changed[name] = _normal_like(value, other, size, size.force * size.length, 1.0)
+        elif name in units and value is not None:
+            changed[name] = 0.0 * value if other is None else units[name] * other
+    return with_fields(piece, **changed)
 
 
 def _light_pieces(mechanism: Mechanism) -> set[int]:
@@ -121,6 +221,24 @@ def seed_like(scene: Scene | RigidScene) -> Scene | RigidScene:
 def _idle(scene: Scene | RigidScene) -> Actuation:
     """The scene's actuators at strength zero: the seed's walker is passive."""
     return None if scene.actuation is None else tuple(part.idle() for part in scene.actuation)
+
+
+def _normal_like(law: Any, model: Any, size: _Sizes, force: Any, length: Any) -> Any:
+    """A law with numbers that resemble a model's of Ristow and Schäfer, in these units."""
+    like = functools.partial(
+        normal_law_like,
+        K=model.K * force / length**model.n,
+        c=model.c * force * size.time / length**2,
+        n=model.n,
+        mass=2.0 * size.mass,
+    )
+    return _like_seed(law, NORMAL_LAWS, like)
+
+
+def _friction_like(law: Any, model: Any, size: _Sizes) -> Any:
+    pace = size.length / size.time
+    like = functools.partial(friction_law_like, v0=model.v0 * pace, xi=model.xi / pace)
+    return _like_seed(law, FRICTION_LAWS, like)
 
 
 def _like_seed(law: _Law, catalogue: Mapping[str, type], like: Callable[[str], Any]) -> _Law:

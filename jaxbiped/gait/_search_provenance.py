@@ -42,7 +42,7 @@ class FoundBy(NamedCode):
     - walking: forward walks from many starts.
     - continuation: continuation of the gait of the seed's scene to this one; for a walker with
       other bodies, of the same walker relaxed: straight, passive, with hardly any mass outside its
-      legs.
+      legs; where there is nothing to relax, with legs of the seed or of McGeer's kneed walker.
     - scattered starts: Newton's method from scattered starts.
     """
 

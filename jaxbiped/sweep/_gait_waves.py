@@ -84,6 +84,7 @@ class GaitWaves:
             if place in self._doubtful and self._is_worth_a_search(place, reach):
                 self._search_without_guess(place)
         for place, best in self._doubtful.items():
+            assert best is not None  # it was searched from a start, at least
             self._grid.write([place], rows_of(best, None))
             self._count(1)
 
@@ -167,7 +168,7 @@ class GaitWaves:
         else:
             self._in_vain.append(place)
             self._doubt(place, gait)
-            self._grid.write([place], rows_of(self._doubtful[place], None))
+            self._grid.write([place], rows_of(self._doubtful[place] or gait, None))
         self._spread()
 
     def _is_worth_a_search(self, place: Place, reach: int) -> bool:

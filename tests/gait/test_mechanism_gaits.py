@@ -201,7 +201,7 @@ def test_a_kneed_walker_of_a_users_own_is_found_without_a_guess():
     assert isinstance(scene.clearance, jb.laws.AlwaysTouching)
     gait = jb.find_gait(scene, parameters=("m_thigh",), radius_sensitivities=False)
     assert gait.stable
-    assert gait.found_by is jb.gait.FoundBy.WALKING
+    assert gait.found_by is jb.gait.FoundBy.CONTINUATION
     assert float(gait.unit_multiplier_error) < 1e-5
     # Its legs swing bent, and the knee is stretched again before the foot comes down.
     states = gait.orbit[1]

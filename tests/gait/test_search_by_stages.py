@@ -51,7 +51,7 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
         points = [np.full(4, 1.0)] * len(queue["walk"])
         return SimpleNamespace(settled=lambda: points)
 
-    def follow(*_):
+    def follow(*_, begins_at_model):
         took.append("branch")
         end = BranchEnd.FOLD if branch is None else BranchEnd.REACHED
         queue["branch"] = [] if branch is None else [branch]

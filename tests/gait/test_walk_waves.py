@@ -10,7 +10,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._state_quantities import recurring_names
 from jaxbiped.gait import _walk_waves
-from jaxbiped.gait._homotopy import homotopy_to
+from jaxbiped.gait._homotopy import homotopy_to, line_from_model
 from jaxbiped.gait._settled_walks import Walks
 from jaxbiped.gait._walk_waves import walks_of
 from jaxbiped.scene._parameter_access import parameter_values
@@ -106,7 +106,84 @@ def test_a_relaxed_walker_is_straight_and_passive_and_of_legs_alone():
         "torso.motor.share": pytest.approx(1e-3),
         "leg.foot.centre_ahead": 0.0,
     }
-    assert homotopy_to(scene_of("unequal")) is None
+
+
+def _shape(scene):
+    """Numbers of a walker and its laws in its weight, its height and g."""
+    known = {name: float(x) for name, x in parameter_values(scene).items()}
+    mechanism, g = scene.mechanism, known["g"]
+    weight, height = float(mechanism.total_mass) * g, float(mechanism.height)
+    pace = (g * height) ** 0.5
+    lengths = {k: x / height for k, x in known.items() if "centre" in k or k.endswith("radius")}
+    return lengths | {
+        "K": known["K"] * height**1.5 / weight,
+        "c": known["c"] * height * pace / weight,
+        "v0": known["v0"] / pace,
+        "xi": known["xi"] * pace,
+        "slope": known["slope"],
+        "inertia": known["thigh.inertia"] * g / weight / height**2,
+        "stop": known["shank.stop.K"] / weight / height,
+        "damper": known["shank.stop.c"] * pace / weight / height**2,
+    }
+
+
+def test_a_line_begins_at_a_model_of_the_scenes_size_and_weight():
+    """Where nothing can be relaxed: in its own units the first walker is McGeer's with knees."""
+    line = homotopy_to(person())
+    model = jb.models.mcgeer(knees=True)
+    wanted = _shape(dataclasses.replace(model, walker=model.mechanism))
+    begun = _shape(line.first)
+    assert {name: pytest.approx(x, rel=1e-12) for name, x in begun.items()} == wanted
+    assert float(line.first.mechanism.total_mass) == pytest.approx(39.0)
+    assert float(line.first.mechanism.height) == pytest.approx(0.9)
+    assert line.first.ground.g == person().ground.g
+    legs = homotopy_to(scene_of("unequal")).first.walker.pieces[:2]
+    assert [float(leg.mass) for leg in legs] == pytest.approx([1.1, 1.1])
+    own = homotopy_to(model)  # a walker of parameters by name is followed as a mechanism
+    assert jax.tree.structure(own.first) == jax.tree.structure(own.last)
+    assert line_from_model(scene_of("flat")) is line_from_model(scene_of("five")) is None
+
+
+def person(size=1.0, mass=39.0, g=9.81):
+    """A walker with knees of a person's proportions, on ground in proportion to its weight."""
+    leg, weight = 0.9 * size, mass * g
+    pace, share = (g * leg) ** 0.5, mass / 39.0
+    bodies, joints = [], []
+    for i in (1, 2):
+        thigh, shank = f"thigh_{i}", f"shank_{i}"
+        inertias = 0.1234 * share * size**2, 0.0945 * share * size**2
+        own = dict(mass=8.0 * share, inertia=inertias[0], centre=0.2 * leg)
+        bodies.append(jb.Body(thigh, **own))
+        own = dict(mass=4.0 * share, inertia=inertias[1], centre=(0.24 * leg, -0.01 * leg))
+        bodies.append(jb.Body(shank, **own, parent=thigh, at=0.46 * leg))
+        law = jb.laws.RistowSchafer(K=40.0 * weight * leg, c=400.0 * weight * leg**2 / pace, n=1.0)
+        joints.append(jb.Stop(shank, upper=0.2, law=law))
+    walker = jb.Mechanism(
+        root_mass=15.0 * share,
+        bodies=bodies,
+        feet=[jb.Foot(f"shank_{i}", centre=0.34 * leg, radius=0.2 * leg) for i in (1, 2)],
+        joints=joints,
+        mirror=(("thigh_1", "thigh_2"), ("shank_1", "shank_2")),
+    )
+    return jb.Scene(
+        walker=walker,
+        ground=jb.Ground(slope=0.05, g=g),
+        normal=jb.laws.RistowSchafer(K=1.3e4 * weight / leg**1.5, c=4e5 * weight / leg / pace),
+        friction=jb.laws.BengisuAkay(0.5, 0.4, 5e-5 * pace, 2e3 / pace),
+    )
+
+
+@pytest.mark.slow
+def test_knees_are_found_by_continuation_at_every_size():
+    """The gait of a person's, a toy's and one on the moon is the same in its own units."""
+    found = {}
+    for size, mass, g in ((1.0, 39.0, 9.81), (0.1, 0.05, 9.81), (1.0, 39.0, 1.62)):
+        gait = jb.find_gait(person(size, mass, g), **PLAIN)
+        assert gait.stable
+        assert gait.found_by is jb.gait.FoundBy.CONTINUATION
+        found[size, g] = float(gait.measures.period) * (g / size) ** 0.5
+    first, *others = found.values()
+    assert others == pytest.approx([first] * 2, rel=1e-6)
 
 
 def test_a_share_multiplies_the_motors_torque():
@@ -149,7 +226,7 @@ def test_a_walker_without_a_gait_is_told_where_its_branch_folds():
 
 
 @pytest.mark.nightly
-def test_a_kneed_walker_far_from_the_seed_is_found_by_waves():
+def test_a_kneed_walker_far_from_the_seed_is_found():
     """Heavy thighs and shanks: no walk about the seed's start goes on; the gait is unstable."""
     stop = jb.laws.RistowSchafer(K=300.0, c=3000.0, n=1.0)
     walker = jb.Kneed(
@@ -160,7 +237,7 @@ def test_a_kneed_walker_far_from_the_seed_is_found_by_waves():
     scene = jb.Scene(walker, seed.ground, seed.normal, seed.friction)
     gait = jb.find_gait(scene, **PLAIN)
     assert gait.outcome is jb.gait.Search.FOUND
-    assert gait.found_by is jb.gait.FoundBy.WALKING
+    assert gait.found_by is jb.gait.FoundBy.CONTINUATION
     start, walk = gait.measures.state, jb.simulate(scene, gait.measures.state, footsteps=4)
     assert float(walk.t[-1]) > 3.0 * float(gait.measures.period)
     after = jax.tree.map(float, jb.return_map(scene, start).state)
