@@ -230,9 +230,8 @@ class Descent:
             covariance[np.ix_(~held, ~held)] = free.covariance
             clocks = sum(each.clocks for each in self.measured)
             freedom = len(self.values) - free.rank - clocks
-            wide = told.undetermined.any() or bool(
-                np.nanmax(np.diag(told.covariance), initial=0.0) > _LINEAR**2
-            )
+            widest = np.nanmax(np.diag(told.covariance), initial=0.0)
+            wide = bool(told.undetermined.any() or widest > _LINEAR**2)
             follow = wide and ending is FitEnding.CONVERGED
             self.searching = False  # a profile follows gaits from one to the next
             for which in np.flatnonzero(~held & (follow | ~undetermined)).tolist():
