@@ -95,27 +95,33 @@ def test_what_is_not_allowed_is_one_sentence(gait, how, said):
 def fit():
     return GaitFit(
         ending=FitEnding.CONVERGED,
-        estimates={"K": 2e6, "xi": 3.0},
-        standard_errors={"K": 1e4, "xi": np.nan},
-        intervals={"K": (1.9e6, 2.1e6), "xi": (np.nan, np.nan)},
-        correlation=np.array([[1.0, np.nan], [np.nan, np.nan]]),
+        estimates={"K": 2e6, "xi": 3.0, "c": 1e7},
+        standard_errors={"K": 1e4, "xi": np.nan, "c": np.nan},
+        intervals={"K": (1.9e6, 2.1e6), "xi": (np.nan, np.nan), "c": (2e6, np.inf)},
+        correlation=np.where(np.arange(9).reshape(3, 3) == 0, 1.0, np.nan),
         undetermined=("xi",),
         at_bounds=(),
         residuals=np.array([0.1, -0.2]),
         freedom=1,
         evaluations=3,
-        units={"K": "N/m^n", "xi": ""},
+        units={"K": "N/m^n", "xi": "", "c": "N s/m^2"},
+        one_sided=("c",),
     )
 
 
 def test_a_fit_has_rows_by_parameter():
-    first, second = rows_of(fit().to_csv())
+    first, second, third = rows_of(fit().to_csv())
     assert first == {
         "parameter": "K", "unit": "N/m^n", "estimate [SI]": "2000000.0",
         "estimate_error [SI]": "10000.0", "low [SI]": "1900000.0", "high [SI]": "2100000.0",
-        "undetermined": "no", "at_bound": "no",
+        "undetermined": "no", "one_sided": "no", "at_bound": "no",
     }  # fmt: skip
     assert (second["estimate_error [SI]"], second["undetermined"]) == ("", "yes")
+    assert (third["low [SI]"], third["high [SI]"], third["one_sided"]) == (
+        "2000000.0",
+        "inf",
+        "yes",
+    )
     assert fit().to_dataset().attrs["ending"] == "converged"
     rows = fit().to_latex(columns=["parameter", "estimate", "unit"]).splitlines()
     assert r"K & 2.000(10)e6 & \unit{N/m^n} \\" in rows
@@ -124,8 +130,8 @@ def test_a_fit_has_rows_by_parameter():
 
 def test_a_fit_is_printed_in_a_line():
     assert repr(fit()) == (
-        "GaitFit(converged, K=2e+06 ± 1e+04, xi=3 ± nan, chi squared 0.05 at 1 degrees of freedom, "
-        "undetermined: xi, 3 scenes)"
+        "GaitFit(converged, K=2e+06 ± 1e+04, xi=3 ± nan, c=1e+07 ± nan, chi squared 0.05 at 1 "
+        "degrees of freedom, undetermined: xi, limited on one side: c, 3 scenes)"
     )
 
 

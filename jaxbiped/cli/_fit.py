@@ -57,6 +57,8 @@ class Fit(options.Command, of=("fit_gait",)):
         )
         if fit.undetermined:
             report.say(f"these data do not determine {', '.join(fit.undetermined)}")
+        if fit.one_sided:
+            report.say(f"limited on one side only: {', '.join(fit.one_sided)}")
         if fit.at_bounds:
             report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
         report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))

@@ -9,7 +9,6 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage
 from jaxbiped.identify._gait_fit import (
-    LOOSE,
     FitEnding,
     GaitFit,
     information,
@@ -57,8 +56,9 @@ class Descent:
         self.scene, self.measured, self.now, self.guess = scene, measured, now, guess
         self.units = {name: each.unit for name, each in parameter_quantities(scene).items()}
         self.names, self.first = tuple(bounds), np.array([float(own[name]) for name in bounds])
-        self.limits = np.array(list(bounds.values())).T
-        self.widths = np.where(self.first == 0.0, self.limits[1] - self.limits[0], 1.0)
+        limits = np.array(list(bounds.values())).T
+        self.widths = np.where(self.first == 0.0, limits[1] - limits[0], 1.0)
+        self.limits = np.stack([self.variables(each) for each in limits])
         self.how = dict(accuracy=accuracy, engine=engine)
         self.values = np.concatenate([gait.values for gait in measured])
         self.deviations = np.concatenate([gait.deviations for gait in measured])
@@ -113,7 +113,7 @@ class Descent:
         """
         from scipy.stats import qmc
 
-        low, high = map(self.variables, self.limits)
+        low, high = self.limits
         low, high = np.maximum(low, -_ABOUT), np.minimum(high, _ABOUT)
         found: list[Tried] = []
         self.searching = True
@@ -131,7 +131,7 @@ class Descent:
             self.residuals,
             begin,
             self.slopes,
-            bounds=tuple(map(self.variables, self.limits)),
+            bounds=tuple(self.limits),
             max_nfev=most,
             xtol=1e-9,
             ftol=1e-12,
@@ -140,7 +140,8 @@ class Descent:
         return FitEnding.CONVERGED if found.success else FitEnding.OUT_OF_EVALUATIONS
 
     def parameters(self, at: np.ndarray) -> dict[str, float]:
-        values = np.where(self.first == 0.0, at * self.widths, self.first * np.exp(at))
+        zero = self.first == 0.0
+        values = np.where(zero, at * self.widths, self.first * np.exp(np.where(zero, 0.0, at)))
         return dict(zip(self.names, values.tolist(), strict=True))
 
     def variables(self, values: np.ndarray) -> np.ndarray:
@@ -229,19 +230,18 @@ class Descent:
             covariance[np.ix_(~held, ~held)] = free.covariance
             clocks = sum(each.clocks for each in self.measured)
             freedom = len(self.values) - free.rank - clocks
-            wide = told.undetermined.any() or bool(
-                np.nanmax(np.diag(told.covariance), initial=0.0) > _LINEAR**2
-            )
+            widest = np.nanmax(np.diag(told.covariance), initial=0.0)
+            wide = bool(told.undetermined.any() or widest > _LINEAR**2)
             follow = wide and ending is FitEnding.CONVERGED
-            for which in np.flatnonzero(~undetermined & ~held).tolist():
-                self.searching = False  # a profile follows gaits from one to the next
+            self.searching = False  # a profile follows gaits from one to the next
+            for which in np.flatnonzero(~held & (follow | ~undetermined)).tolist():
                 ends[:, which] = self._interval(best, which, follow)
-            lost = ~(ends[1] - ends[0] < 2.0 * _WITHIN * LOOSE) & ~held
-            undetermined |= lost
-            ends[:, lost] = np.nan
-            covariance[lost] = covariance[:, lost] = np.nan
+        known = np.isfinite(ends)
+        undetermined, lost = ~known.any(axis=0) & ~held, ~known.all(axis=0)
+        covariance[lost] = covariance[:, lost] = np.nan
+        ends[:, undetermined] = np.nan
         spread = np.sqrt(np.diag(covariance))
-        low, high = (self.parameters(end) for end in ends)
+        low, high = (self.parameters(end) for end in np.clip(ends, *self.limits))
         return GaitFit(
             ending=ending,
             estimates=self.parameters(at),
@@ -250,6 +250,7 @@ class Descent:
             correlation=covariance / np.outer(spread, spread),
             undetermined=tuple(names[undetermined].tolist()),
             at_bounds=tuple(names[held].tolist()),
+            one_sided=tuple(names[lost & ~undetermined & ~held].tolist()),
             residuals=residuals,
             freedom=freedom,
             evaluations=self.evaluations,
@@ -258,7 +259,7 @@ class Descent:
 
     def _at_bounds(self, at: np.ndarray, residuals: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """Which parameters lie at a bound, within a thousandth of their error, and push there."""
-        low, high = map(self.variables, self.limits)
+        low, high = self.limits
         near = 1e-3 / np.maximum(np.linalg.norm(slopes, axis=0), 1.0)
         push = -slopes.T @ residuals
         return ((at - low <= near) & (push < 0.0)) | ((high - at <= near) & (push > 0.0))
@@ -276,18 +277,23 @@ class Descent:
     def _interval(self, best: Tried, which: int, follow: bool) -> tuple[float, float]:
         """Both ends in the variable; by the linearised model, or followed where it bends.
 
-        They are followed from the outermost scene that was tried and lies within: the way to it
-        from the best one may lead over scenes where derivatives tell nothing.
+        They are followed from the outermost scene tried that lies within and tells of it: the way
+        to it from the best one may lead over scenes where derivatives tell nothing.
         """
-        limits = np.stack([self.variables(each) for each in self.limits])
-        square, ends = best[0] + _WITHIN**2, []
-        within = [each for each in self.tried if follow and each[0] < square]
-        for sign in (-1.0, 1.0):
-            _, at, found = max(within, key=lambda each: sign * each[1][which]) if follow else best
-            known = self._linearised(found)
-            if follow:
-                end = interval_end(self._model, at, known, square, which, sign, limits)
-            else:
-                end = at[which] + linear_step(*known, square, which, sign, limits - at)[which]
-            ends.append(float(end))
-        return ends[0], ends[1]
+        limits, square = self.limits, best[0] + _WITHIN**2
+        within = [each for each in self.tried if each[0] < square]
+        known = [information(*self._scaled_slopes(each[2])) for each in within]
+        telling = [a for a, b in zip(within, known, strict=True) if follow and b.distinct[which]]
+
+        def end(sign: float) -> float:
+            if follow and not telling:
+                return sign * np.inf
+            _, at, found = max(telling, key=lambda e: sign * e[1][which], default=best)
+            here = self._linearised(found)
+            if not follow:
+                step, _ = linear_step(*here, square, which, sign, limits - at)
+                return float(at[which] + step[which])
+            end = sign * interval_end(self._model, at, here, square, which, sign, limits)
+            return sign * max(end, *(sign * float(each[1][which]) for each in within))
+
+        return end(-1.0), end(1.0)

@@ -48,12 +48,14 @@ class Information(NamedTuple):
             columns of what is undetermined.
         undetermined: whether the data do not tell a parameter, shape (k,).
         resolved: whether a parameter's derivatives exceed their own errors, shape (k,).
+        distinct: whether they do, and no other parameters can make up for it, shape (k,).
         rank: how many combinations of parameters are told.
     """
 
     covariance: np.ndarray
     undetermined: np.ndarray
     resolved: np.ndarray
+    distinct: np.ndarray
     rank: int
 
 
@@ -69,7 +71,7 @@ def information(slopes: np.ndarray, slope_errors: np.ndarray) -> Information:
     resolved = sizes > 2.0 * sizes_of_errors
     covariance, undetermined = np.full((k, k), np.nan), np.ones(k, bool)
     if not resolved.any():
-        return Information(covariance, undetermined, resolved, 0)
+        return Information(covariance, undetermined, resolved, resolved, 0)
     scale = sizes[resolved]
     _, singular, rows = np.linalg.svd(slopes[:, resolved] / scale)
     singular = np.append(singular, np.zeros(len(rows) - len(singular)))
@@ -81,10 +83,11 @@ def information(slopes: np.ndarray, slope_errors: np.ndarray) -> Information:
     turned = 1e-6 + 2.0 * float(np.max(noise)) / np.min(singular[~null], initial=np.inf)
     free = np.linalg.norm(rows[null], axis=0) > turned
     loose = free | (np.sqrt(np.diag(found)) > LOOSE)
-    undetermined[resolved] = loose
+    undetermined[resolved], distinct = loose, resolved.copy()
+    distinct[resolved] = ~free
     kept = ~undetermined
     covariance[np.ix_(kept, kept)] = found[np.ix_(~loose, ~loose)]
-    return Information(covariance, undetermined, resolved, int(np.sum(~null)))
+    return Information(covariance, undetermined, resolved, distinct, int(np.sum(~null)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,12 +99,13 @@ class GaitFit(Tabular):
         estimates: estimates by name, SI units; for an undetermined parameter, the last value of the
             search.
         standard_errors: standard errors of the joint fit by name, SI units; NaN for parameters that
-            are undetermined or at a bound.
+            are undetermined, one-sided or at a bound, or whose error exceeds their size.
         intervals: ends of the 95 % interval by name; farther out, no values of the other
-            parameters, within their bounds, compensate for this one. NaN for parameters that are
-            undetermined or at a bound.
+            parameters, within their bounds, compensate for this one. An end that the data do not
+            tell is the bound, 0 or infinite. NaN for parameters that are undetermined or at a
+            bound.
         correlation: of the estimates' errors, shape (k, k).
-        undetermined: names of the parameters that the data do not determine.
+        undetermined: names of the parameters that the data limit on neither side.
         at_bounds: names of the parameters that are held by a bound, because the data favour a value
             beyond it.
         residuals: (predicted − measured) over standard deviation, shape (n,).
@@ -109,6 +113,7 @@ class GaitFit(Tabular):
             combinations and clocks of angles that they determine.
         evaluations: number of scenes that were searched for gaits.
         units: SI units of the parameters by name.
+        one_sided: names of the parameters that the data limit on one side only.
     """
 
     rows: ClassVar[str] = "parameter"
@@ -123,11 +128,13 @@ class GaitFit(Tabular):
     freedom: int
     evaluations: int
     units: dict[str, str]
+    one_sided: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         pairs = zip(self.estimates.items(), self.standard_errors.values(), strict=True)
         estimates = ", ".join(f"{name}={value:.6g} ± {bar:.2g}" for (name, value), bar in pairs)
         words = {"undetermined": self.undetermined, "at bounds": self.at_bounds}
+        words["limited on one side"] = self.one_sided
         held = (f", {said}: {', '.join(names)}" for said, names in words.items() if names)
         return (
             f"GaitFit({self.ending}, {estimates}, chi squared {self.chi_squared:.3g} at "
@@ -151,8 +158,8 @@ class GaitFit(Tabular):
 
         Returns:
             Along `parameter` the estimates with their standard errors, the ends of the 95 %
-            intervals, units, and whether a parameter is undetermined or at a bound; the correlation
-            along `parameter` and `other`; residuals along `measurement`.
+            intervals, units, and whether a parameter is undetermined, one-sided or at a bound; the
+            correlation along `parameter` and `other`; residuals along `measurement`.
         """
         import xarray
 
@@ -171,6 +178,7 @@ class GaitFit(Tabular):
             "low": column(low, "lower end of 95 %"),
             "high": column(high, "upper end of 95 %"),
             "undetermined": among(self.undetermined, "undetermined"),
+            "one_sided": among(self.one_sided, "limited on one side"),
             "at_bound": among(self.at_bounds, "at a bound"),
             "correlation": Entry(("parameter", "other"), self.correlation, Quantity("correlation")),
             "residual": Entry(("measurement",), self.residuals, Quantity("residual")),
@@ -233,8 +241,10 @@ def interval_end(
     near = np.clip(limits, at - _FAR, at + _FAR)
     for _ in range(_MOST):
         room = np.clip(near - here, -_REACH, _REACH)
-        step = linear_step(*known, square, which, sign, room)
+        step, flat = linear_step(*known, square, which, sign, room)
         ahead = here[which] + step[which]
+        if _FAR * flat > _SHARE * max(farthest, abs(step[which])):
+            break  # it moves as far where the sum of squares does not change
         if np.any(np.abs(here + step - at) >= _FAR):
             break  # the others might make up for even more
         if ahead in limits[:, which] or abs(step[which]) <= _SHARE * farthest:
@@ -259,8 +269,9 @@ def linear_step(
     which: int,
     sign: float,
     room: np.ndarray,
-) -> np.ndarray:
-    """The step to that end by the linearised model, shape (k,).
+) -> tuple[np.ndarray, float]:
+    """The step to that end by the linearised model, shape (k,), and how much of the variable lies
+    along directions in which nothing is moved, from 0 to 1.
 
     A variable that would leave its room (2, k) stops there, and the others make up for that.
     """
@@ -270,14 +281,16 @@ def linear_step(
         largest = np.linalg.norm(part, 2) if part.size else 0.0
         inverse = np.linalg.pinv(part, rcond=min(_FLAT / max(largest, _FLAT), 1.0))
         held = residuals + slopes[:, ~free] @ step[~free]
-        step[free] = -inverse @ held
+        step[free], flat = -inverse @ held, 0.0
         if free[which]:
             spare = square - float(np.sum((held + slopes[:, free] @ step[free]) ** 2))
-            row = inverse[np.count_nonzero(free[:which])]
+            place = np.count_nonzero(free[:which])
+            row, (_, singular, rows) = inverse[place], np.linalg.svd(part)
+            flat = float(np.linalg.norm(rows[np.sum(singular > _FLAT) :, place]))
             if spare > 0.0 and row.any():
                 step[free] += sign * np.sqrt(spare) / np.linalg.norm(row) * (inverse @ row)
         beyond = free & ((step < room[0]) | (step > room[1]))
         if not beyond.any():
-            return step
+            return step, flat
         step = np.where(beyond, np.clip(step, *room), step)
         free &= ~beyond

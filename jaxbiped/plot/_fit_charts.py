@@ -26,10 +26,10 @@ def fit(fitted: GaitFit) -> Figure:
     """Draws the estimates of a fit with their intervals, and its residuals.
 
     Above, each estimate with its 95 % interval (thin) and its standard error (thick), relative to
-    the estimate, and in numbers above it. A parameter that the data do not determine, or that is at
-    a bound, has no bars. Below, (predicted − measured) over the standard deviation of each number
-    measured; about 95 % of them lie within the shaded band if the model and the deviations are
-    right.
+    the estimate, and in numbers above it. An open end is drawn at 100 %. A parameter that the data
+    do not determine, or that is at a bound, has no bars. Below, (predicted − measured) over the
+    standard deviation of each number measured; about 95 % of them lie within the shaded band if the
+    model and the deviations are right.
 
     Args:
         fitted: a fit from `fit_gait`.
@@ -66,6 +66,7 @@ def _draw_estimates(ax: Axes, fitted: GaitFit, names: list[str]) -> None:
     with np.errstate(divide="ignore", invalid="ignore"):
         percent = np.where(values == 0.0, np.nan, 100.0 / values)
     reach = np.sort((ends - values[:, None]) * percent[:, None], axis=1)
+    reach[np.isinf(reach)] = np.sign(reach[np.isinf(reach)]) * 100.0
     look: dict[str, Any] = {"color": style.LEG_COLOURS[0]}
     ax.hlines(places, *reach.T, linewidth=1.0, label="95 % interval", **look)
     deviations = np.abs(errors * percent)
@@ -82,6 +83,8 @@ def _draw_estimates(ax: Axes, fitted: GaitFit, names: list[str]) -> None:
         text = f"{_with_error(value, error)} {quantity.unit_in_figure}".removesuffix(" –")
         if name in fitted.undetermined:
             text += ", undetermined"
+        elif name in fitted.one_sided:
+            text += ", limited on one side"
         elif name in fitted.at_bounds:
             text += ", at a bound"
         style.label_point(ax, text, (0.0, float(place)), (0, 6), ha="center", va="bottom")

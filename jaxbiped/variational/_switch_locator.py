@@ -36,9 +36,9 @@ before it, for a step's last stage lies on the other side, where the Jacobian ma
 _BEFORE = 1e-3
 """How far before, as a share of the way to it."""
 _LAST, _LEFT = 1e-8, 0.1
-"""Longest last step to where derivatives are read [s], at the section or a largest load, and the
-share of the way that each step before leaves. A step's error in a stiff component of the state
-turns the rates by that error times the component's own rate, and so moves the time that is read."""
+"""Longest last step to the section or a largest load where there are switches [s], and the share of
+the way that each step before leaves. A step's error in a stiff component of the state turns the
+rates by that error times the component's own rate, and so moves the time of a load."""
 
 
 class SwitchLocatorState(NamedTuple):
@@ -203,7 +203,7 @@ class SwitchLocator(AbstractWrappedControl):
             roots = StepCubic(parts[0], parts[2], parts[1], parts[3]).sign_change()
             roots = jnp.where(jnp.stack(crossed), roots, 1.0)
             first, place, which = jnp.min(roots), jnp.ones_like(span), jnp.asarray(0)
-            read = jnp.min(roots[count:], initial=1.0) <= first
+            read = jnp.min(roots[count:], initial=1.0) <= first if count else none
             for number, switch in enumerate(at_end[:count], 1):
                 if switch.corner and not self.corners:
                     continue

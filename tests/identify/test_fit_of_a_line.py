@@ -120,7 +120,7 @@ def test_an_interval_follows_the_profile_where_the_model_bends(monkeypatch):
     assert abs(np.exp(1.959964 * spread) / inside[-1] - 1.0) > 0.05
 
 
-def test_an_interval_holds_where_an_undetermined_parameter_could_as_well_lie(monkeypatch):
+def test_a_parameter_may_be_limited_on_one_side_and_moves_the_others(monkeypatch):
     """y₁ = log c − log(1 + K) and y₂ = K / (1 + K), which is best where K vanishes. No derivative
     tells of K there, but larger ones fit within the 95 %, too, and c with them."""
 
@@ -135,13 +135,40 @@ def test_an_interval_holds_where_an_undetermined_parameter_could_as_well_lie(mon
         {"period": (1e-9, 0.1), "step_length": (1e-9, 0.5), "speed": (1e-9, 1.0)}
     )
     fit = jb.fit_gait(SCENE, ("J", "d"), seen)
-    assert fit.undetermined == ("J",)
+    assert (fit.one_sided, fit.undetermined) == (("J",), ())
+    assert np.isnan(fit.standard_errors["J"])
     c = np.linspace(-0.5, 2.5, 3001)
     share = np.linspace(0.0, 0.99, 2001)[:, None]  # K / (1 + K)
     squares = ((c + np.log1p(-share)) / 0.1) ** 2 + ((share + 0.2) / 0.5) ** 2
-    inside = c[np.min(squares, axis=0) <= fit.chi_squared + 1.959964**2]
-    found = np.log(np.array(fit.intervals["d"]) / float(jb.parameter_values(SCENE)["d"]))
+    within = squares <= fit.chi_squared + 1.959964**2
+    own, inside = jb.parameter_values(SCENE), c[np.any(within, axis=0)]
+    found = np.log(np.array(fit.intervals["d"]) / float(own["d"]))
     assert found == pytest.approx([inside[0], inside[-1]], abs=0.01)
+    most = np.max(share[np.any(within, axis=1)])
+    assert fit.intervals["J"] == pytest.approx(
+        (0.0, float(own["J"]) * most / (1.0 - most)), rel=0.02
+    )
+
+
+@pytest.mark.parametrize("far", [1.0, 10.0])
+def test_no_end_is_told_where_a_derivative_dies_out(far, monkeypatch):
+    """y = K / (1 + K / far) was measured 0.67 standard deviations below what it comes to at last,
+    and 2.67 above nothing: K has a lower end alone, where y lies 1.96 below the measured value."""
+
+    def predicted(scene, measured, values, sizes, guess, **how):
+        k = values["J"] / float(jb.parameter_values(SCENE)["J"])
+        share = 1.0 / (1.0 + k / far)
+        slopes = np.array([[k * share**2], [0.0], [0.0]])
+        told = np.array([k * share, 0.2, 0.35])
+        return Prediction(told, slopes, np.full((3, 1), 1e-9), (), (), True)
+
+    monkeypatch.setattr(_descent, "predict", predicted)
+    seen = {"period": (0.8 * far, 0.3 * far), "step_length": (0.2, 0.02), "speed": (0.35, 0.03)}
+    fit = jb.fit_gait(SCENE, ("J",), jb.identify.MeasuredGait(seen))
+    assert fit.one_sided == ("J",)
+    share = 0.8 - 1.959964 * 0.3
+    lowest = far * share / (1.0 - share) * float(jb.parameter_values(SCENE)["J"])
+    assert fit.intervals["J"] == pytest.approx((lowest, np.inf), rel=0.01)
 
 
 def test_a_fit_that_does_not_fit_says_so(monkeypatch):
