@@ -126,8 +126,8 @@ def of_optimise_speed(numbers: dict[str, Any]) -> Iterator[str]:
         basin, norm = f"{told['basin'][0]:.3f}", f"{told['sensitivity_norm']:.2f}"
         yield row(name, *sizes, norm, basin)
     for name, each in numbers["descents"].items():
-        seconds = (f"{each[key]:.1f}" for key in ("warm_wall_s", "warm_cpu_s"))
-        yield row(name, str(each["iterations"]), str(each["evaluations"]), *seconds)
+        seconds = f"{each['warm_cpu_s']:.1f}"
+        yield row(name, str(each["iterations"]), str(each["evaluations"]), seconds)
 
 
 def of_published_walkers(numbers: dict[str, Any]) -> Iterator[str]:

@@ -129,7 +129,8 @@ def as_listed(objects: Mapping[str, Any], link: re.Match[str]) -> str:
 def mend_links(app: Sphinx, page: str, _: str, context: dict[str, Any], *__: Any) -> None:
     """Links back from pages of source, as the reference lists the names."""
     if page.startswith("_modules/jaxbiped"):
-        mend = functools.partial(as_listed, app.env.get_domain("py").objects)
+        domain: Any = app.env.get_domain("py")
+        mend = functools.partial(as_listed, domain.objects)
         pattern = r'href="(?P<page>[^"#]+)#(?P<name>jaxbiped[^"]+)"'
         context["body"] = re.sub(pattern, mend, context["body"])
 

@@ -118,7 +118,7 @@ def _run(given: list[str]) -> None:
         warnings.formatwarning = usual
 
 
-def _one_line(message: Warning | str, *_: Any) -> str:
+def _one_line(message: Warning | str, *_: Any, **__: Any) -> str:
     """A warning as a command tells it: no line of the caller's code is of use there."""
     return f"jaxbiped: warning: {message}\n"
 

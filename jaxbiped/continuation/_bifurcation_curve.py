@@ -77,7 +77,7 @@ def bifurcation_curve(
     """Follows a bifurcation of a branch along a second parameter, in both directions.
 
     Args:
-        branch: from `continue_gait`; the first parameter stays within its range.
+        branch: from `continue_gait`; the curve ends at the first point beyond its range.
         bifurcation: one of its folds, period doublings or Neimark–Sacker points.
         along: name of the second parameter.
         bounds: range (from, to) of the second parameter, SI units; the scene's own value must lie
