@@ -55,7 +55,9 @@ def warn_if_steep(ground: Ground, friction: object) -> None:
     largest = [mu for mu in known if mu is not None]
     if not largest or any(isinstance(each, jax.core.Tracer) for each in (ground.slope, *largest)):
         return
-    slope, mu = np.max(np.abs(ground.slope)), max(float(np.max(each)) for each in largest)
+    # By NumPy alone: what is traced around a known scene would trace these, too.
+    slope, *most = (np.max(np.abs(np.asarray(each))) for each in (ground.slope, *largest))
+    mu = max(most)
     if 0.0 < mu < np.tan(slope):
         warn(
             f"slope = {slope:g} rad is steeper than friction can hold, whose coefficient is at "

@@ -203,7 +203,7 @@ class SwitchLocator(AbstractWrappedControl):
             roots = StepCubic(parts[0], parts[2], parts[1], parts[3]).sign_change()
             roots = jnp.where(jnp.stack(crossed), roots, 1.0)
             first, place, which = jnp.min(roots), jnp.ones_like(span), jnp.asarray(0)
-            read = jnp.min(roots[count:], initial=1.0) <= first if count else none
+            read = jnp.min(jnp.append(roots[count:], 1.0)) <= first if count else none
             for number, switch in enumerate(at_end[:count], 1):
                 if switch.corner and not self.corners:
                     continue
