@@ -138,8 +138,10 @@ class FollowedBranch(NamedTuple):
 
     @property
     def farthest(self) -> int:
-        """The point nearest to the scene that was asked for."""
-        return int(np.argmax(self.s))
+        """The point nearest to the scene that was asked for, before the branch turned back: behind
+        its first fold, orbits need not be walks."""
+        turned = np.flatnonzero(np.diff(self.s) < 0.0)
+        return int(turned[0] if turned.size else np.argmax(self.s))
 
 
 def follow_branch(

@@ -11,10 +11,9 @@ import jax.tree_util as jtu
 
 from jaxbiped._parameter_declaration import with_fields
 from jaxbiped._types import as_float
-from jaxbiped.models._mcgeer import mcgeer
 from jaxbiped.scene._joint_parts import Motor, Stop
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._ready_scenes import seed_scene
+from jaxbiped.scene._ready_scenes import kneed_scene, seed_scene
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene.actuation._abstract_actuator import Actuation
 from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
@@ -105,7 +104,7 @@ def _sizes(scene: Scene, model: Scene) -> _Sizes:
 
 def _model_of(mechanism: Mechanism) -> Any:
     """The scene of the model with the same kind of legs; None where there is none."""
-    kind, models = _kind_of_legs(mechanism), (seed_scene(), mcgeer(knees=True))
+    kind, models = _kind_of_legs(mechanism), (seed_scene(), kneed_scene())
     return next((each for each in models if _kind_of_legs(each.mechanism) == kind), None)
 
 

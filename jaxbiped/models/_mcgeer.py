@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 import jaxbiped as jb
+from jaxbiped.scene._ready_scenes import kneed_scene
 
 if TYPE_CHECKING:
     from jaxbiped._types import Parameter
@@ -32,29 +33,6 @@ def mcgeer(slope: "Parameter | None" = None, *, knees: bool = False) -> "jb.Rigi
         ArgumentError: the slope is not allowed.
     """
     if knees:
-        seed = jb.seed_scene(slope=0.0456 if slope is None else slope)
-        return jb.Scene(_kneed(), seed.ground, seed.normal, seed.friction)
+        return kneed_scene(slope=0.0456 if slope is None else slope)
     walker = jb.Walker(m=1.0, J=0.32**2, l=1.0, d=1.0 - 0.63, r=0.3, hip_mass=0.0)
     return jb.RigidScene(walker, jb.Ground(slope=0.03 if slope is None else slope, g=1.0))
-
-
-def _kneed() -> "jb.Kneed":
-    """Of length and mass: thighs 0.46 and 0.1, shanks 0.54 and 0.062, feet of a radius of 0.2.
-
-    Radii of gyration are 0.135 and 0.186 of the length, and 68 % of the mass are at the hip.
-    """
-    return jb.Kneed(
-        m_thigh=0.2,
-        J_thigh=5.8e-4,
-        l_thigh=0.184,
-        d_thigh=0.080,
-        m_shank=0.124,
-        J_shank=6.9e-4,
-        l_shank=0.216,
-        d_shank=0.096,
-        w_shank=-0.004,
-        r=0.08,
-        hip_mass=1.352,
-        epsilon=0.2,
-        stop=jb.laws.RistowSchafer(K=300.0, c=3000.0, n=1.0),
-    )

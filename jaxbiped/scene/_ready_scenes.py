@@ -1,11 +1,13 @@
-"""Ready scenes: the seed paper's own, and a ladder of fidelity of one walker."""
+"""Ready scenes: the seed paper's own, one with knees, and a ladder of fidelity of one walker."""
 
 import dataclasses
 import inspect
 
 from jaxbiped._checks import check_choice, check_type
+from jaxbiped._types import Parameter
 from jaxbiped.scene._clearance import StanceRotation
 from jaxbiped.scene._ground import Ground
+from jaxbiped.scene._kneed import Kneed
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
@@ -81,6 +83,33 @@ _CREEP = 1e-3
 """Slip speed of the friction without slip cost [m/s]: a stance foot creeps at less than it."""
 _BRISTLE_DAMPING = 100.0
 """Damping of the bristles [s/m]: they settle without ringing under a leg of some kilograms."""
+
+
+def kneed_scene(*, slope: Parameter = 0.0456) -> Scene:
+    """McGeer's walker with knees on the seed's ground, scaled to legs of 0.4 m and 2 kg in all.
+
+    Of length and mass: thighs 0.46 and 0.1, shanks 0.54 and 0.062, feet of a radius of 0.2. Radii
+    of gyration are 0.135 and 0.186 of the length, and 68 % of the mass are at the hip.
+
+    Source: McGeer 1990, Passive walking with knees, IEEE Conference on Robotics and Automation.
+    """
+    walker = Kneed(
+        m_thigh=0.2,
+        J_thigh=5.8e-4,
+        l_thigh=0.184,
+        d_thigh=0.080,
+        m_shank=0.124,
+        J_shank=6.9e-4,
+        l_shank=0.216,
+        d_shank=0.096,
+        w_shank=-0.004,
+        r=0.08,
+        hip_mass=1.352,
+        epsilon=0.2,
+        stop=RistowSchafer(K=300.0, c=3000.0, n=1.0),
+    )
+    seed = seed_scene(slope=slope)
+    return Scene(walker, seed.ground, seed.normal, seed.friction)
 
 
 def ladder(scene: Scene | None = None) -> dict[str, Scene | RigidScene]:
