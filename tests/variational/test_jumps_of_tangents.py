@@ -166,14 +166,14 @@ def _beside_a_switch(power):
     """
     times = np.abs(SIDES)
     first = np.where(np.asarray(SIDES) > 0.0, 3e4 + 2.0 * (1e10 * times) ** power * 1e4, 0.0)
-    noise = 1e-13 * np.array([1.0, -3.0, 2.0, 2.0, -5.0, 1.0, 4.0, -2.0, -1.0, 3.0])
+    noise = 1e-12 * np.array([1.0, -3.0, 2.0, 2.0, -5.0, 1.0])
     return np.stack([first, 0.0 * times + 7.0, noise], axis=1)[:, None]
 
 
-@pytest.mark.parametrize("power", [0.5, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("power", [0.5, 1.0])
 def test_a_jump_of_the_jacobian_is_its_value_at_the_switch(power):
     jump = np.asarray(jump_of(jnp.asarray(_beside_a_switch(power))))[0]
-    np.testing.assert_allclose(jump, [3e4, 0.0, 0.0], rtol=1e-11, atol=1e-10)
+    np.testing.assert_allclose(jump, [3e4, 0.0, 0.0], rtol=1e-12, atol=1e-10)
 
 
 @pytest.mark.parametrize("power", [-0.75, -0.5, -0.25])
