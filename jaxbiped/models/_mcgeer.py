@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 import jaxbiped as jb
-from jaxbiped.scene._ready_scenes import kneed_scene
 
 if TYPE_CHECKING:
     from jaxbiped._types import Parameter
@@ -33,6 +32,9 @@ def mcgeer(slope: "Parameter | None" = None, *, knees: bool = False) -> "jb.Rigi
         ArgumentError: the slope is not allowed.
     """
     if knees:
+        # The command line's help reads this module, and does without JAX.
+        from jaxbiped.scene._ready_scenes import kneed_scene
+
         return kneed_scene(slope=0.0456 if slope is None else slope)
     walker = jb.Walker(m=1.0, J=0.32**2, l=1.0, d=1.0 - 0.63, r=0.3, hip_mass=0.0)
     return jb.RigidScene(walker, jb.Ground(slope=0.03 if slope is None else slope, g=1.0))
