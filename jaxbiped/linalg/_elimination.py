@@ -55,20 +55,7 @@ def inverse(matrix: Matrix) -> list[list[Scalar]]:
 
 def solution(matrix: Scalar, right: Scalar) -> Scalar:
     """The solution of a square system (n, n), with right side (n,), by Gauss with pivoting."""
-    rows = [jnp.append(row, value) for row, value in zip(matrix, right, strict=True)]
-    for k in range(len(rows)):
-        _largest_first(rows, k)
-        heads = [row[:1] for row in rows]
-        rows[k:] = [row[1:] for row in rows[k:]]
-        rows[k] = rows[k] / heads[k]
-        for i in range(k + 1, len(rows)):
-            rows[i] = rows[i] - heads[i] * rows[k]
-    found: list[Scalar] = []
-    for row in reversed(rows):
-        # A row is what is right of its pivot's one.
-        known = [a * x for a, x in zip(row[:-1], found[::-1], strict=True)] if found else []
-        found.append(row[-1] - sum(known[1:], known[0]) if known else row[-1])
-    return jnp.stack(found[::-1])
+    return pivoted(matrix).solve(right)
 
 
 class PivotedFactors(NamedTuple):
