@@ -23,9 +23,10 @@ Arrival = Callable[[PyTree, PyTree], tuple[Scalar, Scalar]]
 _STEEPER, _LARGE = 1.2, 1e-4
 """From which ratio of its changes near a switch and farther off an entry of a Jacobian is without
 bound, and from which size, in units of the largest entry, such a change is no rounding."""
-SIDES = tuple(1e-10 * side for side in (1.0, 4.0, 16.0, -1.0, -4.0, -16.0))
+SIDES = tuple(1e-11 * side for side in (1.0, 4.0, 16.0, -1.0, -4.0, -16.0))
 """When the two sides of a switch are looked at [s]: first the new one. Nearer, penetrations are all
-rounding; a thousand times the margin away, Jacobians have changed by more than their jump's error.
+rounding; ten times farther away, load times slope of friction, which goes as the square of time,
+has changed by more than rounding where v0 is small.
 """
 
 

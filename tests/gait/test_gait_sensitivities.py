@@ -204,6 +204,23 @@ def test_rounding_does_not_reach_the_derivatives_of_the_radius():
     assert np.max(np.std(found, axis=0)) < 2e-7
 
 
+def test_steep_friction_keeps_the_derivatives_of_the_radius():
+    """Beside a switch the load times friction's slope goes as the square of time."""
+    steep = {"slope": 0.019246747, "K": 109613.0, "c": 66014095.0, "v0": 2.192886e-5}
+    scene = jb.seed_scene(**steep, xi=36.72085, mu_static=1.25, mu_kinetic=1.0)
+    gait = jb.find_gait(scene, accuracy="tight", parameters=("slope",))
+
+    def radius(change):
+        moved = jb.with_parameters(scene, {"slope": steep["slope"] * np.exp(change)})
+        how = dict(accuracy="tight", parameters=(), radius_sensitivities=False)
+        return float(jb.find_gait(moved, gait, **how).measures.spectral_radius)
+
+    difference = (radius(5e-4) - radius(-5e-4)) / 1e-3
+    each = gait.sensitivities, gait.sensitivity_errors
+    told, bar = (float(values.spectral_radius[0]) * steep["slope"] for values in each)
+    assert abs(told - difference) <= bar < 1e-4 * difference
+
+
 def test_the_section_does_not_matter(found):
     """Multipliers and their derivatives belong to the orbit, though heel strike is a switch."""
     other = jb.find_gait(jb.seed_scene(), section=jb.HeelStrike())

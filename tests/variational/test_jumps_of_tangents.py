@@ -165,7 +165,7 @@ def _beside_a_switch(power):
     The last one is rounding.
     """
     times = np.abs(SIDES)
-    first = np.where(np.asarray(SIDES) > 0.0, 3e4 + 2.0 * (1e10 * times) ** power * 1e4, 0.0)
+    first = np.where(np.asarray(SIDES) > 0.0, 3e4 + 2.0 * (1e11 * times) ** power * 1e4, 0.0)
     noise = 1e-12 * np.array([1.0, -3.0, 2.0, 2.0, -5.0, 1.0])
     return np.stack([first, 0.0 * times + 7.0, noise], axis=1)[:, None]
 
