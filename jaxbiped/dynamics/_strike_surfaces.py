@@ -15,7 +15,8 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._legs import mean
 from jaxbiped.dynamics._stance import Stance, of_stance
-from jaxbiped.scene._rigid_feet import standing_legs
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._rigid_feet import next_leg, standing_legs
 from jaxbiped.scene._scene import RigidScene
 
 FALL_ANGLE = 1.0
@@ -66,18 +67,29 @@ def standing_place(stance: Stance) -> Scalar:
     return mean([stance.foot(k).x for k in stance.feet])
 
 
-def _leg_angles(stance: Stance) -> tuple[Scalar, Scalar] | None:
-    """Angles of swing leg and stance leg where these are alike bodies on the root point."""
-    mechanism = stance.mechanism
-    structure = mechanism.structure
+def straight_legs(mechanism: Mechanism) -> tuple[int, int] | None:
+    """Numbers of swing leg and stance leg where these are alike bodies on the root point.
+
+    Such a walker that has fallen leans to one side for good; with bent legs it may change.
+    """
+    structure, leg = mechanism.structure, mechanism.structure.stance_leg
     if len(standing_legs(structure)) > 1:
         return None
-    feet = (*stance.next_feet, *stance.feet)
+    feet = (*structure.feet_of_leg[next_leg(structure, leg)], *structure.feet_of_leg[leg])
     bodies = [structure.feet[k] for k in feet]
     bent = any(structure.parents[j] >= 0 for j in bodies) or len(feet) > 2
     if bent or any(mechanism.feet[k].centre.ahead is not None for k in feet):
         return None
-    swings, stands = (stance.pose.motion.angles[j] for j in bodies)
+    swings, stands = bodies
+    return swings, stands
+
+
+def _leg_angles(stance: Stance) -> tuple[Scalar, Scalar] | None:
+    """Angles of the two, where there are."""
+    legs = straight_legs(stance.mechanism)
+    if legs is None:
+        return None
+    swings, stands = (stance.pose.motion.angles[j] for j in legs)
     return swings, stands
 
 

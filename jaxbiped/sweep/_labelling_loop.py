@@ -17,6 +17,7 @@ from jaxbiped.basins._labels import Label, label_names
 from jaxbiped.dynamics._footfalls import any_of
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._strike_surfaces import straight_legs
 from jaxbiped.dynamics._symmetry import images
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
@@ -231,8 +232,10 @@ class RigidLabelling:
         return Progress(initial_progress(walk), trace, zero, None)
 
     def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
+        # A step behind a fall tells its side, unless legs that bend may change it.
+        bends = straight_legs(start.solve.scene.mechanism) is None
         after, over = attempt_step(
-            start.solve, now.solve, embedded=self.embedded, lands_on_falls=False
+            start.solve, now.solve, embedded=self.embedded, lands_on_falls=bends
         )
         trace = _after_arrival(start, now, after.struck, lambda: after.state, self.cycles)
         strike = jnp.where(after.struck, after.t, now.strike)

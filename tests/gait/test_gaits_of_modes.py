@@ -117,6 +117,25 @@ def test_labels_of_modes_are_how_walks_end(gait):
         assert int(found.label[k]) == int(walk.outcome), k
 
 
+@pytest.mark.slow
+def test_a_leg_that_collapses_falls_to_the_side_that_its_walk_tells(gait):
+    """Hip and foot are nearly in line then, and a step later the hip is on the other side."""
+    scene = hsu_chen()
+    angles = {
+        "theta_thigh_1": (-0.27, -0.16),
+        "theta_shank_1": (-0.30, -0.275),
+        "theta_thigh_2": (0.26, 0.29),
+        "theta_shank_2": (0.17, 0.2),
+    }
+    labelling = jb.labelling(scene, guess=gait.measures.state)
+    states = jb.starts.sample(scene, angles, 24).at(labelling, np.arange(24)).states
+    found = labelling(states)
+    starts = (type(states)(*[float(np.asarray(leaf)[k]) for leaf in states]) for k in range(24))
+    endings = [int(jb.rigid_walk(scene, start, footsteps=30).outcome) for start in starts]
+    np.testing.assert_array_equal(found.label, endings)
+    assert set(endings) == {int(jb.Ending.FELL_FORWARD), int(jb.Ending.FELL_BACK)}
+
+
 def test_gaits_of_modes_are_not_xlas():
     with pytest.raises(jb.ArgumentError, match=r"engine = 'xla' is not allowed"):
         jb.find_gait(hsu_chen(), engine="xla")
