@@ -16,13 +16,13 @@ from jaxbiped.dynamics._footfalls import touches as touches
 from jaxbiped.dynamics._hip_force import hip_force as hip_force
 from jaxbiped.dynamics._impact import Impact as Impact
 from jaxbiped.dynamics._impact import impact as impact
+from jaxbiped.dynamics._impact import push_off_work as push_off_work
 from jaxbiped.dynamics._linkage_motion import LinkageMotion as LinkageMotion
 from jaxbiped.dynamics._linkage_motion import LinkageState as LinkageState
 from jaxbiped.dynamics._linkage_motion import linkage_field as linkage_field
 from jaxbiped.dynamics._linkage_motion import linkage_motion as linkage_motion
 from jaxbiped.dynamics._minimal_motion import accelerations as accelerations
 from jaxbiped.dynamics._minimal_motion import vector_field as vector_field
-from jaxbiped.dynamics._push_off import push_off_work as push_off_work
 from jaxbiped.dynamics._redundant_motion import HipForce as HipForce
 from jaxbiped.dynamics._redundant_motion import RedundantMotion as RedundantMotion
 from jaxbiped.dynamics._redundant_motion import Violation as Violation

@@ -8,9 +8,15 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import load_shares, preload
-from jaxbiped.dynamics._footfalls import FootMotion, leg_depth, standing_leg, touches
+from jaxbiped.dynamics._footfalls import (
+    FootMotion,
+    LegMotion,
+    leg_depth,
+    leg_motions,
+    standing_leg,
+    touches,
+)
 from jaxbiped.dynamics._joint_loads import Pressed, stop_limits
-from jaxbiped.dynamics._legs import LegMotion, leg_motions
 from jaxbiped.dynamics._redundant_state import CompliantState, motion_in, poses_of
 from jaxbiped.dynamics._symmetry import images
 from jaxbiped.dynamics._tree import Pose, point_motion

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._implicit_field import fold
 from jaxbiped.dynamics._stance import Stance
-from jaxbiped.dynamics._tree_balance import fold
 from jaxbiped.linalg._sparse_lu import SparseFactors
 from jaxbiped.linalg._symmetric import factorise, solve
 from jaxbiped.scene._modes import Modes

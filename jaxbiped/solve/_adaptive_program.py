@@ -24,10 +24,13 @@ from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
-from jaxbiped.solve.controllers._first_and_last_step import clip_step, first_step
-from jaxbiped.solve.controllers._footstep_counter import FootstepLimit
-from jaxbiped.solve.controllers._located_ending import LocatedEnding
-from jaxbiped.solve.controllers._walk_step_size import walk_control, weigh_crossed
+from jaxbiped.solve.controllers._solve_ends import (
+    FootstepLimit,
+    LocatedEnding,
+    clip_step,
+    first_step,
+)
+from jaxbiped.solve.controllers._step_size import walk_control, weigh_crossed
 from jaxbiped.solve.controllers._wrapped_control import StepControl, widened_extremes
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
 
