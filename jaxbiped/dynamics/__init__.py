@@ -6,7 +6,6 @@ from jaxbiped.dynamics._consistent_state import project as project
 from jaxbiped.dynamics._contacts import FootForce as FootForce
 from jaxbiped.dynamics._contacts import feet as feet
 from jaxbiped.dynamics._contacts import foot_forces as foot_forces
-from jaxbiped.dynamics._contacts import standing_height as standing_height
 from jaxbiped.dynamics._energy import Energies as Energies
 from jaxbiped.dynamics._energy import Powers as Powers
 from jaxbiped.dynamics._energy import energies as energies
@@ -37,6 +36,7 @@ from jaxbiped.dynamics._rolling import rolling as rolling
 from jaxbiped.dynamics._rolling import rolling_field as rolling_field
 from jaxbiped.dynamics._section import AbstractSection as AbstractSection
 from jaxbiped.dynamics._state import rigid_state as rigid_state
+from jaxbiped.dynamics._state import standing_height as standing_height
 from jaxbiped.dynamics._state import whole_state as whole_state
 from jaxbiped.dynamics._switches import Switch as Switch
 from jaxbiped.dynamics._switches import switches as switches

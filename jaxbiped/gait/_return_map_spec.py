@@ -12,8 +12,8 @@ from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._gradient_modes import AbstractGradient, Reverse
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene, is_rigid
-from jaxbiped.scene._scene import RedundantScene
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._scene import RedundantScene, is_rigid
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._projected_solver import with_projection

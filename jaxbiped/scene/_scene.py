@@ -278,3 +278,13 @@ class RedundantScene(AbstractWalkerScene):
 
 CompliantScene: TypeAlias = Scene | RedundantScene
 """A walker with laws of contact, in minimal or redundant coordinates."""
+
+
+def is_compliant(args: object) -> bool:
+    """Whether the parameters of a system are a scene with laws of contact."""
+    return isinstance(args, AbstractWalkerScene) and args.compliant
+
+
+def is_rigid(args: object) -> bool:
+    """Whether the parameters of a system are a scene whose feet roll and strike."""
+    return isinstance(args, AbstractWalkerScene) and not args.compliant

@@ -56,18 +56,24 @@ _SAME_SLIP = 3.0
 
 
 def walk_control(
-    rtol: RealScalarLike, atol: RealScalarLike, units: Units, *, switch_weight: float = 1.0
+    rtol: RealScalarLike,
+    atol: RealScalarLike,
+    units: Units,
+    *,
+    switch_weight: float = 1.0,
+    probe: PyTree = None,
 ) -> StepControl:
     """The controller of a walk's steps; the solve's `args` must be the scene.
 
     Args:
         rtol, atol: tolerances; the absolute one in units of each leaf.
         units: units of the state's leaves and of time.
-        switch_weight: factor of the errors of steps that cross a switch (see `weigh_crossed`).
+        switch_weight: factor of the errors of steps that cross a switch.
+        probe: as of `CrossedSwitches`.
     """
     control: StepControl = ErrorControl(rtol, atol, units)
     if switch_weight != 1.0:
-        control = CrossedSwitches(control, switch_weight)
+        control = CrossedSwitches(control, switch_weight, probe)
     return ShallowContact(TouchdownAhead(control))
 
 
@@ -170,28 +176,18 @@ class CrossedSwitches(AbstractMemorylessControl):
 
     Attributes:
         weight: factor of those errors [–].
+        probe: a state as close to the step's end as its error, whose contacts cost less; None if
+            there is no such state.
     """
 
     weight: float
+    probe: PyTree = None
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        weighed = weigh_crossed(attempt.args, self.weight, attempt.y0, attempt.y1, attempt.error)
-        return attempt.by(self.controller, error=weighed)
-
-
-def weigh_crossed(
-    scene: CompliantScene, weight: float, y0: PyTree, y1: PyTree, error: PyTree
-) -> PyTree:
-    """A step's error, multiplied by `weight` if the step crosses a switch of the contact.
-
-    Args:
-        scene: the simulated scene.
-        weight: factor of the error of such a step [–].
-        y0, y1: states at the step's start and at its end, or as close to its end as its error.
-        error: error of the step, shaped as the states.
-    """
-    factor = jnp.where(crosses(scene, y0, y1), weight, 1.0)
-    return jtu.tree_map(lambda leaf: leaf * factor.astype(leaf.dtype), error)
+        end = attempt.y1 if self.probe is None else self.probe
+        factor = jnp.where(crosses(attempt.args, attempt.y0, end), self.weight, 1.0)
+        error = jtu.tree_map(lambda leaf: leaf * factor.astype(leaf.dtype), attempt.error)
+        return attempt.by(self.controller, error=error)
 
 
 def crosses(scene: CompliantScene, y0: PyTree, y1: PyTree) -> Scalar:
