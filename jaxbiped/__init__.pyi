@@ -38,7 +38,7 @@ from jaxbiped.scene._joint_parts import Latch as Latch
 from jaxbiped.scene._joint_parts import Motor as Motor
 from jaxbiped.scene._joint_parts import Spring as Spring
 from jaxbiped.scene._joint_parts import Stop as Stop
-from jaxbiped.scene._kneed import Kneed as Kneed
+from jaxbiped.scene._walker import Kneed as Kneed
 from jaxbiped.scene._mechanism import Mechanism as Mechanism
 from jaxbiped.scene._ready_scenes import ladder as ladder
 from jaxbiped.scene._parameter_access import parameter_names as parameter_names
@@ -49,7 +49,7 @@ from jaxbiped.scene._scene import RedundantScene as RedundantScene
 from jaxbiped.scene._scene import RigidScene as RigidScene
 from jaxbiped.scene._scene import Scene as Scene
 from jaxbiped.scene._ready_scenes import seed_scene as seed_scene
-from jaxbiped.scene._torso_walker import WithTorso as WithTorso
+from jaxbiped.scene._walker import WithTorso as WithTorso
 from jaxbiped.scene._walker import Walker as Walker
 
 # States and the sections that they cross.

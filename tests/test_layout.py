@@ -98,7 +98,7 @@ KNOW_OF_TWO_LEGS = {
     "dynamics/_state.py",  # the seed's start
     "gait/_search_starts.py",  # the seed's start
     "models/_catalogue.py",  # starts of published walkers
-    "models/_compass_walkers.py",  # which angles of papers they are
+    "models/_published_walkers.py",  # which angles of papers they are
     "identify/_measured_gait.py",  # two names of angles
     "plot/_parameter_charts.py",  # an example
     "scene/_state_types.py",

@@ -4,7 +4,7 @@ import pytest
 
 from tests.scene_trip import above, imports, trip_through
 
-MOST = {"simulate": (23, 2), "find_gait": (25, 5), "labelling": (33, 6)}
+MOST = {"simulate": (19, 2), "find_gait": (22, 5), "labelling": (27, 6)}
 """Files entered, and climbs back to a file above."""
 
 

@@ -8,7 +8,7 @@ import equinox as eqx
 from jaxbiped._checks import check_at_least
 from jaxbiped._parameter_declaration import AbstractPart
 from jaxbiped._types import Scalar, by_numpy
-from jaxbiped.linalg._symmetric import factorise, solve
+from jaxbiped.linalg._elimination import symmetric_factors
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
@@ -128,7 +128,7 @@ class AbstractExactProjection(AbstractProjectingMethod):
 def exact_multipliers(system: Constrained, right: list[Scalar] | None = None) -> list[Scalar]:
     """λ with (J M⁻¹ Jᵀ) λ = right. Default of `right`: the free residual."""
     right = free_residual(system) if right is None else right
-    return solve(factorise(gram(system.rows, inverse_masses(system.masses))), right)
+    return symmetric_factors(gram(system.rows, inverse_masses(system.masses))).solve(right)
 
 
 def applied_impulse(rows: list[Row], weights: list[Scalar], multipliers: list[Scalar]) -> Row:
@@ -143,4 +143,4 @@ def applied_impulse(rows: list[Row], weights: list[Scalar], multipliers: list[Sc
 
 def projection(rows: list[Row], weights: list[Scalar], residual: list[Scalar]) -> Row:
     """−W Jᵀ(J W Jᵀ)⁻¹ r for a diagonal W."""
-    return applied_impulse(rows, weights, solve(factorise(gram(rows, weights)), residual))
+    return applied_impulse(rows, weights, symmetric_factors(gram(rows, weights)).solve(residual))

@@ -21,7 +21,7 @@ from jaxbiped.constraints._constraint_method import (
     projection,
     stabilised_residual,
 )
-from jaxbiped.linalg._symmetric import Factors, factorise, solve
+from jaxbiped.linalg._elimination import SymmetricFactors, symmetric_factors
 
 
 class Standard(AbstractConstraintMethod):
@@ -79,14 +79,16 @@ class AbstractPenalised(AbstractConstraintMethod):
     zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
     needs_independent: ClassVar[bool] = False
 
-    def penalty_system(self, system: Constrained) -> tuple[Factors, list[Scalar]]:
+    def penalty_system(self, system: Constrained) -> tuple[SymmetricFactors, list[Scalar]]:
         """Factors of J M⁻¹ Jᵀ + 1/A, and the violation that the applied forces alone would leave.
 
         By Woodbury's identity (M + A JᵀJ)⁻¹ asks for no more than that k × k matrix, which is
         regular whatever the constraints say, and is well conditioned where M + A JᵀJ is not.
         """
         right = stabilised_residual(system, 2.0 * self.zeta * self.omega, self.omega * self.omega)
-        return factorise(gram(system.rows, inverse_masses(system.masses), 1.0 / self.A)), right
+        return symmetric_factors(
+            gram(system.rows, inverse_masses(system.masses), 1.0 / self.A)
+        ), right
 
 
 class AbstractAugmented(AbstractPenalised):
@@ -111,7 +113,7 @@ class AbstractAugmented(AbstractPenalised):
 
 
 def iterate_multipliers(
-    factors: Factors,
+    factors: SymmetricFactors,
     matrix: list[list[Scalar]],
     right: list[Scalar],
     iterations: int,
@@ -121,14 +123,14 @@ def iterate_multipliers(
     An error of λ that the constraints feel shrinks by 1/(1 + A s) each time, s the eigenvalue of S
     that it belongs to.
     """
-    found = solve(factors, right)
+    found = factors.solve(right)
     size = len(right)
     for _ in range(iterations - 1):
         left = []
         for i in range(size):
             row = [matrix[max(i, j)][min(i, j)] * found[j] for j in range(size)]
             left.append(right[i] - sum(row[1:], row[0]))
-        found = [x + dx for x, dx in zip(found, solve(factors, left), strict=True)]
+        found = [x + dx for x, dx in zip(found, factors.solve(left), strict=True)]
     return found
 
 
@@ -148,7 +150,8 @@ class Penalty(AbstractPenalised):
     A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e10)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        return solve(*self.penalty_system(system))
+        factors, right = self.penalty_system(system)
+        return factors.solve(right)
 
 
 class Augmented(AbstractAugmented):
@@ -186,7 +189,7 @@ class Index1Augmented(AbstractAugmented, AbstractProjectingMethod):
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
         weights = inverse_masses(masses)
-        factors = factorise(gram(rows, weights, 1.0 / self.A))
+        factors = symmetric_factors(gram(rows, weights, 1.0 / self.A))
         found = iterate_multipliers(factors, gram(rows, weights), residual, self.iterations)
         return applied_impulse(rows, weights, found)
 

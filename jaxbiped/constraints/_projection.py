@@ -20,7 +20,7 @@ from jaxbiped.constraints._constraint_method import (
 )
 from jaxbiped.constraints._linkage import Linkage
 from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of, row_times
-from jaxbiped.linalg._symmetric import factorise, solve
+from jaxbiped.linalg._elimination import symmetric_factors
 
 _LEAST = 1e-10
 """Smallest eigenvalue of J M⁻¹ Jᵀ, in units of the largest, of constraints that are independent."""
@@ -99,7 +99,7 @@ def nearest_consistent(
         matrix = gram(rows, weights)
         shift = 1e-14 * sum((matrix[i][i] for i in range(1, len(matrix))), matrix[0][0])
         return applied_impulse(
-            rows, weights, solve(factorise(gram(rows, weights, shift)), residual)
+            rows, weights, symmetric_factors(gram(rows, weights, shift)).solve(residual)
         )
 
     def nearer(_: Scalar, q: list[Scalar]) -> list[Scalar]:

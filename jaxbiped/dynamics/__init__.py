@@ -6,7 +6,6 @@ from jaxbiped.dynamics._consistent_state import project as project
 from jaxbiped.dynamics._contacts import FootForce as FootForce
 from jaxbiped.dynamics._contacts import feet as feet
 from jaxbiped.dynamics._contacts import foot_forces as foot_forces
-from jaxbiped.dynamics._contacts import standing_height as standing_height
 from jaxbiped.dynamics._energy import Energies as Energies
 from jaxbiped.dynamics._energy import Powers as Powers
 from jaxbiped.dynamics._energy import energies as energies
@@ -16,13 +15,13 @@ from jaxbiped.dynamics._footfalls import touches as touches
 from jaxbiped.dynamics._hip_force import hip_force as hip_force
 from jaxbiped.dynamics._impact import Impact as Impact
 from jaxbiped.dynamics._impact import impact as impact
+from jaxbiped.dynamics._impact import push_off_work as push_off_work
 from jaxbiped.dynamics._linkage_motion import LinkageMotion as LinkageMotion
 from jaxbiped.dynamics._linkage_motion import LinkageState as LinkageState
 from jaxbiped.dynamics._linkage_motion import linkage_field as linkage_field
 from jaxbiped.dynamics._linkage_motion import linkage_motion as linkage_motion
 from jaxbiped.dynamics._minimal_motion import accelerations as accelerations
 from jaxbiped.dynamics._minimal_motion import vector_field as vector_field
-from jaxbiped.dynamics._push_off import push_off_work as push_off_work
 from jaxbiped.dynamics._redundant_motion import HipForce as HipForce
 from jaxbiped.dynamics._redundant_motion import RedundantMotion as RedundantMotion
 from jaxbiped.dynamics._redundant_motion import Violation as Violation
@@ -37,6 +36,7 @@ from jaxbiped.dynamics._rolling import rolling as rolling
 from jaxbiped.dynamics._rolling import rolling_field as rolling_field
 from jaxbiped.dynamics._section import AbstractSection as AbstractSection
 from jaxbiped.dynamics._state import rigid_state as rigid_state
+from jaxbiped.dynamics._state import standing_height as standing_height
 from jaxbiped.dynamics._state import whole_state as whole_state
 from jaxbiped.dynamics._switches import Switch as Switch
 from jaxbiped.dynamics._switches import switches as switches

@@ -6,8 +6,8 @@ from typing import NamedTuple, TypeAlias, TypeVar
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._footfalls import LegMotion
 from jaxbiped.dynamics._joint_loads import with_joint_loads
-from jaxbiped.dynamics._legs import LegMotion
 from jaxbiped.dynamics._motor_motion import motor_torques
 from jaxbiped.dynamics._tree import Loads, Motion
 from jaxbiped.scene._scene import CompliantScene, RigidScene

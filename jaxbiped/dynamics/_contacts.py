@@ -1,5 +1,6 @@
-"""Contacts: the feet, which of them touch, the forces on them, and all gaps that may close."""
+"""Contacts: the feet, which touch, how far they slid, the forces on them, and gaps that close."""
 
+import functools
 from typing import NamedTuple, cast
 
 import jax.numpy as jnp
@@ -8,16 +9,20 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import load_shares, preload
-from jaxbiped.dynamics._footfalls import FootMotion, leg_depth, standing_leg, touches
+from jaxbiped.dynamics._footfalls import (
+    FootMotion,
+    LegMotion,
+    leg_depth,
+    leg_motions,
+    standing_leg,
+    touches,
+)
 from jaxbiped.dynamics._joint_loads import Pressed, stop_limits
-from jaxbiped.dynamics._legs import LegMotion, leg_motions
 from jaxbiped.dynamics._redundant_state import CompliantState, motion_in, poses_of
 from jaxbiped.dynamics._symmetry import images
 from jaxbiped.dynamics._tree import Pose, point_motion
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._ground import drop_under
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._placement import placement
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene._state_types import SomeState
 from jaxbiped.scene._structure import Structure
@@ -118,30 +123,6 @@ def with_stance_leg_standing(scene: CompliantScene, state: SomeState) -> SomeSta
     for other, image in others:
         state = select((stands == 1 + other) & ~strikes, image, state)
     return state
-
-
-def standing_height(
-    scene: AbstractWalkerScene, stance_angle: Scalar, penetration: Scalar | float = 0.0
-) -> Scalar:
-    """Height of the root point over a leg that stands on its lowest foot.
-
-    Args:
-        scene: the walker on its ground.
-        stance_angle: angle of all bodies of that leg from the slope's normal [rad].
-        penetration: depth of the foot in the ground [m].
-
-    Returns:
-        The root point's height above the slope [m], of the broadcast shape.
-    """
-    structure = scene.mechanism.structure
-    leg = structure.stance_leg
-    turned = {
-        f"theta_{structure.bodies[j]}": stance_angle
-        for j in structure.free
-        if j in structure.bodies_of_leg(leg)
-    }
-    placed = placement(scene.mechanism, scene.ground.slope, turned, structure.legs[leg])
-    return placed[f"{structure.root}_z"] - penetration
 
 
 class FootForce(NamedTuple):
@@ -280,3 +261,29 @@ def gaps(scene: CompliantScene, state: CompliantState) -> tuple[Gap, ...]:
     ]
     at_stops = [Gap(limit.penetration, limit.rate, None) for _, limit in limits_of(scene, state)]
     return (*under, *at_stops)
+
+
+def contact_places(scene: CompliantScene, state: CompliantState) -> tuple[Scalar, ...]:
+    """For each foot, the place [m] that changes by what it slips: its rate is the slip speed."""
+    mechanism, angles = scene.mechanism, motion_in(scene, state).angles
+    parts = zip(feet(scene, state), mechanism.feet, mechanism.structure.feet, strict=True)
+    return tuple(
+        found.x if foot.radius is None else found.x + foot.radius * angles[body]
+        for found, foot, body in parts
+    )
+
+
+def slip_distances(
+    scene: CompliantScene, state: CompliantState, landed: tuple[Scalar, ...]
+) -> tuple[tuple[Scalar, ...], Scalar]:
+    """The places at which the feet last came down, and how far the worst one has slid since [m].
+
+    `landed` are these places a step ago; see `contact_places`.
+    """
+    found, places = feet(scene, state), contact_places(scene, state)
+    kept = tuple(
+        jnp.where(touches(foot), old, new)
+        for foot, old, new in zip(found, landed, places, strict=True)
+    )
+    slid = [jnp.abs(new - old) for old, new in zip(kept, places, strict=True)]
+    return kept, functools.reduce(jnp.maximum, slid)

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._implicit_field import fold
 from jaxbiped.dynamics._stance import Stance
-from jaxbiped.dynamics._tree_balance import fold
+from jaxbiped.linalg._elimination import symmetric_factors
 from jaxbiped.linalg._sparse_lu import SparseFactors
-from jaxbiped.linalg._symmetric import factorise, solve
 from jaxbiped.scene._modes import Modes
 from jaxbiped.scene._structure import Angle, weighted
 
@@ -56,7 +56,7 @@ class Holds(NamedTuple):
         right = [
             jnp.where(h, -value, zero) for h, value in zip(held, self.along(free), strict=True)
         ]
-        return solve(factorise(matrix), right)
+        return symmetric_factors(matrix).solve(right)
 
     def under(self, free: Row, reactions: Sequence[Scalar]) -> Row:
         """Values with the reactions."""

@@ -16,12 +16,16 @@ from jaxbiped.dynamics._contacts import (
     normal_forces,
 )
 from jaxbiped.dynamics._footfalls import FootMotion
-from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
+from jaxbiped.dynamics._implicit_field import (
+    AbstractImplicitField,
+    Residual,
+    force_balance,
+    free_mass_entries,
+)
 from jaxbiped.dynamics._joint_loads import with_constraint_torques
 from jaxbiped.dynamics._redundant_state import CompliantState, motion_in
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, Pose, point_motion, pose_of
-from jaxbiped.dynamics._tree_balance import force_balance, free_mass_entries
 from jaxbiped.dynamics._tree_inertia import (
     Composites,
     centrifugal_loads,

@@ -11,8 +11,8 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, is_number
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._footfalls import LegMotion
 from jaxbiped.dynamics._joint_loads import angle_value
-from jaxbiped.dynamics._legs import LegMotion
 from jaxbiped.dynamics._tree import Motion
 from jaxbiped.scene._joint_parts import Motor
 from jaxbiped.scene._mechanism import Mechanism

@@ -8,8 +8,8 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._trigonometry import angle_of_vector, sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import kept_alone
+from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._joint_loads import motion_of
-from jaxbiped.dynamics._legs import mean
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.dynamics._tree import Motion, Pose, point_motion, pose_of
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene

@@ -10,11 +10,11 @@ from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import Carriers, with_driven_joints
 from jaxbiped.dynamics._contacts import FootForce, legs_in
 from jaxbiped.dynamics._holds import Holds, Row, holds_of
+from jaxbiped.dynamics._implicit_field import fold, fold_matrix
 from jaxbiped.dynamics._joint_loads import of_all_bodies
 from jaxbiped.dynamics._stance import Stance, angles_and_rates, of_stance
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, rehung
-from jaxbiped.dynamics._tree_balance import fold, fold_matrix
 from jaxbiped.dynamics._tree_inertia import inertial_loads
 from jaxbiped.linalg._elimination import Entry
 from jaxbiped.linalg._sparse_lu import factorise

@@ -19,7 +19,8 @@ from jaxbiped.dynamics._footfalls import (
 )
 from jaxbiped.dynamics._strike_surfaces import lead, lean, opening
 from jaxbiped.dynamics._symmetry import exchange_legs, images
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene, is_rigid
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._scene import is_rigid
 from jaxbiped.scene._state_types import SomeState
 
 

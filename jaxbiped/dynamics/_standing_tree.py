@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxbiped._parameter_declaration import with_fields
 from jaxbiped._types import Scalar
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.dynamics._tree_balance import Weights, free_weights
+from jaxbiped.dynamics._implicit_field import Weights, free_weights
 from jaxbiped.dynamics._tree_inertia import Composites, composites
 from jaxbiped.linalg._elimination import Entry, plus
 from jaxbiped.scene._mechanism import Mechanism

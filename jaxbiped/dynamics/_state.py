@@ -16,6 +16,7 @@ from jaxbiped._types import Scalar, VectorField, as_float, by_numpy
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._stance import angles_and_rates, of_stance
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._placement import placement
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import SomeState, State, state_type_of
 
@@ -52,6 +53,30 @@ def seed_state() -> State:
         omega_1=as_float(-0.0052),
         omega_2=as_float(-1.2565),
     )
+
+
+def standing_height(
+    scene: AbstractWalkerScene, stance_angle: Scalar, penetration: Scalar | float = 0.0
+) -> Scalar:
+    """Height of the root point over a leg that stands on its lowest foot.
+
+    Args:
+        scene: the walker on its ground.
+        stance_angle: angle of all bodies of that leg from the slope's normal [rad].
+        penetration: depth of the foot in the ground [m].
+
+    Returns:
+        The root point's height above the slope [m], of the broadcast shape.
+    """
+    structure = scene.mechanism.structure
+    leg = structure.stance_leg
+    turned = {
+        f"theta_{structure.bodies[j]}": stance_angle
+        for j in structure.free
+        if j in structure.bodies_of_leg(leg)
+    }
+    placed = placement(scene.mechanism, scene.ground.slope, turned, structure.legs[leg])
+    return placed[f"{structure.root}_z"] - penetration
 
 
 def without_whole_turns(scene: AbstractWalkerScene, state: SomeState) -> SomeState:

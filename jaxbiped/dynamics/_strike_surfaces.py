@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._legs import mean
+from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._rigid_feet import next_leg, standing_legs

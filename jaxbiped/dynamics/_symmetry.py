@@ -6,7 +6,8 @@ from typing import Any
 from jaxbiped.dynamics._redundant_state import motion_in
 from jaxbiped.dynamics._stance import stance_on
 from jaxbiped.dynamics._state_quantities import OF_BODIES
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene, is_rigid
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._scene import is_rigid
 from jaxbiped.scene._state_types import SomeState
 from jaxbiped.scene._structure import Structure
 

@@ -12,9 +12,9 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state_quantities import recurring_names
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._gradient_modes import AbstractGradient, Implicit
 from jaxbiped.gait._measures import Measures
 from jaxbiped.gait._return_map import Return, return_map
+from jaxbiped.gait._return_map_spec import AbstractGradient, Implicit
 from jaxbiped.linalg._elimination import solution
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene

@@ -30,6 +30,7 @@ from jaxbiped.scene._walker import Walker
 _CONTROL = StepControl(first=0.08, largest=0.35, smallest=2e-4)
 _CONVERGED = 2e-5
 """Size of a correction that ends the corrector."""
+_MOST_STEPS = 150
 _AT_END = 1e-9
 _BEYOND_FOLD, _BACK = 24, 0.25
 """Steps, and distance in s, for which a branch is followed back behind its first fold."""
@@ -151,7 +152,6 @@ def follow_branch(
     *,
     scales: np.ndarray,
     smallest: float = _CONTROL.smallest,
-    most_steps: int = 150,
 ) -> FollowedBranch:
     """Follows the branch of zeros of `change` from one at s until s = 1.
 
@@ -161,7 +161,6 @@ def follow_branch(
         s: where the branch begins.
         scales: sizes of the components, shape (m,), in which arclength is measured; s in its own.
         smallest: arclength of a step below which the branch is given up.
-        most_steps: steps allowed.
     """
     curve = Curve(change, np.append(scales, 1.0), _CONVERGED)
     here = np.append(start, s) / curve.sizes
@@ -170,7 +169,7 @@ def follow_branch(
         return FollowedBranch(start[None], np.full(1, s), BranchEnd.NO_BEGINNING, first.code)
     control = _CONTROL._replace(smallest=smallest)
     path, end, code = [first.found], BranchEnd.UNFINISHED, 0
-    for attempt in islice(follow(curve, first.found, control, high=1.0), most_steps):
+    for attempt in islice(follow(curve, first.found, control, high=1.0), _MOST_STEPS):
         if attempt.found is None:
             code = attempt.code
             end = BranchEnd.WALK_ENDS if code else BranchEnd.BREAKS_OFF

@@ -13,10 +13,17 @@ from jaxbiped._types import Scalar, Time, as_float, select
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import check_leaves, without_whole_turns
-from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
 from jaxbiped.gait._poincare_map import LinearisedReturn, linearised_return, seed_directions
 from jaxbiped.gait._return_derivatives import forward, reverse
-from jaxbiped.gait._return_map_spec import arrivals_of, check_holds_none, return_map_spec
+from jaxbiped.gait._return_map_spec import (
+    AbstractGradient,
+    Forward,
+    Reverse,
+    arrivals_of,
+    check_gradient,
+    check_holds_none,
+    return_map_spec,
+)
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
@@ -84,7 +91,7 @@ def return_map(
         TypeError: forward mode is used with `Reverse()`.
     """
     gradient = Forward() if gradient is None else gradient
-    check_anywhere(gradient, "a return map")
+    check_gradient(gradient)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_positive("max_time", max_time, "s")
     if system is None:

@@ -1,4 +1,4 @@
-"""Specification of a return map: whose it is, and how it is solved."""
+"""Specification of a return map: whose it is, how it is solved, and how derivatives are taken."""
 
 import diffrax
 import equinox as eqx
@@ -11,9 +11,8 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.gait._gradient_modes import AbstractGradient, Reverse
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene, is_rigid
-from jaxbiped.scene._scene import RedundantScene
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._scene import RedundantScene, is_rigid
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._projected_solver import with_projection
@@ -29,6 +28,35 @@ from jaxbiped.variational._tangents import Watch
 
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""
+
+
+class AbstractGradient(eqx.Module):
+    """A way to take derivatives."""
+
+
+class Forward(AbstractGradient):
+    """Tangents carried along the motion, their errors controlled: for few directions.
+
+    Through XLA every direction is one solve of its own under `jax.jacfwd`, in lockstep; by lanes
+    all share one.
+    """
+
+
+class Reverse(AbstractGradient):
+    """Reverse mode, for many parameters.
+
+    Through XLA it goes back over the solver's steps, with checkpoints; they are chosen so that the
+    derivatives with respect to the whole state keep the derivatives' tolerance, and reverse mode
+    is those derivatives' transpose. By lanes the derivatives with respect to every input are
+    carried along the motion, as `Forward` does, and transposed.
+    """
+
+
+class Implicit(AbstractGradient):
+    """The implicit function theorem at a periodic orbit: every derivative, once, for both modes.
+
+    First derivatives only: a second one is refused.
+    """
 
 
 class ReturnMapSpec(eqx.Module):
@@ -195,6 +223,19 @@ def orbit_solver(
             "which steps are chosen."
         )
     return found
+
+
+def check_gradient(gradient: AbstractGradient) -> None:
+    """Raises `ArgumentError` for a mode that needs a periodic orbit."""
+    if not isinstance(gradient, AbstractGradient):
+        raise ArgumentError(
+            f"gradient = {gradient!r} is not allowed: it must be Forward() or Reverse()."
+        )
+    if isinstance(gradient, Implicit):
+        raise ArgumentError(
+            "gradient = Implicit() is not allowed for a return map, which need not be periodic: "
+            "choose Forward() or Reverse()."
+        )
 
 
 def check_holds_none(

@@ -1,4 +1,4 @@
-"""Small matrices, inverted by elimination unrolled over rows.
+"""Small matrices, inverted or factorised by elimination unrolled over rows.
 
 A matrix is a list of rows of scalars, in which None stands for an entry that is zero whatever the
 state. Scalars may carry any batch shape, so that under `vmap` every operation runs over the whole
@@ -204,3 +204,53 @@ def matmul(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
     """A matrix times a vector, each a list of scalars."""
     products = [[a * b for a, b in zip(row, right, strict=True)] for row in matrix]
     return [sum(row[1:], row[0]) for row in products]
+
+
+class SymmetricFactors(NamedTuple):
+    """L D Lᵀ of a symmetric positive matrix.
+
+    Attributes:
+        lower: rows of L, the unit diagonal left out.
+        inverse: the inverses of the entries of D.
+    """
+
+    lower: list[list[Scalar]]
+    inverse: list[Scalar]
+
+    def solve(self, right: list[Scalar]) -> list[Scalar]:
+        """The solution of the system with this right side."""
+        lower, inverse = self
+        size = len(right)
+        forward: list[Scalar] = []
+        for i in range(size):
+            known = [lower[i][k] * forward[k] for k in range(i)]
+            forward.append(right[i] - _total(known, right[i]))
+        found = [value * over for value, over in zip(forward, inverse, strict=True)]
+        for i in reversed(range(size)):
+            known = [lower[k][i] * found[k] for k in range(i + 1, size)]
+            found[i] = found[i] - _total(known, found[i])
+        return found
+
+
+def symmetric_factors(matrix: list[list[Scalar]]) -> SymmetricFactors:
+    """Factors of a symmetric positive matrix; not finite, or huge, where it is singular.
+
+    Only the lower half of its rows is read.
+    """
+    lower: list[list[Scalar]] = []
+    diagonal: list[Scalar] = []
+    inverse: list[Scalar] = []
+    for i, row in enumerate(matrix):
+        scaled: list[Scalar] = []
+        for j in range(i):
+            known = [scaled[k] * diagonal[k] * lower[j][k] for k in range(j)]
+            scaled.append((row[j] - _total(known, row[j])) * inverse[j])
+        known = [scaled[k] * scaled[k] * diagonal[k] for k in range(i)]
+        diagonal.append(row[i] - _total(known, row[i]))
+        inverse.append(1.0 / diagonal[i])
+        lower.append(scaled)
+    return SymmetricFactors(lower, inverse)
+
+
+def _total(terms: list[Scalar], like: Scalar) -> Scalar:
+    return sum(terms[1:], terms[0]) if terms else jnp.zeros_like(like)

@@ -5,9 +5,16 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from jaxbiped.models._compass_walkers import bhounsule, garcia, goswami, kuo, wisse
-from jaxbiped.models._mcgeer import mcgeer
-from jaxbiped.models._walkers_in_modes import hsu_chen, rimless_wheel
+from jaxbiped.models._published_walkers import (
+    bhounsule,
+    garcia,
+    goswami,
+    hsu_chen,
+    kuo,
+    mcgeer,
+    rimless_wheel,
+    wisse,
+)
 
 
 class Model(NamedTuple):

@@ -18,8 +18,7 @@ from jaxbiped.dynamics._actuation import actuator_powers
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._energy import is_driven, powers
 from jaxbiped.dynamics._footfalls import touches
-from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._push_off import push_off_work
+from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._stance import kinetic_energy

@@ -171,9 +171,9 @@ def legend_below(ax: Axes, *, columns: int, **options: Any) -> None:
     legend(ax, **place | options)
 
 
-def legend_of_figure(figure: Figure, entries: list[Any], *, columns: int = 3) -> None:
-    """A legend under all axes of a figure, in so many columns or as many as there is room for."""
-    columns = _columns(figure, entries, columns)
+def legend_of_figure(figure: Figure, entries: list[Any]) -> None:
+    """A legend under all axes of a figure, in three columns or as many as there is room for."""
+    columns = _columns(figure, entries, 3)
     look: dict[str, Any] = {"frameon": False, "fontsize": "small", "ncols": columns}
     figure.legend(handles=entries, loc="outside lower center", **look)
 

@@ -9,9 +9,7 @@ from equinox import AbstractVar
 from jaxbiped._summary import notebook_html
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._mechanism import Mechanism, mechanism_of
-from jaxbiped.scene.laws._abstract_laws import (
-    AbstractBristleLaw,
-)
+from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
@@ -94,13 +92,3 @@ class AbstractMinimalScene(AbstractWalkerScene):
     def with_minimal(self, minimal: Self) -> Self:
         """The other model itself."""
         return minimal
-
-
-def is_compliant(args: object) -> bool:
-    """Whether the parameters of a system are a scene with laws of contact."""
-    return isinstance(args, AbstractWalkerScene) and args.compliant
-
-
-def is_rigid(args: object) -> bool:
-    """Whether the parameters of a system are a scene whose feet roll and strike."""
-    return isinstance(args, AbstractWalkerScene) and not args.compliant

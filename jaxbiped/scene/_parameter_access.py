@@ -93,7 +93,7 @@ def _quantity(part: object, name: str, path: _Path) -> Quantity:
             continue
         if not dataclasses.is_dataclass(part):
             break  # an entry of a user's own dictionary
-        infos = parameter_infos(part)
+        infos = parameter_infos(type(part))
         if key.name in infos:
             found = _entry(infos[key.name].quantity, path[position + 1 :])
             if isinstance(part, Point):

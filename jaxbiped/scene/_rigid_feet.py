@@ -1,13 +1,22 @@
-"""Rigid feet of a mechanism: which may stand and strike, and what is refused of them."""
+"""Rigid feet of a mechanism: which may stand and strike, and the mode that a start is in."""
 
-from collections.abc import Sequence
+import functools
+import operator
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, holds_somewhere
+from jaxbiped._types import Parameter, Scalar, as_float, by_numpy
+from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.scene._couplings import angles_and_rates_named
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._modes import Modes, modes_of
-from jaxbiped.scene._placement import feet_named
+from jaxbiped.scene._modes import Mode, Modes, limits_named, modes_of
+from jaxbiped.scene._placement import feet_named, foot_motion
 from jaxbiped.scene._structure import Indices, Structure
 
 
@@ -85,3 +94,140 @@ def check_stands(structure: Structure, standing: str | Sequence[str] | None) -> 
         which = "one leg stands" if len(able) > 1 else "the second of each pair stands"
         raise ArgumentError(f"standing = {standing!r} is not allowed: {which}, {told}.")
     return named
+
+
+AT_LIMIT = 1e-6
+"""Distance from a limit [rad], and rate in rad/s, up to which a stop may be held."""
+_DRIFT = 1e-2
+"""The same of a state that a walk ended at."""
+_LEVEL = 1e-9
+"""Difference of height of two feet, in units of the walker's height, up to which both stand."""
+
+
+def starting_mode(
+    mechanism: Mechanism,
+    modes: Modes,
+    slope: Parameter,
+    state: Mapping[str, Scalar],
+    standing: Indices,
+    held: str | Sequence[str] | None,
+) -> Scalar:
+    """The mode of a state.
+
+    Args:
+        mechanism: with its stops.
+        modes: of it.
+        slope: angle of the vertical [rad].
+        state: scalars by name.
+        standing: feet of one leg that may stand: the lowest of them does, or both.
+        held: names of stops that are held; None for those that rest at a limit. One that moves
+            into its limit hits it as the motion begins.
+
+    Raises:
+        ArgumentError: a stop that is passed, or one that is held off its limit.
+    """
+    named = None if held is None else limits_named(modes, held)
+    leaves, tree = jtu.tree_flatten(mechanism)
+    names, known = list(state), len(state)
+
+    def found(numpy: Any, slope: Any, *numbers: Any) -> tuple[Any, ...]:
+        values = dict(zip(names, numbers[:known], strict=True))
+        placed: Mechanism = jtu.tree_unflatten(tree, numbers[known:])
+        angles, rates = angles_and_rates_named(placed, slope, values)
+        gaps = [limit.distance(placed, angles, slope) for limit in modes.limits]
+        closing = [limit.gap.of(rates) for limit in modes.limits]
+        if named is None:
+            stay = [
+                (numpy.abs(gap) <= AT_LIMIT) & (numpy.abs(rate) <= AT_LIMIT)
+                for gap, rate in zip(gaps, closing, strict=True)
+            ]
+        else:
+            stay = [numpy.full(numpy.shape(gap), i in named) for i, gap in enumerate(gaps)]
+        like = values[names[0]]
+        heights = [_height(numpy, placed, k, angles, rates) for k in standing]
+        stands = _standing(modes, standing, heights, placed.height, like)
+        mode = Mode(stands, tuple(stay), tuple(0.0 * like > 1.0 for _ in modes.locks))
+        return (modes.encoded(numpy, mode, like), *gaps, *closing)
+
+    number: Scalar
+    number, *parts = by_numpy(found, as_float(slope), *state.values(), *leaves)
+    gaps, closing = parts[: len(modes.limits)], parts[len(modes.limits) :]
+    for i, (limit, gap, rate) in enumerate(zip(modes.limits, gaps, closing, strict=True)):
+        if holds_somewhere(gap < -AT_LIMIT):
+            raise ArgumentError(
+                f"the state passes the stop {limit.name!r} by {-gap} rad, which is not allowed: "
+                "it may come up to its limit."
+            )
+        off = (abs(gap) > AT_LIMIT) | (abs(rate) > AT_LIMIT)
+        if named is not None and i in named and holds_somewhere(off):
+            raise ArgumentError(
+                f"held = {limit.name!r} is not allowed: the stop is {gap} rad off its limit and "
+                f"moves at {rate} rad/s, where it must be at rest there."
+            )
+    return number
+
+
+def check_mode(mechanism: Mechanism, modes: Modes, slope: Parameter, state: Any) -> None:
+    """Refuses a state that passes a stop, or whose mode holds one that it is off or moves on.
+
+    Such states come from `_replace`, not from a scene's `state`. Less than a walk's own error is
+    allowed, so that a walk may go on from where another ended.
+
+    Raises:
+        ArgumentError: such a state, where it is known.
+    """
+    given = (mechanism, slope, state)
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(given)):
+        holds_somewhere(_is_misheld(modes, *given))
+        return
+    leaves, tree = jtu.tree_flatten(given)
+
+    def found(numpy: Any, *leaves: Any) -> list[tuple[Any, Any, Any]]:
+        return _misheld(numpy, modes, *jtu.tree_unflatten(tree, leaves))
+
+    for limit, (wrong, gap, rate) in zip(modes.limits, by_numpy(found, *leaves), strict=True):
+        if wrong.any():
+            raise ArgumentError(
+                f"state.mode = {state.mode} is not allowed: the stop {limit.name!r} is {gap} rad "
+                f"off its limit and moves at {rate} rad/s, so that it is passed or cannot be held; "
+                "make the state with scene.state(...)."
+            )
+
+
+@cached_jit  # many small operations
+def _is_misheld(modes: Modes, mechanism: Mechanism, slope: Scalar, state: Any) -> Scalar:
+    found = _misheld(jnp, modes, mechanism, slope, state)
+    return functools.reduce(operator.or_, (wrong for wrong, _, _ in found), jnp.asarray(False))
+
+
+def _misheld(
+    numpy: Any, modes: Modes, mechanism: Mechanism, slope: Any, state: Any
+) -> list[tuple[Any, Any, Any]]:
+    """For each limit whether it is passed, or held but off or moving; its gap, and the rate."""
+    angles, rates = angles_and_rates_named(mechanism, slope, state._asdict())
+    held, found = modes.decoded(numpy, state.mode).held, []
+    for limit, stays in zip(modes.limits, held, strict=True):
+        gap, rate = limit.distance(mechanism, angles, slope), limit.gap.of(rates)
+        off = stays & ((abs(gap) > _DRIFT) | (abs(rate) > _DRIFT))
+        found.append((off | (gap < -_DRIFT), gap, rate))
+    return found
+
+
+def _height(numpy: Any, mechanism: Mechanism, foot: int, angles: Any, rates: Any) -> Any:
+    radius = mechanism.feet[foot].radius
+    z, _, _ = foot_motion(numpy, mechanism, foot, angles, rates)
+    return z - (0.0 if radius is None else radius)
+
+
+def _standing(
+    modes: Modes, feet: Indices, heights: list[Any], unit: Any, like: Any
+) -> tuple[Any, ...]:
+    yes, no = 0.0 * like == 0.0, 0.0 * like > 1.0
+    for leg, own in modes.soles:
+        if feet[0] in own:
+            low = [yes if k in feet else no for k in own]
+            if len(feet) > 1:
+                (first, second), near = heights, _LEVEL * unit
+                low = [first <= second + near, second <= first + near]
+            return modes.standing(leg, low, like)
+    return ()

@@ -19,8 +19,7 @@ from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._linkages import check_loaded_bodies, walker_linkage
 from jaxbiped.scene._modes import limits_named
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._rigid_feet import check_rolls, check_stands, rigid_modes
-from jaxbiped.scene._starting_mode import starting_mode
+from jaxbiped.scene._rigid_feet import check_rolls, check_stands, rigid_modes, starting_mode
 from jaxbiped.scene._state_types import state_type_of
 from jaxbiped.scene.actuation._abstract_actuator import (
     AbstractActuator,
@@ -278,3 +277,13 @@ class RedundantScene(AbstractWalkerScene):
 
 CompliantScene: TypeAlias = Scene | RedundantScene
 """A walker with laws of contact, in minimal or redundant coordinates."""
+
+
+def is_compliant(args: object) -> bool:
+    """Whether the parameters of a system are a scene with laws of contact."""
+    return isinstance(args, AbstractWalkerScene) and args.compliant
+
+
+def is_rigid(args: object) -> bool:
+    """Whether the parameters of a system are a scene whose feet roll and strike."""
+    return isinstance(args, AbstractWalkerScene) and not args.compliant

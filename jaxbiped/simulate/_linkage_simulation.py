@@ -31,8 +31,8 @@ from jaxbiped.solve._accuracy import rms_norm, tolerances
 from jaxbiped.solve._projected_solver import check_adjoint, wrap_projected
 from jaxbiped.solve._solvers import solver_named, with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.controllers._first_and_last_step import first_step
-from jaxbiped.solve.controllers._tangent_step_size import step_control
+from jaxbiped.solve.controllers._solve_ends import first_step
+from jaxbiped.solve.controllers._step_size import step_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl
 
 _FAR = 0.5

@@ -48,7 +48,7 @@ from jaxbiped.solve._scene_key import scene_key
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import Units, si_units, units_of
-from jaxbiped.solve.controllers._footstep_counter import PATIENCE
+from jaxbiped.solve.controllers._solve_ends import PATIENCE
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 

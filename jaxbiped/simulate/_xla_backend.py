@@ -18,10 +18,13 @@ from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.solve._solvers import with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.controllers._contact_steps import MissedContacts
-from jaxbiped.solve.controllers._first_and_last_step import first_step
-from jaxbiped.solve.controllers._footstep_counter import PATIENCE, FootstepLimit
-from jaxbiped.solve.controllers._located_ending import LocatedEnding
-from jaxbiped.solve.controllers._walk_step_size import walk_control
+from jaxbiped.solve.controllers._solve_ends import (
+    PATIENCE,
+    FootstepLimit,
+    LocatedEnding,
+    first_step,
+)
+from jaxbiped.solve.controllers._step_size import walk_control
 from jaxbiped.solve.controllers._wrapped_control import Extremes, GivenFirstStep
 
 if TYPE_CHECKING:

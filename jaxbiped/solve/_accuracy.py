@@ -10,8 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive
 from jaxbiped._types import RealScalarLike, Scalar
-from jaxbiped.scene._abstract_scene import is_rigid
-from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene._scene import CompliantScene, is_rigid
 
 
 class Tolerances(NamedTuple):

@@ -24,10 +24,13 @@ from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
-from jaxbiped.solve.controllers._first_and_last_step import clip_step, first_step
-from jaxbiped.solve.controllers._footstep_counter import FootstepLimit
-from jaxbiped.solve.controllers._located_ending import LocatedEnding
-from jaxbiped.solve.controllers._walk_step_size import walk_control, weigh_crossed
+from jaxbiped.solve.controllers._solve_ends import (
+    FootstepLimit,
+    LocatedEnding,
+    clip_step,
+    first_step,
+)
+from jaxbiped.solve.controllers._step_size import walk_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl, widened_extremes
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
 
@@ -121,9 +124,7 @@ class AdaptiveSolve:
             self.solver.error_order(term),
         )
         count = jnp.zeros((), dtype=jnp.int64)
-        last = (
-            self.saved.first(solve.scene, solve.state, self.solver) if self.saved.within else None
-        )
+        last = self.saved.first(solve, self.solver) if self.saved.within else None
         extremes = None
         if self.saved.extremes is not None:
             values = _numbers(self.saved.extremes(solve.scene, solve.state))
@@ -138,9 +139,6 @@ class AdaptiveSolve:
             )
             if solve.scene.redundant and solve.scene.method.projects:
                 y1 = project(solve.scene, y1)
-        if self.solver.switch_weight != 1.0:
-            # The last stage knows the contact there; at the new value it would cost as much again.
-            error = weigh_crossed(solve.scene, self.solver.switch_weight, now.state, last, error)
         # Asked here and not where a step ends: of the state that a step starts from, the step
         # itself needs what failures are told by.
         events = ending_events(self.watch).values()
@@ -159,7 +157,7 @@ class AdaptiveSolve:
         last = now.last
         if last is not None:
             last = self.saved.following(
-                solve.scene,
+                solve,
                 last,
                 began=(now.t, now.state),
                 ended=(t, state),
@@ -212,7 +210,7 @@ class AdaptiveSolve:
     def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
         assert now.last is not None
         return self.saved.record(
-            solve.scene, now.last, now=(now.t, now.state), due=time, solver=self.solver
+            solve, now.last, now=(now.t, now.state), due=time, solver=self.solver
         )
 
     def _extremes_after(
@@ -224,7 +222,14 @@ class AdaptiveSolve:
         return widened_extremes(keep, now.extremes, values)
 
     def _controller(self, solve: Solve, probe: PyTree = None) -> StepControl:
-        control = walk_control(solve.rtol, solve.atol, solve.units)
+        # The last stage knows the contact at its probe; at the new value it would cost as much.
+        control = walk_control(
+            solve.rtol,
+            solve.atol,
+            solve.units,
+            switch_weight=self.solver.switch_weight,
+            probe=probe,
+        )
         if self.counting:
             control = FootstepLimit(control, solve.footsteps)
         return LocatedEnding(control, self.watch, probe) if self.located else control

@@ -12,7 +12,6 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._parameter_declaration import with_fields
 from jaxbiped._types import Scalar, Time
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._contacts import feet, legs_at
@@ -132,7 +131,7 @@ def is_barred(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
         barred = []
         for i, name in enumerate(structure.legs):
             rule = _Admitted(modelled.clearance, name)
-            touching = with_fields(modelled, clearance=rule)  # its ground may have a step
+            touching = eqx.tree_at(lambda own: own.clearance, modelled, rule)
             barred.append(
                 (_turning_rate(modelled, state, i) < 0.0)
                 & (_turning_rate(touching, _at_turn(scene, state, i), i) > 0.0)

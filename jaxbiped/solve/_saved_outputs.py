@@ -1,7 +1,7 @@
 """Saved outputs of a solve in the lanes engine, and how they are found within a step."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +17,9 @@ from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, RosenbrockInterpolation
+
+if TYPE_CHECKING:
+    from jaxbiped.solve._adaptive_program import Solve
 
 _BISECTIONS = 50
 
@@ -81,8 +84,9 @@ class Saved(NamedTuple):
         """Whether anything is saved from within the steps."""
         return self.steps or self.times or self.section is not None
 
-    def first(self, scene: Scene, state: State, solver: AbstractRosenbrock) -> LastStep:
+    def first(self, solve: "Solve", solver: AbstractRosenbrock) -> LastStep:
         """What is known before the first attempt."""
+        scene, state = solve.scene, solve.state
         zero, none = jnp.zeros_like(state[0]), jnp.asarray(False)
         nothing = jtu.tree_map(jnp.zeros_like, state)
         rows = tuple([nothing] * len(solver.tableau.dense))
@@ -93,7 +97,7 @@ class Saved(NamedTuple):
 
     def following(
         self,
-        scene: Scene,
+        solve: "Solve",
         last: LastStep,
         *,
         began: tuple[Scalar, State],
@@ -107,7 +111,7 @@ class Saved(NamedTuple):
 
         `keep` is whether it was accepted, and `moving` whether any was before.
         """
-        t, start = began
+        scene, (t, start) = solve.scene, began
         if self.section is None:
             return LastStep(keep, t, start, dense)
         assert last.leg is not None
@@ -133,7 +137,7 @@ class Saved(NamedTuple):
 
     def record(
         self,
-        scene: Scene,
+        solve: "Solve",
         last: LastStep,
         *,
         now: tuple[Scalar, State],
@@ -150,7 +154,7 @@ class Saved(NamedTuple):
             return last.noted & (due <= t), [due, *dense.evaluate(due)]
         nothing = [jnp.zeros_like(t)] * (1 + len(state))
         return last.noted, jax.lax.cond(
-            last.noted, lambda: self._arrival(scene, last, dense), lambda: nothing
+            last.noted, lambda: self._arrival(solve.scene, last, dense), lambda: nothing
         )
 
     def _arrival(

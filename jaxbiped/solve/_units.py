@@ -15,7 +15,8 @@ from jaxtyping import PyTree
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.dynamics._state_quantities import dimensions_of, recurring_leaves
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene, is_compliant
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._scene import is_compliant
 
 _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""

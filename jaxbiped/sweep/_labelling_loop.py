@@ -14,6 +14,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Parameter, Scalar, select
 from jaxbiped.basins._labels import Label, label_names
+from jaxbiped.dynamics._contacts import contact_places, slip_distances
 from jaxbiped.dynamics._footfalls import any_of
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state_quantities import recurring_leaves
@@ -38,7 +39,7 @@ from jaxbiped.sweep._convergence_test import (
     after_arrival,
     empty_history,
 )
-from jaxbiped.sweep._walk_events import arrival_time, contact_places, grazes, slip_distances
+from jaxbiped.sweep._walk_events import arrival_time, grazes
 
 
 class Start(NamedTuple):

@@ -1,20 +1,18 @@
-"""Events within a step of a walk that is labelled: arrival at the section, sliding and grazes.
+"""Events within a step of a walk that is labelled: arrival at the section, and grazes.
 
 A foot that grazes touches the ground, or misses it, by a hair, and so may a stop. Whether there was
 a contact is then open at the tolerance; near a boundary the label may be, too.
 """
 
-import functools
 from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.dynamics._contacts import Gap, feet, gaps
-from jaxbiped.dynamics._footfalls import any_of, touches
-from jaxbiped.dynamics._redundant_state import motion_in
-from jaxbiped.scene._scene import CompliantScene, Scene
+from jaxbiped.dynamics._contacts import Gap, gaps
+from jaxbiped.dynamics._footfalls import any_of
+from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
@@ -46,32 +44,6 @@ def arrival_time(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -
 
     start = (low, high, value(low), value(high), jnp.zeros_like(low), high)
     return jax.lax.fori_loop(0, _SECANTS, secant, start)[-1]
-
-
-def contact_places(scene: Scene, state: State) -> tuple[Scalar, ...]:
-    """For each foot, the place [m] that changes by what it slips: its rate is the slip speed."""
-    mechanism, angles = scene.mechanism, motion_in(scene, state).angles
-    parts = zip(feet(scene, state), mechanism.feet, mechanism.structure.feet, strict=True)
-    return tuple(
-        found.x if foot.radius is None else found.x + foot.radius * angles[body]
-        for found, foot, body in parts
-    )
-
-
-def slip_distances(
-    scene: Scene, state: State, landed: tuple[Scalar, ...]
-) -> tuple[tuple[Scalar, ...], Scalar]:
-    """The places at which the feet last came down, and how far the worst one has slid since [m].
-
-    `landed` are these places a step ago; see `contact_places`.
-    """
-    found, places = feet(scene, state), contact_places(scene, state)
-    kept = tuple(
-        jnp.where(touches(foot), old, new)
-        for foot, old, new in zip(found, landed, places, strict=True)
-    )
-    slid = [jnp.abs(new - old) for old, new in zip(kept, places, strict=True)]
-    return kept, functools.reduce(jnp.maximum, slid)
 
 
 def grazes(

@@ -15,7 +15,7 @@ from jaxbiped._types import Scalar, VectorField
 from jaxbiped.compiler import LANES
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve.rosenbrock._abstract_linearisation import Components
-from jaxbiped.solve.rosenbrock._implicit_linearisation import implicit_form
+from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm
 from jaxbiped.solve.rosenbrock._linearisation import split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import Stages, stages_of
 from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau, end_weights, error_weights
@@ -70,7 +70,7 @@ def differentiate_step(
 
     span = jnp.asarray(t1 - t0)
     with without_barriers():
-        form = implicit_form(field, join, args.args)
+        form = ImplicitForm(field, join, args.args)
         stages = stages_of(
             tableau, lambda t, y: rates(t, y, parameters), t0, start, span, span, form
         )

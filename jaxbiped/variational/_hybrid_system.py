@@ -24,13 +24,8 @@ from jaxbiped.dynamics._state_quantities import cyclic_names
 from jaxbiped.dynamics._strike_surfaces import lead, opening
 from jaxbiped.dynamics._switches import Switch, switches
 from jaxbiped.dynamics._symmetry import exchange_legs
-from jaxbiped.scene._abstract_scene import (
-    AbstractScene,
-    AbstractWalkerScene,
-    is_compliant,
-    is_rigid,
-)
-from jaxbiped.scene._scene import CompliantScene, RigidScene
+from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
+from jaxbiped.scene._scene import CompliantScene, RigidScene, is_compliant, is_rigid
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._failure_events import WATCHES, ending_events, rigid_ending
 

@@ -13,7 +13,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._abstract_linearisation import Components
-from jaxbiped.solve.rosenbrock._implicit_linearisation import implicit_form
+from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm
 from jaxbiped.solve.rosenbrock._linearisation import split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import Stages, stages_of
 from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau, end_weights, error_weights
@@ -49,7 +49,7 @@ def rosenbrock_tangents(
 
     t = jnp.asarray(t0)
     span = jnp.asarray(t1 - t0, dtype=jnp.result_type(*start))
-    form = implicit_form(field, join, args.args)
+    form = ImplicitForm(field, join, args.args)
     stages = stages_of(tableau, lambda t, y: rates(t, y, parameters), t, start, span, span, form)
     if any(rate is not None for rate in stages.lin.time_derivative()):
         return None

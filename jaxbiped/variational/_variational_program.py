@@ -13,12 +13,11 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.solve._accuracy import rms_norm
-from jaxbiped.solve.controllers._first_and_last_step import clip_step, first_step
-from jaxbiped.solve.controllers._tangent_step_size import step_control
+from jaxbiped.solve.controllers._solve_ends import clip_step, first_step
+from jaxbiped.solve.controllers._step_size import step_control
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._column_step import Differentiated, column_step, cross, differentiate_step
-from jaxbiped.variational._reset import behind_reset
-from jaxbiped.variational._saltation import at_fixed_time, meet, meeting_at
+from jaxbiped.variational._saltation import at_fixed_time, behind_reset, meet, meeting_at
 from jaxbiped.variational._solve_to_section import onto_section, peak_of
 from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
 from jaxbiped.variational._tangent_solver import SHARE

@@ -17,7 +17,7 @@ from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import LANES, XLA, AbstractEngine, Program, Recorded, Recording, Request
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.controllers._first_and_last_step import just_before_end
+from jaxbiped.solve.controllers._solve_ends import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival
 from jaxbiped.variational._tangents import (

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._implicit_field import force_balance, free_mass_entries
 from jaxbiped.dynamics._joint_loads import motion_of, with_constraint_torques, with_joint_loads
 from jaxbiped.dynamics._tree import Loads, point_motion, pose_of
-from jaxbiped.dynamics._tree_balance import force_balance, free_mass_entries
 from jaxbiped.dynamics._tree_inertia import centrifugal_loads, composites, eliminate
 from jaxbiped.scene._bodies import Body, Foot, Point
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop

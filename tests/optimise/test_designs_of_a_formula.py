@@ -12,7 +12,7 @@ import jaxbiped as jb
 from jaxbiped._progress import Stage
 from jaxbiped.continuation._nearest_bifurcation import farthest_allowed, range_of
 from jaxbiped.dynamics._actuation import actuator_powers, hip_torques
-from jaxbiped.dynamics._push_off import push_off_work
+from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
 from jaxbiped.optimise import _certificate, _design_gaits
 from jaxbiped.optimise._augmented_system import integrals_of

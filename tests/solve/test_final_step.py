@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.solve.controllers._first_and_last_step import just_before_end
+from jaxbiped.solve.controllers._solve_ends import just_before_end
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

@@ -5,8 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.variational._reset import behind_reset
-from jaxbiped.variational._saltation import at_fixed_time, meet, meeting_at
+from jaxbiped.variational._saltation import at_fixed_time, behind_reset, meet, meeting_at
 from jaxbiped.variational._tangents import Seeded, Watch
 
 G = 9.8

@@ -20,14 +20,13 @@ from jaxbiped.caching._disk_cache import read_object, write_object
 from jaxbiped.caching._fingerprint import fingerprint
 from jaxbiped.compiler.host_code._control_flow import CONTROL_FLOW
 from jaxbiped.compiler.host_code._host_writer import NAMES, HostWriter, Rule, UnwrittenError, Value
-from jaxbiped.compiler.host_code._indexing import INDEXING
 from jaxbiped.compiler.host_code._moves import MOVES
 from jaxbiped.compiler.host_code._operations import LINEAR_ALGEBRA, OPERATIONS
 
 _KIND = "host"
 _FEW = 1000
 """Numbers in an array up to which NumPy runs a function: it holds all that lies in between."""
-_RULES: dict[str, Rule] = OPERATIONS | MOVES | INDEXING | LINEAR_ALGEBRA | CONTROL_FLOW
+_RULES: dict[str, Rule] = OPERATIONS | MOVES | LINEAR_ALGEBRA | CONTROL_FLOW
 Converter: TypeAlias = Callable[[list[Any]], list[Any]]
 _P = ParamSpec("_P")
 _T = TypeVar("_T")

@@ -1,7 +1,7 @@
 """Linearisation of a vector field by its implicit form, whose matrices have the zeros of a tree."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import PyTree
@@ -19,22 +19,25 @@ from jaxbiped.solve.rosenbrock._abstract_linearisation import (
 
 
 class ImplicitForm(NamedTuple):
-    """The implicit form of a vector field of components; see `AbstractImplicitField`."""
+    """The implicit form of a field (t, y, args), if it has one, in components.
 
-    mass_matrix: Callable[[Components], SparseMatrix]
-    residual: Callable[[Components, Components], Residual]
+    `join` makes states of them.
+    """
 
+    field: Any
+    join: Callable[[Components], PyTree]
+    args: PyTree
 
-def implicit_form(
-    field: object, join: Callable[[Components], PyTree], args: PyTree
-) -> ImplicitForm | None:
-    """The implicit form of a field (t, y, args) in components that `join` puts together, if any."""
-    if not isinstance(field, AbstractImplicitField):
-        return None
-    return ImplicitForm(
-        lambda y: field.mass_matrix(join(y), args),
-        lambda y, rates: field.residual(join(y), join(rates), args),
-    )
+    @property
+    def exists(self) -> bool:
+        """Whether the field has one; see `AbstractImplicitField`."""
+        return isinstance(self.field, AbstractImplicitField)
+
+    def mass_matrix(self, y: Components) -> SparseMatrix:
+        return self.field.mass_matrix(self.join(y), self.args)
+
+    def residual(self, y: Components, rates: Components) -> Residual:
+        return self.field.residual(self.join(y), self.join(rates), self.args)
 
 
 class ImplicitJacobian(NamedTuple):

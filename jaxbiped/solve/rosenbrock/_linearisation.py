@@ -63,7 +63,7 @@ def linearise(
     """Linearises a vector field of components (as `split` makes them) about (t, y)."""
     program = jax.make_jaxpr(lambda t, *y: field(t, list(y)))(t, *y)
     run = jax.extend.core.jaxpr_as_fun(program)
-    if form is not None:
+    if form is not None and form.exists:
         return ImplicitLinearisation(run, structure_of(program), t, tuple(y), form)
     dense = len(y) == 1 and jnp.ndim(y[0]) == 1
     kind = _DenseLinearisation if dense else _ScalarLinearisation

@@ -20,7 +20,7 @@ from jaxbiped.solve.rosenbrock._abstract_linearisation import (
     Components,
     StepMatrix,
 )
-from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, implicit_form
+from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm
 from jaxbiped.solve.rosenbrock._linearisation import linearise, split
 from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau, error_weights, last_stage
 
@@ -135,7 +135,7 @@ def step_of(
 
     span = jnp.asarray(t1 - t0, dtype=dtype)
     control = jnp.asarray(terms.contr(t0, t1), dtype=dtype)
-    form = implicit_form(whole, join, args)
+    form = ImplicitForm(whole, join, args)
     stages = stages_of(tableau, field, jnp.asarray(t0), start, span, control, form)
     last = _plus(start, stages.weighted(tableau.a[-1]))
     end = _plus(last, stages.weighted(last_stage(tableau)))

@@ -13,9 +13,8 @@ from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, with_parameters
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._rigid_feet import rigid_modes
+from jaxbiped.scene._rigid_feet import AT_LIMIT, rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene._starting_mode import AT_LIMIT
 from jaxbiped.sweep._admissible import limit_motions, passes_a_stop
 
 START_QUANTITIES = {

@@ -9,7 +9,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.controllers._walk_step_size import CrossedSwitches, ErrorControl, crosses
+from jaxbiped.solve.controllers._step_size import CrossedSwitches, ErrorControl, crosses
 
 SCENE = jb.seed_scene()
 V0 = float(SCENE.friction.v0)

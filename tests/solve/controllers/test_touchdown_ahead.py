@@ -10,9 +10,9 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.controllers import _walk_step_size
+from jaxbiped.solve.controllers import _step_size
 from jaxbiped.solve.controllers._contact_steps import TouchdownAhead
-from jaxbiped.solve.controllers._walk_step_size import ErrorControl
+from jaxbiped.solve.controllers._step_size import ErrorControl
 
 SCENE = jb.seed_scene()
 
@@ -80,7 +80,7 @@ def test_touchdowns_cost_fewer_attempts_and_no_exactness(monkeypatch):
     exact, _ = walked(1e-11, "rodas5p")
     ends, attempted = walked(1e-5)
     with monkeypatch.context() as patched:
-        patched.setattr(_walk_step_size, "TouchdownAhead", lambda control: control)
+        patched.setattr(_step_size, "TouchdownAhead", lambda control: control)
         patched.setenv("JAXBIPED_CACHE", "")
         _forget_programs()
         plain_ends, plain = walked(1e-5)

@@ -8,10 +8,8 @@ import pytest
 
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._contact_steps import ShallowContact, TouchdownAhead
-from jaxbiped.solve.controllers._footstep_counter import FootstepLimit
-from jaxbiped.solve.controllers._located_ending import LocatedEnding
-from jaxbiped.solve.controllers._tangent_step_size import InUnits
-from jaxbiped.solve.controllers._walk_step_size import CrossedSwitches
+from jaxbiped.solve.controllers._solve_ends import FootstepLimit, LocatedEnding
+from jaxbiped.solve.controllers._step_size import CrossedSwitches, InUnits
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractMemorylessControl,
     AbstractWrappedControl,

@@ -13,7 +13,7 @@ import jaxbiped as jb
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.scene._state_types import BristleState
 from jaxbiped.solve.rosenbrock._abstract_linearisation import StepMatrix
-from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitLinearisation, implicit_form
+from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, ImplicitLinearisation
 from jaxbiped.solve.rosenbrock._linearisation import linearise, split
 
 MASS, BOB, LENGTH, GRAVITY = 2.0, 0.7, 0.9, 9.81
@@ -153,7 +153,7 @@ def test_the_implicit_form_solves_the_dense_system(name):
     def rates(t, y):
         return list(field(t, join(y), scene))
 
-    lin = linearise(rates, jnp.zeros(()), components, implicit_form(field, join, scene))
+    lin = linearise(rates, jnp.zeros(()), components, ImplicitForm(field, join, scene))
     assert isinstance(lin, ImplicitLinearisation)
     dense = jax.jacfwd(lambda y: jnp.stack(rates(0.0, list(y))))(jnp.stack(components))
     right = np.random.default_rng(0).normal(size=len(components))
@@ -172,7 +172,7 @@ def test_the_implicit_form_solves_the_dense_system(name):
 def test_legs_do_not_touch_each_other_in_the_tree_s_form():
     field, scene = field_of(SCENES["seed"]), SCENES["seed"]
     components, join = split(STANDS, field)
-    form = implicit_form(field, join, scene)
+    form = ImplicitForm(field, join, scene)
     lin = linearise(lambda t, y: list(field(t, join(y), scene)), jnp.zeros(()), components, form)
     factors = lin.factorise(lin.jacobian(), jnp.asarray(1e-3))
     omega_1, omega_2 = (STANDS._fields.index(f"omega_{leg}") for leg in "12")

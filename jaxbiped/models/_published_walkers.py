@@ -1,13 +1,13 @@
-"""Compass walkers: two straight legs, massless in the simplest one, with and without a torso.
+"""Published walkers: with straight legs and with knees, a torso, and a wheel without a rim.
 
 Scenes are made with public names alone, so that a look at the walkers' names does not load JAX.
 """
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import jaxbiped as jb
-from jaxbiped._checks import check_finite, check_positive, check_within
+from jaxbiped._checks import check_at_least, check_finite, check_positive, check_within
 
 if TYPE_CHECKING:
     from jaxbiped._types import Parameter
@@ -152,3 +152,111 @@ def wisse(
     legs = jb.Walker(m=5.0, J=0.0, l=1.0, d=0.5, r=0.0, hip_mass=10.0 - torso_mass)
     walker = jb.WithTorso(legs, m_torso=torso_mass, J_torso=0.0, h=torso_height)
     return jb.RigidScene(walker, jb.Ground(slope=slope, g=9.8))
+
+
+def mcgeer(slope: "Parameter | None" = None, *, knees: bool = False) -> "jb.RigidScene | jb.Scene":
+    """McGeer's walkers: straight legs on rigid round feet, or legs with knees on compliant feet.
+
+    The walker with straight legs is dimensionless: a leg's mass and length and gravity are 1. From
+    the paper come the height of a leg's mass centre above the sole, 0.63, and its radius of
+    gyration, 0.32; the feet have a radius of 0.3. The walker with knees has SI units, because its
+    feet have the laws of contact of `seed_scene`: its proportions are scaled to legs of 0.4 m and
+    a mass of 2 kg. Stops at the knees begin at 0.2 rad. Angles are the papers', from the slope's
+    normal.
+
+    Source: McGeer 1990, Passive dynamic walking, International Journal of Robotics Research 9, 62;
+    McGeer 1990, Passive walking with knees, IEEE Conference on Robotics and Automation, 1640.
+
+    Args:
+        slope: slope of the ground [rad]. Default: 0.03, or the paper's 0.0456 with knees.
+        knees: whether legs are thighs and shanks with stops between them.
+
+    Returns:
+        The walker, a `RigidScene` with straight legs and a `Scene` with knees.
+
+    Raises:
+        ArgumentError: the slope is not allowed.
+    """
+    if knees:
+        # The command line's help reads this module, and does without JAX.
+        from jaxbiped.scene._ready_scenes import kneed_scene
+
+        return kneed_scene(slope=0.0456 if slope is None else slope)
+    walker = jb.Walker(m=1.0, J=0.32**2, l=1.0, d=1.0 - 0.63, r=0.3, hip_mass=0.0)
+    return jb.RigidScene(walker, jb.Ground(slope=0.03 if slope is None else slope, g=1.0))
+
+
+def hsu_chen(slope: "Parameter" = 0.0504) -> "jb.RigidScene":
+    """A walker with knees and point feet: point masses on thighs, shanks and hip; legs of 1 m.
+
+    A knee locks when it is straight, and stays locked until its leg has struck and stood. The
+    paper measures angles from the vertical: its q1 is `theta_thigh_2` minus the slope, its q2 and
+    q3 are `theta_thigh_1` and `theta_shank_1` minus the slope. It does not state g; here g is
+    9.81 m/s².
+
+    Source: Hsu Chen 2007, Passive dynamic walking with knees: a point foot model, thesis, MIT.
+
+    Args:
+        slope: slope of the ground [rad].
+
+    Returns:
+        The walker on rigid feet.
+
+    Raises:
+        ArgumentError: the slope is not allowed.
+    """
+    walker = jb.Kneed(
+        m_thigh=0.5,
+        J_thigh=0.0,
+        l_thigh=0.5,
+        d_thigh=0.325,
+        m_shank=0.05,
+        J_shank=0.0,
+        l_shank=0.5,
+        d_shank=0.125,
+        w_shank=0.0,
+        r=0.0,
+        hip_mass=0.5,
+        epsilon=0.0,
+        holds="through heel strike",
+    )
+    return jb.RigidScene(walker, jb.Ground(slope=slope, g=9.81))
+
+
+def rimless_wheel(
+    slope: "Parameter" = 0.08, *, spokes: int = 8, inertia: "Parameter" = 0.5
+) -> "jb.RigidScene":
+    """A wheel without a rim that rolls from spoke to spoke; mass, spoke length and gravity are 1.
+
+    With the angle 2α between spokes, an impact multiplies the rate ω by
+    η = (inertia + cos 2α)/(inertia + 1), and the multiplier of the gait is η².
+
+    Source: McGeer 1990, Passive dynamic walking; Coleman, Chatterjee and Ruina 1997, Motions of a
+    rimless spoked wheel: a simple three-dimensional system with impacts.
+
+    Args:
+        slope: slope of the ground [rad].
+        spokes: number of spokes.
+        inertia: moment of inertia about the hub, above 0 [in units of the mass times the squared
+            length of a spoke].
+
+    Returns:
+        The wheel on rigid feet.
+
+    Raises:
+        ArgumentError: a number is not allowed.
+    """
+    check_at_least("spokes", spokes, "3", 3)
+    check_positive("inertia", inertia)
+    hub: Any = 0.0
+    tips: list[Any] = [
+        (math.cos(turn), math.sin(turn))
+        for turn in (2.0 * math.pi * k / spokes for k in range(spokes))
+    ]
+    wheel = jb.Mechanism(
+        root="hub",
+        bodies=(jb.Body("wheel", mass=1.0, inertia=inertia, centre=hub),),
+        feet=tuple(jb.Foot("wheel", centre=tip, leg=f"spoke_{k}") for k, tip in enumerate(tips)),
+        turn={"wheel": spokes},
+    )
+    return jb.RigidScene(wheel, jb.Ground(slope=slope, g=1.0))

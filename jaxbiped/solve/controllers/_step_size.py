@@ -1,16 +1,16 @@
-"""Step size of a walk, from the error estimate of the last attempt; the same for every engine.
+"""Step size, from the error estimate of the last attempt: of walks, and with derivatives.
 
-The law is plain integral control. Unlike diffrax's, it allows a smaller step after an accepted one,
-and no larger step after a rejected one. If the force has corners, both save attempts (Hairer,
-Nørsett and Wanner, Solving Ordinary Differential Equations I, section II.4). A step in which the
-contact changes its kind must be more accurate, because the embedded estimate of some methods
-hardly sees a corner of the force that a step crosses.
+A walk's is the same for every engine. The law is plain integral control. Unlike diffrax's, it
+allows a smaller step after an accepted one, and no larger step after a rejected one. If the force
+has corners, both save attempts (Hairer, Nørsett and Wanner, Solving Ordinary Differential
+Equations I, section II.4). A step in which the contact changes its kind must be more accurate,
+because the embedded estimate of some methods hardly sees a corner of the force that a step crosses.
 """
 
 import functools
 import operator
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 import diffrax
 import jax
@@ -26,7 +26,6 @@ from jaxbiped.scene.laws.friction._coulomb import Frictionless
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._contact_steps import ShallowContact, TouchdownAhead
-from jaxbiped.solve.controllers._tangent_step_size import SAFETY, SMALLEST_STEP
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractControl,
     AbstractMemorylessControl,
@@ -35,6 +34,12 @@ from jaxbiped.solve.controllers._wrapped_control import (
     StepControl,
 )
 
+SAFETY = 0.8
+"""Of the step size that the error estimate allows. At diffrax's 0.9 the contact's switches reject
+so many steps that the same error takes more of them."""
+SMALLEST_STEP = 1e-12
+"""Step size, in units of time, that is taken whatever its error: how a jump of the force is
+crossed."""
 _LEAST, _MOST = 0.2, 10.0
 """Sizes of the next step, in units of the last attempt."""
 _TINY = 1e-30
@@ -51,18 +56,24 @@ _SAME_SLIP = 3.0
 
 
 def walk_control(
-    rtol: RealScalarLike, atol: RealScalarLike, units: Units, *, switch_weight: float = 1.0
+    rtol: RealScalarLike,
+    atol: RealScalarLike,
+    units: Units,
+    *,
+    switch_weight: float = 1.0,
+    probe: PyTree = None,
 ) -> StepControl:
     """The controller of a walk's steps; the solve's `args` must be the scene.
 
     Args:
         rtol, atol: tolerances; the absolute one in units of each leaf.
         units: units of the state's leaves and of time.
-        switch_weight: factor of the errors of steps that cross a switch (see `weigh_crossed`).
+        switch_weight: factor of the errors of steps that cross a switch.
+        probe: as of `CrossedSwitches`.
     """
     control: StepControl = ErrorControl(rtol, atol, units)
     if switch_weight != 1.0:
-        control = CrossedSwitches(control, switch_weight)
+        control = CrossedSwitches(control, switch_weight, probe)
     return ShallowContact(TouchdownAhead(control))
 
 
@@ -165,28 +176,18 @@ class CrossedSwitches(AbstractMemorylessControl):
 
     Attributes:
         weight: factor of those errors [–].
+        probe: a state as close to the step's end as its error, whose contacts cost less; None if
+            there is no such state.
     """
 
     weight: float
+    probe: PyTree = None
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        weighed = weigh_crossed(attempt.args, self.weight, attempt.y0, attempt.y1, attempt.error)
-        return attempt.by(self.controller, error=weighed)
-
-
-def weigh_crossed(
-    scene: CompliantScene, weight: float, y0: PyTree, y1: PyTree, error: PyTree
-) -> PyTree:
-    """A step's error, multiplied by `weight` if the step crosses a switch of the contact.
-
-    Args:
-        scene: the simulated scene.
-        weight: factor of the error of such a step [–].
-        y0, y1: states at the step's start and at its end, or as close to its end as its error.
-        error: error of the step, shaped as the states.
-    """
-    factor = jnp.where(crosses(scene, y0, y1), weight, 1.0)
-    return jtu.tree_map(lambda leaf: leaf * factor.astype(leaf.dtype), error)
+        end = attempt.y1 if self.probe is None else self.probe
+        factor = jnp.where(crosses(attempt.args, attempt.y0, end), self.weight, 1.0)
+        error = jtu.tree_map(lambda leaf: leaf * factor.astype(leaf.dtype), attempt.error)
+        return attempt.by(self.controller, error=error)
 
 
 def crosses(scene: CompliantScene, y0: PyTree, y1: PyTree) -> Scalar:
@@ -218,3 +219,46 @@ def _changes(scene: CompliantScene, before: FootMotion, after: FootMotion) -> Sc
     for one, other in zip(friction(old), friction(new), strict=True):
         changes = changes | ((one > 0.0) != (other > 0.0))
     return (carried != carries) | (carries & changes)
+
+
+def step_control(
+    rtol: RealScalarLike,
+    atol: RealScalarLike,
+    norm: Callable[[PyTree], Scalar],
+    units: Units | None = None,
+) -> StepControl:
+    """The controller of solves that carry derivatives: diffrax's; `norm` measures the errors.
+
+    Args:
+        rtol, atol: tolerances; the absolute one in units of each leaf.
+        norm: norm of the errors in units of the tolerance.
+        units: units of the state's leaves and of time. Default: SI.
+    """
+    time = 1.0 if units is None else units.time
+    control = diffrax.PIDController(
+        rtol=rtol,
+        atol=atol,
+        norm=norm,
+        dtmin=SMALLEST_STEP * time,
+        safety=SAFETY,
+        force_dtmin=True,  # a state that is no longer a number ends the solve in another way
+    )
+    found = cast(StepControl, control)
+    return found if units is None else InUnits(found, units.inverse)
+
+
+class InUnits(AbstractMemorylessControl):
+    """Wraps a controller; shows it states and errors in units of their own.
+
+    Attributes:
+        inverse: reciprocal of the unit of each leaf of the state.
+    """
+
+    inverse: PyTree
+
+    def adapt(self, attempt: Attempt) -> Adapted:
+        before, after, error = (
+            jtu.tree_map(lambda leaf, inverse: leaf * inverse, y, self.inverse)
+            for y in (attempt.y0, attempt.y1, attempt.error)
+        )
+        return attempt.by(self.controller, y0=before, y1=after, error=error)
