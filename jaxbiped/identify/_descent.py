@@ -8,13 +8,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage
-from jaxbiped.identify._gait_fit import (
-    FitEnding,
-    GaitFit,
-    information,
-    interval_end,
-    linear_step,
-)
+from jaxbiped.identify._gait_fit import FitEnding, GaitFit, information
+from jaxbiped.identify._interval_end import interval_end, linear_step
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
 from jaxbiped.scene._parameter_access import (
@@ -134,7 +129,7 @@ class Descent:
             bounds=tuple(self.limits),
             max_nfev=most,
             xtol=1e-9,
-            ftol=1e-12,
+            ftol=1e-4 / len(self.values),
             gtol=1e-10,
         )
         return FitEnding.CONVERGED if found.success else FitEnding.OUT_OF_EVALUATIONS
@@ -291,7 +286,7 @@ class Descent:
             _, at, found = max(telling, key=lambda e: sign * e[1][which], default=best)
             here = self._linearised(found)
             if not follow:
-                step, _ = linear_step(*here, square, which, sign, limits - at)
+                step, *_ = linear_step(*here, square, which, sign, limits - at)
                 return float(at[which] + step[which])
             end = sign * interval_end(self._model, at, here, square, which, sign, limits)
             return sign * max(end, *(sign * float(each[1][which]) for each in within))
