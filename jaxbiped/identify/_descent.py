@@ -24,6 +24,8 @@ _LINEAR = 0.02
 """Standard error of every parameter, in units of its size, up to which a model counts as linear."""
 UNLIKELY = 1e-3
 """Probability of chi squared below which a fit is said not to fit."""
+_GAIN = 1e-4
+"""Decrease of chi squared, as a share of its mean over the numbers, at which a descent ends."""
 _STARTS, _ABOUT = 8, float(np.log(3.0))
 """Starts that are tried beside a fit's own, and how far from it."""
 _FITS = 3
@@ -108,8 +110,7 @@ class Descent:
         """
         from scipy.stats import qmc
 
-        low, high = self.limits
-        low, high = np.maximum(low, -_ABOUT), np.minimum(high, _ABOUT)
+        low, high = np.clip(self.limits, -_ABOUT, _ABOUT)
         found: list[Tried] = []
         self.searching = True
         for start in qmc.scale(qmc.Sobol(len(low), seed=0).random(_STARTS), low, high):
@@ -129,7 +130,7 @@ class Descent:
             bounds=tuple(self.limits),
             max_nfev=most,
             xtol=1e-9,
-            ftol=1e-4 / len(self.values),
+            ftol=1e-12,
             gtol=1e-10,
         )
         return FitEnding.CONVERGED if found.success else FitEnding.OUT_OF_EVALUATIONS
@@ -154,14 +155,13 @@ class Descent:
         """Of every measured gait; None where one is lost."""
         if self.last is not None and np.array_equal(self.last[0], at):
             return self.last[1]
-        found: list[Prediction] | None = []
+        parts: list[Prediction] = []
         for k, each in enumerate(self.measured):
             one = self._predict(at, each, k)
             if one is None or not one.found:
-                found = None
                 break
-            assert found is not None
-            found.append(one)
+            parts.append(one)
+        found = parts if len(parts) == len(self.measured) else None
         self.evaluations += 1
         self.last = (at.copy(), found)
         if found is not None:
@@ -192,9 +192,14 @@ class Descent:
         return np.full(len(self.values), np.inf) if found is None else self._scaled_misfits(found)
 
     def slopes(self, at: np.ndarray) -> np.ndarray:
+        """Of the residuals; none, which ends a descent, where no step of at most 1 gains more."""
         found = self.predictions(at)
         assert found is not None  # no step ends without its gaits
-        return self._scaled_slopes(found)[0]
+        slopes, off = self._scaled_slopes(found)[0], self._scaled_misfits(found)
+        free = slopes[:, ~self._at_bounds(at, off, slopes)]
+        down = free.T @ off
+        gain = down @ np.linalg.solve(free.T @ free + np.eye(len(down)), down)
+        return slopes * (gain > _GAIN * np.mean(off**2))
 
     def _scaled_misfits(self, found: list[Prediction]) -> np.ndarray:
         predicted = np.concatenate([each.values for each in found])
