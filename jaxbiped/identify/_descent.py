@@ -25,7 +25,7 @@ _LINEAR = 0.02
 UNLIKELY = 1e-3
 """Probability of chi squared below which a fit is said not to fit."""
 _GAIN = 1e-4
-"""Decrease of chi squared, as a share of its mean over the numbers, at which a descent ends."""
+"""Change of the residuals, squared, as a share of their mean square, at which a descent ends."""
 _STARTS, _ABOUT = 8, float(np.log(3.0))
 """Starts that are tried beside a fit's own, and how far from it."""
 _FITS = 3
@@ -192,14 +192,13 @@ class Descent:
         return np.full(len(self.values), np.inf) if found is None else self._scaled_misfits(found)
 
     def slopes(self, at: np.ndarray) -> np.ndarray:
-        """Of the residuals; none, which ends a descent, where no step of at most 1 gains more."""
+        """Of the residuals; none, which ends a descent, where no step of about 1 moves them."""
         found = self.predictions(at)
         assert found is not None  # no step ends without its gaits
         slopes, off = self._scaled_slopes(found)[0], self._scaled_misfits(found)
         free = slopes[:, ~self._at_bounds(at, off, slopes)]
-        down = free.T @ off
-        gain = down @ np.linalg.solve(free.T @ free + np.eye(len(down)), down)
-        return slopes * (gain > _GAIN * np.mean(off**2))
+        moved = free @ np.linalg.solve(free.T @ free + np.eye(free.shape[1]), free.T @ off)
+        return slopes * (np.sum(moved**2) > _GAIN * np.mean(off**2))
 
     def _scaled_misfits(self, found: list[Prediction]) -> np.ndarray:
         predicted = np.concatenate([each.values for each in found])
