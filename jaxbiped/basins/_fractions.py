@@ -15,6 +15,10 @@ from jaxbiped._checks import (
 from jaxbiped.basins._labels import Label, check_known
 
 
+_RARE = 3
+"""Counts up to which an interval's end is that of Poisson's distribution."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Fraction:
     """A fraction of the starts with its confidence interval.
@@ -53,8 +57,11 @@ def wilson_interval(
     """Wilson's score interval of a proportion; from 0 to 1 where nothing was counted.
 
     Wilson, "Probable inference, the law of succession, and statistical inference", J. Am. Stat.
-    Assoc. 22 (1927) 209. It holds for starts drawn independently; on a regular grid, whose
-    starts are spread more evenly than that, it is usually too wide.
+    Assoc. 22 (1927) 209. Next to 0 and 1 its 95 % would cover as little as 83.8 %. Lower ends of
+    counts from 1 to 3, and upper ends of as many failures, are therefore those of Poisson's
+    distribution, as Brown, Cai and DasGupta, "Interval estimation for a binomial proportion",
+    Stat. Sci. 16 (2001) 101, modify it. It holds for starts drawn independently; on a regular grid,
+    whose starts are spread more evenly than that, it is usually too wide.
 
     Args:
         count: how many have the property, any shape.
@@ -74,7 +81,7 @@ def wilson_interval(
         >>> round(float(low), 4), round(float(high), 4)
         (0.2189, 0.3958)
     """
-    from scipy.special import ndtri
+    from scipy.special import gammaincinv, ndtri
 
     _check_confidence(confidence)
     check_not_negative("count", count)
@@ -93,7 +100,13 @@ def wilson_interval(
     failures = np.divide(k * (n - k), n, out=np.zeros_like(n), where=n > 0)
     half = z * np.sqrt(failures + 0.25 * z**2) / (n + z**2)
     centre = (k + 0.5 * z**2) / (n + z**2)
-    return np.where(k == 0, 0.0, centre - half), np.where(k == n, 1.0, centre + half)
+
+    def lowest(wilson: np.ndarray, count: np.ndarray) -> np.ndarray:
+        poisson = gammaincinv(np.maximum(count, 1.0), 1.0 - confidence) / np.maximum(n, 1.0)
+        rare = np.where(count <= _RARE, np.minimum(wilson, poisson), wilson)
+        return np.where(count == 0, 0.0, rare)
+
+    return lowest(centre - half, k), 1.0 - lowest(1.0 - centre - half, n - k)
 
 
 def fractions(

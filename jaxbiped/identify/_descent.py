@@ -8,13 +8,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage
-from jaxbiped.identify._gait_fit import (
-    FitEnding,
-    GaitFit,
-    information,
-    interval_end,
-    linear_step,
-)
+from jaxbiped.identify._gait_fit import FitEnding, GaitFit, information
+from jaxbiped.identify._interval_end import interval_end, linear_step
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
 from jaxbiped.scene._parameter_access import (
@@ -29,6 +24,8 @@ _LINEAR = 0.02
 """Standard error of every parameter, in units of its size, up to which a model counts as linear."""
 UNLIKELY = 1e-3
 """Probability of chi squared below which a fit is said not to fit."""
+_GAIN = 1e-4
+"""Change of the residuals, squared, as a share of their mean square, at which a descent ends."""
 _STARTS, _ABOUT = 8, float(np.log(3.0))
 """Starts that are tried beside a fit's own, and how far from it."""
 _FITS = 3
@@ -113,8 +110,7 @@ class Descent:
         """
         from scipy.stats import qmc
 
-        low, high = self.limits
-        low, high = np.maximum(low, -_ABOUT), np.minimum(high, _ABOUT)
+        low, high = np.clip(self.limits, -_ABOUT, _ABOUT)
         found: list[Tried] = []
         self.searching = True
         for start in qmc.scale(qmc.Sobol(len(low), seed=0).random(_STARTS), low, high):
@@ -159,14 +155,13 @@ class Descent:
         """Of every measured gait; None where one is lost."""
         if self.last is not None and np.array_equal(self.last[0], at):
             return self.last[1]
-        found: list[Prediction] | None = []
+        parts: list[Prediction] = []
         for k, each in enumerate(self.measured):
             one = self._predict(at, each, k)
             if one is None or not one.found:
-                found = None
                 break
-            assert found is not None
-            found.append(one)
+            parts.append(one)
+        found = parts if len(parts) == len(self.measured) else None
         self.evaluations += 1
         self.last = (at.copy(), found)
         if found is not None:
@@ -197,9 +192,13 @@ class Descent:
         return np.full(len(self.values), np.inf) if found is None else self._scaled_misfits(found)
 
     def slopes(self, at: np.ndarray) -> np.ndarray:
+        """Of the residuals; none, which ends a descent, where no step of about 1 moves them."""
         found = self.predictions(at)
         assert found is not None  # no step ends without its gaits
-        return self._scaled_slopes(found)[0]
+        slopes, off = self._scaled_slopes(found)[0], self._scaled_misfits(found)
+        free = slopes[:, ~self._at_bounds(at, off, slopes)]
+        moved = free @ np.linalg.solve(free.T @ free + np.eye(free.shape[1]), free.T @ off)
+        return slopes * (np.sum(moved**2) > _GAIN * np.mean(off**2))
 
     def _scaled_misfits(self, found: list[Prediction]) -> np.ndarray:
         predicted = np.concatenate([each.values for each in found])
@@ -291,7 +290,7 @@ class Descent:
             _, at, found = max(telling, key=lambda e: sign * e[1][which], default=best)
             here = self._linearised(found)
             if not follow:
-                step, _ = linear_step(*here, square, which, sign, limits - at)
+                step, *_ = linear_step(*here, square, which, sign, limits - at)
                 return float(at[which] + step[which])
             end = sign * interval_end(self._model, at, here, square, which, sign, limits)
             return sign * max(end, *(sign * float(each[1][which]) for each in within))

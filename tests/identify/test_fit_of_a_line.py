@@ -120,6 +120,33 @@ def test_an_interval_follows_the_profile_where_the_model_bends(monkeypatch):
     assert abs(np.exp(1.959964 * spread) / inside[-1] - 1.0) > 0.05
 
 
+@pytest.mark.parametrize(("tilt", "bend"), [(0.1, 0.5), (0.03, 1.0)])
+def test_an_interval_ends_in_a_bent_valley_where_derivatives_alone_would_cycle(
+    tilt, bend, monkeypatch
+):
+    """y₁ = x + tilt y − bend y², measured 40 times better than y₂ = y: each y has its own x."""
+
+    def predicted(scene, measured, values, sizes, guess, **how):
+        x, y = (np.log(values[n] / float(jb.parameter_values(SCENE)[n])) for n in ("J", "d"))
+        slopes = np.array([[1.0, tilt - 2.0 * bend * y], [0.0, 1.0], [0.0, 0.0]])
+        told = np.array([x + tilt * y - bend * y**2, y, 0.0])
+        return Prediction(told, slopes, 0.0 * slopes, (), (), True)
+
+    monkeypatch.setattr(_descent, "predict", predicted)
+    seen = {"period": (0.0, 0.002), "step_length": (0.0, 0.08), "speed": (0.0, 1.0)}
+    fit = jb.fit_gait(SCENE, ("J", "d"), jb.identify.MeasuredGait(seen))
+    assert (fit.one_sided, fit.undetermined) == ((), ())
+    y = np.linspace(-1.0, 1.0, 200001) * 0.08 * 1.959964
+    spare = 0.002 * np.sqrt(np.maximum(1.959964**2 - (y / 0.08) ** 2, 0.0))
+    ridge = bend * y**2 - tilt * y
+    own, low, high = jb.parameter_values(SCENE), np.min(ridge - spare), np.max(ridge + spare)
+    found = np.log(np.array(fit.intervals["J"]) / float(own["J"]))
+    assert found == pytest.approx([low, high], abs=0.02 * (high - low))
+    found = np.log(np.array(fit.intervals["d"]) / float(own["d"]))
+    assert found == pytest.approx([y[0], y[-1]], rel=0.02)
+    assert fit.evaluations <= 30
+
+
 def test_a_parameter_may_be_limited_on_one_side_and_moves_the_others(monkeypatch):
     """y₁ = log c − log(1 + K) and y₂ = K / (1 + K), which is best where K vanishes. No derivative
     tells of K there, but larger ones fit within the 95 %, too, and c with them."""
