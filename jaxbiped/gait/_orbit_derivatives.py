@@ -1,6 +1,5 @@
 """Periodic orbit: its stability and its sensitivities."""
 
-import dataclasses
 import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -34,9 +33,6 @@ _ROWS = ("jacobian", "monodromy", "period_row", "advance_rows", "peak_row")
 """Those of a return's leaves that are derivatives."""
 _VALUES = ("recurring", "period", "advance", "peak")
 """Those that they are derivatives of."""
-_MORE_STEPS = 4
-"""Factor of the steps that a return may take where it carries columns of parameters: small
-sensitivities are solved as exactly as large ones."""
 _NOTHING = 1e-300
 _POOLED = 0.2
 """Of what a looser solve changes on the whole, that every first derivative is wrong by at least."""
@@ -108,8 +104,7 @@ def with_parameter_columns(problem: FixedPointProblem, found: Found) -> Found:
     start = problem.state(found.recurring)
     idle = found.ending == int(Search.NO_RETURN)
     lost = idle | (found.ending == int(Search.NOT_CONVERGED))
-    most = _MORE_STEPS * problem.spec.max_solver_steps
-    spec = dataclasses.replace(problem.spec, max_solver_steps=most)
+    spec = problem.spec.with_more_steps()
 
     def once(precision: Precision) -> LinearisedReturn:
         return linearised_return(spec, seeds, start, precision, idle)

@@ -1,5 +1,7 @@
 """Specification of a return map: whose it is, how it is solved, and how derivatives are taken."""
 
+import dataclasses
+
 import diffrax
 import equinox as eqx
 import jax
@@ -28,6 +30,9 @@ from jaxbiped.variational._tangents import Watch
 
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""
+_MORE_STEPS = 4
+"""Factor of the steps that a return may take where it carries columns of parameters: small
+sensitivities are solved as exactly as large ones."""
 
 
 class AbstractGradient(eqx.Module):
@@ -81,6 +86,10 @@ class ReturnMapSpec(eqx.Module):
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)
     within: AbstractSystem | None = None
+
+    def with_more_steps(self) -> "ReturnMapSpec":
+        """The same with the steps that a return with columns of parameters may take."""
+        return dataclasses.replace(self, max_solver_steps=_MORE_STEPS * self.max_solver_steps)
 
     def watch(
         self,

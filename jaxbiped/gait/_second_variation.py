@@ -4,7 +4,6 @@ The spectral radius is a function of the return map's Jacobian, so its sensitivi
 derivatives of the map.
 """
 
-import dataclasses
 from typing import NamedTuple
 
 import jax
@@ -24,9 +23,9 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec, has_switches
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._adjoint_solve import Adjoints, carry_tangents, pull_back
 from jaxbiped.variational._flow import Flow, tangent_on_section
-from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
+from jaxbiped.variational._tangents import Seeded, active_leaves
 
-_STEP = 0.3
+_STEP = 0.2
 """Step of these differences, in units of the fifth root of the tolerance."""
 
 
@@ -87,7 +86,7 @@ def second_variation(
         if spec.engine == "xla":  # which would compile another solve, for minutes
             unknown = jnp.full(len(sizes), jnp.nan)
             return SecondVariation(unknown, jnp.zeros(len(tangents)), unknown)
-        return _by_differences(spec, args, like, last, leading, weights, tangents, sizes, precision)
+        return _by_differences(spec, args, like, last, leading, weights, tangents, precision)
     field = spec.system.vector_field
     flow = Flow(spec.system, watch.section, field, args, jtu.tree_structure(like))
     places = jnp.asarray(recurring_indices(spec.system, like))
@@ -118,20 +117,24 @@ def _by_differences(
     leading: Scalar,
     weights: Scalar,
     tangents: Scalar,
-    sizes: Scalar,
     precision: Precision,
 ) -> SecondVariation:
-    """The same from differences of Jacobians."""
-    pair, h = _jacobian_slopes(spec, args, like, last, tangents, sizes, precision)
-    rows, m = pair[:, :, -weights.shape[1] :], len(tangents)
-    slopes, rougher = jnp.einsum("vc,opcm,vm->op", weights, rows, leading)
+    """The same from differences of Jacobians along the leading directions, of which there are few:
+    second derivatives are symmetric.
+    """
+    m, c = len(tangents), weights.shape[1]
+    pair, h = _jacobian_slopes(spec, args, like, last, leading, precision)
+    both = jnp.einsum("vc,ovcn->on", weights, pair[:, :, -c:])
+    by_point, by_parameter = both[0, :m], both[0, m:]
+    slopes, rougher = both[:, :m] @ tangents + both[:, m:]
     errors: RealScalarLike = 0.0
     if not has_switches(spec.system, args.args, like, "resets"):
         # Between resets a motion is smooth; a force that jumps makes the Jacobians' errors rough.
-        own = jnp.concatenate([last.advance_rows, last.jacobian])[-weights.shape[1] :, :m]
-        size = jnp.einsum("vc,cm,vm->", *map(jnp.abs, (weights, own, leading)))
-        errors = jnp.abs(slopes - rougher) + precision.tangent_rtol * size / h
-    return SecondVariation(slopes, jnp.zeros(m), slopes, errors)
+        own = jnp.abs(jnp.concatenate([last.advance_rows, last.jacobian])[-c:])
+        sizes = jnp.einsum("vc,cn,v->n", jnp.abs(weights), own, 1.0 / h)
+        size = sizes[:m] @ jnp.abs(tangents) + sizes[m:]
+        errors = jnp.abs(slopes - rougher) + precision.tangent_rtol * size
+    return SecondVariation(slopes, by_point, by_parameter, errors)
 
 
 def _jacobian_slopes(
@@ -139,30 +142,28 @@ def _jacobian_slopes(
     args: Seeded,
     like: PyTree,
     last: LinearisedReturn,
-    tangents: Scalar,
-    sizes: Scalar,
+    leading: Scalar,
     precision: Precision,
 ) -> tuple[Scalar, Scalar]:
-    """Derivatives of the Jacobian's rows along p directions, of two orders, shape (2, p, c, m), and
-    the steps of their differences, shape (p,).
+    """Derivatives of the Jacobian's rows along v directions, of two orders, shape (2, v, c, n), and
+    the steps of their differences, shape (v,).
 
     Central differences of order four, whose step balances their error and the solve's, and of two.
     """
-    h = _STEP * jnp.power(precision.rtol, 0.2)
-    m, parameters = len(tangents), jnp.stack([jnp.asarray(q) for q in active_leaves(args)])
+    size = jnp.max(jnp.abs(leading), axis=1)
+    h = _STEP * jnp.power(precision.rtol, 0.2) / jnp.maximum(1.0, size)
 
-    # A parameter that is zero has no size of its own: what it moves has.
-    h = h / jnp.maximum(1.0, jnp.max(jnp.abs(tangents), axis=0))
-
-    def rows(tangent: Scalar, moved: Scalar, share: Scalar) -> Scalar:
-        near = dataclasses.replace(args, args=with_active(args, list(parameters + share * moved)))
-        state = state_with(spec.system, like, last.recurring + share * tangent)
-        once = linearised_return(spec, near, state, precision, False, carries_parameters=False)
-        return jnp.concatenate([once.advance_rows, once.jacobian])[:, :m]
+    def rows(along: Scalar, share: Scalar) -> Scalar:
+        state = state_with(spec.system, like, last.recurring + share * along)
+        # A real eigenvector has no imaginary part to go along.
+        idle = ~jnp.any(along != 0.0)
+        once = linearised_return(spec.with_more_steps(), args, state, precision, idle)
+        found = jnp.concatenate([once.advance_rows, once.jacobian])
+        return jnp.where(idle, 0.0, jnp.where(once.code != 0, jnp.nan, found))
 
     shares = h[:, None] * jnp.array([1.0, -1.0, 2.0, -2.0])
-    each = jax.vmap(jax.vmap(rows, (None, None, 0)))
-    near, back, far, farther = jnp.moveaxis(each(tangents.T, jnp.diag(sizes), shares), 1, 0)
+    each = jax.vmap(jax.vmap(rows, (None, 0)))(leading, shares)
+    near, back, far, farther = jnp.moveaxis(each, 1, 0)
     pair = (8.0 * (near - back) - (far - farther)) / 12.0, (near - back) / 2.0
     return jnp.stack(pair) / h[:, None, None], h
 
