@@ -227,7 +227,8 @@ def law_cases(options):
     for slips in options.sized(jb.laws.FRICTION_LAWS, ("stribeck",)):
         for name in options.sized(jb.laws.NORMAL_LAWS, ("kelvin-voigt", "tsuji")):
             run = _walk(seed_with(name, slips), START, duration=0.6)
-            yield Case(slips, name, run, float(START.omega_1))
+            # So far that the walks' own errors, where a force jumps, are not seen at "tight".
+            yield Case(slips, name, run, float(START.omega_1), step=1e-3)
 
 
 @experiment
