@@ -8,7 +8,13 @@ from jaxtyping import PyTree
 
 from jaxbiped._progress import Stage, stage
 from jaxbiped.gait._branch_along import Searching, branch_along, state_at
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, cycle_of
+from jaxbiped.gait._fixed_point_search import (
+    FixedPointProblem,
+    Found,
+    Search,
+    cycle_of,
+    steps_ahead,
+)
 from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, homotopy_to
 from jaxbiped.gait._relaxation import relaxed
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
@@ -100,8 +106,8 @@ def search_in_stages(
         return any(each.radius < 1.0 and each.is_whole for each in seen)
 
     def add(found: Found, by: FoundBy) -> None:
-        # What a walk itself settles on is one, however deep.
-        sound = by is FoundBy.WALKING or bool(found.sound)
+        # What a walk itself settles on is one, however deep, but not where it stands and chatters.
+        sound = bool(found.sound) or (by is FoundBy.WALKING and _steps_ahead(found, modelled))
         known = any(_same(found, old) for old in seen)
         if int(found.ending) == int(Search.FOUND) and sound and not known:
             seen.append(Seen(found, by, spectral_radius(found), is_whole(found, problem)))
@@ -203,6 +209,11 @@ def spectral_radius(found: Found) -> float:
     if not np.all(np.isfinite(jacobian)):
         return float("inf")
     return float(np.max(np.abs(np.linalg.eigvals(jacobian))))
+
+
+def _steps_ahead(found: Found, scene: Scene | RigidScene) -> bool:
+    last = found.last
+    return bool(steps_ahead(scene, np.sum(last.advance), np.asarray(last.period)))
 
 
 def _same(a: Found, b: Seen) -> bool:

@@ -45,7 +45,8 @@ class Walks(NamedTuple):
 
     def settled(self, most: int = 4) -> list[np.ndarray]:
         """Where those that walked on are in the end, the most settled first, shapes (m,)."""
-        walking = np.flatnonzero(self.counts >= _CYCLES)
+        goes = np.diff(self.places[:, -2:])[:, 0] > _SHORTEST  # one that stands may chatter
+        walking = np.flatnonzero((self.counts >= _CYCLES) & goes)
         latest, before = self.points[walking, -1], self.points[walking, -1 - _DEPTH : -1]
         moved = np.linalg.norm(latest[:, None] - before, axis=-1)
         return self._apart(latest, np.min(moved, axis=-1, initial=np.inf), most)

@@ -101,6 +101,8 @@ def test_a_gait_that_is_seen_twice_or_is_no_walk_is_told_once_or_not(monkeypatch
     # What a walk itself settles on is one, however deep.
     told, _ = staged(monkeypatch, NOTHING, walking=[found(0.5, sound=False)])
     assert told.best.by is FoundBy.WALKING
+    # A foot that chatters where the walker stands is none.
+    assert staged(monkeypatch, NOTHING, walking=[found(0.5, 4e-7, sound=False)])[0].best is None
     problem = FixedPointProblem(None, SCENE, (), START, None)
     origin = origin_of(staged(monkeypatch, found(1.5), scattered=[found(1.2, 0.7)])[0], problem)
     assert float(origin.others.period[0]) == 0.5
@@ -115,7 +117,8 @@ def test_a_jacobian_that_is_no_number_has_no_radius():
 
 
 def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
-    """Of five walks the one that repeats every other footstep, and one that still drifts."""
+    """Of six walks the one that repeats every other footstep, and one that still drifts; the last
+    stands, and its foot chatters."""
     sizes = recurring_sizes(SCENE, START)
     rate = np.sqrt(9.8 / 0.4)
     np.testing.assert_allclose(sizes, [1.0, 1.0, rate, rate])
@@ -124,10 +127,11 @@ def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
     )
     last = np.arange(5.0)
     angle = np.stack([0.2 + 0.01 * last, 0.5 + 0.3 * (last % 2), 0.2400001 + 0.0 * last,
-                      0.9 + 0.0 * last, 0.7 - 0.1 * last])  # fmt: skip
+                      0.9 + 0.0 * last, 0.7 - 0.1 * last, 0.1 + 0.0 * last])  # fmt: skip
     zero = np.zeros_like(angle)
-    states = jb.dynamics.RigidState(zero, angle, zero, zero, zero)
-    counts = np.array([40, 40, 40, 39, 40])
+    places = np.where(np.arange(6)[:, None] < 5, 0.2, 1e-8) * last
+    states = jb.dynamics.RigidState(places, angle, zero, zero, zero)
+    counts = np.array([40, 40, 40, 39, 40, 40])
     monkeypatch.setattr(_settled_walks, "_rigid_arrivals", lambda *_: (counts, states))
     chosen = walks_from(SCENE, START).settled()
     # The third is where the first one is; the fourth fell.
