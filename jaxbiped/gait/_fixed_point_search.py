@@ -257,7 +257,8 @@ def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) 
 
 def steps_ahead(scene: AbstractWalkerScene, step_length: Scalar, period: Scalar) -> Scalar:
     """Whether an orbit comes downhill, in more time than a foot chatters (boolean)."""
-    return (step_length > 0.0) & (period > _SHORTEST * (scene.mechanism.height / scene.ground.g) ** 0.5)
+    shortest = _SHORTEST * (scene.mechanism.height / scene.ground.g) ** 0.5
+    return (step_length > 0.0) & (period > shortest)
 
 
 def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: RealScalarLike) -> Scalar:
