@@ -1,10 +1,29 @@
 """Endings of a simulation, by name: codes that simulations and labels share."""
 
 import enum
+from typing import Any, Self
+
+from jaxbiped._checks import ArgumentError
 
 
 class NamedCode(enum.IntEnum):
     """A code with a name. `str(code)` is the name in words."""
+
+    @classmethod
+    def of(cls, code: Any) -> Self:
+        """The name of one result's code.
+
+        Raises:
+            ArgumentError: the code is an array, of a batch, or a traced value.
+        """
+        try:
+            return cls(int(code))
+        except TypeError:  # JAX's of a traced value is one, too
+            what = f"is an array of shape {code.shape}" if code.ndim else "is a traced value"
+            raise ArgumentError(
+                f"only the code of one result has a name: this one {what}; compare it with numbers "
+                f"such as {cls.__name__}.{next(iter(cls)).name}."
+            ) from None
 
     def __str__(self) -> str:
         return self.name.lower().replace("_", " ")

@@ -131,17 +131,17 @@ class Gait(eqx.Module, Tabular):
     @property
     def outcome(self) -> Search:
         """Outcome of the search, as a `Search`; for one gait, not a batch."""
-        return Search(int(self.ending))
+        return Search.of(self.ending)
 
     @property
     def walk_outcome(self) -> Ending:
         """`Ending` of the last trial that did not return; for one gait, not a batch."""
-        return Ending(int(self.walk_ending))
+        return Ending.of(self.walk_ending)
 
     @property
     def found_by(self) -> FoundBy:
         """The stage of the search that found it, as a `FoundBy`; for one gait, not a batch."""
-        return FoundBy(int(self.origin.found_by))
+        return FoundBy.of(self.origin.found_by)
 
     @property
     def others(self) -> list[OtherGait]:

@@ -118,7 +118,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     @property
     def outcome(self) -> Ending:
         """The outcome as an `Ending`; for one simulation, not a batch."""
-        return Ending(int(self.ending))
+        return Ending.of(self.ending)
 
     @property
     def modes(self) -> tuple[tuple[str, ...], ...]:
