@@ -1,4 +1,4 @@
-"""Codes with names."""
+"""Codes with names, against the members that they name and by what they refuse."""
 
 import jax
 import jax.numpy as jnp
