@@ -23,6 +23,7 @@ from jaxbiped.scene._mechanism_pieces import (
     angle_of_part,
     check_pieces,
     check_state_names,
+    check_zero_pose,
     foot_names_of,
     named_angle,
     number_of,
@@ -44,7 +45,6 @@ from jaxbiped.scene._turn import (
     turned_foot,
     turning_body,
 )
-from jaxbiped.scene._zero_pose import check_zero_pose
 
 
 class Mechanism(eqx.Module):
