@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
-import jax
 import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._types import is_traced
 from jaxbiped.scene._bodies import RESERVED, Body, Foot
 from jaxbiped.scene._joint_parts import AbstractJointPart
 from jaxbiped.scene._structure import Angle, Indices, Structure
@@ -141,7 +141,7 @@ def check_zero_pose(mechanism: "Mechanism") -> None:
     Hanging straight down, what has no inertia of its own has none at all: a mass at its hinge, a
     massless thigh over a shank that is a mass point, legs without inertia under a massless root.
     """
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(mechanism)):
+    if is_traced(mechanism):
         return
     _check_shapes(mechanism)
     height = np.min(np.asarray(mechanism.height))
