@@ -63,13 +63,18 @@ def as_array(values: np.ndarray) -> Array:
     return jnp.asarray(values, dtype=values.dtype)
 
 
+def is_traced(tree: PyTree) -> bool:
+    """Whether JAX traces any leaf, so that its number is not known yet."""
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(tree))
+
+
 def by_numpy(function: Callable[..., Any], *given: Any) -> Any:
     """`function(numpy, *given)` of arrays: by JAX's NumPy where any is traced, else by NumPy.
 
     There JAX would compile a program for each operation. The results are arrays of JAX, of plain
     numbers plain numbers.
     """
-    if any(isinstance(each, jax.core.Tracer) for each in given):
+    if is_traced(given):
         return function(jnp, *given)
     if all(isinstance(each, float | int) for each in given):
         return function(np, *given)

@@ -13,6 +13,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import check_choice, check_count, check_unbatched
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._progress import Stage, stage
+from jaxbiped._types import is_traced
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._consistent_state import consistent_state
@@ -188,7 +189,7 @@ def find_gait(
     asked = problem._replace(active=active, method=None)
     origin = single_stage_origin(problem, FoundBy.START if guess is None else FoundBy.GUESS)
     staged = guess is None and max_evaluations is None and method == "newton"
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(problem)):
+    if is_traced(problem):
         if staged:
             found, origin = search_along(problem, origin)
         else:

@@ -23,14 +23,15 @@ from jaxbiped.gait._fixed_point_search import (
     minimal_cycle,
     search_by_lanes,
 )
-from jaxbiped.gait._gait_path import nodes_of, step_lengths
 from jaxbiped.gait._gait_table import gait_coordinates, gait_entries
 from jaxbiped.gait._measures import (
     Measures,
     elasticities_of,
     measure_errors,
     measure_slopes,
+    nodes_of,
     speed_backwards,
+    step_lengths,
 )
 from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
 from jaxbiped.gait._search_provenance import FoundBy, Origin, OtherGait

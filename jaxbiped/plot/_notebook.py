@@ -7,13 +7,13 @@ import io
 import math
 from collections.abc import Iterable
 
-import jax
 import jax.tree_util as jtu
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped._checks import check_type
+from jaxbiped._types import is_traced
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -88,8 +88,7 @@ def notebook_html(shown: object) -> str:
     Returns:
         HTML with an embedded picture, some ten thousand characters.
     """
-    leaves = jtu.tree_leaves(shown)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+    if is_traced(shown):
         return _plain(shown)
     return _html_of(shown)
 

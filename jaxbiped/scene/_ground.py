@@ -4,13 +4,12 @@ import math
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._checks import warn
 from jaxbiped._parameter_declaration import AbstractPart, parameter
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, is_traced
 
 
 class Ground(AbstractPart):
@@ -53,7 +52,7 @@ def warn_if_steep(ground: Ground, friction: object) -> None:
     """Warns of a slope whose tangent exceeds every coefficient of friction: a walker slides."""
     known = (getattr(friction, name, None) for name in ("mu", "mu_static", "mu_kinetic"))
     largest = [mu for mu in known if mu is not None]
-    if not largest or any(isinstance(each, jax.core.Tracer) for each in (ground.slope, *largest)):
+    if not largest or is_traced((ground.slope, *largest)):
         return
     # By NumPy alone: what is traced around a known scene would trace these, too.
     slope, *most = (np.max(np.abs(np.asarray(each))) for each in (ground.slope, *largest))

@@ -8,12 +8,11 @@ from typing import Any
 
 import equinox as eqx
 import jax
-import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._jax_versions import current_trace
 from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
-from jaxbiped._types import Parameter, Scalar, by_numpy
+from jaxbiped._types import Parameter, Scalar, by_numpy, is_traced
 from jaxbiped.caching._caches import OfObjects
 from jaxbiped.scene._bodies import Body, Foot, check_name
 from jaxbiped.scene._couplings import fixed_angles
@@ -23,6 +22,7 @@ from jaxbiped.scene._mechanism_pieces import (
     angle_of_part,
     check_pieces,
     check_state_names,
+    check_zero_pose,
     foot_names_of,
     named_angle,
     number_of,
@@ -44,7 +44,6 @@ from jaxbiped.scene._turn import (
     turned_foot,
     turning_body,
 )
-from jaxbiped.scene._zero_pose import check_zero_pose
 
 
 class Mechanism(eqx.Module):
@@ -270,7 +269,7 @@ def mechanism_of(walker: Any) -> Mechanism:
             "mechanism() that makes one."
         )
     # What is made within one trace means nothing in another.
-    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(walker))
+    traced = is_traced(walker)
     made, trace = _MADE(walker, dict), current_trace() if traced else None
     if trace not in made:
         # The walker's own rules first: they name its fields, and its leaves may be new to them.

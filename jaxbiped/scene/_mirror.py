@@ -10,6 +10,7 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._parameter_declaration import with_fields
+from jaxbiped._types import is_traced
 from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Latch, Motor, Spring, Stop
 from jaxbiped.scene._structure import Angle, Indices
 
@@ -157,7 +158,7 @@ def _equal(one: Any, other: Any) -> bool:
     if structure != jtu.tree_structure(other):
         return False
     for a, b in zip(leaves, others, strict=True):
-        if isinstance(a, jax.core.Tracer) or isinstance(b, jax.core.Tracer):
+        if is_traced((a, b)):
             continue
         same = np.array_equal(a, b) if eqx.is_array_like(a) else a == b
         if not same:
@@ -216,7 +217,7 @@ def _is_not_zero(value: Any) -> bool:
 def _are_opposite(one: Any, other: Any) -> bool:
     if one is None or other is None:
         return False
-    if isinstance(one, jax.core.Tracer) or isinstance(other, jax.core.Tracer):
+    if is_traced((one, other)):
         return True
     return bool(np.array_equal(np.asarray(one), -np.asarray(other)))
 

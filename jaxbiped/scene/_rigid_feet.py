@@ -5,13 +5,12 @@ import operator
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, holds_somewhere
-from jaxbiped._types import Parameter, Scalar, as_float, by_numpy
+from jaxbiped._types import Parameter, Scalar, as_float, by_numpy, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.scene._couplings import angles_and_rates_named
 from jaxbiped.scene._mechanism import Mechanism
@@ -177,7 +176,7 @@ def check_mode(mechanism: Mechanism, modes: Modes, slope: Parameter, state: Any)
         ArgumentError: such a state, where it is known.
     """
     given = (mechanism, slope, state)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(given)):
+    if is_traced(given):
         holds_somewhere(_is_misheld(modes, *given))
         return
     leaves, tree = jtu.tree_flatten(given)

@@ -13,7 +13,7 @@ import jax.tree_util as jtu
 from jaxtyping import ArrayLike
 
 from jaxbiped._checks import ArgumentError, check_type, is_number, traced_rules
-from jaxbiped._types import SomeTree, as_float
+from jaxbiped._types import SomeTree, as_float, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import OfObjects
 
@@ -32,7 +32,7 @@ def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
     exact = [_in_64_bits(leaf) for leaf in leaves]
     if any(a is not b for a, b in zip(leaves, exact, strict=True)):
         scene = jtu.tree_unflatten(structure, exact)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in exact):
+    if is_traced(exact):
         with traced_rules() as rules:
             _check_parts(scene)
         return where_allowed(rules, scene)

@@ -4,12 +4,9 @@ import cmath
 import math
 from collections.abc import Mapping, Sequence
 
-import jax
-import jax.tree_util as jtu
-
 from jaxbiped._checks import ArgumentError
 from jaxbiped._parameter_declaration import with_fields
-from jaxbiped._types import by_numpy
+from jaxbiped._types import by_numpy, is_traced
 from jaxbiped.scene._bodies import Body, Foot, OwnHinge, Point
 from jaxbiped.scene._joint_parts import AbstractJointPart, Motor, Spring
 from jaxbiped.scene._mechanism_pieces import number_of
@@ -83,7 +80,7 @@ def check_turn(
             "the feet at each place must be a leg of their own; give them leg=."
         )
     body = bodies[turn.body]
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves((body, feet))):
+    if is_traced((body, feet)):
         return
     if _number(body.centre):
         raise ArgumentError(

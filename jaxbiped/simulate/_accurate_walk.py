@@ -17,6 +17,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, warn
 from jaxbiped._ending import Ending
+from jaxbiped._types import is_traced
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name
@@ -177,8 +178,7 @@ def warn_of_long_steps(run: Simulation, walk: Trajectory) -> None:
 
     Compiles nothing: steps are an input of the program.
     """
-    leaves = jtu.tree_leaves((run, walk))
-    if run.dt is None or any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+    if run.dt is None or is_traced((run, walk)):
         return
     if walk.outcome in (Ending.SOLVER_FAILED, Ending.OUT_OF_STEPS):
         return

@@ -6,7 +6,7 @@ are, so a rule is given here.
 
 import contextlib
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn, TypeVar
 
 import equinox as eqx
@@ -19,7 +19,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._jax_versions import unbatched, untraced
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.simulate._slopes import Slopes
 from jaxbiped.solve._trajectory import Trajectory
@@ -50,7 +50,7 @@ def with_derivatives(
     leaves, structure = jtu.tree_flatten(arrays)
     # What is known stays so: the times to save at must be, for lanes.
     traced = [i for i, leaf in enumerate(leaves) if isinstance(leaf, jax.core.Tracer)]
-    if not _is_traced(unbatched(leaves[i]) for i in traced):
+    if not is_traced([unbatched(leaves[i]) for i in traced]):
         return compute(run)
 
     def filled(others: Sequence[Any], values: Sequence[Any]) -> PyTree:
@@ -73,7 +73,7 @@ def with_derivatives(
         dots = moving(filled([_STILL] * len(leaves), tangents))
         state_dots, scene_dots, clock_dots = map(_moved, dots)
         # What is known is not traced along with the tangents: JAX compiles no small programs.
-        known = not _is_traced(primals)
+        known = not is_traced(primals)
         with untraced() if known else contextlib.nullcontext():
             found = compute(whole(primals)) if known else function(*primals)
             once = whole(primals if known else first_derivatives_only(primals, "a simulation"))
@@ -162,7 +162,3 @@ def _no_tangent(leaf: Scalar) -> Scalar | np.ndarray:
 
 def _is_real(leaf: Scalar) -> bool:
     return jnp.issubdtype(jnp.result_type(leaf), jnp.inexact)
-
-
-def _is_traced(leaves: Iterable[object]) -> bool:
-    return any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._types import as_float
+from jaxbiped._types import as_float, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import BY_NAME, LaneEngine, Request
 from jaxbiped.scene._state_types import State
@@ -65,7 +65,7 @@ def _hindrance(
     each, section = jtu.tree_leaves(leaves), asked.section
     if not isinstance(solver, AbstractRosenbrock):
         return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
-    if asked.save_steps and any(isinstance(leaf, jax.core.Tracer) for leaf in each):
+    if asked.save_steps and is_traced(each):
         return (
             'under jit, vmap or derivatives it does not save every step (save="steps"); ask for '
             'save="end", an array of times or a section'

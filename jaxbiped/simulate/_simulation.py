@@ -22,7 +22,7 @@ from jaxbiped._checks import (
     traced_rules,
     warn,
 )
-from jaxbiped._types import Numbers, Scalar, as_array, as_float
+from jaxbiped._types import Numbers, Scalar, as_array, as_float, is_traced
 from jaxbiped.compiler import BY_NAME, Request
 from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
@@ -192,7 +192,7 @@ class Simulation(eqx.Module):
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
         if self.adjoint is not None:
-            if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(self)):
+            if is_traced(self):
                 warn(_OF_STEPS)
             walk = _run(self)
         else:

@@ -19,7 +19,7 @@ from jaxbiped._checks import (
     warn,
 )
 from jaxbiped._jax_versions import untraced
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._projection import check_independent
 from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
@@ -184,7 +184,7 @@ def check_start_height(scene: Scene | RedundantScene, state: Any) -> None:
     Raises:
         ArgumentError: a deeper start.
     """
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves((scene, state))):
+    if is_traced((scene, state)):
         return
     root = f"{scene.mechanism.structure.root}_z"
     if not hasattr(state, root):

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import RealScalarLike, Scalar, is_traced
 from jaxbiped.scene._scene import CompliantScene, is_rigid
 
 
@@ -105,7 +105,7 @@ def resolve_slip_speed(rtol: float, scene: PyTree) -> RealScalarLike:
     if name is None:
         return rtol
     leaves = (getattr(law, name), scene.ground.g, scene.mechanism.height)
-    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
+    traced = is_traced(leaves)
     xp: Any = jnp if traced else np  # where numbers are known nothing is compiled for them
     slow, g, l = (jax.lax.stop_gradient(leaf) if traced else np.asarray(leaf) for leaf in leaves)
     fast = xp.sqrt(g * l)
@@ -153,8 +153,7 @@ def check_precision(scene: CompliantScene, dtype: np.dtype) -> None:
     Raises:
         ArgumentError: for float32 (or less) where contact is too stiff.
     """
-    leaves = jtu.tree_leaves(scene)
-    if dtype == np.float64 or any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+    if dtype == np.float64 or is_traced(scene):
         return
     mechanism = scene.mechanism
     stiffness = scene.normal.elastic_force(jnp.ones_like(mechanism.height))

@@ -4,13 +4,11 @@ from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 import equinox as eqx
-import jax
-import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_positive, warn
-from jaxbiped._types import JsonObject
+from jaxbiped._types import JsonObject, is_traced
 
 LOOSER = 10.0
 """How many times looser a tolerance the first witness of an error takes."""
@@ -72,7 +70,7 @@ def check_wanted(accuracy: object, **replaced: object) -> None:
 
 def check_untraced(accuracy: float, given: PyTree, names: Iterable[str]) -> None:
     """Raises `ArgumentError` for a number, unlike a name, where what is given is traced."""
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(given)):
+    if is_traced(given):
         raise ArgumentError(
             f"accuracy = {accuracy:g} is not allowed under jit, vmap or differentiation: name one "
             f"of {', '.join(names)} there."

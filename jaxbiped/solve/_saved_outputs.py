@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from jaxbiped.solve._adaptive_program import Solve
 
 _BISECTIONS = 50
+_SECANTS = 8
+"""By which `arrival_time` is located, to rounding."""
 
 
 class Rise(NamedTuple):
@@ -205,3 +207,26 @@ def _rise(
     rises = crosses | (below & (new >= 0.0))
     happens = jax.lax.cond(rises, lambda: jnp.asarray(section.counts(scene, at(until))), lambda: no)
     return Rise(happens, jnp.where(crosses & ~below, turn, t0), until)
+
+
+def arrival_time(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -> Scalar:
+    """Where a function rises through zero between two times [s], by the Illinois method."""
+
+    def secant(_: Scalar, now: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+        a, b, at_a, at_b, side, _ = now
+        rise = at_b - at_a
+        middle = b - at_b * (b - a) / jnp.where(rise == 0.0, 1.0, rise)
+        found = value(middle)
+        left = found < 0.0
+        # An end that stays twice counts half, so that it moves the next time.
+        return (
+            jnp.where(left, middle, a),
+            jnp.where(left, b, middle),
+            jnp.where(left, found, jnp.where(side > 0.0, 0.5 * at_a, at_a)),
+            jnp.where(left, jnp.where(side < 0.0, 0.5 * at_b, at_b), found),
+            jnp.where(left, -1.0, 1.0),
+            middle,
+        )
+
+    start = (low, high, value(low), value(high), jnp.zeros_like(low), high)
+    return jax.lax.fori_loop(0, _SECANTS, secant, start)[-1]

@@ -16,7 +16,7 @@ from jaxtyping import PyTreeDef
 
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._identity import identity
-from jaxbiped._types import Scalar, as_array
+from jaxbiped._types import Scalar, as_array, is_traced
 from jaxbiped.caching._caches import PROGRAMS, OfObjects, bounded_cache
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory
@@ -29,7 +29,7 @@ def scene_key(scene: Any) -> Scalar:
     """The key of a scene, shaped as its leaves; without derivatives."""
     leaves, structure = jtu.tree_flatten(scene)
     weights = _weights(structure)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+    if is_traced(leaves):
         leaves = [jax.lax.stop_gradient(leaf) for leaf in leaves]
         return _sum(jnp, jnp.stack(jnp.broadcast_arrays(*map(jnp.asarray, leaves))), weights)
     # Kept as NumPy's: under `jit` an array of JAX's would be a tracer.
@@ -53,7 +53,7 @@ def check_scene_of(trajectory: Any, scene: Any, name: str = "trajectory") -> Non
     if kept is None:
         return
     own = scene_key(scene)
-    if isinstance(own, jax.core.Tracer) or isinstance(kept, jax.core.Tracer):
+    if is_traced((own, kept)):
         return
     near = _ROUNDING * np.finfo(trajectory.t.dtype).eps * (1.0 + np.abs(kept))
     if np.any(np.abs(np.asarray(own) - np.asarray(kept)) > near):

@@ -16,7 +16,7 @@ from jaxtyping import Array, Float, Int, PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._summary import summary
-from jaxbiped._types import Numbers, Scalar, by_numpy
+from jaxbiped._types import Numbers, Scalar, by_numpy, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._error_estimate import ErrorEstimate
@@ -147,7 +147,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
                 were saved, or this is a batch.
         """
         dense = self.require_dense()
-        if any(isinstance(x, jax.core.Tracer) for x in jtu.tree_leaves((dense, t))):
+        if is_traced((dense, t)):
             flat = jnp.ravel(jnp.asarray(t, dtype=self.t.dtype))
             states = jax.vmap(dense.evaluate)(flat)
             return jtu.tree_map(lambda leaf: jnp.reshape(leaf, np.shape(t)), states)

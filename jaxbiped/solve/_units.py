@@ -12,7 +12,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Numbers, Scalar
+from jaxbiped._types import Numbers, Scalar, is_traced
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.dynamics._state_quantities import dimensions_of, recurring_leaves
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
@@ -71,7 +71,7 @@ def recurring_inverse_units(args: PyTree, count: int) -> Scalar:
 
 def _length_and_time(args: AbstractWalkerScene) -> tuple[Scalar, Scalar]:
     height, ground = args.mechanism.height, args.ground
-    known = not any(isinstance(leaf, jax.core.Tracer) for leaf in (height, ground.g))
+    known = not is_traced((height, ground.g))
     xp: Any = np if known else jnp  # where numbers are known nothing is compiled for them
     length = xp.asarray(height) / _LENGTH
     gravity = xp.asarray(ground.g) / _GRAVITY

@@ -30,7 +30,7 @@ from jaxbiped.solve._rigid_progress import (
     state_with_hip,
 )
 from jaxbiped.solve._rigid_steps import attempt_step
-from jaxbiped.solve._saved_outputs import Saved
+from jaxbiped.solve._saved_outputs import Saved, arrival_time
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import (
     UNDECIDED,
@@ -39,7 +39,7 @@ from jaxbiped.sweep._convergence_test import (
     after_arrival,
     empty_history,
 )
-from jaxbiped.sweep._walk_events import arrival_time, grazes
+from jaxbiped.variational._grazing import grazes
 
 
 class Start(NamedTuple):
