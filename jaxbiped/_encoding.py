@@ -95,7 +95,7 @@ class Encoder:
         return {"dataset": variables, "coords": coordinates, "attrs": attributes}
 
     def _path(self, thing: Any, where: str) -> str:
-        name = f"{thing.__module__}:{thing.__qualname__}"
+        name = f"{_home(thing)}:{thing.__qualname__}"
         if any(each in name for each in _NOWHERE):
             raise ArgumentError(
                 f"{where} is not allowed: {thing.__qualname__} has no import path; define it at "
@@ -103,6 +103,16 @@ class Encoder:
             )
         self.found[name] = thing
         return name
+
+
+def _home(thing: Any) -> str:
+    """The outermost package that exports a class or function, else its module, which may move."""
+    parts = thing.__module__.split(".")
+    for package in (".".join(parts[:depth]) for depth in range(1, len(parts))):
+        names = dir(sys.modules[package])
+        if thing.__qualname__ in names and getattr(sys.modules[package], thing.__qualname__) is thing:
+            return package
+    return str(thing.__module__)
 
 
 def _is_dataset(value: Any) -> bool:
