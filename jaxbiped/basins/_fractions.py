@@ -14,7 +14,6 @@ from jaxbiped._checks import (
 )
 from jaxbiped.basins._labels import Label, check_known
 
-
 _RARE = 3
 """Counts up to which an interval's end is that of Poisson's distribution."""
 
