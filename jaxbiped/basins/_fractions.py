@@ -59,8 +59,9 @@ def wilson_interval(
     Assoc. 22 (1927) 209. Next to 0 and 1 its 95 % would cover as little as 83.8 %. Lower ends of
     counts from 1 to 3, and upper ends of as many failures, are therefore those of Poisson's
     distribution, as Brown, Cai and DasGupta, "Interval estimation for a binomial proportion",
-    Stat. Sci. 16 (2001) 101, modify it. It holds for starts drawn independently; on a regular grid,
-    whose starts are spread more evenly than that, it is usually too wide.
+    Stat. Sci. 16 (2001) 101, modify it. It holds for starts drawn independently (the
+    method "uniform" of `jaxbiped.starts.sample`); for a regular grid or a Sobol sequence, whose
+    starts are spread more evenly than that, it is usually too wide.
 
     Args:
         count: how many have the property, any shape.

@@ -11,6 +11,7 @@ from typing import NamedTuple, TypeAlias
 import jax
 import jax.tree_util as jtu
 import numpy as np
+import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, as_float
@@ -66,11 +67,15 @@ class AnglesInTime(NamedTuple):
             lasts.append(clock[known][-1])
         return cls(splines, np.cumsum(lasts), _mid_stance(scene, gait))
 
-    def at(self, seen: MeasuredAngles, shift: float) -> tuple[np.ndarray, np.ndarray]:
-        """The angles that were measured and their rates where the clock's zero lies at `shift`."""
-        times = np.asarray(np.ma.filled(seen.times, 0.0), dtype=float) + shift
-        found = [self._angle(name, times[at]) for name, at in seen.seen.items()]
-        angles, rates = (np.concatenate(part) for part in zip(*found, strict=True))
+    def at(self, seen: MeasuredAngles, shift: npt.ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+        """The angles that were measured and their rates where the clock's zero lies at `shift`.
+
+        They are along the last axis, beside those of the shift.
+        """
+        clock = np.asarray(np.ma.filled(seen.times, 0.0), dtype=float)
+        times = clock + np.asarray(shift)[..., None]
+        found = [self._angle(name, times[..., at]) for name, at in seen.seen.items()]
+        angles, rates = (np.concatenate(part, axis=-1) for part in zip(*found, strict=True))
         return angles, rates
 
     def _angle(self, name: str, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,9 +139,8 @@ def clock_zero(angles: AnglesInTime, seen: MeasuredAngles) -> float:
     values, tries = seen.values, 2 * _PHASES * len(angles.ends)
     spacing = 2.0 * angles.ends[-1] / tries
     phases = spacing * np.arange(tries)
-    squares = [float(np.sum((angles.at(seen, each)[0] - values) ** 2)) for each in phases]
-    best = phases[int(np.argmin(squares))]
-    shift = best
+    squares = np.sum((angles.at(seen, phases)[0] - values) ** 2, axis=-1)
+    shift = best = phases[int(np.argmin(squares))]
     for _ in range(_REFINED):
         own, rates = angles.at(seen, shift)
         move = float(rates @ (values - own) / (rates @ rates))
