@@ -107,11 +107,11 @@ class Encoder:
 
 def _home(thing: Any) -> str:
     """The outermost package that exports a class or function, else its module, which may move."""
-    parts = thing.__module__.split(".")
-    for package in (".".join(parts[:depth]) for depth in range(1, len(parts))):
-        names = dir(sys.modules[package])
-        if thing.__qualname__ in names and getattr(sys.modules[package], thing.__qualname__) is thing:
-            return package
+    parts, name = thing.__module__.split("."), thing.__qualname__
+    for depth in range(1, len(parts)):
+        package = sys.modules[".".join(parts[:depth])]
+        if name in dir(package) and getattr(package, name) is thing:
+            return package.__name__
     return str(thing.__module__)
 
 

@@ -182,10 +182,7 @@ def replace(old, new):
         ),
         (replace("tests.saved_parts:Grip", "os:system"), "needs system of the module os, which is"),
         (replace('"grip"', '"grasp"'), "Grip has other fields here: grasp, grip"),
-        (
-            replace("jaxbiped.scene._ground:Ground", "jaxbiped.scene._ground:Floor"),
-            "needs Floor of",
-        ),
+        (replace("jaxbiped:Ground", "jaxbiped:Floor"), "needs Floor of"),
         (lambda held: {"value": 1}, "must be a whole file of"),
         (replace('"jax": 0', '"jax": 99'), "must be a whole file of"),
         (replace('"jax": 0', '"pickle": 0'), "must be a whole file of"),
@@ -202,7 +199,7 @@ def test_another_file_is_one_sentence(tmp_path, change, said):
 def test_another_version_is_named_where_it_made_other_classes(tmp_path):
     path = tmp_path / "it.npz"
     jb.save(path, jb.seed_scene())
-    rewritten(path, replace("_ground:Ground", "_ground:Floor"))
+    rewritten(path, replace("jaxbiped:Ground", "jaxbiped:Floor"))
     rewritten(path, lambda held: held | {
         "written_by": held["written_by"] | {"version_jaxbiped": "9.0"}
     })  # fmt: skip
