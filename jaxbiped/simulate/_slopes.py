@@ -36,6 +36,9 @@ from jaxbiped.variational._variational_solve import (
     tangents_at_times,
 )
 
+_EARLY, _LEFT = 3.0, 1e-2
+"""How long before an event the motion is first followed, in tolerances times the unit of time, and
+the share of that which is left in the end: behind a touchdown derivatives change in nanoseconds."""
 _WATCH = Watch(field=vector_field, switches=switches)
 """Derivatives are taken up to the times at which the plain solve saved."""
 _ROLLING = Watch(field=rolling_field, switches=mode_switches)
@@ -98,14 +101,20 @@ def slopes_of(
     at = TangentsAtTimes(there, jnp.zeros((len(t), 0, len(there))))
     time = jnp.zeros((len(t), 0))
     if places or active:
-        how = motion_solve(_WATCH, solver, rtol)
+        how, engine = motion_solve(_WATCH, solver, rtol), CUDA if device else None
         start, seeded = seeded_directions(scene, state, places, active)
-        at = tangents_at_times(how, start, seeded, t, CUDA if device else None)
+        early = _EARLY * rtol * units_of(scene, state).time
+        at = tangents_at_times(how, start, seeded, jnp.where(by_clock, t, t - early), engine)
         time = jnp.zeros(at.columns.shape[:2])
     columns = at.columns
     if until is not None and (places or active):
         end = jtu.tree_map(lambda leaf: leaf[-1], saved)
-        moves = _at_events(scene, at, end, found.ending, section, rtol, seeded)
+
+        def nearer(here: Tangents, delay: Scalar) -> Tangents:
+            lasts = jnp.where(delay <= 2.0 * early, (1.0 - _LEFT) * jnp.maximum(delay, 0.0), 0.0)
+            return tangents_after(how, here, seeded, lasts, engine)
+
+        moves = _at_events(scene, at, end, found.ending, section, rtol, seeded, nearer)
         time = jnp.where(by_clock[:, None], 0.0, moves.time)
         columns = jnp.where(by_clock[:, None, None], columns, moves.state)
     rates = jnp.stack(jtu.tree_leaves(jax.vmap(lambda y: vector_field(0.0, y, scene))(at.state)), 1)
@@ -126,19 +135,27 @@ def _at_events(
     section: AbstractSection | None,
     rtol: Scalar,
     seeded: Seeded,
+    nearer: Callable[[Tangents, Scalar], Tangents],
 ) -> EventMotion:
-    """At arrivals at a section, but at last where the simulation ends."""
+    """At arrivals at a section, but at last where the simulation ends.
+
+    `nearer` follows the motion from before an event almost as far as that.
+    """
     unit = units_of(scene, end).time
 
     def follow(surface: Callable[[PyTree, PyTree], Scalar], here: TangentsAtTimes) -> EventMotion:
-        return follow_event(
-            surface,
-            lambda a, y: vector_field(0.0, y, a),
-            Tangents(here.state, here.columns.T),
-            seeded,
-            rtol=rtol,
-            unit=unit,
-        )
+        def event(at: Tangents) -> EventMotion:
+            return follow_event(
+                surface,
+                lambda a, y: vector_field(0.0, y, a),
+                at,
+                seeded,
+                rtol=rtol,
+                unit=unit,
+            )
+
+        first = Tangents(here.state, here.columns.T)
+        return event(nearer(first, event(first).delay))
 
     def arrive(here: TangentsAtTimes) -> EventMotion:
         assert section is not None
