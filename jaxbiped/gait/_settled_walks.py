@@ -36,12 +36,14 @@ class Walks(NamedTuple):
         points: states there without hip_x, scaled, shape (n, 40, m); NaN beyond the last.
         sizes: of their components, shape (m,).
         places: along the slope, in units of the walker's height, shape (n, 40); NaN likewise.
+        attempted: steps that all of them took together.
     """
 
     counts: np.ndarray
     points: np.ndarray
     sizes: np.ndarray
     places: np.ndarray
+    attempted: int = 0
 
     def settled(self, most: int = 4) -> list[np.ndarray]:
         """Where those that walked on are in the end, the most settled first, shapes (m,)."""
@@ -89,19 +91,19 @@ def walks_from(scene: Scene | RigidScene, starts: WalkerState) -> Walks:
     walked: Any = _arrivals if scene.compliant else _rigid_arrivals
     # Without last digits, in which versions of JAX differ: all come to the same gait, to the bit.
     rounded = jtu.tree_map(lambda leaf: np.round(np.asarray(leaf), _DIGITS), starts)
-    counts, arrivals = walked(scene, rounded)
+    counts, arrivals, attempted = walked(scene, rounded)
     sizes = recurring_sizes(scene, arrivals)
     points = np.stack(recurring_leaves(arrivals), axis=-1) / sizes
     places = np.where(np.isfinite(arrivals[0]), arrivals[0], np.nan) / float(scene.mechanism.height)
-    return Walks(np.asarray(counts), points, sizes, places)
+    return Walks(np.asarray(counts), points, sizes, places, int(np.sum(attempted)))
 
 
 @cached_jit
-def _arrivals(scene: Scene, starts: WalkerState) -> tuple[Scalar, WalkerState]:
-    """Arrivals at the section of each walk, and the states at them, the stance leg standing."""
+def _arrivals(scene: Scene, starts: WalkerState) -> tuple[Scalar, WalkerState, Scalar]:
+    """Of each walk arrivals at the section, states at them, the stance leg standing, and steps."""
     section, footsteps = section_of(scene, None), scene.mechanism.structure.cycle_footsteps
 
-    def one(start: PyTree) -> tuple[Scalar, PyTree]:
+    def one(start: PyTree) -> tuple[Scalar, PyTree, Scalar]:
         walk = simulate(
             scene,
             start,
@@ -113,20 +115,20 @@ def _arrivals(scene: Scene, starts: WalkerState) -> tuple[Scalar, WalkerState]:
         )
         assert walk.arrivals is not None
         at = walk.arrivals.state
-        return walk.arrivals.total, in_nearest_names(section, scene, at, at)
+        return walk.arrivals.total, in_nearest_names(section, scene, at, at), walk.attempted
 
     return jax.vmap(one)(starts)
 
 
 @cached_jit
-def _rigid_arrivals(scene: RigidScene, starts: WalkerState) -> tuple[Scalar, WalkerState]:
-    """Cycles of each walk, and the states just after the heel strike that ends each."""
+def _rigid_arrivals(scene: RigidScene, starts: WalkerState) -> tuple[Scalar, WalkerState, Scalar]:
+    """Of each walk cycles, states just after the heel strike that ends each, and steps."""
     each = scene.mechanism.structure.cycle_footsteps
 
-    def one(start: PyTree) -> tuple[Scalar, PyTree]:
+    def one(start: PyTree) -> tuple[Scalar, PyTree, Scalar]:
         walk = rigid_walk(scene, start, footsteps=each * _CYCLES, max_arrivals=each * _CYCLES)
         assert walk.arrivals is not None
         last = jtu.tree_map(lambda leaf: leaf[each - 1 :: each], walk.arrivals.state)
-        return walk.arrivals.total // each, last
+        return walk.arrivals.total // each, last, walk.attempted
 
     return jax.vmap(one)(starts)
