@@ -34,6 +34,7 @@ from jaxbiped.gait._pseudo_arclength import Change
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.gait._walk_waves import is_far_from_seed, walks_of
+from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.scene._walker import Walker
 from jaxbiped.solve._accuracy import Precision
@@ -75,6 +76,7 @@ def branch_along(
     """
     begin: Any = line.first
     start = default_guess(begin)
+    problem = problem._replace(active=_columns(line) if problem.active else ())
     first = search(problem._replace(args=begin, guess=start), _TURNS)
     if int(first.ending) != int(Search.FOUND) and not isinstance(begin.walker, Walker):
         for point in _likely_gaits(begin, begins_at_model, search, problem, like):
@@ -128,6 +130,16 @@ def _likely_gaits(
             yield branch.points[-1]
 
 
+def _columns(line: Homotopy) -> tuple[int, ...]:
+    """Positions of all leaves of a line's scenes, in the order of a gait's sensitivities.
+
+    So a search, what follows it and a step along the line are one program of lanes.
+    """
+    named = select_parameters(line.last.minimal, None)[1]
+    count = len(jtu.tree_leaves(line.last))
+    return (*named, *(i for i in range(count) if i not in named))
+
+
 def _beyond(
     search: Searching, problem: FixedPointProblem, line: Homotopy, branch: FollowedBranch
 ) -> tuple[np.ndarray, float] | None:
@@ -162,11 +174,11 @@ def _scene_along(
     precision: Precision,
 ) -> tuple[Scalar, Scalar, Scalar, Scalar]:
     """What a return changes in a point, and how that depends on the point and on s."""
-    m, scene = point.shape[0], line.at(s)
-    seeds, sizes = seed_directions(scene, tuple(range(len(jtu.tree_leaves(scene)))), m)
+    m, scene, columns = point.shape[0], line.at(s), _columns(line)
+    seeds, sizes = seed_directions(scene, columns, m)
     start = state_with(scout.system, like, point)
     once = linearised_return(
         scout, seeds, start, precision, jnp.asarray(False), carries_parameters=jnp.asarray(True)
     )
-    by_s = once.jacobian[:, m:] @ (line.slopes(s) / sizes)
+    by_s = once.jacobian[:, m:] @ (line.slopes(s)[jnp.asarray(columns)] / sizes)
     return once.recurring - point, once.jacobian[:, :m] - jnp.eye(m), by_s, once.code

@@ -243,7 +243,8 @@ def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) 
     """
     if not isinstance(scene, AbstractWalkerScene):
         return jnp.asarray(True)
-    forward = steps_ahead(scene, step_length, period)
+    pace = jnp.sqrt(scene.mechanism.height / scene.ground.g)
+    forward = (step_length > 0.0) & (period > _SHORTEST * pace)
     if not scene.compliant:
         return forward
     modelled = scene.minimal
@@ -253,12 +254,6 @@ def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) 
         return touches(foot) & (modelled.normal.elastic_force(foot.penetration) > _DEEPEST * weight)
 
     return forward & ~any_of([deep(foot) for foot in feet(modelled, minimal_state(scene, state))])
-
-
-def steps_ahead(scene: AbstractWalkerScene, step_length: Scalar, period: Scalar) -> Scalar:
-    """Whether an orbit comes downhill, in more time than a foot chatters (boolean)."""
-    shortest = _SHORTEST * (scene.mechanism.height / scene.ground.g) ** 0.5
-    return (step_length > 0.0) & (period > shortest)
 
 
 def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: RealScalarLike) -> Scalar:

@@ -8,13 +8,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._progress import Stage, stage
 from jaxbiped.gait._branch_along import Searching, branch_along, state_at
-from jaxbiped.gait._fixed_point_search import (
-    FixedPointProblem,
-    Found,
-    Search,
-    cycle_of,
-    steps_ahead,
-)
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, cycle_of
 from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, homotopy_to
 from jaxbiped.gait._relaxation import relaxed
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
@@ -27,7 +21,7 @@ from jaxbiped.gait._search_provenance import (
     single_stage_origin,
 )
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
-from jaxbiped.gait._settled_walks import Walks
+from jaxbiped.gait._settled_walks import SHORTEST, Walks
 from jaxbiped.gait._walk_waves import is_far_from_seed, state_rows, walks_of
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Walker
@@ -70,12 +64,15 @@ class Staged(NamedTuple):
         others: the others that were seen, by their radius.
         branch: the branch from the seed's gait, None where it was not followed.
         line: the scenes along which.
+        walks, searches: how many there were in all of the scene itself.
     """
 
     best: Seen | None
     others: tuple[Seen, ...]
     branch: FollowedBranch | None
     line: Homotopy | None
+    walks: int
+    searches: int
 
 
 def search_in_stages(
@@ -94,6 +91,7 @@ def search_in_stages(
     seen: list[Seen] = []
     walks: list[Walks] = []
     branch = line = None
+    searches = 1
     walker: Any = modelled
     if is_far_from_seed(modelled):
         line = homotopy_to(modelled)
@@ -115,7 +113,9 @@ def search_in_stages(
             now.update(0, f"{len(seen)} found, the smallest spectral radius {best:.4g}")
 
     def try_all(points: Sequence[np.ndarray] | np.ndarray, by: FoundBy) -> None:
+        nonlocal searches
         for point in points:
+            searches += 1
             add(search(problem._replace(guess=state_at(type(start), point)), _TURNS), by)
             now.update()
             if has_stable():
@@ -168,7 +168,9 @@ def search_in_stages(
             near = [point for each in latest for point in each.near_returns(_NEAR)]
             try_all([*near, *scattered[1:]], FoundBy.SCATTERED_STARTS)
     ordered = sorted(seen, key=lambda each: (not each.is_whole, each.radius))
-    return Staged(ordered[0] if ordered else None, tuple(ordered[1:]), branch, line)
+    best = ordered[0] if ordered else None
+    walked = sum(len(each.counts) for each in walks)
+    return Staged(best, tuple(ordered[1:]), branch, line, walked, searches)
 
 
 def origin_of(staged: Staged, problem: FixedPointProblem) -> Origin:
@@ -181,15 +183,18 @@ def origin_of(staged: Staged, problem: FixedPointProblem) -> Origin:
         row[:3] = float(last.period), float(last.advance[0]), each.radius
         row[3:] = 0.0, *np.asarray(each.found.recurring).tolist()
     period, length, radius, *state = columns.T
-    others = OtherGait(period, length, radius, type(problem.guess)(*state))
+    plain = plain._replace(
+        others=OtherGait(period, length, radius, type(problem.guess)(*state)),
+        walks=code_array(staged.walks),
+        searches=code_array(staged.searches),
+    )
     if staged.branch is None or staged.line is None:
-        return plain._replace(others=others)
+        return plain
     branch = staged.branch
     nearest = plain.nearest
     if branch.end is not BranchEnd.NO_BEGINNING:
         nearest = staged.line.at(np.float64(branch.s[branch.farthest]))
     return plain._replace(
-        others=others,
         branch_end=code_array(branch.end),
         branch_walk_ending=code_array(branch.code),
         nearest=nearest,
@@ -212,8 +217,7 @@ def spectral_radius(found: Found) -> float:
 
 
 def _steps_ahead(found: Found, scene: Scene | RigidScene) -> bool:
-    last = found.last
-    return bool(steps_ahead(scene, np.sum(last.advance), np.asarray(last.period)))
+    return float(np.sum(found.last.advance)) > SHORTEST * float(scene.mechanism.height)
 
 
 def _same(a: Found, b: Seen) -> bool:

@@ -128,6 +128,7 @@ def _after(way: _Way, latest: Found, line: Homotopy, first: Scalar) -> _Way:
         branch_end=jnp.where(followed, end, way.origin.branch_end),
         branch_walk_ending=jnp.where(followed & lost, latest.code, way.origin.branch_walk_ending),
         nearest=select(followed & ~from_seed, line.at(at[1]).minimal, way.origin.nearest),
+        searches=way.searches + 1,
     )
     return _Way(
         s=s,

@@ -81,6 +81,8 @@ class Origin(NamedTuple):
         branch_walk_ending: code of the `Ending` of the walk at which it ended.
         nearest: the scene with a gait on that branch that is nearest to the requested one; NaN if
             no branch was followed.
+        walks: how many walks were followed from starts of the scene.
+        searches: how many searches by Newton's method began at states of the scene.
     """
 
     found_by: Scalar
@@ -88,6 +90,8 @@ class Origin(NamedTuple):
     branch_end: Scalar
     branch_walk_ending: Scalar
     nearest: AbstractScene
+    walks: Scalar
+    searches: Scalar
 
 
 def single_stage_origin(problem: FixedPointProblem, found_by: FoundBy) -> Origin:
@@ -99,6 +103,8 @@ def single_stage_origin(problem: FixedPointProblem, found_by: FoundBy) -> Origin
         branch_end=code_array(BranchEnd.NOT_FOLLOWED),
         branch_walk_ending=code_array(0),
         nearest=jtu.tree_map(lambda leaf: np.full(np.shape(leaf), np.nan), problem.args.minimal),
+        walks=code_array(0),
+        searches=code_array(1),
     )
 
 
@@ -118,7 +124,7 @@ def explain_search(scene: AbstractScene, gait: "Gait") -> str:
         One sentence, without a full stop.
     """
     if gait.outcome is not Search.FOUND:
-        told = _branch(scene, gait) + _what_to_try(scene, gait)
+        told = _tried(gait) + _branch(scene, gait) + _what_to_try(scene, gait)
         return f"no gait found: {_search_sentence(gait)}{told}"
     text = f"found by {gait.found_by}"
     asked, least = len(gait.step_lengths), int(gait.cycle_footsteps)
@@ -166,6 +172,14 @@ def _search_sentence(gait: "Gait") -> str:
     if gait.outcome is Search.NO_WALK:
         return "an orbit that returns has a foot deep underground, or steps uphill"
     return "the search from the start does not converge"
+
+
+def _tried(gait: "Gait") -> str:
+    """What else was tried, after a semicolon; nothing where the search had but one stage."""
+    walks, searches = int(gait.origin.walks), int(gait.origin.searches) - 1
+    if not walks and not searches:
+        return ""
+    return f"; {searches} further searches and {walks} walks led to none"
 
 
 def _what_to_try(scene: Any, gait: "Gait") -> str:

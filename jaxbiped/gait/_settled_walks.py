@@ -22,7 +22,7 @@ _DIGITS = 9
 _CYCLES = 40
 _ALIKE = 1e-2
 """Scaled distance of two states that count as one."""
-_SHORTEST = 0.02
+SHORTEST = 0.02
 """Advance in units of the height below which two arrivals are no step: a foot may also chatter."""
 _DEPTH = 4
 """Longest cycle that is looked for in a walk's last arrivals."""
@@ -36,16 +36,18 @@ class Walks(NamedTuple):
         points: states there without hip_x, scaled, shape (n, 40, m); NaN beyond the last.
         sizes: of their components, shape (m,).
         places: along the slope, in units of the walker's height, shape (n, 40); NaN likewise.
+        attempted: steps that all of them took together.
     """
 
     counts: np.ndarray
     points: np.ndarray
     sizes: np.ndarray
     places: np.ndarray
+    attempted: int = 0
 
     def settled(self, most: int = 4) -> list[np.ndarray]:
         """Where those that walked on are in the end, the most settled first, shapes (m,)."""
-        goes = np.diff(self.places[:, -2:])[:, 0] > _SHORTEST  # one that stands may chatter
+        goes = np.diff(self.places[:, -2:])[:, 0] > SHORTEST  # one that stands may chatter
         walking = np.flatnonzero((self.counts >= _CYCLES) & goes)
         latest, before = self.points[walking, -1], self.points[walking, -1 - _DEPTH : -1]
         moved = np.linalg.norm(latest[:, None] - before, axis=-1)
@@ -69,7 +71,7 @@ class Walks(NamedTuple):
 
     def _moved(self) -> np.ndarray:
         """Distance of each arrival's state from the next; infinite without a step between."""
-        is_step = np.diff(self.places, axis=1) > _SHORTEST  # NaN is none
+        is_step = np.diff(self.places, axis=1) > SHORTEST  # NaN is none
         before, after = (np.where(is_step[..., None], x, 0.0)
                          for x in (self.points[:, :-1], self.points[:, 1:]))  # fmt: skip
         return np.where(is_step, np.linalg.norm(after - before, axis=-1), np.inf)
@@ -89,19 +91,19 @@ def walks_from(scene: Scene | RigidScene, starts: WalkerState) -> Walks:
     walked: Any = _arrivals if scene.compliant else _rigid_arrivals
     # Without last digits, in which versions of JAX differ: all come to the same gait, to the bit.
     rounded = jtu.tree_map(lambda leaf: np.round(np.asarray(leaf), _DIGITS), starts)
-    counts, arrivals = walked(scene, rounded)
+    counts, arrivals, attempted = walked(scene, rounded)
     sizes = recurring_sizes(scene, arrivals)
     points = np.stack(recurring_leaves(arrivals), axis=-1) / sizes
     places = np.where(np.isfinite(arrivals[0]), arrivals[0], np.nan) / float(scene.mechanism.height)
-    return Walks(np.asarray(counts), points, sizes, places)
+    return Walks(np.asarray(counts), points, sizes, places, int(np.sum(attempted)))
 
 
 @cached_jit
-def _arrivals(scene: Scene, starts: WalkerState) -> tuple[Scalar, WalkerState]:
-    """Arrivals at the section of each walk, and the states at them, the stance leg standing."""
+def _arrivals(scene: Scene, starts: WalkerState) -> tuple[Scalar, WalkerState, Scalar]:
+    """Of each walk arrivals at the section, states at them, the stance leg standing, and steps."""
     section, footsteps = section_of(scene, None), scene.mechanism.structure.cycle_footsteps
 
-    def one(start: PyTree) -> tuple[Scalar, PyTree]:
+    def one(start: PyTree) -> tuple[Scalar, PyTree, Scalar]:
         walk = simulate(
             scene,
             start,
@@ -113,20 +115,20 @@ def _arrivals(scene: Scene, starts: WalkerState) -> tuple[Scalar, WalkerState]:
         )
         assert walk.arrivals is not None
         at = walk.arrivals.state
-        return walk.arrivals.total, in_nearest_names(section, scene, at, at)
+        return walk.arrivals.total, in_nearest_names(section, scene, at, at), walk.attempted
 
     return jax.vmap(one)(starts)
 
 
 @cached_jit
-def _rigid_arrivals(scene: RigidScene, starts: WalkerState) -> tuple[Scalar, WalkerState]:
-    """Cycles of each walk, and the states just after the heel strike that ends each."""
+def _rigid_arrivals(scene: RigidScene, starts: WalkerState) -> tuple[Scalar, WalkerState, Scalar]:
+    """Of each walk cycles, states just after the heel strike that ends each, and steps."""
     each = scene.mechanism.structure.cycle_footsteps
 
-    def one(start: PyTree) -> tuple[Scalar, PyTree]:
+    def one(start: PyTree) -> tuple[Scalar, PyTree, Scalar]:
         walk = rigid_walk(scene, start, footsteps=each * _CYCLES, max_arrivals=each * _CYCLES)
         assert walk.arrivals is not None
         last = jtu.tree_map(lambda leaf: leaf[each - 1 :: each], walk.arrivals.state)
-        return walk.arrivals.total // each, last
+        return walk.arrivals.total // each, last, walk.attempted
 
     return jax.vmap(one)(starts)

@@ -30,6 +30,8 @@ _COUNT, _BEST, _KEPT = 1024, 48, 16
 """Walks of a wave; the best of all so far, about which the next begins; those that must gain."""
 _MOST, _PATIENCE, _GAIN = 24, 5, 1.02
 """Waves at most, and without a gain by this factor."""
+_MOST_STEPS = 40_000_000
+"""Solver steps after which no further wave begins: on stiff ground feet bounce for thousands."""
 _FIRST, _LEAST, _WIDER, _NEAR = 0.5, 0.02, 1.3, 0.3
 """Standard deviation of the first starts, the least of others, how much wider than the best they
 are spread, and of those about a single one."""
@@ -79,7 +81,7 @@ def _waves(scene: Scene | RigidScene, pushed: Pushed) -> Iterator[Walks]:
     """Walks in waves, until some settle, or none gets much farther than those before."""
     numbers = np.random.default_rng(0)
     size = scattered_start_count(scene)
-    best, farthest, without = np.zeros((0, size)), np.zeros(0), 0
+    best, farthest, without, attempted = np.zeros((0, size)), np.zeros(0), 0, 0
     for _ in range(_MOST):
         begun, others = _draw(numbers, best, size), pushed()[: _COUNT // 2]
         starts = starts_scattered_by(scene, jnp.asarray(begun.T))
@@ -92,7 +94,8 @@ def _waves(scene: Scene | RigidScene, pushed: Pushed) -> Iterator[Walks]:
         order = np.argsort(-farthest, kind="stable")[:_BEST]
         best, farthest = best[order], farthest[order]
         without = 0 if farthest[:_KEPT].sum() > _GAIN * before else without + 1
-        if walks.settled(1) or without == _PATIENCE:
+        attempted += walks.attempted
+        if walks.settled(1) or without == _PATIENCE or attempted > _MOST_STEPS:
             return
 
 

@@ -1,5 +1,6 @@
 """The search without a guess, against walks that settle and gaits that are known."""
 
+import dataclasses
 import warnings
 
 import equinox as eqx
@@ -89,6 +90,19 @@ def test_where_there_is_no_gait_the_end_of_the_branch_is_told(scene, words):
     assert said.startswith("no gait found: ")
     for word in words:
         assert word in said
+
+
+@pytest.mark.nightly
+def test_a_walker_with_large_feet_that_stands_on_a_gentle_slope_has_only_an_unstable_gait():
+    """A foot that chatters where it stands is no gait; the seed's walker tells which is one."""
+    seed = jb.seed_scene(slope=0.005, r=0.2)
+    scene = dataclasses.replace(seed, walker=seed.walker.mechanism())
+    gait = jb.find_gait(scene, **PLAIN)
+    assert not bool(gait.stable)
+    assert float(gait.measures.period) == pytest.approx(0.406768, abs=1e-6)
+    assert float(gait.measures.spectral_radius) == pytest.approx(1.3514, abs=1e-3)
+    own = jb.find_gait(seed, **PLAIN)
+    assert float(own.measures.period) == pytest.approx(float(gait.measures.period), abs=1e-6)
 
 
 def test_the_nearest_scene_on_the_branch_has_a_gait():

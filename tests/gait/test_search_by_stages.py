@@ -21,14 +21,14 @@ SCENE = jb.ladder()["rigid"]
 START = jb.dynamics.RigidState(0.0, -0.2, 0.3, -1.0, -2.0)
 
 
-def found(radius, period=0.5, *, ending=jb.gait.Search.FOUND, sound=True):
+def found(radius, period=0.5, *, advance=0.2, ending=jb.gait.Search.FOUND, sound=True):
     """A gait with a leading pair of this radius."""
     jacobian = np.diag([0.1, 0.0, 0.05, 0.0])
     jacobian[:2, :2] = radius * np.array([[0.6, -0.8], [0.8, 0.6]])
     whole = np.asarray(0)
     last = LinearisedReturn(
         np.full(4, period), jacobian, jacobian, whole, np.asarray(period), whole,
-        np.array([0.2]), *[whole] * 7, None,
+        np.array([advance]), *[whole] * 7, None,
     )  # fmt: skip
     pair = last._replace(**{
         name: np.stack([np.asarray(leaf)] * 2) for name, leaf in last._asdict().items()
@@ -49,7 +49,7 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
     def walks(scene, starts):
         took.append(f"walk {len(starts.hip_x)}")
         points = [np.full(4, 1.0)] * len(queue["walk"])
-        return SimpleNamespace(settled=lambda: points)
+        return SimpleNamespace(settled=lambda: points, counts=starts.hip_x)
 
     def follow(*_, begins_at_model):
         took.append("branch")
@@ -89,7 +89,9 @@ def test_stages_follow_each_other_and_the_least_unstable_gait_is_told(monkeypatc
     assert [each.by for each in told.others] == [FoundBy.CONTINUATION]
     _, took = staged(monkeypatch, NOTHING, engine="xla")
     assert took == ["branch", "scatter"]
-    assert staged(monkeypatch, NOTHING)[0].best is None
+    nothing = staged(monkeypatch, NOTHING)[0]
+    assert (nothing.best, nothing.walks, nothing.searches) == (None, 1024, 12)
+    assert staged(monkeypatch, found(0.5))[0].searches == 1
 
 
 def test_a_gait_that_is_seen_twice_or_is_no_walk_is_told_once_or_not(monkeypatch):
@@ -102,7 +104,10 @@ def test_a_gait_that_is_seen_twice_or_is_no_walk_is_told_once_or_not(monkeypatch
     told, _ = staged(monkeypatch, NOTHING, walking=[found(0.5, sound=False)])
     assert told.best.by is FoundBy.WALKING
     # A foot that chatters where the walker stands is none.
-    assert staged(monkeypatch, NOTHING, walking=[found(0.5, 4e-7, sound=False)])[0].best is None
+    assert (
+        staged(monkeypatch, NOTHING, walking=[found(0.5, 4e-7, advance=1e-8, sound=False)])[0].best
+        is None
+    )
     problem = FixedPointProblem(None, SCENE, (), START, None)
     origin = origin_of(staged(monkeypatch, found(1.5), scattered=[found(1.2, 0.7)])[0], problem)
     assert float(origin.others.period[0]) == 0.5
@@ -132,21 +137,25 @@ def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
     places = np.where(np.arange(6)[:, None] < 5, 0.2, 1e-8) * last
     states = jb.dynamics.RigidState(places, angle, zero, zero, zero)
     counts = np.array([40, 40, 40, 39, 40, 40])
-    monkeypatch.setattr(_settled_walks, "_rigid_arrivals", lambda *_: (counts, states))
+    monkeypatch.setattr(_settled_walks, "_rigid_arrivals", lambda *_: (counts, states, counts))
+    assert walks_from(SCENE, START).attempted == 239
     chosen = walks_from(SCENE, START).settled()
     # The third is where the first one is; the fourth fell.
     assert [float(point[0]) for point in chosen] == pytest.approx([0.5, 0.2400001, 0.3])
     assert len(walks_from(SCENE, START).settled(most=1)) == 1
 
 
-def gait(outcome, *, end=BranchEnd.NOT_FOLLOWED, stable=True, others=(), grazes=0, walk=0):
+def gait(outcome, *, end=BranchEnd.NOT_FOLLOWED, stable=True, others=(), grazes=0, walk=0, walks=0):
     nearest = jb.with_parameters(SCENE, {"slope": 0.015})
     return SimpleNamespace(
         sensitivities=SimpleNamespace(period=np.zeros(2)),
         outcome=outcome, found_by="walks", others=others, grazes=grazes, stable=stable,
         walk_outcome=jb.Ending.STUMBLED,
         step_lengths=np.zeros(1), cycle_footsteps=1,
-        origin=SimpleNamespace(branch_end=int(end), nearest=nearest, branch_walk_ending=walk),
+        origin=SimpleNamespace(
+            branch_end=int(end), nearest=nearest, branch_walk_ending=walk, walks=walks,
+            searches=1 + walks // 64,
+        ),
     )  # fmt: skip
 
 
@@ -162,6 +171,10 @@ def gait(outcome, *, end=BranchEnd.NOT_FOLLOWED, stable=True, others=(), grazes=
         ),
         (gait(jb.gait.Search.NO_RETURN), "the walk from the start ends (stumbled)"),
         (gait(jb.gait.Search.NO_WALK), "a foot deep underground"),
+        (
+            gait(jb.gait.Search.NO_RETURN, walks=1024),
+            "(stumbled); 16 further searches and 1024 walks led to none",
+        ),
         (gait(jb.gait.Search.NOT_CONVERGED, end=BranchEnd.REACHED), 'try accuracy="tight"'),
         (gait(jb.gait.Search.NOT_CONVERGED, end=BranchEnd.NO_BEGINNING), "has no gait under these"),
         (

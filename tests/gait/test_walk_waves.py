@@ -20,9 +20,9 @@ LEVEL = dict(ground=jb.Ground(slope=0.0), clearance=jb.laws.StanceRotation())
 PLAIN = dict(parameters=(), radius_sensitivities=False)
 
 
-def made_up(monkeypatch, target, *, reach):
+def made_up(monkeypatch, target, *, reach, attempted=0):
     """Walks that get the farther the nearer their scatter is to a target; `reach` is how near all
-    the way needs."""
+    the way needs, `attempted` how many steps they take."""
     scene, begun = scene_of("torso"), []
 
     def starts(scene, scatter):
@@ -37,7 +37,8 @@ def made_up(monkeypatch, target, *, reach):
         gone = np.arange(40) < counts[:, None]
         points = np.where(gone[..., None], np.broadcast_to(off[:, None, None], (len(off), 40, m)),
                           np.nan)  # fmt: skip
-        return Walks(counts, points, np.ones(m), np.where(gone, 0.4 * np.arange(40), np.nan))
+        places = np.where(gone, 0.4 * np.arange(40), np.nan)
+        return Walks(counts, points, np.ones(m), places, attempted)
 
     monkeypatch.setattr(_walk_waves, "starts_scattered_by", starts)
     monkeypatch.setattr(_walk_waves, "walks_from", walks)
@@ -63,6 +64,13 @@ def test_waves_end_where_none_gets_farther(monkeypatch):
     scene, _ = made_up(monkeypatch, np.zeros(6), reach=0.0)
     assert 5 <= len(list(walks_of(scene, list))) < 24
     assert len(list(walks_of(scene, list, most=1))) == 1
+
+
+def test_waves_end_where_walks_take_too_many_steps(monkeypatch):
+    """As on ground so stiff that feet bounce: three waves of 15 million, but one of 50."""
+    for attempted, waves in ((15_000_000, 3), (50_000_000, 1)):
+        scene, _ = made_up(monkeypatch, np.zeros(6), reach=0.0, attempted=attempted)
+        assert len(list(walks_of(scene, list))) == waves
 
 
 def test_walks_get_as_far_as_they_step_ahead_and_all_but_return():
