@@ -1,4 +1,4 @@
-"""Derivatives where a walk ends at a touchdown: those before the force jumps."""
+"""Derivatives where a walk ends at a touchdown, against those of a much finer solve."""
 
 import dataclasses
 
