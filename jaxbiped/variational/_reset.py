@@ -1,4 +1,4 @@
-"""Reset of a state at a switch, as by an impact, and what becomes of its columns."""
+"""Reset of a state at a switch or on arrival, as by an impact, and what becomes of its columns."""
 
 import jax
 import jax.numpy as jnp
@@ -6,7 +6,15 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.variational._tangents import Seeded, Watch, active_leaves, with_active
+from jaxbiped.variational._tangents import (
+    Seeded,
+    Tangents,
+    Watch,
+    active_leaves,
+    along_columns_in_turn,
+    as_columns,
+    with_active,
+)
 
 
 def behind_reset(
@@ -52,3 +60,12 @@ def behind_reset(
 
     found: tuple[PyTree, list[Scalar]] = jax.lax.cond(met, after, lambda: (state, columns))
     return found
+
+
+def behind_arrival(watch: Watch, y: Tangents, args: Seeded) -> Tangents:
+    """A state on the section and its columns there, as the watch's `arrival` makes them."""
+    arrival = watch.arrival
+    if arrival is None:
+        return y
+    state, moved = along_columns_in_turn(lambda s, a: arrival(a, s), y, args)
+    return Tangents(state, as_columns(moved))
