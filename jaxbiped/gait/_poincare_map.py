@@ -209,7 +209,6 @@ def _next_arrival(
     carries_parameters: Scalar | bool,
 ) -> SectionArrival:
     """The next arrival, by the engine that is asked for, and there the state behind the reset."""
-    watch = dataclasses.replace(watch, arrival=spec.system.reset_map)
     how = SectionSolve(watch, spec.solver, precision, limit, spec.max_solver_steps)
     m = args.seeds.shape[1] - len(args.active)
     if spec.engine == "xla":
@@ -219,6 +218,7 @@ def _next_arrival(
         found = solve_to_section(how, y0, args, save_nodes=True)
         return _exit_coordinates(spec, found, args)
     sizes = jnp.diagonal(args.seeds[:, m:])
+    how = how._replace(watch=dataclasses.replace(watch, arrival=spec.system.reset_map))
     return solve_to_section_by_lanes(how, y0, args, sizes, carries_parameters)
 
 
