@@ -198,11 +198,12 @@ def summarise_gait(
         radius: whether the spectral radius is differentiated.
         origin: how the search came to it.
     """
+    path = nodes_of(found.last, problem.guess)  # of the search: its steps are those that are told
     found = with_parameter_columns(problem, found)
     orbit = orbit_of(problem, found, radius=radius)
     stability = orbit.stability
     last, m = found.last, found.recurring.shape[0]
-    path, structure = nodes_of(last, problem.guess), problem.args.mechanism.structure
+    structure = problem.args.mechanism.structure
     lost = found.ending == int(Search.NO_RETURN)
 
     def known(tree: PyTree) -> PyTree:

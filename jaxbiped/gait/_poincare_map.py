@@ -3,6 +3,7 @@
 Newton's method, multipliers and sensitivities all read this one evaluation.
 """
 
+import dataclasses
 from typing import NamedTuple
 
 import equinox as eqx
@@ -142,9 +143,7 @@ def linearised_return(
         y0 = _entry_coordinates(spec, y0, args)
         within = jnp.where(failed != 0, 0.0, limit)
         found = _next_arrival(spec, watch, y0, args, precision, within, carries_parameters)
-        found = _exit_coordinates(spec, found, args)
-        state, moved = along_columns(lambda s, a: spec.system.reset_map(a, s), found.y, args)
-        on_section = as_columns(moved)
+        state, on_section = found.y
         # At a fixed time the reset comes earlier or later, and the motion after it with it.
         rates = spec.system.vector_field(jnp.zeros(()), state, args.args)
         velocity = jnp.stack(jtu.tree_leaves(rates))
@@ -179,10 +178,12 @@ def _entry_coordinates(spec: ReturnMapSpec, y: Tangents, args: Seeded) -> Tangen
 
 
 def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) -> SectionArrival:
-    """A solve's arrival in the cycle's own coordinates."""
+    """A solve's arrival in the cycle's own coordinates, behind the reset."""
+    reset = spec.system.reset_map
     if spec.within is None:
-        return found
-    state, columns = along_columns(lambda s, a: minimal_state(a, s), found.y, args)
+        state, moved = along_columns(lambda s, a: reset(a, s), found.y, args)
+        return found._replace(y=Tangents(state, as_columns(moved)))
+    state, columns = along_columns(lambda s, a: reset(a, minimal_state(a, s)), found.y, args)
     nodes = found.nodes
     if nodes is not None:
         assert isinstance(nodes.ends, Recorded)
@@ -207,15 +208,17 @@ def _next_arrival(
     limit: Scalar,
     carries_parameters: Scalar | bool,
 ) -> SectionArrival:
-    """The next arrival, by the engine that is asked for."""
+    """The next arrival, by the engine that is asked for, and there the state behind the reset."""
     how = SectionSolve(watch, spec.solver, precision, limit, spec.max_solver_steps)
     m = args.seeds.shape[1] - len(args.active)
     if spec.engine == "xla":
         deaf = (jnp.arange(len(args.floors)) >= m) & ~jnp.asarray(carries_parameters)
         floors = jnp.where(deaf, jnp.inf, args.floors)
         args = Seeded(args.args, args.seeds, floors, args.active)
-        return solve_to_section(how, y0, args, save_nodes=True)
+        found = solve_to_section(how, y0, args, save_nodes=True)
+        return _exit_coordinates(spec, found, args)
     sizes = jnp.diagonal(args.seeds[:, m:])
+    how = how._replace(watch=dataclasses.replace(watch, arrival=spec.system.reset_map))
     return solve_to_section_by_lanes(how, y0, args, sizes, carries_parameters)
 
 

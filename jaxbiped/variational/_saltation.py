@@ -10,7 +10,15 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.variational._tangents import Seeded, Watch, active_leaves, with_active
+from jaxbiped.variational._tangents import (
+    Seeded,
+    Tangents,
+    Watch,
+    active_leaves,
+    along_columns_in_turn,
+    as_columns,
+    with_active,
+)
 
 _BEYOND = 1e-3
 """How far across a surface its other side is looked at, as a share of the distance to it."""
@@ -197,3 +205,12 @@ def behind_reset(
 
     found: tuple[PyTree, list[Scalar]] = jax.lax.cond(met, after, lambda: (state, columns))
     return found
+
+
+def behind_arrival(watch: Watch, y: Tangents, args: Seeded) -> Tangents:
+    """A state on the section and its columns there, as the watch's `arrival` makes them."""
+    arrival = watch.arrival
+    if arrival is None:
+        return y
+    state, moved = along_columns_in_turn(lambda s, a: arrival(a, s), y, args)
+    return Tangents(state, as_columns(moved))

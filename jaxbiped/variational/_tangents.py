@@ -133,6 +133,7 @@ class Watch(eqx.Module):
         ending: code of the failure that ends the solve, 0 for none.
         peak: a quantity whose largest value is to be known.
         reset: what becomes of the state at a switch that `resets`.
+        arrival: what becomes of it on the section, for a program to carry its columns through.
     """
 
     field: VectorField = eqx.field(static=True)
@@ -143,6 +144,7 @@ class Watch(eqx.Module):
     ending: Callable[[PyTree, PyTree], Scalar] | None = eqx.field(static=True, default=None)
     peak: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
     reset: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
+    arrival: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
 
 
 class _TracedOnce(AbstractImplicitField):
@@ -235,12 +237,14 @@ class VariationalSolution(NamedTuple):
     """What a solve found: as in `SectionArrival`, all columns as rows of shape (m + p, …).
 
     Attributes:
-        t, state, columns, time_columns: on the section.
+        t, reached, time_columns: on the section.
+        state, columns: there, or behind it where the watch's `arrival` makes another one of it.
         code, attempted, jumps, grazes, peak, peak_columns: see there.
         accepted: number of steps accepted.
     """
 
     t: Scalar
+    reached: PyTree
     state: PyTree
     columns: Scalar
     time_columns: Scalar

@@ -17,7 +17,13 @@ from jaxbiped.solve.controllers._solve_ends import clip_step, first_step
 from jaxbiped.solve.controllers._step_size import step_control
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._column_step import Differentiated, column_step, cross, differentiate_step
-from jaxbiped.variational._saltation import at_fixed_time, behind_reset, meet, meeting_at
+from jaxbiped.variational._saltation import (
+    at_fixed_time,
+    behind_arrival,
+    behind_reset,
+    meet,
+    meeting_at,
+)
 from jaxbiped.variational._solve_to_section import onto_section, peak_of
 from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
 from jaxbiped.variational._tangent_solver import SHARE
@@ -160,8 +166,7 @@ class AdaptiveColumns:
         return after, over
 
     def finish(self, given: VariationalProblem, now: _Now) -> VariationalSolution:
-        late = now.t >= given.max_time
-        ended = jnp.where(late, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
+        ended = jnp.where(now.t >= given.max_time, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
         zero, field = jnp.zeros(()), self.watch.field
@@ -169,11 +174,11 @@ class AdaptiveColumns:
         by_state, by_parameter = at_fixed_time(rates, now.columns, now.shifts)
         by_parameter = jnp.where(given.carries_parameters > 0.0, by_parameter, jnp.nan)
         seeded, columns = self._seeded(given), jnp.concatenate([by_state, by_parameter]).T
-        y, t = Tangents(now.state, columns), now.t
-        time_columns, peak = jnp.zeros(columns.shape[1]), jnp.zeros(())
-        peak_columns = time_columns
+        y, t, peak = Tangents(now.state, columns), now.t, jnp.zeros(())
+        time_columns = peak_columns = jnp.zeros(columns.shape[1])
         if self.watch.section is not None:
             y, t, time_columns = onto_section(self.watch, y, t, seeded, along_columns_in_turn)
+        reached, y = y.state, behind_arrival(self.watch, y, seeded)
         if self.watch.peak is not None:
             at_peak = now.landed.at_peak
             rates = field(zero, at_peak, given.args)
@@ -183,6 +188,7 @@ class AdaptiveColumns:
             peak_columns = jnp.where(now.landed.jumps_at_peak, jnp.nan, peak_columns)
         return VariationalSolution(
             t=t,
+            reached=reached,
             state=y.state,
             columns=y.columns.T,
             time_columns=time_columns,

@@ -104,7 +104,10 @@ def _number(value: RealScalarLike) -> Scalar:
 def solve_to_section_by_lanes(
     how: SectionSolve, y0: Tangents, args: Seeded, sizes: Scalar, carries_parameters: Scalar | bool
 ) -> SectionArrival:
-    """`solve_to_section` for columns as `solve_variational` takes them; nodes are a `Recording`."""
+    """`solve_to_section` for columns as `solve_variational` takes them; nodes are a `Recording`.
+
+    State and columns are those behind the watch's `arrival`.
+    """
     found, recording = solve_variational(
         how, y0, args, sizes, carries_parameters=carries_parameters, save_nodes=True
     )
@@ -124,7 +127,7 @@ def solve_to_section_by_lanes(
 
 def _nodes(start: PyTree, found: VariationalSolution, recording: Recording | Recorded) -> Nodes:
     first = jnp.stack([jnp.zeros(()), *jtu.tree_leaves(start)])
-    last = jnp.stack([found.t, *jtu.tree_leaves(found.state)])
+    last = jnp.stack([found.t, *jtu.tree_leaves(found.reached)])
     return Nodes(first, recording, last, found.accepted)
 
 
