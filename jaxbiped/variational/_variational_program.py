@@ -146,7 +146,10 @@ class AdaptiveColumns:
             behind = behind_reset(self.watch, met, past, state, new_columns, seeded, given.sizes)
             (state, new_columns), t = behind, jnp.where(met, t - past, t)
         if self.watch.peak is None:
-            columns = tuple(_select(keep, a, b) for a, b in zip(new_columns, columns, strict=True))
+            pairs = zip(new_columns, columns, strict=True)
+            columns = tuple(
+                jax.lax.map(lambda each: jnp.where(keep, *each), pair) for pair in pairs
+            )
             peaks, peak_shifts = columns, shifts
         else:
             highest = keep & (landed.peak > now.landed.peak)
@@ -240,7 +243,6 @@ class AdaptiveColumns:
         self, given: VariationalProblem, now: _Now, step: Differentiated
     ) -> tuple[list[Scalar], Scalar]:
         """The columns after the step, and the largest norm of their errors."""
-
         inverse = jnp.stack(jtu.tree_leaves(given.units.inverse))
 
         def step_column(
@@ -253,14 +255,14 @@ class AdaptiveColumns:
             square = jnp.sum(scaled * scaled) / len(scaled)
             return end, jnp.where(jnp.isnan(square), jnp.inf, square)
 
-        found, norms = [], []
+        found, worst = [], jnp.zeros(())
         by_state, by_parameter = now.columns
         if by_state.shape[0]:
             columns, squares = jax.lax.map(
                 lambda each: step_column(each[0], each[1], None), (by_state, given.state_floors)
             )
             found.append(columns)
-            norms.append(jnp.max(squares))
+            worst = jnp.max(squares)
         else:
             found.append(by_state)
         if by_parameter.shape[0]:
@@ -277,12 +279,9 @@ class AdaptiveColumns:
                 given.carries_parameters > 0.0, carried, lambda: (by_parameter, jnp.zeros(()))
             )
             found.append(columns)
-            norms.append(square)
+            worst = jnp.maximum(worst, square)
         else:
             found.append(by_parameter)
-        worst = jnp.zeros(())
-        for norm in norms:
-            worst = jnp.maximum(worst, norm)
         # The step that crosses a switch is too short for them to change.
         return found, jnp.where(now.next_t - now.t > 2.0 * NEAR, jnp.sqrt(worst), 0.0)
 
@@ -292,10 +291,6 @@ class AdaptiveColumns:
 
         control = step_control(given.rtol, 1e-2 * given.rtol, norm, given.units)
         return SwitchLocator(control, self.watch, corners=True)
-
-
-def _select(keep: Scalar, new: Scalar, old: Scalar) -> Scalar:
-    return jax.lax.map(lambda each: jnp.where(keep, *each), (new, old))
 
 
 def _row(
