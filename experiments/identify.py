@@ -1,10 +1,10 @@
 """Parameters of a walker from measured gaits, and whether their intervals hold the truth.
 
 Writes identify.png. Gaits of the seed's walker on three slopes are measured with noise, over and
-over; K, c and mu_kinetic are fitted to each set from a start that is far off. Of the Stribeck rate
-xi such data tell nothing, and the fit says so. The same is done in settings where intervals are
-wide, the model bends or a parameter is undetermined: K beside c, friction's pair, a rigid walker's
-inertia and centre of mass, and angles of either walker on a clock that is not known.
+over; K, c and mu_kinetic are fitted to each set from a start that is far off. Such data limit the
+Stribeck rate xi from below at most, and the fit says so. The same is done in settings where
+intervals are wide, the model bends or a parameter is undetermined: K beside c, friction's pair, a
+rigid walker's inertia and centre of mass, and angles of either walker on a clock that is not known.
 """
 
 import time
@@ -86,7 +86,9 @@ def main(options: Options):
         "sets": count,
         "converged": sum(fit.ending is jb.identify.FitEnding.CONVERGED for fit in fits),
         "parameters": rows,
-        "undetermined_with_xi": list(with_xi.undetermined),
+        "without_upper_end_with_xi": [
+            name for name, (_, high) in with_xi.intervals.items() if not np.isfinite(high)
+        ],
         "settings": {name: coverage(each, count, random) for name, each in SETTINGS.items()},
         "mean_chi_squared": float(np.mean([fit.chi_squared for fit in fits])),
         "freedom": fits[0].freedom,
