@@ -19,7 +19,10 @@ class NamedCode(enum.IntEnum):
         try:
             return cls(int(code))
         except TypeError:  # JAX's of a traced value is one, too
-            what = f"is an array of shape {code.shape}" if code.ndim else "is a traced value"
+            import numpy as np
+
+            shape = np.shape(code)
+            what = f"is an array of shape {shape}" if shape else "is a traced value"
             raise ArgumentError(
                 f"only the code of one result has a name: this one {what}; compare it with numbers "
                 f"such as {cls.__name__}.{next(iter(cls)).name}."

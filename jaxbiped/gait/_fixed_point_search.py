@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._ending import NamedCode
-from jaxbiped._types import RealScalarLike, Scalar, by_numpy
+from jaxbiped._types import RealScalarLike, Scalar, by_numpy, is_traced
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._footfalls import FootMotion, any_of, touches
 from jaxbiped.dynamics._redundant_state import minimal_state
@@ -96,7 +96,7 @@ class Found(NamedTuple):
 
     def _one_of_both(self, place: int) -> LinearisedReturn:
         known: LinearisedReturn = self.both
-        if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(known)):
+        if not is_traced(known):
             # By NumPy: JAX would compile a program for every shape.
             known = jax.tree.map(np.asarray, known)
         return jax.tree.map(lambda leaf: leaf[place], known)

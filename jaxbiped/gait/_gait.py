@@ -198,7 +198,7 @@ def summarise_gait(
         radius: whether the spectral radius is differentiated.
         origin: how the search came to it.
     """
-    path = nodes_of(found.last, problem.guess)  # of the search: its steps are those that are told
+    path = nodes_of(found.last, problem.guess)  # of the search, whose steps are counted
     found = with_parameter_columns(problem, found)
     orbit = orbit_of(problem, found, radius=radius)
     stability = orbit.stability

@@ -1,7 +1,6 @@
 """Motion of a linkage in gravity."""
 
 import diffrax
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
@@ -18,7 +17,7 @@ from jaxbiped._checks import (
     warn,
 )
 from jaxbiped._ending import Ending
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Scalar, as_float, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._linkage_constraints import Constraints, constraints_of
@@ -91,8 +90,7 @@ def simulate_linkage(
         raise ArgumentError(
             "adjoint = None is not allowed in forward mode: choose diffrax.ForwardMode()."
         ) from error
-    leaves = jtu.tree_leaves((scene, state, times, step))
-    if step is not None and not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+    if step is not None and not is_traced((scene, state, times, step)):
         longer = _solve(*problem, _LONGER * step, asked.max_solver_steps, chosen)
         _warn_of_long_steps(swung, float(step), longer)
     return swung
@@ -103,8 +101,8 @@ def _check_joints(scene: LinkageScene, state: LinkageState) -> None:
     joints = scene.linkage.joints
     pins = [joint.point_1 for joint in joints]
     pins += [joint.point_2 for joint in joints if joint.body_2 is not None]
-    leaves = jtu.tree_leaves((scene, state))
-    if not pins or any(isinstance(x, jax.core.Tracer) or jnp.ndim(x) for x in leaves):
+    start = scene, state
+    if not pins or is_traced(start) or any(map(jnp.ndim, jtu.tree_leaves(start))):
         return
     arm = max(float(np.hypot(*pin)) for pin in pins)
     off = float(_distance(constraints_of(scene.linkage, *state)))
