@@ -16,7 +16,7 @@ _progress._PATIENCE, _progress._PAUSE = 0.2, 0.05
 def work(name, **how):
     with _progress.stage(name, **how) as now:
         for k in range(4):
-            time.sleep(0.1)
+            time.sleep(0.1 if k < 3 else 0.6)  # a busy machine may show it late
             now.update(found=f"{k} found")
 """
 
@@ -30,7 +30,6 @@ def test_a_file_gets_what_takes_long_in_commands_and_what_was_asked_for():
     ended = run("work('a library call'); work('asked', total=4, unit='gaits', show=True)")
     assert ended.returncode == 0, ended.stderr
     first = ended.stderr.splitlines()[0]
-    # A busy machine may show it a turn later.
     assert re.fullmatch(r"asked: [123] of 4 gaits, [012] found …", first)
     last = ended.stderr.splitlines()[-1]
     times = r"\[\d+ s, 0 s left(, \d+ gaits/s)?\]"
@@ -96,7 +95,7 @@ def test_a_notebook_shows_the_line_below_the_cell_and_takes_it_away():
             return super().process_message(message, cell, index)
 
     Client(notebook, kernel_name="python3", timeout=60).execute()
-    assert updates[0].startswith("in a notebook: |███         | 1 of 4 gaits, 0 found")
+    assert re.match(r"in a notebook: \|█{3,9} +\| [123] of 4 gaits, [012] found", updates[0])
     assert updates[-1] == ""
     (output,) = notebook.cells[0].outputs
     assert output["data"] == {"text/plain": ""}
