@@ -25,6 +25,16 @@ def test_every_derivative_through_an_ending_is_right_or_refused(tmp_path):
     assert "kelvin-voigt" in (tmp_path / "event_derivatives.md").read_text()
 
 
+def test_every_parameter_s_derivative_of_a_mechanism_is_right(tmp_path):
+    numbers, _ = quick_run("mechanism_derivatives", tmp_path)
+    (row,) = numbers["rows"]
+    assert min(row[f"{accuracy}: judged"] for accuracy in ("draft", "balanced", "tight")) >= 10
+    assert row["draft"] < 1e-3
+    assert row["balanced"] < 1e-4
+    assert row["tight"] < 1e-6
+    assert "| torso coupled | a time |" in (tmp_path / "mechanism_derivatives.md").read_text()
+
+
 def test_both_precautions_make_derivatives_follow_their_tolerance(tmp_path):
     # Units stand in the titles, of what is in error.
     bare = {"error", "attempted steps of a footstep"}
