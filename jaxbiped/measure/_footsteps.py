@@ -14,8 +14,8 @@ from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._energy import energies, is_driven, powers
+from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._footfalls import landings, standing_leg
-from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._samples import Samples, at_steps, evaluate_at, moments_of_change, sample
 from jaxbiped.scene._scene import RedundantScene, Scene

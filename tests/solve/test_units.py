@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.solve._units import recurring_inverse_units, units_of
+from jaxbiped.solve._accuracy import recurring_inverse_units, units_of
 
 SEED, START = jb.seed_scene(), jb.seed_state()
 DURATION = 0.8

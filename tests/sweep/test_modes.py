@@ -6,7 +6,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.models import hsu_chen
 from jaxbiped.optimise._certificate import _basin
-from jaxbiped.sweep._admissible import admissible_directions, independent_names, passes_a_stop
+from jaxbiped.sweep._follow_starts import passes_a_stop
+from jaxbiped.variational._hybrid_system import admissible_directions, independent_names
 
 pytestmark = pytest.mark.nightly
 

@@ -15,7 +15,7 @@ from jaxbiped.scene._parameter_access import parameter_names, parameter_quantiti
 from jaxbiped.scene._placement import placement
 from jaxbiped.scene._rigid_feet import AT_LIMIT, rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.sweep._admissible import limit_motions, passes_a_stop
+from jaxbiped.sweep._follow_starts import limit_motions, passes_a_stop
 
 START_QUANTITIES = {
     "theta_stance": Quantity("stance leg angle", r"$\theta_2$", "rad"),
