@@ -177,19 +177,6 @@ def check_precision(scene: CompliantScene, dtype: np.dtype) -> None:
         )
 
 
-def accuracy_told(text: str) -> str | float:
-    """An accuracy as a command was told it: a number where it is one, else a name.
-
-    Raises:
-        ArgumentError: neither.
-    """
-    try:
-        return float(text)
-    except ValueError:
-        check_accuracy_name(text)
-        return text
-
-
 def check_accuracy_name(accuracy: object) -> None:
     """Raises `ArgumentError` unless `accuracy` is a name of `ACCURACIES`."""
     check_choice("accuracy", accuracy, (*ACCURACIES, "or a relative error above 0"))

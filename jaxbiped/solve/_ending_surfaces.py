@@ -12,7 +12,7 @@ from jaxbiped.dynamics._contacts import feet, legs_at
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._footfalls import FootMotion, LegMotion, leg_places, touching_legs
-from jaxbiped.scene._clearance import StanceRotation
+from jaxbiped.scene._ground import StanceRotation
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._structure import Structure
 from jaxbiped.solve._failure_events import (

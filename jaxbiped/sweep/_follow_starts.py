@@ -15,9 +15,7 @@ from jaxbiped._types import as_float
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import BY_NAME, DEVICES, Program, Request
 from jaxbiped.dynamics._mode_changes import SLACK
-from jaxbiped.scene._couplings import angles_and_rates_named
-from jaxbiped.scene._modes import Limit
-from jaxbiped.scene._rigid_feet import rigid_modes
+from jaxbiped.scene._rigid_feet import limit_motions, rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve._adaptive_program import Solve
@@ -177,27 +175,12 @@ def broadcast_leaves(tree: PyTree, count: int) -> PyTree:
     return jtu.tree_map(repeat, tree)
 
 
-def limit_motions(scene: Any, values: Mapping[str, Any]) -> list[tuple[Limit, Any, Any]]:
-    """Each limit of a rigid walker's stops, how far it is [rad] and at what rate it goes away.
-
-    Args:
-        scene: the walker.
-        values: scalars of its states by name, arrays of any common shape.
-    """
-    mechanism, slope = scene.mechanism, scene.ground.slope
-    nothing = 0.0 * np.asarray(values[mechanism.structure.coordinates[2]])
-    angles, rates = angles_and_rates_named(mechanism, slope, values, nothing)
-    return [
-        (limit, np.asarray(limit.distance(mechanism, angles, slope)), limit.gap.of(rates))
-        for limit in rigid_modes(mechanism).limits
-    ]
-
-
 def passes_a_stop(scene: Any, values: Mapping[str, Any], *, by: float = SLACK) -> np.ndarray:
     """Whether states by name, arrays of shape (n,), lie beyond a stop by so much [rad]."""
     angle = scene.mechanism.structure.coordinates[2]
     passed = np.zeros(np.shape(values[angle]), dtype=bool)
     if not scene.compliant:
-        for _, off, _ in limit_motions(scene, values):
-            passed = passed | (off < -by)
+        mechanism, slope = scene.mechanism, scene.ground.slope
+        for gap, _ in limit_motions(mechanism, rigid_modes(mechanism), slope, values):
+            passed = passed | (np.asarray(gap) < -by)
     return passed
