@@ -1,4 +1,7 @@
-"""Numbers and rows of tables as the pages write them."""
+"""Numbers, rows and the matrix of capabilities as the pages write them, in Markdown."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 UNKNOWN = "…"
 """Stands for what the results do not hold: the pages may say anything there."""
@@ -20,3 +23,32 @@ def row(*cells: str) -> str:
 def percents(number: float) -> str:
     """A fraction as the pages write it."""
     return f"{100.0 * number:.1f}"
+
+
+def table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Lines of the page: the table, then each sentence by the letter that stands in the cells."""
+    columns = list(rows[0]["cells"])
+    letters: dict[str, str] = {}
+    yield row("capability", *columns, "what the number is")
+    yield "|" + "---|" * (len(columns) + 2)
+    for each in rows:
+        shown = [_cell(each["cells"][column], letters) for column in columns]
+        yield row(each["capability"], *shown, each["number"])
+    if letters:
+        yield ""
+    for sentence, letter in letters.items():
+        yield f"- ({letter}) {sentence}"
+
+
+def _cell(value: Any, letters: dict[str, str]) -> str:
+    """A number as the pages write it, or the letter of a sentence."""
+    if isinstance(value, str):
+        return f"({letters.setdefault(value, _letter(len(letters)))})"
+    if isinstance(value, int):
+        return str(value)
+    return f"{value:.4f}" if 1e-3 <= abs(value) < 1e3 else small(value)
+
+
+def _letter(number: int) -> str:
+    alphabet = "abcdefghijklmnopqrstuvwxyz"
+    return alphabet[number] if number < 26 else alphabet[number // 26 - 1] + alphabet[number % 26]

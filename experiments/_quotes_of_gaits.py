@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from _mechanism_table import table
-from _quote_words import UNKNOWN, row, small
+from _quote_words import UNKNOWN, row, small, table
 
 
 def of_bifurcation_elasticities(numbers: dict[str, Any]) -> Iterator[str]:

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 
 import _casadi
 import numpy as np
-from _final_slopes import slopes_and_end
 from _trade_store import Case, Store, not_installed
 from _trade_walks import tolerances, walk_of
+from _walks import slopes_and_end
 from reference.compliant import SEED, numbers
 from reference.scipy_solves import final_of
 

@@ -16,11 +16,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _experiment import Options, experiment
-from _final_slopes import slopes_and_end
 from _pictures import draw_by, label
 from _scenes import seed_with
 from _timing import seconds_of, timed
-from _walks import DURATION, errors_of, exact_ends, perturbed, walk_from, walker
+from _walks import DURATION, errors_of, exact_ends, perturbed, slopes_and_end, walk_from, walker
 from reference.numbalsoda_solves import lsoda, lsoda_address, lsoda_batch
 from reference.scipy_solves import FINEST, final_of
 

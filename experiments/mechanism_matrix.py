@@ -13,8 +13,8 @@ from pathlib import Path
 
 from _experiment import Options, experiment
 from _mechanism_cells import CAPABILITIES, Trial
-from _mechanism_table import table
 from _mechanisms import Case, cases
+from _quote_words import table
 from _row_store import RowStore
 
 import jaxbiped as jb

@@ -41,10 +41,6 @@ def main(options: Options):
             for point in points
             if point["outcome"] != str(jb.gait.Search.FOUND)
         ],
-        "disagreement_with_neighbours": {
-            name: {key: disagreement(name, points, key) for key in keys}
-            for name, points in found.items()
-        },
     }
 
 
@@ -81,18 +77,6 @@ def own(name, points, key, kind="elasticities"):
     """Elasticities of a measure, or their errors, in the very parameter that is swept."""
     place = list(SEED).index(name)
     return np.asarray([point[kind][key][place] for point in points])
-
-
-def disagreement(name, points, key):
-    """Largest difference between a measure's change from point to point and what they promise.
-
-    In the logarithm, the elasticities integrated by the trapezium rule; None without numbers.
-    """
-    steps = np.diff(np.log([point["value"] for point in points]))
-    slopes = own(name, points, key)
-    promised = 0.5 * steps * (slopes[1:] + slopes[:-1])
-    open_ = np.abs(np.diff(np.log([point["measures"][key] for point in points])) - promised)
-    return None if np.all(np.isnan(open_)) else float(np.nanmax(open_))
 
 
 def draw(options, found, keys):

@@ -1,4 +1,4 @@
-"""Files: paths that a user gives, checked; and JSON, read and written as its standard has it."""
+"""Files and the environment: paths and numbers that a user gives there, checked; strict JSON."""
 
 import errno
 import json
@@ -10,9 +10,21 @@ from typing import Any, TypeAlias
 
 from jaxbiped._checks import ArgumentError, ResourceError
 
+CACHE_BYTES_VARIABLE = "JAXBIPED_CACHE_BYTES"
+"""Bytes for records of simulations and for buffers; 0 to keep none."""
+THREADS_VARIABLE = "JAXBIPED_THREADS"
+"""Threads to use, else as many as the process has cores."""
+VECTOR_VARIABLE = "JAXBIPED_VECTOR_BITS"
+"""The bits of a vector where the CPU has as many or more."""
+_ALLOWED: dict[str, tuple[str, Callable[[int], bool]]] = {
+    CACHE_BYTES_VARIABLE: ("a whole number of bytes, 0 to keep none", lambda n: True),
+    THREADS_VARIABLE: ("a whole number of threads above 0", lambda n: n > 0),
+    VECTOR_VARIABLE: ("128, 256 or 512", (128, 256, 512).__contains__),
+}
+
+
 JsonObject: TypeAlias = dict[str, Any]
 """Numbers and words by name, ready for JSON: what a command writes, settings of a store."""
-
 _WRONG_PATH = ("EACCES", "EPERM", "EROFS", "ENOENT", "EEXIST", "ENOTDIR", "EISDIR", "ENAMETOOLONG")
 """Errors of a file system where another path would do; any other is the disk's own."""
 
@@ -121,3 +133,21 @@ def _plain(value: Any, unknown: Callable[[float], Any]) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return unknown(value)
     return value
+
+
+def environment_number(name: str) -> int | None:
+    """The whole number that a variable holds, None where it is not set or empty.
+
+    Raises:
+        ArgumentError: it holds something else.
+    """
+    text, (allowed, test) = os.environ.get(name, "").strip(), _ALLOWED[name]
+    if text and not (text.isdecimal() and test(int(text))):
+        raise ArgumentError(f"{name} = {text!r} in the environment: it must be {allowed}.")
+    return int(text) if text else None
+
+
+def check_environment() -> None:
+    """Raises `ArgumentError` for a variable that is not understood."""
+    for name in _ALLOWED:
+        environment_number(name)

@@ -11,7 +11,7 @@ import weakref
 from collections.abc import Callable, Hashable
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from jaxbiped._environment import CACHE_BYTES_VARIABLE, environment_number
+from jaxbiped._files import CACHE_BYTES_VARIABLE, environment_number
 
 _CACHE_BYTES = 1 << 30
 PROGRAMS = 64

@@ -17,8 +17,7 @@ import tyro
 from tyro.conf import subcommand
 
 from jaxbiped._checks import ArgumentError, ResourceError
-from jaxbiped._environment import check_environment
-from jaxbiped._files import user_path
+from jaxbiped._files import check_environment, user_path
 from jaxbiped._progress import tell_stages
 from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._constraints import Constraints

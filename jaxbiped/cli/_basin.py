@@ -72,14 +72,13 @@ class Basin(options.Command):
     output: options.OutputOptions
 
     def run(self) -> int:
-        from jaxbiped.solve._accuracy import accuracy_told
         from jaxbiped.sweep._labelling_preparation import effort_of
         from jaxbiped.sweep._store_files import store_path
 
         scene: Any = self.scene.scene()
         starts = self.starts.chosen(scene)
         how = self.sweep.arguments("labelling")
-        how["accuracy"] = accuracy_told(self.sweep.accuracy)
+        how["accuracy"] = options.accuracy_told(self.sweep.accuracy)
         effort = effort_of(scene, **how)
         self.output.make_folder()
         store_path(self.sweep.store)

@@ -61,7 +61,6 @@ class FindGait(options.Command, of=("find_gait",)):
     engine: options.Engine
 
     def run(self) -> int:
-        from jaxbiped.solve._accuracy import accuracy_told
         from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 
         find_gait, imported = jb.find_gait, time.perf_counter()
@@ -70,7 +69,7 @@ class FindGait(options.Command, of=("find_gait",)):
         self.output.make_folder()
         section = None if self.section is None else getattr(jb, _SECTIONS[self.section])()
         how = self.arguments("find_gait")
-        how |= {"section": section, "accuracy": accuracy_told(self.accuracy)}
+        how |= {"section": section, "accuracy": options.accuracy_told(self.accuracy)}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
             gait = find_gait(scene, guess, **how)

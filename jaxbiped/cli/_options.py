@@ -127,14 +127,21 @@ def positive(unit: str = "") -> Check:
     return Check(lambda name, value: check_positive(name, value, unit))
 
 
-def _check_accuracy(name: str, accuracy: str) -> None:
-    """Raises `ArgumentError` unless it names an accuracy or is a relative error above 0."""
+def accuracy_told(text: str) -> str | float:
+    """An accuracy as it was told: a number where it is one, else a name."""
     try:
-        number = float(accuracy)
+        return float(text)
     except ValueError:
+        return text
+
+
+def _check_accuracy(name: str, text: str) -> None:
+    """Raises `ArgumentError` unless it names an accuracy or is a relative error above 0."""
+    accuracy = accuracy_told(text)
+    if isinstance(accuracy, str):
         check_choice(name, accuracy, (*names("ACCURACIES"), "a relative error above 0"))
     else:
-        check_positive(name, number)
+        check_positive(name, accuracy)
 
 
 Count = Annotated[int, Check(check_count)]

@@ -66,9 +66,8 @@ class SolveOptions(options.Options, of=("simulate",)):
         if self.accuracy is None:
             return None
         from jaxbiped.simulate._accurate_walk import check_accurate_walk
-        from jaxbiped.solve._accuracy import accuracy_told
 
-        return check_accurate_walk(accuracy_told(self.accuracy), atol=self.atol, dt=self.dt)
+        return check_accurate_walk(options.accuracy_told(self.accuracy), atol=self.atol, dt=self.dt)
 
     def tolerances(self) -> dict[str, Any]:
         """What decides on the steps' sizes, as `simulate` takes it; raises `ArgumentError`."""

@@ -21,7 +21,7 @@ from jaxbiped.cli._walk_warnings import (
 )
 from jaxbiped.constraints._constraint_methods import name_of
 from jaxbiped.measure._footsteps import footstep_dataset
-from jaxbiped.measure._samples import from_start, places_of_standing
+from jaxbiped.measure._samples import from_start, places_of_standing, rows_of
 from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 
 _MOST_ROWS = 24
@@ -184,7 +184,7 @@ def _rigid_footsteps(scene: "jb.RigidScene", strikes: Any) -> list[dict[str, flo
     """Each footstep from one heel strike to the next."""
     count, states = min(int(strikes.total), len(np.asarray(strikes.t))), strikes.state
     at = np.asarray(strikes.t)[:count]
-    places = places_of_standing(scene, jtu.tree_map(lambda leaf: np.asarray(leaf)[:count], states))
+    places = places_of_standing(scene, rows_of(states, slice(count)))
     periods, lengths = np.diff(at), np.diff(places)
     found = {"time_s": at[1:], "period_s": periods, "length_m": lengths}
     return _rows(found | {"speed_m_s": lengths / periods})

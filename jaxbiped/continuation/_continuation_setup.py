@@ -19,8 +19,7 @@ from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
-from jaxbiped.solve._accuracy import ACCURACIES, precision_of
-from jaxbiped.solve._units import recurring_sizes
+from jaxbiped.solve._accuracy import ACCURACIES, precision_of, recurring_sizes
 
 _TOLD_BY_CONTACT = (BranchEnd.BREAKS_OFF, BranchEnd.WALK_ENDS)
 _CONVERGED = 3.0

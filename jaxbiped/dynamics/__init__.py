@@ -10,6 +10,9 @@ from jaxbiped.dynamics._energy import Energies as Energies
 from jaxbiped.dynamics._energy import Powers as Powers
 from jaxbiped.dynamics._energy import energies as energies
 from jaxbiped.dynamics._energy import powers as powers
+from jaxbiped.dynamics._equivalent_states import exchange_legs as exchange_legs
+from jaxbiped.dynamics._equivalent_states import minimal_state as minimal_state
+from jaxbiped.dynamics._equivalent_states import redundant_state as redundant_state
 from jaxbiped.dynamics._footfalls import FootMotion as FootMotion
 from jaxbiped.dynamics._footfalls import touches as touches
 from jaxbiped.dynamics._hip_force import hip_force as hip_force
@@ -28,8 +31,6 @@ from jaxbiped.dynamics._redundant_motion import Violation as Violation
 from jaxbiped.dynamics._redundant_motion import redundant_field as redundant_field
 from jaxbiped.dynamics._redundant_motion import redundant_motion as redundant_motion
 from jaxbiped.dynamics._redundant_motion import violation as violation
-from jaxbiped.dynamics._redundant_state import minimal_state as minimal_state
-from jaxbiped.dynamics._redundant_state import redundant_state as redundant_state
 from jaxbiped.dynamics._rigid_checks import RigidChecks as RigidChecks
 from jaxbiped.dynamics._rigid_checks import rigid_checks as rigid_checks
 from jaxbiped.dynamics._rolling import rolling as rolling
@@ -40,7 +41,6 @@ from jaxbiped.dynamics._state import standing_height as standing_height
 from jaxbiped.dynamics._state import whole_state as whole_state
 from jaxbiped.dynamics._switches import Switch as Switch
 from jaxbiped.dynamics._switches import switches as switches
-from jaxbiped.dynamics._symmetry import exchange_legs as exchange_legs
 from jaxbiped.scene._linkages import LinkageScene as LinkageScene
 from jaxbiped.scene._linkages import walker_linkage as walker_linkage
 from jaxbiped.scene._state_types import Accelerations as Accelerations

@@ -11,13 +11,13 @@ from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._linkage_constraints import masses_of
 from jaxbiped.constraints._projection import correct_step, nearest_consistent
+from jaxbiped.dynamics._equivalent_states import BodiesState, CompliantState, redundant_state
 from jaxbiped.dynamics._redundant_motion import (
     Violation,
     coordinates_of,
     violation,
     with_coordinates,
 )
-from jaxbiped.dynamics._redundant_state import BodiesState, CompliantState, redundant_state
 from jaxbiped.dynamics._state import state_for
 from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.scene._state_types import is_redundant

@@ -9,6 +9,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import load_shares, preload
+from jaxbiped.dynamics._equivalent_states import CompliantState, images, motion_in, poses_of
 from jaxbiped.dynamics._footfalls import (
     FootMotion,
     LegMotion,
@@ -18,8 +19,6 @@ from jaxbiped.dynamics._footfalls import (
     touches,
 )
 from jaxbiped.dynamics._joint_loads import Pressed, stop_limits
-from jaxbiped.dynamics._redundant_state import CompliantState, motion_in, poses_of
-from jaxbiped.dynamics._symmetry import images
 from jaxbiped.dynamics._tree import Pose, point_motion
 from jaxbiped.scene._ground import drop_under
 from jaxbiped.scene._mechanism import Mechanism

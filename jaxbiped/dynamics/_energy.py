@@ -15,10 +15,10 @@ from jaxbiped.dynamics._contacts import (
     legs_at,
     normal_forces,
 )
+from jaxbiped.dynamics._equivalent_states import motion_in, poses_of
 from jaxbiped.dynamics._footfalls import FootMotion, touches
 from jaxbiped.dynamics._joint_loads import JointEnergy, joint_energy
 from jaxbiped.dynamics._motor_motion import motor_powers
-from jaxbiped.dynamics._redundant_state import motion_in, poses_of
 from jaxbiped.dynamics._tree import PointMotion, point_motion
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import Scene

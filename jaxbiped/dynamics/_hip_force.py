@@ -5,10 +5,10 @@ from jaxtyping import PyTree
 
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._contacts import feet, foot_force
+from jaxbiped.dynamics._equivalent_states import poses_of
 from jaxbiped.dynamics._joint_loads import of_all_bodies
 from jaxbiped.dynamics._minimal_motion import accelerations
 from jaxbiped.dynamics._redundant_motion import HipForce, redundant_motion
-from jaxbiped.dynamics._redundant_state import poses_of
 from jaxbiped.dynamics._tree import point_acceleration, point_motion
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._scene import CompliantScene, RedundantScene

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import actuators_of
+from jaxbiped.dynamics._equivalent_states import exchange_legs
 from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._joint_loads import with_constraint_torques
 from jaxbiped.dynamics._mode_changes import (
@@ -19,7 +20,6 @@ from jaxbiped.dynamics._mode_changes import (
 )
 from jaxbiped.dynamics._plastic_impact import Grip, Impulse, plastic_impact
 from jaxbiped.dynamics._stance import Stance, of_stance
-from jaxbiped.dynamics._symmetry import exchange_legs
 from jaxbiped.dynamics._tree import Loads, rehung
 from jaxbiped.dynamics._tree_inertia import composites, eliminate
 from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes

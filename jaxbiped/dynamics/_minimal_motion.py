@@ -15,6 +15,7 @@ from jaxbiped.dynamics._contacts import (
     legs_in,
     normal_forces,
 )
+from jaxbiped.dynamics._equivalent_states import CompliantState, motion_in
 from jaxbiped.dynamics._footfalls import FootMotion
 from jaxbiped.dynamics._implicit_field import (
     AbstractImplicitField,
@@ -23,7 +24,6 @@ from jaxbiped.dynamics._implicit_field import (
     free_mass_entries,
 )
 from jaxbiped.dynamics._joint_loads import with_constraint_torques
-from jaxbiped.dynamics._redundant_state import CompliantState, motion_in
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, Pose, point_motion, pose_of
 from jaxbiped.dynamics._tree_inertia import (

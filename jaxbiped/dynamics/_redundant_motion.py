@@ -17,11 +17,11 @@ from jaxbiped.constraints._linkage_constraints import (
     turn_of,
 )
 from jaxbiped.dynamics._contacts import bristles_of, feet_at, foot_force
+from jaxbiped.dynamics._equivalent_states import BodiesState, poses_of
 from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
 from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
 from jaxbiped.dynamics._minimal_motion import bristle_rates, with_torques
-from jaxbiped.dynamics._redundant_state import BodiesState, poses_of
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import (
     Arm,

@@ -10,6 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._contacts import feet, legs_at
+from jaxbiped.dynamics._equivalent_states import exchange_legs, images
 from jaxbiped.dynamics._footfalls import (
     any_of,
     carrier_place,
@@ -18,7 +19,6 @@ from jaxbiped.dynamics._footfalls import (
     touching_legs,
 )
 from jaxbiped.dynamics._strike_surfaces import lead, lean, opening
-from jaxbiped.dynamics._symmetry import exchange_legs, images
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import is_rigid
 from jaxbiped.scene._state_types import SomeState

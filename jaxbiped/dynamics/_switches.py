@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._contacts import feet, foot_force, legs_at, limits_of
+from jaxbiped.dynamics._equivalent_states import CompliantState
 from jaxbiped.dynamics._footfalls import FootMotion, touches
-from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 

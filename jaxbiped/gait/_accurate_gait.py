@@ -19,9 +19,8 @@ from jaxbiped.gait._return_map_spec import orbit_solver
 from jaxbiped.gait._search_provenance import unknown_derivatives
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameter_access import parameter_values
-from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
+from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision, relative_to_scene
 from jaxbiped.solve._error_estimate import Judged, check_untraced, refine
-from jaxbiped.solve._units import relative_to_scene
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 
 _FIRST = 1e-2

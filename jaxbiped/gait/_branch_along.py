@@ -37,8 +37,7 @@ from jaxbiped.gait._walk_waves import is_far_from_seed, walks_of
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.scene._walker import Walker
-from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve._units import recurring_sizes
+from jaxbiped.solve._accuracy import Precision, recurring_sizes
 
 _TURNS = 20
 """Turns that each search may take."""

@@ -17,7 +17,7 @@ from jaxbiped._types import is_traced
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._consistent_state import consistent_state
-from jaxbiped.dynamics._redundant_state import BodiesState, minimal_state
+from jaxbiped.dynamics._equivalent_states import BodiesState, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._fixed_point_search import (

@@ -17,8 +17,8 @@ from jaxtyping import PyTree
 from jaxbiped._ending import NamedCode
 from jaxbiped._types import RealScalarLike, Scalar, by_numpy, is_traced
 from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._footfalls import FootMotion, any_of, touches
-from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.gait._newton import Method, Progress, Stage, initial_progress, newton_iteration
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,

@@ -25,7 +25,7 @@ from jaxbiped.gait._settled_walks import SHORTEST, Walks
 from jaxbiped.gait._walk_waves import is_far_from_seed, state_rows, walks_of
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Walker
-from jaxbiped.solve._units import recurring_sizes
+from jaxbiped.solve._accuracy import recurring_sizes
 
 _PUSHES = (-0.05, -0.01, 0.01, 0.05)
 """Sizes (scaled) of the pushes off an unstable gait from which walks begin as well, and off a

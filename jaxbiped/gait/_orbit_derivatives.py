@@ -19,8 +19,7 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec, has_switches
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.gait._stability import Stability, stability_of
 from jaxbiped.linalg._small_matrices import eigensystem, solve
-from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve._units import recurring_inverse_units
+from jaxbiped.solve._accuracy import Precision, recurring_inverse_units
 
 CLOSENESS = 1e-3
 """Distance of a multiplier from the unit circle that is flagged as a bifurcation."""

@@ -15,10 +15,9 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import Recorded
-from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
+from jaxbiped.dynamics._equivalent_states import minimal_state, redundant_state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve._units import recurring_inverse_units
+from jaxbiped.solve._accuracy import Precision, recurring_inverse_units
 from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival, solve_to_section
 from jaxbiped.variational._tangents import (

@@ -20,8 +20,7 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, has_switches
 from jaxbiped.simulate._derivatives import first_derivatives_only
-from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve._units import units_of
+from jaxbiped.solve._accuracy import Precision, units_of
 from jaxbiped.variational._solve_to_section import SectionArrival, solve_to_section
 from jaxbiped.variational._tangents import SectionSolve, Seeded, Tangents, VariationalSolution
 from jaxbiped.variational._variational_solve import solve_variational

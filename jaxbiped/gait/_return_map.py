@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive, check_type
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Scalar, Time, as_float, select
-from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
+from jaxbiped.dynamics._equivalent_states import minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import check_leaves, without_whole_turns
 from jaxbiped.gait._poincare_map import LinearisedReturn, linearised_return, seed_directions

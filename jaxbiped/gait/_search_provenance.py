@@ -13,7 +13,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
-from jaxbiped.scene._clearance import AlwaysTouching
+from jaxbiped.scene._ground import AlwaysTouching
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.scene._walker import Walker

@@ -14,7 +14,7 @@ from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.simulate._simulate import rigid_walk, simulate
-from jaxbiped.solve._units import recurring_sizes
+from jaxbiped.solve._accuracy import recurring_sizes
 from jaxbiped.variational._hybrid_system import section_of
 
 _DIGITS = 9

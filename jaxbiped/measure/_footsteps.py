@@ -4,9 +4,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-import jax
 import numpy as np
-from jaxtyping import PyTree
 
 from jaxbiped._checks import check_type
 from jaxbiped._quantity import Quantity
@@ -14,10 +12,17 @@ from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._energy import energies, is_driven, powers
+from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._footfalls import landings, standing_leg
-from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.measure._energy_ledger import energy_ledger
-from jaxbiped.measure._samples import Samples, at_steps, evaluate_at, moments_of_change, sample
+from jaxbiped.measure._samples import (
+    Samples,
+    at_steps,
+    evaluate_at,
+    moments_of_change,
+    rows_of,
+    sample,
+)
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene._structure import Structure
 from jaxbiped.solve._scene_key import check_scene_of
@@ -126,10 +131,10 @@ def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
     check_scene_of(trajectory, scene)
     trajectory.require_dense()
     found_feet = at_steps(scene, trajectory, contacts).feet
-    before, after = (_part(found_feet, part) for part in (slice(-1), slice(1, None)))
+    before, after = (rows_of(found_feet, part) for part in (slice(-1), slice(1, None)))
     structure = scene.mechanism.structure
     lands = np.stack(landings(structure, before, after))
-    last = int(standing_leg(structure, _part(found_feet, 0)))
+    last = int(standing_leg(structure, rows_of(found_feet, 0)))
     found: list[tuple[int, int]] = []
     for k in np.flatnonzero(lands.any(axis=0)):
         for leg in range(1, 1 + len(lands)):
@@ -228,10 +233,6 @@ def strike_places(scene: Scene, trajectory: Trajectory, strikes: HeelStrikes) ->
         place = np.choose(first, [feet[k].x for k in own])
         places = np.where(strikes.foot == leg, place, places)
     return places
-
-
-def _part(feet: PyTree, part: slice | int) -> PyTree:
-    return jax.tree_util.tree_map(lambda leaf: leaf[part], feet)
 
 
 def _of_legs(structure: Structure, of_feet: Sequence[Numbers]) -> list[np.ndarray]:

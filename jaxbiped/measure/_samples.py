@@ -221,11 +221,8 @@ def kept_strikes(scene: RigidScene, walk: Trajectory[Any]) -> tuple[np.ndarray, 
 def from_start(scene: RigidScene, walk: Trajectory[Any], start: Any) -> Trajectory[Any]:
     """A rigid walk whose start is kept as a heel strike is, at time 0."""
     first, kept = check_state(start, state_type(scene), "start"), walk.arrivals
-    total, t, state = (
-        1,
-        np.zeros(1),
-        jtu.tree_map(lambda leaf: np.reshape(np.asarray(leaf), (1,)), first),
-    )
+    total, t = 1, np.zeros(1)
+    state = jtu.tree_map(lambda leaf: np.reshape(np.asarray(leaf), (1,)), first)
     if kept is not None:
         total, t = 1 + int(kept.total), np.append(t, np.asarray(kept.t))
         state = jtu.tree_map(lambda a, b: np.append(a, np.asarray(b)), state, kept.state)
@@ -233,8 +230,9 @@ def from_start(scene: RigidScene, walk: Trajectory[Any], start: Any) -> Trajecto
     return dataclasses.replace(walk, arrivals=arrivals)
 
 
-def rows_of(states: Any, rows: slice | np.ndarray) -> Any:
-    return type(states)(*[np.asarray(leaf)[rows] for leaf in states])
+def rows_of(tree: PyTree, rows: slice | np.ndarray | int) -> PyTree:
+    """Rows of each leaf of a tree, as NumPy arrays."""
+    return jtu.tree_map(lambda leaf: np.asarray(leaf)[rows], tree)
 
 
 def places_of_standing(scene: RigidScene, states: Any) -> np.ndarray:

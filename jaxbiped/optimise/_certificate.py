@@ -32,11 +32,11 @@ from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._engine_names import ENGINES
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.sweep._admissible import independent_names
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure
 from jaxbiped.sweep.starts._samples import sample
+from jaxbiped.variational._hybrid_system import independent_names
 
 _SETTLED = 1e-4
 """Relative difference between a walk's last footstep and the gait's that counts as none."""

@@ -13,7 +13,7 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import as_array
 from jaxbiped.dynamics._state import state_type, whole_state
 from jaxbiped.measure._footsteps import HeelStrikes, heel_strikes
-from jaxbiped.measure._samples import evaluate_along, states_after
+from jaxbiped.measure._samples import evaluate_along, rows_of, states_after
 from jaxbiped.plot._skeleton import body_motion
 from jaxbiped.scene._rigid_feet import rigid_modes, standing_legs
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
@@ -157,7 +157,7 @@ class RigidMotion:
     def along(self, function: Callable[..., Any], t: np.ndarray) -> dict[str, np.ndarray]:
         """What a function of (scene, state) has by name at times [s], sides exchanged back."""
         rows = self.rows(t)
-        each = jtu.tree_map(lambda leaf: np.asarray(leaf)[rows], self.starts)
+        each = rows_of(self.starts, rows)
         states = _states_of_walks(self.scene, each, t - self.began[rows])
         found: Any = evaluate_along(self.scene, states, function)
         return _exchanged_back(self.scene.mechanism.structure, found, rows)
@@ -194,7 +194,7 @@ def rigid_motion(scene: RigidScene, walk: Trajectory[Any]) -> RigidMotion:
     if walk.arrivals is not None:
         kept = np.isfinite(np.asarray(walk.arrivals.t))
         times = np.asarray(walk.arrivals.t)[kept]
-        states = jtu.tree_map(lambda leaf: np.asarray(leaf)[kept], walk.arrivals.state)
+        states = rows_of(walk.arrivals.state, kept)
         if times.size and int(walk.arrivals.total) > times.size:
             end = float(times[-1])
     if not times.size or (len(times) == 1 and end <= times[0]):

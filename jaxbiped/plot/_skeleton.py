@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from jaxbiped._types import JsonObject, Scalar
-from jaxbiped.dynamics._redundant_state import minimal_state, motion_in
+from jaxbiped.dynamics._equivalent_states import minimal_state, motion_in
 from jaxbiped.plot import style
 from jaxbiped.plot.style import Look
 from jaxbiped.scene._bodies import Point

@@ -35,15 +35,15 @@ def with_fixed(
 
 
 def angles_and_rates_named(
-    mechanism: Any, slope: Any, values: Mapping[str, Any], nothing: Any = 0.0
+    mechanism: Any, slope: Any, values: Mapping[str, Any]
 ) -> tuple[list[Any], list[Any]]:
-    """Angles and rates of all bodies, from a state's scalars by name; `nothing` where not named.
+    """Angles and rates of all bodies, from a state's scalars by name; 0 where not named.
 
     `slope`: the angle of the vertical [rad].
     """
     structure = mechanism.structure
     angles, rates = (
-        [values.get(f"{kind}_{name}", nothing) for name in structure.bodies]
+        [values.get(f"{kind}_{name}", 0.0) for name in structure.bodies]
         for kind in ("theta", "omega")
     )
     fixed = with_fixed(structure, angles, slope, mechanism.joints)

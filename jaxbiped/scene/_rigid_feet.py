@@ -203,13 +203,21 @@ def _misheld(
     numpy: Any, modes: Modes, mechanism: Mechanism, slope: Any, state: Any
 ) -> list[tuple[Any, Any, Any]]:
     """For each limit whether it is passed, or held but off or moving; its gap, and the rate."""
-    angles, rates = angles_and_rates_named(mechanism, slope, state._asdict())
-    held, found = modes.decoded(numpy, state.mode).held, []
-    for limit, stays in zip(modes.limits, held, strict=True):
-        gap, rate = limit.distance(mechanism, angles, slope), limit.gap.of(rates)
+    motions, found = limit_motions(mechanism, modes, slope, state._asdict()), []
+    for (gap, rate), stays in zip(motions, modes.decoded(numpy, state.mode).held, strict=True):
         off = stays & ((abs(gap) > _DRIFT) | (abs(rate) > _DRIFT))
         found.append((off | (gap < -_DRIFT), gap, rate))
     return found
+
+
+def limit_motions(
+    mechanism: Mechanism, modes: Modes, slope: Any, values: Mapping[str, Any]
+) -> list[tuple[Any, Any]]:
+    """How far each limit is [rad], and at what rate it goes away, by scalars of a state."""
+    angles, rates = angles_and_rates_named(mechanism, slope, values)
+    return [
+        (limit.distance(mechanism, angles, slope), limit.gap.of(rates)) for limit in modes.limits
+    ]
 
 
 def _height(numpy: Any, mechanism: Mechanism, foot: int, angles: Any, rates: Any) -> Any:

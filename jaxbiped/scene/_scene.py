@@ -13,8 +13,7 @@ from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.constraints._constraint_methods import Index1, method_named
 from jaxbiped.constraints._linkage import ORIENTATIONS, Linkage
 from jaxbiped.scene._abstract_scene import AbstractMinimalScene, AbstractWalkerScene
-from jaxbiped.scene._clearance import AbstractClearance, AlwaysTouching, OneFoot
-from jaxbiped.scene._ground import Ground, warn_if_steep
+from jaxbiped.scene._ground import AbstractClearance, AlwaysTouching, Ground, OneFoot, warn_if_steep
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._linkages import check_loaded_bodies, walker_linkage
 from jaxbiped.scene._modes import limits_named

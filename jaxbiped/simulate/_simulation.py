@@ -40,14 +40,20 @@ from jaxbiped.simulate._start import (
     start_for,
 )
 from jaxbiped.simulate._xla_backend import by_xla, trim
-from jaxbiped.solve._accuracy import check_precision, resolve_slip_speed, tolerances
+from jaxbiped.solve._accuracy import (
+    Units,
+    check_precision,
+    resolve_slip_speed,
+    si_units,
+    tolerances,
+    units_of,
+)
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._projected_solver import check_adjoint
 from jaxbiped.solve._scene_key import scene_key
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve._units import Units, si_units, units_of
 from jaxbiped.solve.controllers._solve_ends import PATIENCE
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock

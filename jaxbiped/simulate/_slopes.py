@@ -19,10 +19,10 @@ from jaxbiped.dynamics._section import AbstractSection, in_nearest_names
 from jaxbiped.dynamics._strike_surfaces import opening, uprightness
 from jaxbiped.dynamics._switches import switches
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve._ending_surfaces import ending_surface
 from jaxbiped.solve._rigid_progress import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns

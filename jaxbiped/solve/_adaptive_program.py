@@ -20,10 +20,10 @@ from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._consistent_state import project
 from jaxbiped.dynamics._state import field_of
+from jaxbiped.solve._accuracy import Units
 from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve._saved_outputs import LastStep, Saved
-from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._solve_ends import (
     FootstepLimit,
     LocatedEnding,

@@ -10,9 +10,9 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._contacts import feet, legs_at
 from jaxbiped.dynamics._energy import energies
+from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._footfalls import FootMotion, LegMotion, leg_places, touching_legs
-from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.scene._clearance import StanceRotation
+from jaxbiped.scene._ground import StanceRotation
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._structure import Structure
 from jaxbiped.solve._failure_events import (

@@ -16,6 +16,7 @@ from jaxbiped._types import Scalar, Time
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._contacts import feet, legs_at
 from jaxbiped.dynamics._energy import energies
+from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._footfalls import (
     FootMotion,
     any_of,
@@ -24,9 +25,8 @@ from jaxbiped.dynamics._footfalls import (
     touching_legs,
 )
 from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._strike_surfaces import FALL_ANGLE, lean, uprightness
-from jaxbiped.scene._clearance import AbstractClearance, StanceRotation
+from jaxbiped.scene._ground import AbstractClearance, StanceRotation
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.scene._structure import Structure

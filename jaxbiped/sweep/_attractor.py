@@ -23,11 +23,10 @@ from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recur
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.solve._units import sizes_of
-from jaxbiped.sweep._admissible import passes_a_stop, projection_of
+from jaxbiped.solve._accuracy import sizes_of
 from jaxbiped.sweep._convergence_test import Goals
-from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
-from jaxbiped.variational._hybrid_system import section_of
+from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts, passes_a_stop
+from jaxbiped.variational._hybrid_system import projection_of, section_of
 
 _SHELLS = 1e-5 * 1.5 ** np.arange(30)
 """Distances that are tried."""

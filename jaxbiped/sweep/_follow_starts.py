@@ -1,5 +1,9 @@
-"""Following of starts until the label of each is certain: how far and accurately, by any engine."""
+"""Following of starts until the label of each is certain: how far and accurately, by any engine.
 
+Starts that lie beyond a stop are found here, too.
+"""
+
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import jax.tree_util as jtu
@@ -10,10 +14,12 @@ from jaxtyping import PyTree
 from jaxbiped._types import as_float
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import BY_NAME, DEVICES, Program, Request
+from jaxbiped.dynamics._mode_changes import SLACK
+from jaxbiped.scene._rigid_feet import limit_motions, rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._rigid_progress import RigidWalk
-from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._solve_ends import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import Goals
@@ -167,3 +173,14 @@ def broadcast_leaves(tree: PyTree, count: int) -> PyTree:
         return np.broadcast_to(array, (count, *array.shape))
 
     return jtu.tree_map(repeat, tree)
+
+
+def passes_a_stop(scene: Any, values: Mapping[str, Any], *, by: float = SLACK) -> np.ndarray:
+    """Whether states by name, arrays of shape (n,), lie beyond a stop by so much [rad]."""
+    angle = scene.mechanism.structure.coordinates[2]
+    passed = np.zeros(np.shape(values[angle]), dtype=bool)
+    if not scene.compliant:
+        mechanism, slope = scene.mechanism, scene.ground.slope
+        for gap, _ in limit_motions(mechanism, rigid_modes(mechanism), slope, values):
+            passed = passed | (np.asarray(gap) < -by)
+    return passed

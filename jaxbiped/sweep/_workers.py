@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, ResourceError, check_count, check_positive
-from jaxbiped._environment import THREADS_VARIABLE
+from jaxbiped._files import THREADS_VARIABLE
 from jaxbiped.compiler import default_threads
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._stored_fields import Layout, fields_of

@@ -17,9 +17,8 @@ from jaxbiped.scene._parameter_access import parameter_names
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import MinimalState, WalkerState
 from jaxbiped.simulate._simulation import CompiledSimulation, Simulation
-from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve._accuracy import Precision, sizes_of
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve._units import sizes_of
 from jaxbiped.trade._study_row import (
     OK,
     Row,

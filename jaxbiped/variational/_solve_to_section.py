@@ -12,8 +12,7 @@ from jaxtyping import PyTree
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.compiler import Recorded, Recording
-from jaxbiped.solve._accuracy import rms_norm
-from jaxbiped.solve._units import units_of
+from jaxbiped.solve._accuracy import rms_norm, units_of
 from jaxbiped.solve.controllers._solve_ends import first_step
 from jaxbiped.solve.controllers._step_size import step_control
 from jaxbiped.variational._switch_locator import SwitchLocator, SwitchLocatorState

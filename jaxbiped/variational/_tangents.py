@@ -16,8 +16,7 @@ from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.linalg._sparse_lu import SparseMatrix
-from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve._units import Units
+from jaxbiped.solve._accuracy import Precision, Units
 
 _ROUNDING = 1e-12
 

@@ -6,8 +6,8 @@ import math
 import pytest
 import quote
 from _mechanism_cells import CAPABILITIES
-from _mechanism_table import table
 from _mechanisms import PRESSED, cases
+from _quote_words import table
 
 import jaxbiped as jb
 from tests.experiments.quick import drawn_run

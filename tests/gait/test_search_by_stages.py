@@ -14,8 +14,7 @@ from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.gait._settled_walks import walks_from
-from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve._units import recurring_sizes
+from jaxbiped.solve._accuracy import Precision, recurring_sizes
 
 SCENE = jb.ladder()["rigid"]
 START = jb.dynamics.RigidState(0.0, -0.2, 0.3, -1.0, -2.0)

@@ -5,7 +5,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.gait._search_starts import default_guess
-from tests.solve.test_units import sized
+from tests.solve.test_accuracy import sized
 
 
 def test_the_seeds_own_start_is_the_papers():

@@ -4,7 +4,8 @@ import numpy as np
 
 import jaxbiped as jb
 from jaxbiped.dynamics._state_quantities import recurring_names
-from jaxbiped.sweep._admissible import admissible_directions, independent_names, passes_a_stop
+from jaxbiped.sweep._follow_starts import passes_a_stop
+from jaxbiped.variational._hybrid_system import admissible_directions, independent_names
 from tests.dynamics.test_modes import ANGLES, RATES, hsu_chen
 
 SCENE = hsu_chen()

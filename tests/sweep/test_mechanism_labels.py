@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._redundant_state import motion_in
+from jaxbiped.dynamics._equivalent_states import motion_in
 from tests.mechanisms import FEET, LEGS, PAIR, WALKERS, scene_of, start_of
 from tests.sweep.walkers import gaitless
 

@@ -6,7 +6,6 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.models import hsu_chen
 from jaxbiped.optimise._certificate import _basin
-from jaxbiped.sweep._admissible import admissible_directions, independent_names, passes_a_stop
 
 pytestmark = pytest.mark.nightly
 
@@ -19,28 +18,6 @@ def gait():
 @pytest.fixture(scope="module")
 def labelling(gait):
     return jb.labelling(hsu_chen(), guess=gait.measures.state)
-
-
-def test_directions_keep_the_knee_that_is_held(gait):
-    state = gait.measures.state
-    names, sizes = state._fields[1:], np.array([2.0, 1.0, 3.0, 1.0, 1.0, 1.0, 5.0, 1.0, 1.0])
-    ways = sizes[:, None] * admissible_directions(hsu_chen(), state, sizes)
-    assert ways.shape == (9, 6)
-    of = dict(zip(names, ways, strict=True))
-    for word in ("theta", "omega"):
-        held = of[f"{word}_thigh_2"] - of[f"{word}_shank_2"]
-        np.testing.assert_allclose(held, 0.0, atol=1e-12)
-    np.testing.assert_allclose(of["mode"], 0.0, atol=1e-12)
-    turning = ("thigh_1", "shank_1", "thigh_2")
-    expected = tuple(f"{word}_{name}" for word in ("theta", "omega") for name in turning)
-    assert independent_names(hsu_chen(), state) == expected
-
-
-def test_starts_beyond_a_stop_are_told(gait):
-    state = gait.measures.state
-    moved = {name: np.full(3, float(x)) for name, x in state._asdict().items()}
-    moved["theta_shank_1"] = moved["theta_shank_1"] + np.array([-0.01, 0.0, 0.01])
-    np.testing.assert_array_equal(passes_a_stop(hsu_chen(), moved), [False, False, True])
 
 
 def test_the_radius_of_certain_attraction_is_measured(labelling):

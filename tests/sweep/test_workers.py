@@ -14,7 +14,7 @@ import pytest
 import zarr
 
 import jaxbiped as jb
-from jaxbiped._environment import THREADS_VARIABLE
+from jaxbiped._files import THREADS_VARIABLE
 from jaxbiped.compiler import default_threads
 from jaxbiped.sweep._stored_fields import Layout
 from jaxbiped.sweep._workers import _AHEAD, compute_chunks

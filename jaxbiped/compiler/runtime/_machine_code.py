@@ -11,7 +11,7 @@ import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
 
-from jaxbiped._environment import THREADS_VARIABLE, VECTOR_VARIABLE, environment_number
+from jaxbiped._files import THREADS_VARIABLE, VECTOR_VARIABLE, environment_number
 from jaxbiped.caching._caches import Once, bounded_cache
 from jaxbiped.caching._disk_cache import read_entry, write_entry
 

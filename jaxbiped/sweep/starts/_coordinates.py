@@ -13,9 +13,9 @@ from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, with_parameters
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._rigid_feet import AT_LIMIT, rigid_modes
+from jaxbiped.scene._rigid_feet import AT_LIMIT, limit_motions, rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.sweep._admissible import limit_motions, passes_a_stop
+from jaxbiped.sweep._follow_starts import passes_a_stop
 
 START_QUANTITIES = {
     "theta_stance": Quantity("stance leg angle", r"$\theta_2$", "rad"),
@@ -155,8 +155,10 @@ def _held_along(
                 moved = getattr(base, own) + values[other] - getattr(base, other)
                 values[own] = np.where(stays, moved, values[own])
     like, held = values["mode"], []
-    for (_, off, rate), stays in zip(limit_motions(scene, values), mode.held, strict=True):
-        held.append(stays & (np.abs(off) <= AT_LIMIT) & (np.abs(rate) <= AT_LIMIT))
+    motions = limit_motions(scene.mechanism, modes, scene.ground.slope, values)
+    for (gap, rate), stays in zip(motions, mode.held, strict=True):
+        near = np.abs(np.asarray(gap)) <= AT_LIMIT
+        held.append(stays & near & (np.abs(rate) <= AT_LIMIT))
     passed = passes_a_stop(scene, values, by=AT_LIMIT)
     values["mode"] = modes.encoded(np, mode._replace(held=tuple(held)), like)
     return type(states)(**{name: np.where(passed, np.nan, each) for name, each in values.items()})

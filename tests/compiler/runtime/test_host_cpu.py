@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._environment import VECTOR_VARIABLE
+from jaxbiped._files import VECTOR_VARIABLE
 from jaxbiped.compiler.runtime import _machine_code
 from jaxbiped.compiler.runtime._machine_code import host
 

@@ -8,7 +8,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import feet
-from jaxbiped.solve._units import units_of
+from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve.controllers._step_size import CrossedSwitches, ErrorControl, crosses
 
 SCENE = jb.seed_scene()

@@ -10,7 +10,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.compiler.runtime._program import count_operations
-from jaxbiped.solve._units import units_of
+from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve.controllers._step_size import SAFETY, SMALLEST_STEP, ErrorControl
 
 RTOL, SPAN = 1e-6, 1e-3

@@ -9,7 +9,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import feet
-from jaxbiped.solve._units import units_of
+from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve.controllers import _step_size
 from jaxbiped.solve.controllers._contact_steps import TouchdownAhead
 from jaxbiped.solve.controllers._step_size import ErrorControl
