@@ -58,9 +58,10 @@ def adjoint_step(
     at_stages = stages.carried(begun)
     ends = [stages.pulled(jnp.stack([nowhere, nowhere, each])) for each in after.second]
     second = jnp.stack([start for start, _ in ends])
-    weights = jnp.stack([forcing for _, forcing in ends], axis=1)
-    tangents = order.restored(jnp.moveaxis(at_stages, 1, 0))
-    curved = jax.lax.map(lambda each: rows.curved(*each), (linear.points, tangents, weights))
+    weights = jnp.concatenate([forcing for _, forcing in ends])
+    points, tangents = jnp.concatenate([linear.points] * count), order.restored(at_stages)
+    each = points, tangents.reshape(-1, c), weights  # of every tangent at every point
+    curved = jax.lax.map(lambda one: rows.curved(*one), each).reshape(count, 3, -1).sum(axis=0)
     # By how much earlier the switch is crossed, which times the jump.
     jumps = [(linear.jump @ at_stages[v, 2]) @ after.second[v, d:] for v in range(count)]
     soon = sum(jumps[1:], jumps[0])

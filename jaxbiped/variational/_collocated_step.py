@@ -201,20 +201,14 @@ class Rows:
         return self._by_all(self._kept, list(y))
 
     def _curved(self, y: Scalar, along: Scalar, weights: Scalar) -> Scalar:
-        """Derivatives of a sum of the kept rates' derivatives along tangents of the state, (n,).
+        """Derivatives of a sum of the kept rates' derivatives along a tangent of the state, (n,).
 
-        Tangents (v, c), in the components' own order, and weights (v, k).
+        The tangent (c,), in the components' own order, and weights (k,).
         """
 
         def directional_derivative(y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
-            changes = [
-                jax.jvp(lambda y: self._kept(y, q), (y,), (list(tangent),))[1] for tangent in along
-            ]
-            parts = [
-                weight * change
-                for row, each in zip(weights, changes, strict=True)
-                for weight, change in zip(row, each, strict=True)
-            ]
+            changes = jax.jvp(lambda y: self._kept(y, q), (y,), (list(along),))[1]
+            parts = [weight * change for weight, change in zip(weights, changes, strict=True)]
             return [sum(parts[1:], parts[0])]
 
         return self._by_all(directional_derivative, list(y))[0]
