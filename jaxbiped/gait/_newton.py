@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 _NEAR, _NEARER = 1e-3, 1e-4
 """Residuals at which rough solves give way to coarse ones, and these to fine ones."""
+_FLOOR = 10.0
+"""Newton's correction, in units of the residual that counts as none, from which one that no longer
+shrinks is the solve's own error: several footsteps of an unstable gait enlarge a residual's."""
 _SMALLEST_DAMPING = 1e-3
 """Share of Newton's step below which no step is a step forward."""
 
@@ -146,7 +149,8 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
     rough_done = (now.stage == Stage.ROUGH) & (base_residual <= _NEAR)
     coarse_done = (now.stage == Stage.COARSE) & (base_residual <= _NEARER)
     refined = rough_done | coarse_done
-    fine_done = (now.stage == Stage.FINE) & (base_residual <= method.residual)
+    at_floor = returned & ~forward & (_size(now.step) <= _FLOOR * method.residual)
+    fine_done = (now.stage == Stage.FINE) & ((base_residual <= method.residual) | at_floor)
     nowhere = ~returned & ~jnp.isfinite(base_residual) & (now.stage < Stage.COARSE)
     if method.optimiser is not None:
         step, optimiser = _descent_step(now, base, change, slope, better, method.optimiser)

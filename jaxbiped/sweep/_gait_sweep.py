@@ -68,7 +68,8 @@ def gait_sweep(
     With the lanes engine, a grid of 64 points or more is searched in waves, all points of a wave at
     once: first a coarse lattice from its middle outwards, then finer ones from interpolated states.
     If a search without a guess finds nothing better there, it also speaks for the points up to two
-    strides of the coarse lattice away, except those between two points with a better gait.
+    strides of the coarse lattice away, except those between two points with a better gait and,
+    on the coarse lattice, those next to one.
 
     Args:
         scene: the walker; parameters that are not swept keep their values.

@@ -28,7 +28,7 @@ from jaxbiped.sweep._grid_waves import (
 )
 
 _TRIES = 2
-"""Neighbours from which a point is searched again."""
+"""Neighbours from which a point with an unstable gait is searched again."""
 _REACH = 2
 """How far a search without a guess that found nothing speaks for others, in the coarse lattice's
 strides: those are not searched so."""
@@ -79,10 +79,7 @@ class GaitWaves:
         untried = [place for place, gait in self._doubtful.items() if gait is None]
         self._find(untried, np.array([self._start_at(place) for place in untried]))
         self._spread()
-        reach = _REACH * plan[0].stride if np.prod(self._shape) >= LARGE else 0
-        for place in [place for wave in plan for place in wave.places]:
-            if place in self._doubtful and self._is_worth_a_search(place, reach):
-                self._search_without_guess(place)
+        self._search_without_guesses(plan)
         for place, best in self._doubtful.items():
             assert best is not None  # it was searched from a start, at least
             self._grid.write([place], rows_of(best, None))
@@ -151,15 +148,28 @@ class GaitWaves:
             self._find(list(pairs), np.stack([self._states[near] for near in pairs.values()]))
 
     def _untried_neighbour(self, place: Place) -> Place | None:
-        """One that has a stable gait, or any where this point has none."""
-        tried = self._tried.get(place, [])
-        if len(tried) >= _TRIES:
+        """One that has a stable gait; where this point has none at all, then any that has one."""
+        tried, lacks = self._tried.get(place, []), np.isnan(self._states[place][0])
+        if len(tried) >= _TRIES and not lacks:
             return None
         near = [n for n in neighbours(place, self._shape) if n not in tried]
-        stable = [n for n in near if self._stable[n]]
-        if not stable and np.isnan(self._states[place][0]):
-            stable = [n for n in near if np.isfinite(self._states[n][0])]
-        return stable[0] if stable else None
+        best = [n for n in near if self._stable[n]]
+        if lacks:
+            best += [n for n in near if np.isfinite(self._states[n][0])]
+        return best[0] if best else None
+
+    def _search_without_guesses(self, plan: Sequence[Wave]) -> None:
+        """Searches points where that may come to more, and then those next to what was found."""
+        reach = _REACH * plan[0].stride if np.prod(self._shape) >= LARGE else 0
+        places = {place: wave.stride for wave in plan for place in wave.places}
+        found = True
+        while found:
+            found = False
+            for place, stride in list(places.items()):
+                if place in self._doubtful and self._is_worth_a_search(place, stride, reach):
+                    del places[place]
+                    self._search_without_guess(place)
+                    found = True
 
     def _search_without_guess(self, place: Place) -> None:
         gait = self._search_alone(place)
@@ -171,12 +181,16 @@ class GaitWaves:
             self._grid.write([place], rows_of(self._doubtful[place] or gait, None))
         self._spread()
 
-    def _is_worth_a_search(self, place: Place, reach: int) -> bool:
+    def _is_worth_a_search(self, place: Place, stride: int, reach: int) -> bool:
         """Whether no search without a guess nearby says what one here would come to.
 
-        Such a search is worth it wherever a point has less than those on two opposite sides of it.
+        Such a search is worth it wherever a point has less than those on two opposite sides of it,
+        or on the coarse lattice, where Newton's method has far to go, than one next to it.
         """
         own = self._rank(place)
+        near = map(self._rank, neighbours(place, self._shape, stride))
+        if stride * _REACH == reach and max(near) > own:
+            return True
         for axis, size in enumerate(self._shape):
             sides = [(*place[:axis], place[axis] + k, *place[axis + 1 :]) for k in (-1, 1)]
             if 0 < place[axis] < size - 1 and min(map(self._rank, sides)) > own:

@@ -41,6 +41,20 @@ def test_a_cycle_that_is_entered_at_either_footstep_is_one_gait():
     assert np.asarray(found.gaits.cycle_footsteps).tolist() == [2]
 
 
+@pytest.mark.parametrize("footsteps", [2, 3, 6])
+def test_an_unstable_gait_is_a_cycle_of_several_footsteps_too(footsteps):
+    """Residuals of such a cycle are enlarged by its multiplier, of up to 34 here."""
+    scene, plain = jb.seed_scene(slope=0.12), dict(parameters=(), radius_sensitivities=False)
+    one = jb.find_gait(scene, accuracy="tight", **plain)
+    several = jb.find_gait(scene, one, footsteps=footsteps, **plain)
+    assert several.outcome is jb.gait.Search.FOUND
+    assert int(several.cycle_footsteps) == 1
+    measures, truth = several.measures, one.measures
+    assert float(measures.period) == pytest.approx(footsteps * float(truth.period), rel=1e-6)
+    off = abs(float(measures.spectral_radius) - float(truth.spectral_radius) ** footsteps)
+    assert off < 1e-3 * footsteps * float(measures.spectral_radius)
+
+
 @pytest.mark.parametrize("shape", [(), (2, 2), (0,)])
 def test_starts_of_another_shape_are_refused(shape):
     starts = jax.tree.map(lambda leaf: jnp.full(shape, leaf), jb.seed_state())

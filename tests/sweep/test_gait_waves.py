@@ -117,3 +117,18 @@ def test_a_store_of_another_sweep_or_that_kept_less_is_refused(tmp_path):
     consolidate(path)
     with pytest.raises(jb.ArgumentError, match="kept no grazes"):
         jb.gait_sweep(jb.seed_scene(), over, store=path, **PLAIN)
+
+
+def test_points_next_to_gaits_are_searched_without_a_guess_on_a_coarse_grid(monkeypatch):
+    """Beside a fold, gaits that are far from their neighbours'; periods by continuation in K."""
+    for module in (_gait_sweep, _gait_waves):
+        monkeypatch.setattr(module, "LARGE", 16)
+    stiffness, damping = np.geomspace(1e4, 1e9, 15)[4:8], np.geomspace(1e5, 1e9, 9)[:5]
+    with pytest.warns(RuntimeWarning, match="no gait was found at"):
+        found = jb.gait_sweep(
+            jb.seed_scene(slope=0.005),
+            {"K": stiffness, "c": damping},
+            **(PLAIN | {"parameters": ()}),
+        )
+    for (i, j), period in {(1, 2): 0.641562, (2, 3): 0.565852}.items():
+        assert float(found.period[i, j]) == pytest.approx(period, abs=1e-5)
