@@ -253,7 +253,9 @@ class AdaptiveColumns:
             least = SHARE * jnp.max(sizes) + floor
             scaled = error * inverse / (given.tangent_rtol * (sizes + least))
             square = jnp.sum(scaled * scaled) / len(scaled)
-            return end, jnp.where(jnp.isnan(square), jnp.inf, square)
+            # What an earlier graze left undetermined is in no step's way.
+            bad = jnp.where(jnp.isfinite(jnp.sum(column)), jnp.inf, 0.0)
+            return end, jnp.where(jnp.isnan(square), bad, square)
 
         found, worst = [], jnp.zeros(())
         by_state, by_parameter = now.columns

@@ -6,11 +6,19 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._minimal_motion import vector_field
+from jaxbiped.dynamics._switches import Switch, switches
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._orbit_derivatives import orbit_of, slopes_of
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
+from jaxbiped.variational._tangents import Watch
+from jaxbiped.variational._variational_solve import (
+    motion_solve,
+    seeded_directions,
+    solve_variational,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -151,3 +159,20 @@ def test_an_orbit_that_grazes_has_no_sensitivities_and_multipliers_of_infinite_e
     assert np.all(np.isinf(grazing.stability.errors))
     assert np.all(np.isfinite(grazing.stability.multipliers))
     assert np.all(np.isnan(grazing.slopes.period))
+
+
+def test_columns_that_a_graze_left_undetermined_cost_no_steps():
+    scene, start = jb.seed_scene(), jb.seed_state()
+    watch = Watch(field=vector_field, switches=switches)
+    how = motion_solve(watch, Rodas5P(), 1e-6)._replace(max_time=0.3)
+    at, seeded = seeded_directions(scene, start, (2, 5), ())
+
+    def followed(columns):
+        found, _ = solve_variational(how, at._replace(columns=columns), seeded, jnp.zeros(0))
+        return found
+
+    plain, lost = followed(at.columns), followed(at.columns.at[:, 0].set(jnp.nan))
+    assert abs(int(lost.attempted) - int(plain.attempted)) < 0.5 * int(plain.attempted)
+    assert np.isnan(lost.columns[0]).all()
+    np.testing.assert_allclose(lost.columns[1], plain.columns[1], rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(lost.state, plain.state, atol=1e-6)
