@@ -3,7 +3,7 @@
 Writes mechanism_derivatives.md: for each mechanism and way of ending the largest error at each
 accuracy, relative to the largest entry of its column, and whose it is. Truths are central
 differences of much finer walks at three steps; columns whose truth is not known to 1e-6 are
-counted apart, unless the error is far above what is known.
+counted apart, unless the error is far above what is known. NaN: at this accuracy an event grazes.
 """
 
 from typing import Any, NamedTuple
@@ -110,7 +110,8 @@ def _table(rows):
     yield f"| mechanism | ends or saved | parameters | {' | '.join(ACCURACIES)} |"
     yield "|---" * (3 + len(ACCURACIES)) + "|"
     for each in rows:
-        cells = [f"{each[a]:.0e} ({each[f'{a}: of']})" for a in ACCURACIES]
+        worst = ((each[a], each[f"{a}: of"]) for a in ACCURACIES)
+        cells = [f"{error:.0e} ({of})" if np.isfinite(error) else "NaN" for error, of in worst]
         judged = min(each[f"{a}: judged"] for a in ACCURACIES)
         count = f"{judged} of {each['parameters']}"
         yield f"| {' | '.join([each['mechanism'], each['ends'], count, *cells])} |"
