@@ -10,12 +10,10 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000", "#E69F00", "#5
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
-def draw_by(
-    ax: Axes, key: str, rows: Iterable[Mapping[str, Any]], x: str, y: str, form: str = "o-"
-) -> None:
+def draw_by(ax: Axes, key: str, rows: Iterable[Mapping[str, Any]], x: str, y: str) -> None:
     """A line for each value of an entry among rows, named after it: another entry over a third."""
     for name, own in by(key, rows).items():
-        ax.plot([row[x] for row in own], [row[y] for row in own], form, label=name)
+        ax.plot([row[x] for row in own], [row[y] for row in own], "o-", label=name)
 
 
 def label(ax: Axes, x: str, y: str, title: str = "", *, log: str = "") -> None:

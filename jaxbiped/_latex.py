@@ -42,7 +42,7 @@ def latex_unit(unit: str) -> str:
     return rf"\unit{{{unit.replace(' ', '.')}}}"
 
 
-def latex_number(value: float, error: float | None = None) -> str:
+def latex_number(value: float, error: float | None) -> str:
     """A number in siunitx's notation; what is no number in braces, as it must be in its columns.
 
     A bar that is zero or unknown (NaN) is left out; an infinite one is said.

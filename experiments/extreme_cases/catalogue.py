@@ -52,9 +52,9 @@ def singles() -> Iterator[Case]:
             yield Case(name, {name: value}, parameters_at(name, value), start=start)
 
 
-def pairs(*, each: int, seed: int = 23) -> Iterator[Case]:
+def pairs(*, each: int) -> Iterator[Case]:
     """Two parameters at extremes: all corners, and `each` random pairs of values between."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(23)
     for one, other in itertools.combinations(RANGES, 2):
         if parameters_at(one, 1.0).keys() & parameters_at(other, 1.0).keys():
             continue  # they set the same numbers

@@ -60,9 +60,9 @@ def walk(duration: float, rtol: float, method: str = "Radau") -> Walk:
     return Walk(end[:8], heel_strikes(found), ledger, found)
 
 
-def reference_states(points: int = 41) -> tuple[np.ndarray, np.ndarray]:
+def reference_states() -> tuple[np.ndarray, np.ndarray]:
     """Times and states (n, 8) of the seed's walk over 2 s, by Radau at 1e-11."""
-    times = np.linspace(0.0, 2.0, points)
+    times = np.linspace(0.0, 2.0, 41)
     return times, walk(2.0, 1e-11).solution.sol(times)[:8].T
 
 

@@ -21,7 +21,7 @@ from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState, SomeState, State
 from jaxbiped.simulate._simulate import rigid_walk
 from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import AT_ONCE, Arrivals, Trajectory, join_parts, split_evenly
+from jaxbiped.solve._trajectory import AT_ONCE, Arrivals, Trajectory, in_parts
 
 SomeScene = TypeVar("SomeScene", bound=AbstractWalkerScene)
 _Taken = TypeVar("_Taken")
@@ -111,10 +111,7 @@ def evaluate_along(
     """`function(scene, state)` at states with leaves of shape (n,), as NumPy arrays."""
     # With every leaf an array: a plain number would be compiled in.
     arrays = jtu.tree_map(as_float, scene)
-    leaves, structure = jtu.tree_flatten(state)
-    states = zip(*[split_evenly(np.asarray(leaf)) for leaf in leaves], strict=True)
-    found = [_apply(function, arrays, jtu.tree_unflatten(structure, part)) for part in states]
-    return join_parts(found, len(leaves[0]))
+    return in_parts(lambda states: _apply(function, arrays, states), state)
 
 
 def moments_of_change(

@@ -19,7 +19,7 @@ from jaxbiped.scene._rigid_feet import rigid_modes, standing_legs
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.scene._structure import Structure
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, in_parts
 
 AnyScene: TypeAlias = Scene | RedundantScene | RigidScene
 _EVEN = 2048
@@ -241,15 +241,11 @@ def _whole_motion(scene: RigidScene, state: Any) -> dict[str, Any]:
 
 
 def _states_of_walks(scene: RigidScene, starts: Any, durations: np.ndarray) -> Any:
-    found = []
     # No time at all is not simulated.
     shortest = 1e-12 * math.sqrt(float(scene.mechanism.height) / float(scene.ground.g))
-    for k in range(0, len(durations), _AT_ONCE):
-        rows = slice(k, k + _AT_ONCE)
-        missing = _AT_ONCE - len(durations[rows])
-        padded = [np.pad(leaf[rows], (0, missing), mode="edge") for leaf in (*starts, durations)]
-        part = type(starts)(*map(as_array, padded[:-1]))
-        states = states_after(scene, part, np.maximum(padded[-1], shortest))
-        found.append([np.asarray(leaf)[: _AT_ONCE - missing] for leaf in states])
-    whole = [as_array(np.concatenate(leaves)) for leaves in zip(*found, strict=True)]
-    return type(starts)(*whole)
+
+    def walked(given: tuple[Any, np.ndarray]) -> Any:
+        return states_after(scene, jtu.tree_map(as_array, given[0]), given[1])
+
+    found = in_parts(walked, (starts, np.maximum(durations, shortest)), _AT_ONCE)
+    return jtu.tree_map(as_array, found)

@@ -115,9 +115,7 @@ def label_of(name: str, noun: str) -> str:
     return name if name[0].isalpha() else f"{noun} {name}"
 
 
-def axes_or_new(
-    ax: Axes | None, width: float = 6.4, height: float = 4.0, *, aside: float = 0.0
-) -> Axes:
+def axes_or_new(ax: Axes | None, width: float, height: float, *, aside: float = 0.0) -> Axes:
     """The axes given, or those of a new figure, of which a legend `aside` takes so much width."""
     return new_figure(width, height, aside=aside).add_subplot() if ax is None else ax
 

@@ -205,17 +205,18 @@ def _check_inside(dense: diffrax.DenseInterpolation, times: np.ndarray) -> None:
         )
 
 
-def split_evenly(values: np.ndarray) -> list[np.ndarray]:
-    """Values of shape (n,) in parts of one size, the last one filled up; of none, one part."""
-    if not len(values):
-        return [np.zeros(AT_ONCE)]
-    missing = -len(values) % AT_ONCE
-    return list(np.pad(values, (0, missing), mode="edge").reshape(-1, AT_ONCE))
+def in_parts(function: Callable[[Any], PyTree], tree: PyTree, size: int = AT_ONCE) -> PyTree:
+    """`function` of a tree with leaves of shape (n, …), as NumPy arrays of n rows.
 
-
-def join_parts(found: list[PyTree], size: int) -> PyTree:
-    """What was found for each part, one behind the other, as NumPy arrays of shape (size,)."""
-    return jtu.tree_map(lambda *leaves: np.concatenate(leaves)[:size], *jax.device_get(found))
+    It is called with parts of one size, the last one filled up; with one part where n is 0.
+    """
+    leaves, structure = jtu.tree_flatten(jtu.tree_map(np.asarray, tree))
+    count = len(leaves[0])
+    whole = leaves if count else [np.zeros((1, *leaf.shape[1:]), leaf.dtype) for leaf in leaves]
+    places = np.minimum(np.arange(max(-(-count // size), 1) * size), max(count - 1, 0))
+    parts = [[leaf[k] for leaf in whole] for k in places.reshape(-1, size)]
+    found = jax.device_get([function(jtu.tree_unflatten(structure, part)) for part in parts])
+    return jtu.tree_map(lambda *rows: np.concatenate(rows)[:count], *found)
 
 
 def evaluate_dense(dense: diffrax.DenseInterpolation, times: np.ndarray) -> PyTree:
@@ -226,13 +227,14 @@ def evaluate_dense(dense: diffrax.DenseInterpolation, times: np.ndarray) -> PyTr
     ends = np.asarray(dense.ts)[: int(dense.ts_size)]
     infos = jtu.tree_map(np.asarray, dense.infos)
     inside = np.where((times >= ends[0]) & (times <= ends[-1]), times, np.nan)
-    found = []
-    for part in split_evenly(inside):
+
+    def states(times: np.ndarray) -> PyTree:
         # A time at a step's end is the end of that step; NaN is behind all of them.
-        step = np.clip(np.searchsorted(ends, part) - 1, 0, len(ends) - 2)
-        info = jtu.tree_map(lambda leaf, step=step: leaf[step], infos)
-        found.append(_evaluate(dense.interpolation_cls, ends[step], ends[step + 1], info, part))
-    return join_parts(found, len(times))
+        step = np.clip(np.searchsorted(ends, times) - 1, 0, len(ends) - 2)
+        info = jtu.tree_map(lambda leaf: leaf[step], infos)
+        return _evaluate(dense.interpolation_cls, ends[step], ends[step + 1], info, times)
+
+    return in_parts(states, inside)
 
 
 @cached_jit

@@ -16,6 +16,7 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.solve._trajectory import in_parts
 from jaxbiped.sweep._attractor import Attractor
 from jaxbiped.sweep._follow_starts import passes_a_stop
 from jaxbiped.sweep._gait_family import scene_with
@@ -125,10 +126,8 @@ def boundary_normal(scene: Scene | RigidScene, attractor: Attractor) -> Normal:
         return np.where(walked[:, None] > 0, gradients, np.nan)
 
     def normal(points: np.ndarray) -> np.ndarray:
-        count = len(points)
-        padded = np.resize(points, (-(-count // _AT_ONCE) * _AT_ONCE, points.shape[1]))
-        blocks = [some(padded[k : k + _AT_ONCE]) for k in range(0, count, _AT_ONCE)]
-        return np.concatenate(blocks)[:count] if count else np.array(points)
+        found: np.ndarray = in_parts(some, points, _AT_ONCE) if len(points) else np.array(points)
+        return found
 
     return normal
 

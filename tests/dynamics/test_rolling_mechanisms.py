@@ -165,7 +165,7 @@ def _speed(scene, motion, number):
 
 
 @pytest.mark.parametrize("name", ["torso", "coupled"])
-def test_energy_is_kept_and_push_off_works(name):
+def test_kinetic_energy_is_the_compliant_walkers_and_push_off_works(name):
     """Kinetic energy is the compliant walker's in the same motion."""
     scene = rigid(WALKERS[name], jb.actuation.PushOff(0.1))
     state = scene.state(theta_leg_1=0.2, theta_leg_2=-0.25, omega_leg_1=-0.3, omega_leg_2=-1.4)

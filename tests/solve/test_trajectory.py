@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.solve._trajectory import AT_ONCE, evaluate_dense, join_parts, split_evenly
+from jaxbiped.solve._trajectory import AT_ONCE, evaluate_dense, in_parts
 
 
 def _oscillation(solver):
@@ -44,9 +44,16 @@ def test_states_are_those_of_diffrax(solver):
 @pytest.mark.parametrize("size", [0, 1, AT_ONCE - 1, AT_ONCE, AT_ONCE + 1, 3 * AT_ONCE])
 def test_parts_of_one_size_make_the_whole(size):
     values = np.arange(float(size))
-    cut = split_evenly(values)
-    assert {part.shape for part in cut} == {(AT_ONCE,)}
-    np.testing.assert_array_equal(join_parts(cut, size), values)
+    shapes = []
+
+    def doubled(part):
+        shapes.append((part["x"].shape, part["y"].shape))
+        return 2.0 * part["x"], part["y"][:, 1]
+
+    twice, second = in_parts(doubled, {"x": values, "y": np.stack([values, -values], axis=1)})
+    assert shapes == [((AT_ONCE,), (AT_ONCE, 2))] * max(1, -(-size // AT_ONCE))
+    np.testing.assert_array_equal(twice, 2.0 * values)
+    np.testing.assert_array_equal(second, -values)
 
 
 def test_both_ends_belong_to_it(seed_walk):

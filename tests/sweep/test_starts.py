@@ -1,4 +1,4 @@
-"""Starts, against where they are said to lie, whatever chunk each is made in."""
+"""Starts, against where they are said to lie in any chunk; what stops allow, against limits."""
 
 import itertools
 
@@ -8,11 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
+from jaxbiped.dynamics._state_quantities import recurring_names
+from jaxbiped.sweep._follow_starts import passes_a_stop
 from jaxbiped.sweep.starts._samples import sequence_points
+from jaxbiped.variational._hybrid_system import admissible_directions, independent_names
+from tests.dynamics.test_modes import ANGLES, RATES, hsu_chen
 from tests.sweep.walkers import gaitless, same
 
 SCENE = jb.seed_scene()
 LABELLING = gaitless(SCENE, jb.seed_state(), accuracy="draft")
+KNEED = hsu_chen()
+HELD = KNEED.state(**ANGLES, **RATES, held="shank_2")
 BOUNDS = {"theta_stance": (-0.1, 0.3), "omega_stance": (-2.0, 0.0), "hip_vx": (0.1, 0.9)}
 
 
@@ -100,3 +106,28 @@ def test_given_starts_are_told_apart_by_all_their_numbers():
     assert first != second
     assert len(str(first)) < 200
     assert jb.starts.GivenStarts(state).described() == first
+
+
+def test_states_beyond_a_stop_are_seen_one_by_one():
+    """Shanks may be bent back, and stretched as far as their thighs."""
+    shank = np.array([-0.3, -0.2, -0.1])
+    values = {name: np.full(3, float(value)) for name, value in HELD._asdict().items()}
+    found = passes_a_stop(KNEED, values | {"theta_shank_1": shank})
+    np.testing.assert_array_equal(found, shank > ANGLES["theta_thigh_1"])
+    seed = jb.seed_scene()
+    assert not passes_a_stop(seed, {"theta_1": np.array([3.0])}).any()
+
+
+def test_what_is_held_moves_with_what_holds_it():
+    """A held knee turns as its thigh does, in angle and rate; nothing moves the mode."""
+    names = recurring_names(HELD)
+    scales = np.arange(1.0, 1.0 + len(names))
+    found = admissible_directions(KNEED, HELD, scales)
+    assert found.shape == (9, 6)
+    np.testing.assert_allclose(found.T @ found, np.eye(6), atol=1e-14)
+    moves = dict(zip(names, found * scales[:, None], strict=True))
+    for kind in ("theta", "omega"):
+        np.testing.assert_allclose(moves[f"{kind}_shank_2"], moves[f"{kind}_thigh_2"], atol=1e-13)
+    assert not np.allclose(moves["theta_shank_1"], moves["theta_thigh_1"])
+    left_out = set(names) - set(independent_names(KNEED, HELD))
+    assert left_out == {"theta_shank_2", "omega_shank_2", "mode"}
