@@ -184,7 +184,8 @@ def find_gait(
         patience=np.asarray(int(most)),
     )
     # One program of lanes serves every search, whatever it is asked for, and what follows it.
-    columns = select_parameters(modelled, None)[1] if runs_by_lanes(spec) else ()
+    every = active if parameters is None else select_parameters(modelled, None)[1]
+    columns = every if runs_by_lanes(spec) else ()
     problem = FixedPointProblem(spec, scene, columns, start, precision, how)
     asked = problem._replace(active=active, method=None)
     origin = single_stage_origin(problem, FoundBy.START if guess is None else FoundBy.GUESS)
