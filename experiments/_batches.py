@@ -25,12 +25,15 @@ def labelling_of(model: str, **options: Any) -> jb.labels.Labelling:
     return jb.labelling(rigid_seed() if model == "rigid" else jb.seed_scene(), **options)
 
 
-def starts_of(scene: Any, count: int) -> jb.starts.Sample:
+def starts_of(
+    scene: Any, count: int, *, method: str = "uniform", seed: int = 0
+) -> jb.starts.Sample:
     """So many random starts: of the compliant walker in the slice of basin_seed.py."""
+    how: dict[str, Any] = dict(method=method, seed=seed)
     if isinstance(scene, jb.RigidScene):
-        return jb.starts.sample(scene, RIGID, count, method="uniform", follow=rolling_on)
+        return jb.starts.sample(scene, RIGID, count, follow=rolling_on, **how)
     bounds = {"theta_swing": _basin_slice.THETA, "omega_swing": _basin_slice.OMEGA}
-    return jb.starts.sample(scene, bounds, count, method="uniform")
+    return jb.starts.sample(scene, bounds, count, **how)
 
 
 def swept(labelling: jb.labels.Labelling, count: int, **options: Any) -> Callable[[], Any]:

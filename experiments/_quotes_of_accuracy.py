@@ -5,6 +5,9 @@ from typing import Any
 
 from _quote_words import UNKNOWN, percents, row, small
 
+RARE = 1e-3
+"""Fractions below this are of labels that the pages do not count."""
+
 
 def of_basin_seed(numbers: dict[str, Any]) -> Iterator[str]:
     """How much of the slice walks, how folded boundaries are, and what changes the basin."""
@@ -30,6 +33,24 @@ def of_basin_simplest(numbers: dict[str, Any]) -> Iterator[str]:
         f"{100.0 * first['estimate']:.2f} % of a square at a slope of {low} and "
         f"{100.0 * second['estimate']:.2f} % at {high}"
     )
+
+
+def of_fraction_coverage(numbers: dict[str, Any]) -> Iterator[str]:
+    """How often intervals of fractions hold the truth, and how much less even starts scatter."""
+    yield f"In {numbers['draws']:,} draws of {numbers['starts']} starts"
+
+    def ends(method: str, measure: str, *names: str) -> tuple[float, float]:
+        labels = (each for name in names for each in numbers[name][method].values())
+        found = [each[measure] for each in labels if each["fraction"] > RARE]
+        return min(found), max(found)
+
+    for name in ("rigid", "compliant"):
+        low, high = ends("uniform", "inside_95", name)
+        yield f"{percents(low)} to {percents(high)} % for the {name} seed"
+    both = "rigid", "compliant"
+    low, high = ends("sobol", "scatter", *both)
+    yield f"only {low:.1f} to {high:.1f} times as much"
+    yield f"in {percents(ends('sobol', 'inside_95', *both)[0])} to 100.0 % of the draws"
 
 
 def of_gradient_accuracy(numbers: dict[str, Any]) -> Iterator[str]:

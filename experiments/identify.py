@@ -5,13 +5,16 @@ over; K, c and mu_kinetic are fitted to each set from a start that is far off. S
 Stribeck rate xi from below at most, and the fit says so. The same is done in settings where
 intervals are wide, the model bends or a parameter is undetermined: K beside c, friction's pair, a
 rigid walker's inertia and centre of mass, and angles of either walker on a clock that is not known.
+Fits lie in identify.jsonl as they come: a run that was cut off goes on.
 """
 
+import functools
 import time
 from typing import Any, NamedTuple
 
 import numpy as np
 from _experiment import Options, experiment
+from _row_store import RowStore
 from _scenes import rigid_seed
 from tqdm import tqdm
 
@@ -19,15 +22,15 @@ import jaxbiped as jb
 from jaxbiped.plot.style import new_figure
 
 SLOPES = (0.01, 0.02, 0.04)
-NOISE = {"period": 1e-5, "step_length": 1e-4, "peak_normal": 1e-3}
-"""Relative standard deviations of the means over many footsteps."""
-START = {"K": 1.3e6, "c": 0.7e7, "mu_kinetic": 0.3}
 LABELS = {"K": "stiffness K", "c": "damping c", "mu_kinetic": "kinetic friction"}
 SETS, QUICK_SETS = 200, 3
+SEED = 7
+TOLD = ("estimates", "standard_errors", "intervals", "one_sided", "undetermined")
+"""Of a fit, beside what is computed from it."""
 
 
 class Setting(NamedTuple):
-    """A walker, where fits begin, and absolute deviations of its measures.
+    """A walker, where fits begin, and standard deviations of its measures on the slopes.
 
     `angles`: deviation of 12 leg angles on a clock of its own, and no measures are then taken.
     """
@@ -36,80 +39,93 @@ class Setting(NamedTuple):
     start: dict[str, float]
     deviations: dict[str, float]
     angles: float | None = None
+    relative: bool = False
 
 
+PRECISE = {"period": 1e-5, "step_length": 1e-4, "peak_normal": 1e-3}
+"""Relative, of the means over many footsteps."""
 COARSE = {"period": 3e-3, "step_length": 3e-3}
 CONTACT = {"K": 1.3e6, "c": 0.8e7}
+SEED_SCENE = jb.seed_scene()
 SETTINGS = {
-    "contact": Setting(jb.seed_scene(), CONTACT, COARSE),
-    "contact by angles": Setting(jb.seed_scene(), CONTACT, {}, 1e-4),
-    "friction": Setting(
-        jb.seed_scene(), {"mu_static": 0.6, "mu_kinetic": 0.3}, dict.fromkeys(COARSE, 1e-4)
+    "precise": Setting(
+        SEED_SCENE, {"K": 1.3e6, "c": 0.7e7, "mu_kinetic": 0.3}, PRECISE, relative=True
     ),
-    "slope and inertia by angles": Setting(jb.seed_scene(), {"slope": 0.025, "J": 0.012}, {}, 1e-4),
+    "contact": Setting(SEED_SCENE, CONTACT, COARSE),
+    "contact by angles": Setting(SEED_SCENE, CONTACT, {}, 1e-4),
+    "friction": Setting(
+        SEED_SCENE, {"mu_static": 0.6, "mu_kinetic": 0.3}, dict.fromkeys(COARSE, 1e-4)
+    ),
+    "slope and inertia by angles": Setting(SEED_SCENE, {"slope": 0.025, "J": 0.012}, {}, 1e-4),
     "rigid": Setting(rigid_seed(), {"J": 0.012, "d": 0.12}, COARSE),
     "rigid by angles": Setting(rigid_seed(), {"J": 0.0144}, {}, 0.02),
 }
-"""Those with wide intervals, bent valleys or undetermined parameters."""
+"""After the first, those with wide intervals, bent valleys or undetermined parameters."""
 
 
 @experiment
 def main(options: Options):
-    random = np.random.default_rng(7)
-    scene = jb.seed_scene()
-    gaits = gaits_of(scene, "balanced")
-    start = jb.with_parameters(scene, START)
-
-    def fit(names):
-        return jb.fit_gait(start, names, measured(gaits, random, NOISE, relative=True))
-
-    with_xi = fit((*START, "xi"))
-    count, began = options.sized(SETS, QUICK_SETS), time.perf_counter()
-    fits = [fit(tuple(START)) for _ in tqdm(range(count), unit="fits")]
-    seconds = time.perf_counter() - began
-    scores, rows = {}, {}
-    for name in START:
-        value = float(jb.parameter_values(scene)[name])
-        errors = np.array([fit.standard_errors[name] for fit in fits])
-        estimates = np.array([fit.estimates[name] for fit in fits])
-        inside = [fit.intervals[name][0] <= value <= fit.intervals[name][1] for fit in fits]
-        scores[name] = (estimates - value) / errors
-        rows[name] = {
-            "truth": value,
-            "mean_estimate": float(np.mean(estimates)),
-            "scatter": float(np.std(estimates)),
-            "mean_standard_error": float(np.mean(errors)),
-            "inside_95": float(np.mean(inside)),
-        }
-    draw(options, scores)
+    store = options.path(f"identify{'_quick' if options.quick else ''}.jsonl")
+    rows, count = RowStore(store, seed=SEED), options.sized(SETS, QUICK_SETS)
+    fitters = {name: fitter(name) for name in SETTINGS}
+    fits = {name: [] for name in SETTINGS}
+    for index in tqdm(range(count), unit="sets"):
+        for name, fit in fitters.items():
+            fits[name].append(rows.row(f"{name} {index}", functools.partial(fit, index)))
+    xi = rows.row("precise with xi", functools.partial(fitter("precise", "xi"), 0))
+    precise, truth = fits["precise"], truth_of(SETTINGS["precise"])
+    draw(options, precise, truth)
     return {
         "sets": count,
-        "converged": sum(fit.ending is jb.identify.FitEnding.CONVERGED for fit in fits),
-        "parameters": rows,
+        "parameters": {name: scatter(precise, name, value) for name, value in truth.items()},
         "without_upper_end_with_xi": [
-            name for name, (_, high) in with_xi.intervals.items() if not np.isfinite(high)
+            name for name, (_, high) in xi["intervals"].items() if not np.isfinite(high)
         ],
-        "settings": {name: coverage(each, count, random) for name, each in SETTINGS.items()},
-        "mean_chi_squared": float(np.mean([fit.chi_squared for fit in fits])),
-        "freedom": fits[0].freedom,
-        "seconds": seconds,
+        "settings": {name: coverage(SETTINGS[name], each) for name, each in fits.items()},
     }
 
 
-def gaits_of(scene, accuracy):
-    """The gaits on all slopes."""
-    how = dict(parameters=(), radius_sensitivities=False, accuracy=accuracy)
-    return [jb.find_gait(jb.with_parameters(scene, {"slope": slope}), **how) for slope in SLOPES]
+def fitter(name, *more):
+    """A function that fits a setting's parameters, and more, to data with noise of their own."""
+    place, setting = list(SETTINGS).index(name), SETTINGS[name]
+    gaits = functools.cache(lambda: gaits_of(setting))  # no search if all fits are known
+    start = jb.with_parameters(setting.scene, setting.start)
+
+    def fit(index):
+        data = measured(setting, gaits(), np.random.default_rng((SEED, place, index)))
+        began = time.process_time()
+        told = jb.fit_gait(start, (*setting.start, *more), data)
+        return {
+            "cpu_s": time.process_time() - began,
+            "converged": told.ending is jb.identify.FitEnding.CONVERGED,
+            "chi_squared": told.chi_squared,
+            "freedom": told.freedom,
+            "p_value": told.p_value,
+            **{name: getattr(told, name) for name in TOLD},
+        }
+
+    return fit
 
 
-def measured(gaits, random, deviations, *, relative=False):
-    """Measures of the gaits with noise of these standard deviations."""
+def gaits_of(setting):
+    """Its gaits on all slopes, or only the one whose angles are measured."""
+    how = dict(parameters=(), radius_sensitivities=False, accuracy="tight")
+    if setting.angles is not None:
+        return [jb.find_gait(setting.scene, **how)]
+    scenes = (jb.with_parameters(setting.scene, {"slope": slope}) for slope in SLOPES)
+    return [jb.find_gait(scene, **how) for scene in scenes]
+
+
+def measured(setting, gaits, random):
+    """Measures of the gaits, or angles, with noise."""
+    if setting.angles is not None:
+        return measured_angles(gaits[0], random, setting.angles)
     found = []
     for slope, gait in zip(SLOPES, gaits, strict=True):
         noisy = {}
-        for name, off in deviations.items():
+        for name, off in setting.deviations.items():
             exact = float(getattr(gait.measures, name))
-            off = exact * off if relative else off
+            off = exact * off if setting.relative else off
             noisy[name] = exact + off * random.standard_normal(), off
         found.append(jb.identify.MeasuredGait(noisy, conditions={"slope": slope}))
     return found
@@ -126,50 +142,59 @@ def measured_angles(gait, random, deviation):
     return [jb.identify.MeasuredGait({}, angles=angles)]
 
 
-def coverage(setting, count, random):
-    """What fits tell of each parameter, and how often its interval holds the truth."""
-    own = jb.parameter_values(setting.scene)
-    truth = {name: float(own[name]) for name in setting.start}
-    how = dict(parameters=(), radius_sensitivities=False, accuracy="tight")
-    start = jb.with_parameters(setting.scene, setting.start)
-    if setting.angles is None:
-        gaits = gaits_of(setting.scene, "tight")
-    else:
-        gaits = [jb.find_gait(setting.scene, **how)]
-    fits = []
-    for _ in tqdm(range(count), unit="fits"):
-        if setting.angles is None:
-            data = measured(gaits, random, setting.deviations)
-        else:
-            data = measured_angles(gaits[0], random, setting.angles)
-        fits.append(jb.fit_gait(start, tuple(truth), data))
+def scatter(fits, name, truth):
+    """Estimates of one parameter, and their standard errors."""
+    estimates = [fit["estimates"][name] for fit in fits]
+    errors = [fit["standard_errors"][name] for fit in fits]
     return {
-        "sets": count,
-        "converged": sum(fit.ending is jb.identify.FitEnding.CONVERGED for fit in fits),
-        "p_below_0.05": sum(fit.p_value < 0.05 for fit in fits) / count,
+        "truth": truth,
+        "mean_estimate": float(np.mean(estimates)),
+        "scatter": float(np.std(estimates)),
+        "mean_standard_error": float(np.mean(errors)),
+        "inside_95": told_of(fits, name, truth)["inside_95"],
+    }
+
+
+def coverage(setting, fits):
+    """What fits tell of each parameter, and how often its interval holds the truth."""
+    truth = truth_of(setting)
+    return {
+        "sets": len(fits),
+        "converged": sum(fit["converged"] for fit in fits),
+        "p_below_0.05": float(np.mean([fit["p_value"] < 0.05 for fit in fits])),
+        "mean_chi_squared": float(np.mean([fit["chi_squared"] for fit in fits])),
+        "median_cpu_s": float(np.median([fit["cpu_s"] for fit in fits])),
         "parameters": {name: told_of(fits, name, value) for name, value in truth.items()},
     }
 
 
+def truth_of(setting):
+    """The true values of its parameters."""
+    own = jb.parameter_values(setting.scene)
+    return {name: float(own[name]) for name in setting.start}
+
+
 def told_of(fits, name, value):
     """Of one parameter: numbers of fits, and how many of its intervals hold the truth."""
-    told = [fit.intervals[name] for fit in fits if np.isfinite(fit.intervals[name][0])]
-    inside = sum(bool(low <= value <= high) for low, high in told)
+    ends = [fit["intervals"][name] for fit in fits]
+    told = [(low, high) for low, high in ends if np.isfinite(low)]
+    inside = sum(low <= value <= high for low, high in told)
     return {
         "told": len(told),
-        "one_sided": sum(name in fit.one_sided for fit in fits),
-        "undetermined": sum(name in fit.undetermined for fit in fits),
+        "one_sided": sum(name in fit["one_sided"] for fit in fits),
+        "undetermined": sum(name in fit["undetermined"] for fit in fits),
         "inside_95": inside / len(told) if told else None,
     }
 
 
-def draw(options, scores):
+def draw(options, fits, truth):
     """Distributions of (estimate − truth) / standard error beside the normal one."""
     figure = new_figure(9.0, 3.0)
-    axes = figure.subplots(1, len(scores), sharey=True)
+    axes = figure.subplots(1, len(truth), sharey=True)
     edges, fine = np.linspace(-4.0, 4.0, 25), np.linspace(-4.0, 4.0, 201)
-    for axis, (name, values) in zip(axes, scores.items(), strict=True):
-        axis.hist(values, edges, density=True, color="tab:blue", alpha=0.6, label="fits")
+    for axis, (name, value) in zip(axes, truth.items(), strict=True):
+        off = [(fit["estimates"][name] - value) / fit["standard_errors"][name] for fit in fits]
+        axis.hist(off, edges, density=True, color="tab:blue", alpha=0.6, label="fits")
         axis.plot(fine, np.exp(-0.5 * fine**2) / np.sqrt(2.0 * np.pi), "k", label="normal")
         axis.set_xlabel(f"error of {LABELS[name]},\nin standard errors")
     axes[0].set_ylabel("density")

@@ -106,6 +106,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "extremes": accuracy.of_extremes,
     "footstep_truth": accuracy.of_footstep_truth,
     "force_models": gaits.of_force_models,
+    "fraction_coverage": accuracy.of_fraction_coverage,
     "gpu_speed": accuracy.of_gpu_speed,
     "gradient_accuracy": accuracy.of_gradient_accuracy,
     "gradient_cost": accuracy.of_gradient_cost,

@@ -44,10 +44,11 @@ gaits all did, and the median bar was 24 times the error."""
 _LOOSER_SHARE, _TURNED, _TURNED_TERMS = 1.5, 3.0, 0.01
 """Of what a looser solve changes in derivatives of the spectral radius, that they are wrong by; and
 of a multiplier's error over its distance to the others, by which its eigenvectors are turned, that
-they and their terms are.
+they and their terms are: the largest of the three counts.
 
-With all three, on 130 gaits, compliant and rigid, 99.4 % of 1,390 such derivatives lay within their
-bars, the worst 1.5 bars off, and the median bar was 27 times the error."""
+On 78 rigid and 26 compliant gaits of random scenes, 1,234 of 1,236 such derivatives lay within
+their bars, the worst 4.0 bars off, and the median bar was 28 times the error. On 70 of them, the
+sum of the three held as many, and the median was 34 instead of 25."""
 
 
 class Slopes(NamedTuple):
@@ -222,14 +223,15 @@ def _spread(last: LinearisedReturn, errors: Scalar) -> Slopes:
 
 
 def _radius_errors(both: Scalar, terms: Scalar, stability: Stability) -> Scalar:
-    """Of derivatives of the spectral radius: what a looser solve changes, and what errors of the
-    eigenvectors make of the derivatives and of their terms without signs."""
+    """Of derivatives of the spectral radius: what a looser solve changes, or what errors of the
+    eigenvectors make of the derivatives or of their terms without signs."""
     multipliers = stability.multipliers
     apart = jnp.min(jnp.abs(multipliers[1:] - multipliers[0]), initial=jnp.inf)
     turned = stability.errors[0] / jnp.maximum(apart, _NOTHING)
     slopes, looser = both
     changes = _LOOSER_SHARE * jnp.abs(slopes - looser)
-    return changes + turned * (_TURNED * jnp.abs(slopes) + _TURNED_TERMS * terms)
+    sizes = jnp.maximum(_TURNED * jnp.abs(slopes), _TURNED_TERMS * terms)
+    return jnp.maximum(changes, turned * sizes)
 
 
 def _radius_slopes(

@@ -204,7 +204,7 @@ def predict(
     names = tuple(parameters)
 
     def scene_at(values: dict[str, float]) -> AnyScene:
-        return jtu.tree_map(as_float, with_parameters(scene, {**values, **measured.conditions}))
+        return with_parameters(scene, {**values, **measured.conditions})
 
     def gait_at(values: dict[str, float], guess: PyTree | None, wanted: tuple[str, ...]) -> Gait:
         return find_gait(

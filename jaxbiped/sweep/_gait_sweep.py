@@ -113,8 +113,7 @@ def gait_sweep(
 
     def scene_at(place: Place) -> AnyScene:
         point = {name: values[name][i] for name, i in zip(values, place, strict=True)}
-        own: AnyScene = jtu.tree_map(as_float, with_parameters(scene, point))
-        return own
+        return with_parameters(scene, point)
 
     size = math.prod(map(len, values.values()))
     with stage(

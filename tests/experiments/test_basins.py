@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.drawn import labels_of, points_of
-from tests.experiments.quick import drawn_run
+from tests.experiments.quick import drawn_run, quick_run
 
 pytestmark = pytest.mark.nightly
 
@@ -50,3 +50,13 @@ def test_the_simplest_walkers_basin_is_thin_and_as_the_equations_say(tmp_path):
         assert all(1e-3 < each["distance"] < 1e-2 for each in found["reach"].values())
         assert found["check"]["disagree"] == 0
         assert 0 < found["check"]["walking"] < found["check"]["starts"]
+
+
+def test_fractions_lie_in_their_intervals_and_scatter_less_if_starts_are_even(tmp_path):
+    numbers, _ = quick_run("fraction_coverage", tmp_path)
+    for name in ("rigid", "compliant"):
+        uniform, sobol = (numbers[name][method] for method in ("uniform", "sobol"))
+        for found in (uniform, sobol):
+            assert sum(each["fraction"] for each in found.values()) == pytest.approx(1.0)
+            assert all(each["inside_95"] >= 0.6 for each in found.values())
+        assert sobol["walking"]["scatter"] < uniform["walking"]["scatter"]
