@@ -10,7 +10,8 @@ import numpy as np
 
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._mode_changes import SLACK, on_held
+from jaxbiped.dynamics._holds import on_held
+from jaxbiped.dynamics._mode_changes import SLACK
 from jaxbiped.dynamics._state_quantities import recurring_leaves, recurring_names
 from jaxbiped.scene._couplings import angles_and_rates_named
 from jaxbiped.scene._modes import Limit

@@ -13,9 +13,10 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._contacts import foot_forces, with_stance_leg_standing
+from jaxbiped.dynamics._holds import on_held
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import WalkerField
-from jaxbiped.dynamics._mode_changes import change_mode, mode_switches, on_held
+from jaxbiped.dynamics._mode_changes import change_mode, mode_switches
 from jaxbiped.dynamics._redundant_motion import BodiesField
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._rolling import rolling, rolling_field
