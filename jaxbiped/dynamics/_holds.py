@@ -9,14 +9,20 @@ import functools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._implicit_field import fold
-from jaxbiped.dynamics._stance import Stance
+from jaxbiped.dynamics._stance import Stance, angles_and_rates, stance_on
 from jaxbiped.linalg._elimination import symmetric_factors
 from jaxbiped.linalg._sparse_lu import SparseFactors
-from jaxbiped.scene._modes import Modes
+from jaxbiped.scene._couplings import with_fixed
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._modes import Limit, Modes
+from jaxbiped.scene._rigid_feet import rigid_modes, standing_legs
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._structure import Angle, weighted
 
 ROUNDING = 1e-13
@@ -136,3 +142,54 @@ def holds_of(stance: Stance, modes: Modes, factors: SparseFactors) -> Holds:
 def _sum(row: Row, values: Row) -> Scalar:
     terms = [weighted(values[k], weight) for k, weight in row.items() if k in values]
     return sum(terms[1:], terms[0])
+
+
+def gap_of(scene: RigidScene, limit: Limit, stance: Stance) -> Scalar:
+    """How far a limit is [rad]."""
+    found: Scalar = limit.distance(stance.mechanism, stance.pose.motion.angles, scene.ground.slope)
+    return found
+
+
+def on_held(scene: RigidScene, state: Any) -> Any:
+    """The state with what is held where it belongs and at rest: stops at their limits, flat feet.
+
+    One step of Newton's method; derivatives are those of states that are held there.
+    """
+    mechanism, modes = scene.mechanism, rigid_modes(scene.mechanism)
+    if not modes.any:
+        return state
+    structure, fixed = mechanism.structure, jax.lax.stop_gradient(state.mode)
+    mode, flat = modes.decoded(jnp, fixed), modes.flat(modes.decoded(jnp, fixed))
+    soles = [Angle(((structure.feet[structure.feet_of_leg[leg][0]], 1.0),)) for leg in flat]
+    angles = [*soles, *(limit.gap for limit in modes.limits)]
+    unit = with_fixed(structure, _unit_rows(mechanism))
+    off = [_tilt(stance_on(scene, state, leg)) for leg in flat]
+    off += [gap_of(scene, limit, stance_on(scene, state, standing_legs(structure)[-1]))
+            for limit in modes.limits]  # fmt: skip
+    begun, rates = (jnp.stack(part) for part in angles_and_rates(structure, state))
+    now, projection = begun, jnp.eye(len(structure.free))
+    held = (*flat.values(), *mode.held)
+    for angle, value, is_held in zip(angles, off, held, strict=True):
+        row = np.asarray(angle.of(unit))
+        left = projection @ row
+        along = jnp.where(is_held, left / jnp.maximum(left @ left, 1e-12), 0.0)
+        now = now - along * (value + row @ (now - begun))
+        rates = rates - along * (row @ rates)
+        projection = projection - jnp.outer(left, along)
+    return type(state)(state[0], *now, *rates, fixed)
+
+
+def _tilt(stance: Stance) -> Scalar:
+    """How far the feet of a leg are from lying flat [rad]."""
+    first, second = stance.feet
+    apart = stance.foot(first).x - stance.foot(second).x
+    return (stance.height(first) - stance.height(second)) / apart
+
+
+def _unit_rows(mechanism: Mechanism) -> list[np.ndarray]:
+    """Of each body its angle's derivatives by the free angles; of those that follow, zeros."""
+    free = mechanism.structure.free
+    found = [np.zeros(len(free))] * len(mechanism.bodies)
+    for j, row in zip(free, np.eye(len(free)), strict=True):
+        found[j] = row
+    return found

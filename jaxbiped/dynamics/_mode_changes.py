@@ -4,29 +4,29 @@ A mode goes on until one of its surfaces is reached. What holds by being pressed
 as it would have to pull.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
-import jax
 import jax.numpy as jnp
-import numpy as np
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import kept_alone
-from jaxbiped.dynamics._holds import ROUNDING
+from jaxbiped.dynamics._holds import ROUNDING, gap_of
 from jaxbiped.dynamics._plastic_impact import Grip, Struck, plastic_impact
 from jaxbiped.dynamics._rolling import Turning, ground_force, turning_of
-from jaxbiped.dynamics._stance import Stance, angles_and_rates, of_stance, stance_on
+from jaxbiped.dynamics._stance import Stance, of_stance, stance_on
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.scene._couplings import with_fixed
-from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._modes import THROUGH_STRIKE, Limit, Mode, Modes
-from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes, standing_legs
+from jaxbiped.scene._modes import THROUGH_STRIKE, Mode, Modes
+from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
 from jaxbiped.scene._scene import RigidScene
-from jaxbiped.scene._structure import Angle
 
 SLACK = 1e-9
 """Distance from a limit [rad], and of a foot from the ground in units of the walker's height, at
 which a mode may change."""
+
+
+_FLIES = 1e-6
+"""Rate, in its unit, from which an impact makes fly what it throws off and what is then pressed."""
 
 
 def mode_switches(scene: RigidScene, state: Any) -> tuple[Switch, ...]:
@@ -42,7 +42,7 @@ def mode_switches(scene: RigidScene, state: Any) -> tuple[Switch, ...]:
 
     def gaps_and_reactions(stance: Stance) -> list[Scalar]:
         reactions = _reactions(stance, turning_of(scene, stance))
-        gaps = [_gap(scene, limit, stance) for limit in modes.limits]
+        gaps = [gap_of(scene, limit, stance) for limit in modes.limits]
         return [*gaps, *(each / (weight * mechanism.height) for each in reactions)]
 
     pressed = [a & b for a, b in zip(mode.held, _loose(modes, mode), strict=True)]
@@ -65,12 +65,6 @@ def _falls(value: Scalar, live: Scalar) -> Switch:
 def _reactions(stance: Stance, turning: Turning) -> list[Scalar]:
     """Of limits that are held."""
     return turning.reactions[1:] if len(stance.feet) > 1 else turning.reactions
-
-
-def _gap(scene: RigidScene, limit: Limit, stance: Stance) -> Scalar:
-    """How far a limit is [rad]."""
-    found: Scalar = limit.distance(stance.mechanism, stance.pose.motion.angles, scene.ground.slope)
-    return found
 
 
 def _loose(modes: Modes, mode: Mode) -> list[Any]:
@@ -121,7 +115,7 @@ def _hits(
 ) -> list[Scalar]:
     """Limits that are reached, or that an angle rests at."""
     return [
-        ~held & (_gap(scene, limit, old) <= slack) & (rate <= _still(scene))
+        ~held & (gap_of(scene, limit, old) <= slack) & (rate <= _still(scene))
         for limit, held, rate in zip(modes.limits, mode.held, _gap_rates(old, modes), strict=True)
     ]
 
@@ -130,9 +124,14 @@ def _gap_rates(stance: Stance, modes: Modes) -> list[Any]:
     return [limit.gap.of(stance.pose.motion.rates) for limit in modes.limits]
 
 
+def _unit(scene: RigidScene) -> Scalar:
+    """Of rates [rad/s]."""
+    return jnp.sqrt(scene.ground.g / scene.mechanism.height)
+
+
 def _still(scene: RigidScene) -> Scalar:
     """Rate below which an angle rests [rad/s]."""
-    return SLACK * jnp.sqrt(scene.ground.g / scene.mechanism.height)
+    return SLACK * _unit(scene)
 
 
 def mode_after_strike(scene: RigidScene, old: Stance, found: Struck) -> Mode:
@@ -192,13 +191,30 @@ def _changed(
         jnp.where(hits[i], rests[i], each & mode.held[i])
         for i, each in zip(modes.locks, mode.loose, strict=True)
     ]
-    stands = modes.standing(old.leg, found.stands, state.mode)
-    then = Mode(stands, tuple(found.held), tuple(loose))
+    stays, lies = _bounces_off(scene, found, grip.held, stands)
+    stands = modes.standing(old.leg, lies, state.mode)
+    then = Mode(stands, tuple(stays), tuple(loose))
     struck = with_mode(scene, with_rates(state, found.stance), then)
     happens = jnp.zeros_like(state.mode, dtype=bool)
     for each in (*hits, *comes):
         happens = happens | each
     return settled(scene, select(happens, struck, state), old.leg, least)
+
+
+def _bounces_off(
+    scene: RigidScene, found: Struck, held: Sequence[Scalar], stands: tuple[Scalar, ...]
+) -> tuple[list[Scalar], tuple[Scalar, ...]]:
+    """Limits and feet of a leg that stay, and those that an impact makes leave too slowly to fly.
+
+    Two that throw each other off come down ever sooner, infinitely often in a finite time. Both
+    are at rest behind it, where what the last ones leave behind is below rounding.
+    """
+    slow, modes = _FLIES * _unit(scene), rigid_modes(scene.mechanism)
+    rates = _gap_rates(found.stance, modes)
+    stay = [now | (was & (v <= slow)) for now, was, v in zip(found.held, held, rates, strict=True)]
+    feet, fast = zip(found.stance.feet, stands, strict=False), slow * scene.mechanism.height
+    lie = [was & (found.stance.foot(k).vz <= fast) for k, was in feet]
+    return stay, tuple(now | low for now, low in zip(found.stands, lie, strict=True))
 
 
 def settled(scene: RigidScene, state: Any, leg: int, least: Scalar | float = 0.0) -> Any:
@@ -227,61 +243,21 @@ def _turned(scene: RigidScene, state: Any, leg: int) -> tuple[Stance, Turning]:
 
 
 def _pressed(scene: RigidScene, state: Any, leg: int, least: Scalar | float) -> Any:
-    """The state without limits that would have to pull on feet that stay."""
+    """The state without limits that would have to pull on feet that stay; the others at rest."""
     mechanism, modes = scene.mechanism, rigid_modes(scene.mechanism)
-    if not modes.limits:
-        return state
     stance, turning = _turned(scene, state, leg)
-    mode = stance.mode
-    assert turning.holds is not None
-    assert mode is not None
-    count = len(stance.held) - len(modes.limits)
-    loose = [*[False] * count, *_loose(modes, mode)]
-    pressed = least * (scene.ground.g / mechanism.height) - ROUNDING
-    held = turning.holds.pressed(turning.unheld, stance.held, loose, pressed)
-    return with_mode(scene, state, mode._replace(held=tuple(held[count:])))
-
-
-def on_held(scene: RigidScene, state: Any) -> Any:
-    """The state with what is held where it belongs and at rest: stops at their limits, flat feet.
-
-    One step of Newton's method; derivatives are those of states that are held there.
-    """
-    mechanism, modes = scene.mechanism, rigid_modes(scene.mechanism)
-    if not modes.any:
+    mode, holds, held = stance.mode, turning.holds, stance.held
+    if holds is None:
         return state
-    structure, fixed = mechanism.structure, jax.lax.stop_gradient(state.mode)
-    mode, flat = modes.decoded(jnp, fixed), modes.flat(modes.decoded(jnp, fixed))
-    soles = [Angle(((structure.feet[structure.feet_of_leg[leg][0]], 1.0),)) for leg in flat]
-    angles = [*soles, *(limit.gap for limit in modes.limits)]
-    unit = with_fixed(structure, _unit_rows(mechanism))
-    off = [_tilt(stance_on(scene, state, leg)) for leg in flat]
-    off += [_gap(scene, limit, stance_on(scene, state, standing_legs(structure)[-1]))
-            for limit in modes.limits]  # fmt: skip
-    begun, rates = (jnp.stack(part) for part in angles_and_rates(structure, state))
-    now, projection = begun, jnp.eye(len(structure.free))
-    held = (*flat.values(), *mode.held)
-    for angle, value, is_held in zip(angles, off, held, strict=True):
-        row = np.asarray(angle.of(unit))
-        left = projection @ row
-        along = jnp.where(is_held, left / jnp.maximum(left @ left, 1e-12), 0.0)
-        now = now - along * (value + row @ (now - begun))
-        rates = rates - along * (row @ rates)
-        projection = projection - jnp.outer(left, along)
-    return type(state)(state[0], *now, *rates, fixed)
-
-
-def _tilt(stance: Stance) -> Scalar:
-    """How far the feet of a leg are from lying flat [rad]."""
-    first, second = stance.feet
-    apart = stance.foot(first).x - stance.foot(second).x
-    return (stance.height(first) - stance.height(second)) / apart
-
-
-def _unit_rows(mechanism: Mechanism) -> list[np.ndarray]:
-    """Of each body its angle's derivatives by the free angles; of those that follow, zeros."""
-    free = mechanism.structure.free
-    found = [np.zeros(len(free))] * len(mechanism.bodies)
-    for j, row in zip(free, np.eye(len(free)), strict=True):
-        found[j] = row
-    return found
+    assert mode is not None
+    count = len(held) - len(modes.limits)
+    if modes.limits:
+        loose = [*[False] * count, *_loose(modes, mode)]
+        pressed = least * (scene.ground.g / mechanism.height) - ROUNDING
+        held = holds.pressed(turning.unheld, held, loose, pressed)
+    tree, rates = stance.tree, stance.pose.motion.rates
+    free = {row: rates[j] for row, j in zip(tree.rows, tree.structure.free, strict=True)}
+    rest = tree.free_values(holds.under(free, holds.reactions(free, held)))
+    first = 1 + len(rest)
+    state = type(state)(*state[:first], *rest, *state[first + len(rest) :])
+    return with_mode(scene, state, mode._replace(held=tuple(held[count:])))

@@ -111,7 +111,7 @@ def energy_ledger(
     return EnergyLedger(gravity, damper, friction, stored, residual, driven)
 
 
-_PANELS = 24
+_PANELS = 48
 """Parts of a footstep, each with its Gauss points."""
 _BEFORE = 1e-7
 """How long before its impact a footstep is looked at, in units of its period."""

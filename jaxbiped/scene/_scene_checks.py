@@ -36,7 +36,9 @@ def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
         with traced_rules() as rules:
             _check_parts(scene)
         return where_allowed(rules, scene)
-    _CHECKED(scene, lambda: _check_parts(scene))
+    # Within a caller's trace, too, what is computed of known numbers is known.
+    with jax.ensure_compile_time_eval():
+        _CHECKED(scene, lambda: _check_parts(scene))
     return scene
 
 

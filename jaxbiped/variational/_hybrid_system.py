@@ -19,9 +19,10 @@ from jaxbiped._types import Scalar, Time, as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._contacts import foot_forces, with_stance_leg_standing
 from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
+from jaxbiped.dynamics._holds import on_held
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import WalkerField
-from jaxbiped.dynamics._mode_changes import change_mode, mode_switches, on_held
+from jaxbiped.dynamics._mode_changes import change_mode, mode_switches
 from jaxbiped.dynamics._redundant_motion import BodiesField
 from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance

@@ -6,7 +6,7 @@ import pytest
 import xarray
 
 import jaxbiped as jb
-from tests.mechanisms import WALKERS
+from tests.mechanisms import BISECTING, FEET, LEGS, PAIR, TORSO, WALKERS
 
 LAWS = dict(
     normal=jb.laws.RistowSchafer(K=1e6, c=1e7),
@@ -96,3 +96,16 @@ def test_a_dataset_has_feet_and_parameters_by_name(walked, tmp_path):
         names = scene.walker.parameter_names()
         told = [read.attrs[f"walker.{name}"] for name in names]
         np.testing.assert_array_equal(told, jtu.tree_leaves(scene.walker))
+
+
+@pytest.mark.slow
+def test_a_damper_s_loss_behind_an_impact_closes_the_ledger():
+    """The torso's spring comes to rest within a tenth of the footstep."""
+    spring = jb.Spring(BISECTING, stiffness=16.0, damping=0.6)
+    walker = jb.Mechanism(bodies=(*LEGS, TORSO), feet=FEET, joints=(spring,), mirror=PAIR)
+    scene = jb.RigidScene(walker, jb.Ground(slope=0.03))
+    start = scene.state(theta_leg_1=-0.28, theta_leg_2=0.28, omega_leg_1=-1.1, omega_leg_2=-1.7)
+    walk = jb.rigid_walk(scene, start, footsteps=4, max_arrivals=4, accuracy="tight")
+    books = jb.measure.rigid_ledger(scene, walk)
+    assert np.all(books.joint_loss > 1e-4)
+    np.testing.assert_allclose(books.residual, 0.0, atol=1e-8)

@@ -185,3 +185,16 @@ def test_a_slope_that_no_friction_holds_is_asked_about_at_the_callers_line():
         warnings.simplefilter("error")
         jb.seed_scene(slope=0.46)
         dataclasses.replace(scene, friction=jb.laws.Frictionless())
+
+
+def test_a_known_scene_is_checked_where_its_first_use_is_within_a_trace():
+    """The height of its feet is known there, too, though JAX traces all that it computes."""
+    legs = tuple(jb.Body(f"leg_{i}", mass=1.0, inertia=0.01, centre=0.1) for i in (1, 2))
+    feet = tuple(jb.Foot(f"leg_{i}", centre=0.3) for i in (1, 2))
+    scene = jb.RigidScene(jb.Mechanism(bodies=legs, feet=feet), jb.Ground(slope=0.03))
+    start = scene.state(theta_leg_1=-0.2, theta_leg_2=0.2)
+
+    def lasts(rate):
+        return jb.simulate(scene, start._replace(omega_leg_2=rate), footsteps=1).t[-1]
+
+    assert jax.eval_shape(lasts, -1.1).shape == ()
