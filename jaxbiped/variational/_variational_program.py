@@ -147,9 +147,7 @@ class AdaptiveColumns:
             (state, new_columns), t = behind, jnp.where(met, t - past, t)
         if self.watch.peak is None:
             pairs = zip(new_columns, columns, strict=True)
-            columns = tuple(
-                jax.lax.map(lambda each: jnp.where(keep, *each), pair) for pair in pairs
-            )
+            columns = tuple(jax.lax.map(lambda each: jnp.where(keep, *each), p) for p in pairs)
             peaks, peak_shifts = columns, shifts
         else:
             highest = keep & (landed.peak > now.landed.peak)
