@@ -61,6 +61,8 @@ def gait_measures(
         )
     scene = jtu.tree_map(as_float, scene)
     implicit = isinstance(gradient, Implicit)
+    if implicit:
+        scene = _once(scene)
     gait = find_gait(
         jax.lax.stop_gradient(scene),
         None if guess is None else jax.lax.stop_gradient(guess),
@@ -108,9 +110,20 @@ def _attach_derivatives_jvp(
 ) -> tuple[Measures, Measures]:
     values, slopes, _ = primals
     state_dot = tangents[2]
-    # A second derivative would need slopes that are themselves differentiated.
-    slopes, _ = first_derivatives_only((slopes, primals[2]), "gait_measures by Implicit()")
     return values, jtu.tree_map(lambda slope: slope @ state_dot, slopes)
+
+
+@eqx.filter_custom_jvp
+def _once(scene: PyTree) -> PyTree:
+    """The same, refused at its second derivative: before the gait's slopes, which have none."""
+    return scene
+
+
+@_once.def_jvp
+def _once_jvp(primals: tuple[PyTree], tangents: tuple[PyTree]) -> tuple[PyTree, PyTree]:
+    moving, still = eqx.partition(primals[0], eqx.is_array)
+    once = first_derivatives_only(moving, "gait_measures by Implicit()")
+    return eqx.combine(once, still), tangents[0]
 
 
 def _by_correction(gait: Gait, once: Return) -> Measures:

@@ -35,6 +35,7 @@ def with_derivatives(
     *,
     moving: Callable[[_Run], tuple[PyTree, PyTree, PyTree]],
     slopes: Callable[[_Run, Trajectory[Any], tuple[int, ...], tuple[int, ...]], Slopes],
+    check: Callable[[_Run], None] = lambda run: None,
 ) -> Trajectory[Any]:
     """`compute(run)`, with derivatives of the times and states that are saved.
 
@@ -43,8 +44,8 @@ def with_derivatives(
         compute: simulates it.
         moving: what of it may be differentiated: the start, the scene, and the times at which a
             clock ends or saves it.
-        slopes: derivatives of what was found with respect to some leaves of start and scene. It
-            raises `ArgumentError` for what has none.
+        slopes: derivatives of what was found with respect to some leaves of start and scene.
+        check: raises `ArgumentError` for what has none, before anything is simulated.
     """
     arrays, rest = eqx.partition(run, eqx.is_array)
     leaves, structure = jtu.tree_flatten(arrays)
@@ -75,8 +76,9 @@ def with_derivatives(
         # What is known is not traced along with the tangents: JAX compiles no small programs.
         known = not is_traced(primals)
         with untraced() if known else contextlib.nullcontext():
-            found = compute(whole(primals)) if known else function(*primals)
             once = whole(primals if known else first_derivatives_only(primals, "a simulation"))
+            check(once)
+            found = compute(whole(primals)) if known else function(*primals)
             at = slopes(once, found, tuple(state_dots), tuple(scene_dots))
         along = [*state_dots.values(), *scene_dots.values()]
         return found, _tangent_of(found, *_contract(at, along, *clock_dots.values()))

@@ -202,7 +202,9 @@ class Simulation(eqx.Module):
                 warn(_OF_STEPS)
             walk = _run(self)
         else:
-            walk = with_derivatives(self, _run, moving=_moving, slopes=_slopes)
+            walk = with_derivatives(
+                self, _run, moving=_moving, slopes=_slopes, check=_check_derivatives
+            )
         return dataclasses.replace(walk, scene_key=scene_key(self.scene))
 
     def at_tolerance(self, rtol: float) -> "Simulation":
@@ -249,9 +251,7 @@ def _moving(run: Simulation) -> tuple[PyTree, PyTree, PyTree]:
     return run.state, run.scene, run.duration if run.times is None else run.times
 
 
-def _slopes(
-    run: Simulation, found: Trajectory, places: tuple[int, ...], active: tuple[int, ...]
-) -> Slopes:
+def _check_derivatives(run: Simulation) -> None:
     refused = {
         'save = "steps"': (run.save_steps, 'ask for save="end", an array of times or a section'),
         "extremes": (run.extremes is not None, "only times and states have derivatives"),
@@ -263,6 +263,11 @@ def _slopes(
     for argument, (is_so, instead) in refused.items():
         if is_so:
             raise ArgumentError(f"{argument} is not allowed under derivatives: {instead}.")
+
+
+def _slopes(
+    run: Simulation, found: Trajectory, places: tuple[int, ...], active: tuple[int, ...]
+) -> Slopes:
     # The columns take the walk's own method of steps, where that is one for them.
     solver = run.solver if isinstance(run.solver, AbstractRosenbrock) else solver_named("rodas4p")
     assert isinstance(solver, AbstractRosenbrock)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.simulate import _simulation
 from tests.compliant_walkers import held_walker
 from tests.mechanisms import WALKERS, scene_of, start_of
 
@@ -265,7 +266,10 @@ def test_derivatives_do_not_depend_on_the_engine():
         (jax.hessian, {}, "Second derivatives of a simulation are not offered"),
     ],
 )
-def test_what_has_no_derivatives_says_so(differentiate, how, said):
+def test_what_has_no_derivatives_says_so(differentiate, how, said, monkeypatch):
+    """Before anything is compiled."""
+    monkeypatch.setattr(_simulation, "_run", None)
+
     def end(rate):
         state = jb.seed_state()._replace(omega_1=rate)
         walk = jb.simulate(jb.seed_scene(), state, duration=0.05, **({"save": "end"} | how))
