@@ -1,4 +1,4 @@
-"""Derivatives of walks of eight mechanisms with respect to every parameter of their scenes.
+"""Derivatives of walks of nine mechanisms with respect to every parameter of their scenes.
 
 Writes mechanism_derivatives.md: for each mechanism and way of ending the largest error at each
 accuracy, relative to the largest entry of its column, and whose it is. Truths are central
@@ -6,13 +6,14 @@ differences of much finer walks at three steps; columns whose truth is not known
 counted apart, unless the error is far above what is known. NaN: at this accuracy an event grazes.
 """
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from _experiment import Options, experiment
-from _mechanisms import Case, cases
+from _mechanisms import SIDES, Case, cases
 from tqdm import tqdm
 
 import jaxbiped as jb
@@ -27,6 +28,15 @@ KNOWN = 1e-6
 """How well a column must be known to be judged."""
 STEP, LONGEST = 1e-5, 3e-3
 """Relative step of a difference where a column is the largest, and of the smallest columns."""
+
+
+def with_stops(case: Case) -> Case:
+    """Flat feet that also hit stops at the ankles, whose forces jump."""
+    walker = case.scene.walker
+    law = jb.laws.KelvinVoigt(K=200.0, D=0.5)
+    stops = [jb.Stop(f"foot_{i}", upper=0.02, lower=-0.02, law=law) for i in SIDES]
+    given = walker.arguments() | {"joints": (*walker.joints, *stops)}
+    return case._replace(scene=dataclasses.replace(case.scene, walker=jb.Mechanism(**given)))
 
 
 class Columns(NamedTuple):
@@ -95,7 +105,9 @@ def row(mechanism: str, ends: str, found: Columns) -> dict[str, Any]:
 
 @experiment
 def main(options: Options):
-    chosen = options.sized(cases(), {"torso coupled": cases()["torso coupled"]})
+    every = cases()
+    every["flat feet, ankle stops"] = with_stops(every["flat feet"])
+    chosen = options.sized(every, {"torso coupled": every["torso coupled"]})
     ends = options.sized(ENDS, {"a time": ENDS["a time"]})
     rows = []
     for name, case in tqdm(chosen.items(), desc="mechanisms"):

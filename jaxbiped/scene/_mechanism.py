@@ -178,10 +178,12 @@ class Mechanism(eqx.Module):
 
     @property
     def joints(self) -> tuple[AbstractJointPart, ...]:
-        """All joint parts; the angle of each is in `structure.joints`."""
+        """All joint parts; mirror images have the same leaves."""
         s, found = self.structure, []
         for k, (own, name) in enumerate(zip(s.joint_pieces, s.joint_names, strict=True)):
             part = with_fields(self.pieces[own], name=name)
+            if own in s.joint_pieces[:k]:
+                part = with_fields(part, angle=named_angle(s.joints[k], s.bodies))
             found.append(whole_part(part) if s.changes_sign(k) else part)
         return tuple(found)
 

@@ -61,6 +61,15 @@ def test_mirror_images_share_their_parameters():
     assert float(by_name["hip.mass"]) == 1.0
 
 
+def test_pieces_make_the_mechanism_again():
+    walker = kneed()
+    parts = dict(bodies=walker.bodies, feet=walker.feet, joints=walker.joints)
+    for mirror in ((), walker.arguments()["mirror"]):
+        again = Mechanism(root_mass=walker.root_mass, **parts, mirror=mirror)
+        assert again.structure.joints == walker.structure.joints
+        assert again.structure.feet == walker.structure.feet
+
+
 def test_a_number_left_out_is_no_parameter():
     assert "leg.foot.radius" in two_legs().parameter_names()
     bare = two_legs(feet=tuple(Foot(f"leg_{i}", centre=0.4) for i in (1, 2)))
