@@ -24,6 +24,10 @@ def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
         f"in {100 * inside['K']:g} % (K), {100 * inside['c']:g} % (c) and "
         f"{100 * inside['mu_kinetic']:g} % (friction) of the fits"
     )
+    for name, setting in numbers["settings"].items():
+        for found in setting["parameters"].values() if name != "precise" else ():
+            share = f"{100 * found['inside_95']:.1f} %"
+            yield row(UNKNOWN, str(found["undetermined"]), str(found["one_sided"]), share)
 
 
 def of_kneed_ladder(numbers: dict[str, Any]) -> Iterator[str]:
