@@ -1,14 +1,14 @@
 """Analyses of basins of attraction from labels alone: fractions, boundaries, dimension, entropy."""
 
+from jaxbiped.basins._basin_entropy import Entropy as Entropy
+from jaxbiped.basins._basin_entropy import entropy as entropy
 from jaxbiped.basins._boundary_dimension import Dimension as Dimension
 from jaxbiped.basins._boundary_dimension import Uncertainty as Uncertainty
 from jaxbiped.basins._boundary_dimension import boundary_dimension as boundary_dimension
 from jaxbiped.basins._boundary_dimension import sampled_uncertainty as sampled_uncertainty
 from jaxbiped.basins._boundary_dimension import uncertainty_exponent as uncertainty_exponent
-from jaxbiped.basins._fractions import Entropy as Entropy
 from jaxbiped.basins._fractions import Fraction as Fraction
 from jaxbiped.basins._fractions import Fractions as Fractions
-from jaxbiped.basins._fractions import entropy as entropy
 from jaxbiped.basins._fractions import fractions as fractions
 from jaxbiped.basins._fractions import wilson_interval as wilson_interval
 from jaxbiped.basins._label_errors import LabelErrors as LabelErrors
