@@ -21,8 +21,9 @@ from jaxbiped.cli._walk_warnings import (
 )
 from jaxbiped.constraints._constraint_methods import name_of
 from jaxbiped.measure._footsteps import footstep_dataset
-from jaxbiped.measure._samples import from_start, places_of_standing, rows_of
+from jaxbiped.measure._samples import from_start, places_of_standing
 from jaxbiped.solve._error_estimate import error_numbers, error_sentence
+from jaxbiped.solve._trajectory import rows_of
 
 _MOST_ROWS = 24
 _SHOWN = 60.0

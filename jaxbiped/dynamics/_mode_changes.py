@@ -23,10 +23,8 @@ from jaxbiped.scene._scene import RigidScene
 SLACK = 1e-9
 """Distance from a limit [rad], and of a foot from the ground in units of the walker's height, at
 which a mode may change."""
-
-
 _FLIES = 1e-6
-"""Rate, in its unit, from which an impact makes fly what it throws off and what is then pressed."""
+"""Rate, in the unit of rates, above which what an impact throws off leaves though it is pressed."""
 
 
 def mode_switches(scene: RigidScene, state: Any) -> tuple[Switch, ...]:
@@ -125,7 +123,7 @@ def _gap_rates(stance: Stance, modes: Modes) -> list[Any]:
 
 
 def _unit(scene: RigidScene) -> Scalar:
-    """Of rates [rad/s]."""
+    """The unit of rates [rad/s]."""
     return jnp.sqrt(scene.ground.g / scene.mechanism.height)
 
 
@@ -191,7 +189,7 @@ def _changed(
         jnp.where(hits[i], rests[i], each & mode.held[i])
         for i, each in zip(modes.locks, mode.loose, strict=True)
     ]
-    stays, lies = _bounces_off(scene, found, grip.held, stands)
+    stays, lies = _staying(scene, found, grip.held, stands)
     stands = modes.standing(old.leg, lies, state.mode)
     then = Mode(stands, tuple(stays), tuple(loose))
     struck = with_mode(scene, with_rates(state, found.stance), then)
@@ -201,13 +199,13 @@ def _changed(
     return settled(scene, select(happens, struck, state), old.leg, least)
 
 
-def _bounces_off(
+def _staying(
     scene: RigidScene, found: Struck, held: Sequence[Scalar], stands: tuple[Scalar, ...]
 ) -> tuple[list[Scalar], tuple[Scalar, ...]]:
-    """Limits and feet of a leg that stay, and those that an impact makes leave too slowly to fly.
+    """Which limits, and which feet of a leg, stay after an impact.
 
-    Two that throw each other off come down ever sooner, infinitely often in a finite time. Both
-    are at rest behind it, where what the last ones leave behind is below rounding.
+    Those that leave very slowly stay, too: two that throw each other off come down ever sooner,
+    infinitely often in a finite time. Behind that time both are at rest.
     """
     slow, modes = _FLIES * _unit(scene), rigid_modes(scene.mechanism)
     rates = _gap_rates(found.stance, modes)

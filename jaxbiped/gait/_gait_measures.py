@@ -62,7 +62,7 @@ def gait_measures(
     scene = jtu.tree_map(as_float, scene)
     implicit = isinstance(gradient, Implicit)
     if implicit:
-        scene = _once(scene)
+        scene = _differentiated_once(scene)
     gait = find_gait(
         jax.lax.stop_gradient(scene),
         None if guess is None else jax.lax.stop_gradient(guess),
@@ -114,13 +114,15 @@ def _attach_derivatives_jvp(
 
 
 @eqx.filter_custom_jvp
-def _once(scene: PyTree) -> PyTree:
+def _differentiated_once(scene: PyTree) -> PyTree:
     """The same, refused at its second derivative: before the gait's slopes, which have none."""
     return scene
 
 
-@_once.def_jvp
-def _once_jvp(primals: tuple[PyTree], tangents: tuple[PyTree]) -> tuple[PyTree, PyTree]:
+@_differentiated_once.def_jvp
+def _differentiated_once_jvp(
+    primals: tuple[PyTree], tangents: tuple[PyTree]
+) -> tuple[PyTree, PyTree]:
     moving, still = eqx.partition(primals[0], eqx.is_array)
     once = first_derivatives_only(moving, "gait_measures by Implicit()")
     return eqx.combine(once, still), tangents[0]

@@ -25,6 +25,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.identify._measured_gait import MeasuredAngles, MeasuredGait
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.solve._trajectory import rows_of
 
 AnyScene: TypeAlias = Scene | RigidScene
 Curve = Callable[[np.ndarray], np.ndarray]
@@ -116,7 +117,7 @@ def _mid_stance(scene: AnyScene, gait: Gait) -> float:
         return 0.0  # where its cycles begin
     clock = np.asarray(gait.orbit[0])[0]
     known = np.isfinite(clock)
-    states = jtu.tree_map(lambda leaf: np.asarray(leaf)[0], gait.orbit[1])
+    states = rows_of(gait.orbit[1], 0)
     past = (np.asarray(each)[known] for each in _past_mid_stance(scene, states))
     rises = CubicHermiteSpline(clock[known], *past).roots(extrapolate=False)
     return float(rises[0]) if len(rises) else 0.0

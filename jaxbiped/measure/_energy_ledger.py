@@ -23,13 +23,12 @@ from jaxbiped.measure._samples import (
     evaluate_at,
     kept_strikes,
     mode_changes,
-    rows_of,
     sample,
     states_after,
 )
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, rows_of
 
 
 class EnergyLedger(NamedTuple):

@@ -20,13 +20,12 @@ from jaxbiped.measure._samples import (
     at_steps,
     evaluate_at,
     moments_of_change,
-    rows_of,
     sample,
 )
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene._structure import Structure
 from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, rows_of
 
 if TYPE_CHECKING:
     import xarray

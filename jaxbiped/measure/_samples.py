@@ -21,7 +21,7 @@ from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState, SomeState, State
 from jaxbiped.simulate._simulate import rigid_walk
 from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import AT_ONCE, Arrivals, Trajectory, in_parts
+from jaxbiped.solve._trajectory import AT_ONCE, Arrivals, Trajectory, in_parts, rows_of
 
 SomeScene = TypeVar("SomeScene", bound=AbstractWalkerScene)
 _Taken = TypeVar("_Taken")
@@ -225,11 +225,6 @@ def from_start(scene: RigidScene, walk: Trajectory[Any], start: Any) -> Trajecto
         state = jtu.tree_map(lambda a, b: np.append(a, np.asarray(b)), state, kept.state)
     arrivals = Arrivals(as_array(np.asarray(total)), as_array(t), state)
     return dataclasses.replace(walk, arrivals=arrivals)
-
-
-def rows_of(tree: PyTree, rows: slice | np.ndarray | int) -> PyTree:
-    """Rows of each leaf of a tree, as NumPy arrays."""
-    return jtu.tree_map(lambda leaf: np.asarray(leaf)[rows], tree)
 
 
 def places_of_standing(scene: RigidScene, states: Any) -> np.ndarray:

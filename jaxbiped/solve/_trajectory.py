@@ -16,7 +16,7 @@ from jaxtyping import Array, Float, Int, PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._summary import summary
-from jaxbiped._types import Numbers, Scalar, by_numpy, is_traced
+from jaxbiped._types import Numbers, Scalar, SomeTree, by_numpy, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._error_estimate import ErrorEstimate
@@ -203,6 +203,12 @@ def _check_inside(dense: diffrax.DenseInterpolation, times: np.ndarray) -> None:
             f"t = {float(times[outside][0])!r} is not allowed: this trajectory lasts from "
             f"{first!r} to {last!r} s."
         )
+
+
+def rows_of(tree: SomeTree, rows: Any) -> SomeTree:
+    """Rows of each leaf of a tree, as NumPy arrays; None for one more axis."""
+    found: SomeTree = jtu.tree_map(lambda leaf: np.asarray(leaf)[rows], tree)
+    return found
 
 
 def in_parts(function: Callable[[Any], PyTree], tree: PyTree, size: int = AT_ONCE) -> PyTree:

@@ -29,8 +29,9 @@ from jaxbiped.scene._parameter_access import (
 )
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.solve._trajectory import rows_of
 from jaxbiped.sweep._gait_grid import open_gait_grid
-from jaxbiped.sweep._gait_waves import GaitWaves, rows_of
+from jaxbiped.sweep._gait_waves import GaitWaves
 from jaxbiped.sweep._grid_waves import LARGE, Place
 from jaxbiped.sweep._store_files import store_path, what_is_kept
 from jaxbiped.sweep.starts._coordinates import parameter_axes

@@ -7,15 +7,15 @@ searched without a guess, which takes longest: in a region without gaits not eac
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
-import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._progress import Stage
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.solve._trajectory import rows_of
 from jaxbiped.sweep._gait_grid import GaitGrid
 from jaxbiped.sweep._grid_waves import (
     LARGE,
@@ -207,9 +207,3 @@ class GaitWaves:
 
 def _is_found(gait: Gait | None) -> bool:
     return gait is not None and int(gait.ending) == int(Search.FOUND)
-
-
-def rows_of(gaits: Gait, which: Any) -> Gait:
-    """Some of several gaits; of a single one, by None, a batch."""
-    rows: Gait = jtu.tree_map(lambda leaf: np.asarray(leaf)[which], gaits)
-    return rows
