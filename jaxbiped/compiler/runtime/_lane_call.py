@@ -40,8 +40,7 @@ class BufferPool:
 
     def clear(self) -> None:
         """Keeps nothing of what nobody uses now."""
-        for key in list(self._free):
-            self._free.pop(key, None)
+        self._free.clear()
 
     def array(self, shape: tuple[int, ...]) -> np.ndarray:
         """Of 64-bit floating-point numbers, whatever was there before."""
@@ -294,6 +293,7 @@ class LaneCall(NamedTuple):
         return tuple(self)
 
     def ready(self) -> bool:
-        """Whether it runs without tracing or compiling."""
-        wants_code = self.wants is not Part.COLUMNS
-        return not wants_code or self.how.compiled.runs_at_once(self.simulations)
+        """Whether it, and what it reads if that was given up, runs without compiling."""
+        reads = self.how.reads
+        again = reads is None or self._replace(how=reads).ready()
+        return again and self.how.compiled.runs_at_once(self.simulations)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._lane_call import BufferPool, RecordCache
+from jaxbiped.compiler.runtime._lane_call import BufferPool, LaneCall, LaneRun, Part, RecordCache
 from jaxbiped.compiler.runtime._primitive import Recording, call
 from tests.compiler.one_shot import NUMBER, stepped, two_zeros
 
@@ -269,3 +269,13 @@ def test_shapes(shape):
     assert array.dtype == np.float64
     array[...] = 2.0
     assert np.sum(array) == 2.0 * array.size
+
+
+def test_a_reader_is_ready_only_with_the_code_that_makes_its_records_again(powers, monkeypatch):
+    reader = _last_sum()
+    call_kept = LaneCall(1, LaneRun(reader, reads=LaneRun(powers, ROOM)), Part.ALL)
+    for has_code, ready in (({reader}, False), ({reader, powers}, True), ({powers}, False)):
+        monkeypatch.setattr(
+            CompiledProgram, "runs_at_once", lambda program, count, known=has_code: program in known
+        )
+        assert call_kept.ready() is ready
