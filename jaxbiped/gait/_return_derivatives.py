@@ -288,7 +288,8 @@ def _sizes(args: PyTree, active: tuple[int, ...]) -> list[Scalar]:
 
 
 def _leaves_with_none(tangents: PyTree, like: PyTree) -> list[PyTree]:
-    """Tangents of every leaf, None where JAX left them out."""
+    """Tangents of every leaf, None where JAX left them out; a part that there is not has none."""
+    structure = jtu.tree_structure(like)
     if tangents is None:
-        return [None] * len(jtu.tree_leaves(like))
-    return jtu.tree_leaves(tangents, is_leaf=lambda leaf: leaf is None)
+        return [None] * structure.num_leaves
+    return list(structure.flatten_up_to(tangents))
