@@ -1,5 +1,6 @@
 """What is tried on each mechanism: one number a capability."""
 
+import dataclasses
 import functools
 import json
 import subprocess
@@ -13,6 +14,9 @@ import numpy as np
 from _mechanisms import Case
 
 import jaxbiped as jb
+from jaxbiped.compiler import LANES
+from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES
+from jaxbiped.trade import WalkTrade, Way
 
 CLEARANCES = {jb.laws.StanceRotation: "stance-rotation", jb.laws.AlwaysTouching: "always-touching"}
 """Rules of clearance by the names that the command line has."""
@@ -68,8 +72,22 @@ def footsteps(trial: Trial) -> int:
 
 
 def accurate_walk(trial: Trial) -> float:
-    found = jb.simulate(trial.scene, trial.start, footsteps=2, accuracy=1e-4, save="end")
+    found = jb.simulate(trial.scene, trial.start, footsteps=2, accuracy=1e-6, save="end")
     return float(max(np.max(leaf) for leaf in jax.tree.leaves(found.error)))
+
+
+def bristles(trial: Trial) -> float:
+    law = jb.laws.LuGre.like_seed(jb.seed_scene().friction)
+    scene = dataclasses.replace(trial.scene, friction=law)
+    return float(jb.simulate(scene, trial.start, footsteps=4).t[-1])
+
+
+def tradeoff(trial: Trial) -> float:
+    study = WalkTrade(trial.scene, trial.start, duration=0.5, repeats=1)
+    row = study.row(Way("rodas4p", "lanes", "rtol=1e-6", 1e-6), study.truth())
+    if row.errors.get("state") is None:
+        raise LookupError(row.outcome)
+    return float(row.errors["state"])
 
 
 def ledger(trial: Trial) -> float:
@@ -88,6 +106,19 @@ def slope_of_walk(trial: Trial) -> float:
 
     slope = trial.scene.ground.slope
     return float(jax.jacfwd(place)(slope)[0])
+
+
+def modes(trial: Trial) -> float:
+    """Of d time/d slope of a return: how far both modes are off differences, relative."""
+
+    def duration(slope: Any, gradient: Any = None) -> Any:
+        scene = jb.with_parameters(trial.scene, {"slope": slope})
+        return jb.return_map(scene, trial.start, gradient=gradient, accuracy="tight").time
+
+    slope = trial.scene.ground.slope
+    found = jax.jacfwd(duration)(slope), jax.grad(duration)(slope, jb.gait.Reverse())
+    sides = [float(duration(slope * (1.0 + h))) for h in (1e-4, -1e-4)]
+    return float(np.max(np.abs(np.array(found) * 2e-4 * slope / (sides[0] - sides[1]) - 1.0)))
 
 
 def period_of(found: jb.Gait, where: str) -> float:
@@ -133,6 +164,12 @@ def branch(trial: Trial) -> int:
     slope = float(trial.scene.ground.slope)
     bounds = (0.9 * slope, 1.1 * slope)
     return len(jb.continue_gait(trial.scene, "slope", bounds=bounds, guess=trial.gait))
+
+
+def bifurcations(trial: Trial) -> int:
+    slope = float(trial.scene.ground.slope)
+    bounds = (0.25 * slope, 3.0 * slope)
+    return len(jb.continue_gait(trial.scene, "slope", bounds=bounds, guess=trial.gait).bifurcations)
 
 
 def grid(trial: Trial) -> int:
@@ -207,6 +244,13 @@ def engines(trial: Trial) -> float:
     ]
     there = [each(trial.scene, trial.start) for each in ends]
     return float(max(abs(np.subtract(*pair)) for pair in zip(*there, strict=True)))
+
+
+def device(trial: Trial) -> int:
+    how = dict(duration=1.0, save="end", engine="lanes")
+    request = jb.Simulation.prepare(trial.scene, trial.start, **how).lane_request()
+    lines = LANES.compile(request).kernel.ptx(ARCHITECTURES[9, 0]).splitlines()
+    return sum(line.startswith("\t") and line.endswith(";") for line in lines)
 
 
 def operations(trial: Trial) -> int:
@@ -286,12 +330,15 @@ CAPABILITIES = {
     "redundant coordinates": Capability(
         redundant, "largest difference of accelerations, seven methods"
     ),
-    "accuracy=1e-4": Capability(accurate_walk, "error bar of two footsteps"),
+    "accuracy=1e-6": Capability(accurate_walk, "error bar of two footsteps"),
+    "bristles": Capability(bristles, "time of four footsteps with LuGre's friction, s"),
+    "trade": Capability(tradeoff, "error of `rodas4p` at 1e-6 after 0.5 s, scaled"),
     "gait": Capability(gait, "period, s"),
     "multipliers": Capability(radius, "spectral radius"),
     "unit multiplier": Capability(unit_multiplier, "distance from 1"),
     "sensitivities": Capability(elasticity, "elasticity of the period with respect to the slope"),
     "branch": Capability(branch, "points from 0.9 to 1.1 of the slope"),
+    "bifurcations": Capability(bifurcations, "on the branch from 0.25 to 3 times the slope"),
     "basin": Capability(basin, "share of 144 starts that walk"),
     "nearest_failure": Capability(shock, "smallest fatal push, scaled"),
     "gait without a guess": Capability(without_guess, "period, s"),
@@ -300,9 +347,13 @@ CAPABILITIES = {
     "fit": Capability(fit, "relative error of a mass"),
     "gradient": Capability(gradient, "the same elasticity by `jax.grad`"),
     "slope of a walk": Capability(slope_of_walk, "d hip_x/d slope after a footstep, m/rad"),
+    "both modes": Capability(
+        modes, "of d time/d slope of a return, relative difference from differences"
+    ),
     "rigid feet": Capability(rigid, "period, s"),
     "command line": Capability(command, "footsteps of `jaxbiped walk --walker FILE.py:NAME`"),
     "playground": Capability(playground, "kB of the page"),
     "both engines": Capability(engines, "largest difference after 2 ms, XLA by explicit Euler"),
+    "CUDA": Capability(device, "PTX instructions of a walk's program for compute capability 9.0"),
 }
 """What is tried, and what its number is."""

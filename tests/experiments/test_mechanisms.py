@@ -69,6 +69,11 @@ def test_cells_agree_with_what_is_known_of_them():
     assert all(gap < 1e-8 for gap in NUMBERS["redundant coordinates"].values())
     for name, period in NUMBERS["rigid feet"].items():
         assert period == pytest.approx(NUMBERS["gait"][name], rel=0.02)
+    for name, time in NUMBERS["bristles"].items():
+        assert time == pytest.approx(NUMBERS["walk"][name], rel=0.02)
+    assert max(NUMBERS["accuracy=1e-6"].values()) < 1e-6
+    assert max(NUMBERS["trade"].values()) < 1e-5
+    assert max(NUMBERS["both modes"].values()) < 1e-5
     assert set(NUMBERS["gait_sweep"].values()) == {3}
     assert min(NUMBERS["optimum"].values()) > 0.0
     assert all(abs(error) < 1e-6 for error in NUMBERS["fit"].values())
