@@ -65,7 +65,7 @@ def feet_at(
         point_motion(structure, poses[body], body, foot.centre)
         for body, foot in zip(structure.feet, given, strict=True)
     )
-    legs = leg_motions(structure, poses, [foot.centre for foot in given], points)
+    legs = leg_motions(structure, poses, points)
     admitted = [
         scene.clearance.admits(name, leg.rate)
         for name, leg in zip(structure.legs, legs, strict=True)
@@ -95,12 +95,12 @@ def legs_at(scene: CompliantScene, state: CompliantState) -> tuple[LegMotion, ..
 
 def legs_in(mechanism: Mechanism, poses: tuple[Pose, ...]) -> tuple[LegMotion, ...]:
     """Each leg's line where bodies are in these poses."""
-    structure, centres = mechanism.structure, [foot.centre for foot in mechanism.feet]
+    structure = mechanism.structure
     points = [
-        point_motion(structure, poses[body], body, centre)
-        for body, centre in zip(structure.feet, centres, strict=True)
+        point_motion(structure, poses[body], body, foot.centre)
+        for body, foot in zip(structure.feet, mechanism.feet, strict=True)
     ]
-    return leg_motions(structure, poses, centres, points)
+    return leg_motions(structure, poses, points)
 
 
 @kept_alone

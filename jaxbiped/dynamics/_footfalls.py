@@ -11,7 +11,6 @@ from jaxbiped._trigonometry import angle_of_vector
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._tree import PointMotion, Pose
-from jaxbiped.scene._bodies import Point
 from jaxbiped.scene._structure import Structure
 
 
@@ -139,19 +138,16 @@ class LegMotion(NamedTuple):
     Attributes:
         x, z: from the root point to the mean of the feet's centres [m].
         rate: of its angle [rad/s].
-        fixed_angle: its angle where it is fixed in a body [rad]; None for another line, and in a
-            body that goes round.
     """
 
     x: Scalar
     z: Scalar
     rate: Scalar
-    fixed_angle: Scalar | None
 
     @property
     def angle(self) -> Scalar:
-        """Angle from the slope's normal [rad]."""
-        return angle_of_vector(self.x, -self.z) if self.fixed_angle is None else self.fixed_angle
+        """Angle from the slope's normal, between −π and π [rad]."""
+        return angle_of_vector(self.x, -self.z)
 
 
 def mean(values: Sequence[Scalar]) -> Scalar:
@@ -162,7 +158,6 @@ def mean(values: Sequence[Scalar]) -> Scalar:
 def leg_motions(
     structure: Structure,
     poses: Sequence[Pose],
-    centres: Sequence[Point],
     points: Sequence[PointMotion],
 ) -> tuple[LegMotion, ...]:
     """The lines of all legs, from where their feet's centres are and how they move.
@@ -170,14 +165,13 @@ def leg_motions(
     Where all feet of a leg are on one body that hangs on the root point, its line is fixed in the
     body, so that its rate is the body's, exactly.
     """
-    return tuple(_line(structure, leg, poses, centres, points) for leg in structure.feet_of_leg)
+    return tuple(_line(structure, leg, poses, points) for leg in structure.feet_of_leg)
 
 
 def _line(
     structure: Structure,
     leg: tuple[int, ...],
     poses: Sequence[Pose],
-    centres: Sequence[Point],
     points: Sequence[PointMotion],
 ) -> LegMotion:
     bodies = {structure.feet[k] for k in leg}
@@ -186,12 +180,7 @@ def _line(
     x = mean([points[k].x for k in leg]) - motion.x
     z = mean([points[k].z for k in leg]) - motion.z
     if len(bodies) == 1 and structure.parents[first] < 0:
-        angle, ahead = motion.angles[first], [c for k in leg if (c := centres[k].ahead) is not None]
-        if ahead:
-            along = mean([centres[k].along for k in leg])
-            angle = angle + angle_of_vector(sum(ahead[1:], ahead[0]) / len(leg), along)
-        goes_round = structure.turn is not None  # its angle is known but for whole turns
-        return LegMotion(x, z, motion.rates[first], None if goes_round else angle)
+        return LegMotion(x, z, motion.rates[first])
     vx = mean([points[k].vx for k in leg]) - motion.vx
     vz = mean([points[k].vz for k in leg]) - motion.vz
-    return LegMotion(x, z, (x * vz - z * vx) / (x * x + z * z), None)
+    return LegMotion(x, z, (x * vz - z * vx) / (x * x + z * z))

@@ -68,8 +68,7 @@ class MidStance(AbstractSection):
             return -getattr(y, f"theta_{self.body}")
         if is_rigid(args):
             return -lean(args, y)
-        line = legs_at(args, y)[args.mechanism.structure.stance_leg]
-        return -(line.x if line.fixed_angle is None else line.fixed_angle)
+        return -legs_at(args, y)[args.mechanism.structure.stance_leg].x
 
     def counts(self, args: PyTree, y: PyTree) -> Scalar:
         if is_rigid(args):

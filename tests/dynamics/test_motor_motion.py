@@ -73,9 +73,20 @@ def test_a_leg_of_one_body_turns_as_that_body_does():
     )
     motion = motion_with((0.3, -0.2), (1.0, -2.0))
     straight, flat = leg_line(two_legs(), motion, 1), leg_line(two_legs(feet=feet), motion, 1)
-    assert (float(straight.angle), float(straight.rate)) == (-0.2, -2.0)
+    assert float(straight.angle) == pytest.approx(-0.2, rel=1e-14)
+    assert float(straight.rate) == -2.0
     assert float(flat.angle) == pytest.approx(-0.2 + math.atan2(0.03, 0.3), rel=1e-14)
     assert float(flat.rate) == -2.0
+
+
+@pytest.mark.parametrize("turned", [-1.9, 1.9])
+def test_a_foot_above_the_root_is_where_the_line_points(turned):
+    """The head of a torso that leans forward is ahead of the root, not behind it."""
+    feet = [jb.Foot(name, centre=place) for name, place in (("leg_1", 0.3), ("torso", -0.3))]
+    walker = jb.Mechanism(bodies=(*LEGS, TORSO), feet=feet)
+    found = leg_line(walker, motion_with((0.0, 0.0, turned), RATES[:3]), 1)
+    assert float(found.angle) == pytest.approx(turned - math.copysign(math.pi, turned), rel=1e-14)
+    assert float(found.rate) == RATES[2]
 
 
 def with_motor(law, angle=LEANING, **given):
@@ -125,7 +136,7 @@ def test_a_pulse_and_a_spline_are_those_at_the_hip():
     hip_spline = jb.actuation.HipSpline((0.1, 0.5, -0.2), -0.3, 0.3)
     for law, other in ((pulse, hip), (spline, hip_spline)):
         torque = torque_of(with_motor(law), leg=1).torque
-        assert float(torque) == float(other.torque_at(jnp.asarray(0.2)))
+        assert float(torque) == pytest.approx(float(other.torque_at(jnp.asarray(0.2))), rel=1e-13)
 
 
 def test_roles_are_exchanged_where_the_first_leg_stands():
