@@ -195,7 +195,7 @@ def full_tangents(tangents: PyTree, like: PyTree) -> PyTree:
         # A part that there is not, as bristles may be, has no tangent either.
         return jnp.zeros_like(leaf) if dot is None and leaf is not None else dot
 
-    return jtu.tree_map(full, like, tangents, is_leaf=_is_none)
+    return jtu.tree_map(full, like, tangents, is_leaf=lambda leaf: leaf is None)
 
 
 @eqx.filter_custom_vjp
@@ -291,10 +291,6 @@ def _leaves_with_none(tangents: PyTree, like: PyTree) -> list[PyTree]:
     """Tangents of every leaf, None where JAX left them out."""
     if tangents is None:
         return [None] * len(jtu.tree_leaves(like))
-    # What is not there, as a radius may be, is None in both, and no leaf.
-    leaves, dots = (jtu.tree_leaves(tree, is_leaf=_is_none) for tree in (like, tangents))
-    return [dot for leaf, dot in zip(leaves, dots, strict=True) if leaf is not None]
-
-
-def _is_none(leaf: object) -> bool:
-    return leaf is None
+    # A part that there is not, as a radius may be, is None in both, and no leaf.
+    both = (jtu.tree_leaves(tree, is_leaf=lambda leaf: leaf is None) for tree in (like, tangents))
+    return [dot for leaf, dot in zip(*both, strict=True) if leaf is not None]

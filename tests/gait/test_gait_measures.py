@@ -89,9 +89,7 @@ def test_pieces_left_out_do_not_shift_a_scenes_leaves():
 
     def measured(slope, gradient):
         moved = jb.with_parameters(scene, {"slope": slope})
-        measures = jb.gait_measures(
-            moved, gait.measures.state, gradient=gradient, accuracy="tight"
-        )
+        measures = jb.gait_measures(moved, gait.measures.state, gradient=gradient, accuracy="tight")
         return jnp.stack([measures.period, measures.step_length])
 
     for gradient, mode in ((jb.gait.Forward(), jax.jacfwd), (jb.gait.Reverse(), jax.jacrev)):
