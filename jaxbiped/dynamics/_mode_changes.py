@@ -167,6 +167,14 @@ def change_mode(
     return of_stance(scene, state, lambda old: _changed(scene, state, old, slack, least))
 
 
+def change_mode_on_surface(scene: RigidScene, state: Any) -> Any:
+    """The same of a state that lies on a surface of its mode, on whose side rounding alone decides.
+
+    A load that has fallen to zero may be a little above it there, or 0 to the last bit.
+    """
+    return change_mode(scene, state, SLACK, SLACK)
+
+
 def _changed(
     scene: RigidScene, state: Any, old: Stance, slack: Scalar | float, least: Scalar | float
 ) -> Any:

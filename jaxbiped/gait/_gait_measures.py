@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state_quantities import recurring_names
+from jaxbiped.dynamics._state_quantities import cyclic_names, recurring_names
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._measures import Measures
@@ -137,7 +137,8 @@ def _by_correction(gait: Gait, once: Return) -> Measures:
     step = solution(jnp.eye(size) - gait.return_jacobian[:size], change)
     corrected = {n: getattr(state, n) + step[i] for i, n in enumerate(recurring)}
     by_period, by_length = gait.return_jacobian[size:]
-    time, length = once.time + by_period @ step, once.state.hip_x + by_length @ step
+    (along,) = cyclic_names(state)
+    time, length = once.time + by_period @ step, getattr(once.state, along) + by_length @ step
     measures = Measures(time, length, length / time, None, None, state._replace(**corrected))
     return _nan_unless_found(gait, measures)
 

@@ -13,7 +13,7 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import CUDA, host_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._mode_changes import change_mode, mode_switches
+from jaxbiped.dynamics._mode_changes import change_mode_on_surface, mode_switches
 from jaxbiped.dynamics._rolling import rolling_field
 from jaxbiped.dynamics._section import AbstractSection, in_nearest_names
 from jaxbiped.dynamics._strike_surfaces import opening, uprightness
@@ -42,7 +42,7 @@ the share of that which is left in the end: behind a touchdown derivatives chang
 _WATCH = Watch(field=vector_field, switches=switches)
 """Derivatives are taken up to the times at which the plain solve saved."""
 _ROLLING = Watch(field=rolling_field, switches=mode_switches)
-_IN_MODES = Watch(field=rolling_field, switches=mode_switches, reset=change_mode)
+_IN_MODES = Watch(field=rolling_field, switches=mode_switches, reset=change_mode_on_surface)
 
 
 class Slopes(NamedTuple):

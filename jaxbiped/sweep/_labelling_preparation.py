@@ -12,9 +12,11 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type, warn
 from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.basins._labels import Doubt, Label
-from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._search_starts import default_guess, state_of_guess
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._error_estimate import check_wanted
@@ -44,7 +46,7 @@ def labelling(
     scene: Scene | RigidScene,
     *,
     parameters: Mapping[str, Sequence[float] | np.ndarray] | None = None,
-    guess: PyTree = None,
+    guess: Gait | WalkerState | None = None,
     footsteps: int = 30,
     accuracy: str | float = "draft",
     rtol: float | None = None,
@@ -57,7 +59,7 @@ def labelling(
     Args:
         scene: the walker, compliant or rigid.
         parameters: values of scene parameters by name; the gait is found for every combination.
-        guess: start of the search for the gait. Default: the seed's start.
+        guess: a gait, or a start near one. Default: the seed's start.
         footsteps: maximum number of footsteps; a start that is still uncertain after them is
             "unresolved".
         accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`). Or a number, the fraction of
@@ -89,7 +91,8 @@ def labelling(
         engine=engine,
     )
     values = parameter_axes(scene, parameters, "parameters") if parameters else {}
-    start = default_guess(scene) if guess is None else guess
+    near = state_of_guess(scene, guess)
+    start = default_guess(scene) if near is None else near
     family = find_family(scene, effort, parameters=values, guess=start)
     missing = sum(not row for row in family.rows)
     if missing:

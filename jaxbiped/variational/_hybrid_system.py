@@ -22,7 +22,11 @@ from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
 from jaxbiped.dynamics._holds import on_held
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import WalkerField
-from jaxbiped.dynamics._mode_changes import change_mode, mode_switches
+from jaxbiped.dynamics._mode_changes import (
+    change_mode,
+    change_mode_on_surface,
+    mode_switches,
+)
 from jaxbiped.dynamics._redundant_motion import BodiesField
 from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
@@ -186,7 +190,7 @@ class Rolling(AbstractSystem):
         return mode_switches(args, y)
 
     def reset_at_switch(self, args: RigidScene, y: Any) -> Any:
-        return change_mode(args, y)
+        return change_mode_on_surface(args, y)
 
     def on_held(self, args: RigidScene, y: Any) -> Any:
         return on_held(args, y)

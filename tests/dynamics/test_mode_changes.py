@@ -67,6 +67,24 @@ def test_of_a_flat_foot_the_end_that_would_have_to_pull_is_let_go(angle, rate, s
     assert mode_of(scene, change_mode(scene, state))[0] == stands
 
 
+def test_a_load_that_has_fallen_to_zero_is_let_go_on_either_side_of_it():
+    """Between two neighbouring numbers it changes its sign: what lies on a surface is there."""
+    scene = rigid(HEEL_TOE)
+
+    def flat(angle):
+        return in_mode(scene, scene.state(theta_leg_1=-0.3, theta_leg_2=angle), (), (True, True))
+
+    def least(angle):
+        return min(map(float, loads_of_feet(scene, flat(angle))))
+
+    above, below = 0.0, 0.1
+    while above < (middle := 0.5 * (above + below)) < below:
+        above, below = (middle, below) if least(middle) > 0.0 else (above, middle)
+    assert 0.0 < least(above) < 1e-12
+    for angle in (above, below):
+        assert mode_of(scene, Rolling().reset_at_switch(scene, flat(angle)))[0] == [True, False]
+
+
 def test_a_foot_that_comes_down_flat_turns_no_more():
     scene = rigid(HEEL_TOE)
     angles = dict(theta_leg_1=0.1, theta_leg_2=-0.1)

@@ -75,3 +75,24 @@ def test_second_derivatives_are_refused(monkeypatch):
     ):
         with pytest.raises(jb.ArgumentError, match=said):
             jax.make_jaxpr(jax.hessian(function))(at)
+
+
+def test_pieces_left_out_do_not_shift_a_scenes_leaves():
+    """Points for feet and no hinge's place: None among the leaves. The root has its own name."""
+    legs = tuple(jb.Body(f"leg_{i}", mass=5.0, inertia=0.0, centre=0.5) for i in (1, 2))
+    feet = tuple(jb.Foot(f"leg_{i}", centre=1.0) for i in (1, 2))
+    pair = (("leg_1", "leg_2"),)
+    walker = jb.Mechanism(root="pelvis", root_mass=10.0, bodies=legs, feet=feet, mirror=pair)
+    scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=0.05))
+    how = dict(accuracy="tight", parameters=("slope",), radius_sensitivities=False)
+    gait = jb.find_gait(scene, **how)
+
+    def measured(slope, gradient):
+        moved = jb.with_parameters(scene, {"slope": slope})
+        measures = jb.gait_measures(moved, gait.measures.state, gradient=gradient, accuracy="tight")
+        return jnp.stack([measures.period, measures.step_length])
+
+    for gradient, mode in ((jb.gait.Forward(), jax.jacfwd), (jb.gait.Reverse(), jax.jacrev)):
+        slopes = mode(lambda slope, g=gradient: measured(slope, g))(0.05)
+        own = [gait.sensitivities.period[0], gait.sensitivities.step_length[0]]
+        np.testing.assert_allclose(slopes, np.array(own), rtol=1e-6)

@@ -47,26 +47,6 @@ TORSO = _seed_with(
 )
 
 
-@pytest.mark.parametrize("mode", ["Forward", "Reverse"])
-def test_a_return_is_differentiated_by_the_parameter_that_is_named(mode):
-    """A walker may lack a part, as this torso its spring: places among leaves do not count it."""
-    walker = jb.WithTorso(jb.seed_scene().walker, m_torso=0.3, J_torso=0.0015, h=0.1)
-    scene = dataclasses.replace(jb.seed_scene(), walker=walker)
-    start = scene.state(theta_1=0.1, omega_1=2.3, omega_2=-0.69, standing="2")
-    named = {name: float(jb.parameter_values(scene)[name]) for name in ("slope", "g", "K")}
-
-    def duration(values):
-        moved = jb.with_parameters(scene, values)
-        gradient = getattr(jb.gait, mode)()
-        return jb.return_map(moved, start, accuracy="tight", gradient=gradient).time
-
-    found = (jax.jacfwd if mode == "Forward" else jax.grad)(duration)(named)
-    for name, value in named.items():
-        sides = (duration(named | {name: value * (1.0 + h)}) for h in (1e-4, -1e-4))
-        difference = float(np.subtract(*sides)) / (2e-4 * value)
-        assert float(found[name]) == pytest.approx(difference, rel=1e-5)
-
-
 def test_the_seed_is_a_mechanism():
     scene = _seed_with()
     assert type(scene.state(theta_1=0.1)) is jb.State

@@ -44,6 +44,7 @@ def of_parameters(values, count=1):
         (lambda: label(engine="gpu"), "engine = 'gpu'"),
         (lambda: label(solver="kvaerno3"), "rodas3p to rodas5p"),
         (lambda: jb.labelling("walker"), "scene = 'walker' .* Scene"),
+        (lambda: label(guess="seed"), "guess = 'seed' is not allowed"),
         (lambda: label(parameters={"hip_vx": [1.0]}), "'hip_vx' is not known"),
         (lambda: label(parameters={"K": [1e6, -1.0]}), "K = -1 .* above 0"),
         (lambda: label(parameters={"K": []}), r"K has values of shape \(0,\)"),

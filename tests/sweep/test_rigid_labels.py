@@ -49,6 +49,14 @@ def test_falls_are_told_with_the_time_of_the_fall_and_no_strike_is_counted_twice
     assert 10 < back[fell].sum() < 100
 
 
+def test_a_gait_is_a_guess():
+    """Its state alone is: warnings of what else it holds are errors here."""
+    gait = jb.find_gait(rigid_seed(), parameters=(), radius_sensitivities=False)
+    near = jb.labelling(rigid_seed(), guess=gait).family.rows[0][0].state
+    assert type(near) is jb.dynamics.RigidState
+    np.testing.assert_allclose(near[1:], gait.measures.state[1:], atol=1e-9)
+
+
 def test_labels_by_a_share_doubt_a_foot_that_grazes():
     """Two neighbours of which small steps say that one strikes at first and the other does not."""
     labelling = jb.labelling(rigid_seed(), accuracy=1e-2)
