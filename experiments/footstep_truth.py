@@ -22,11 +22,6 @@ OURS = Way("jaxbiped", "rtol", (1e-4, 3e-7, 1e-9), ours)
 
 @experiment
 def main(options: Options):
-    return measured(options)
-
-
-def measured(options: Options):
-    """The problem with its truth, and the rows of all ways; draws them."""
     truth, change, apart = references()
     ways = options.sized((OURS, *PEERS), (OURS, PEERS[-1]._replace(settings=(1e-4,))))
     work = [(way, value) for way in ways for value in way.settings]
