@@ -4,12 +4,12 @@ Each row is a number as its source prints it, ours, and their difference; docs/p
 has the table. Writes published_walkers.png, doublings of the simplest walker and the compass gait.
 """
 
-import dataclasses
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from _experiment import Options, experiment
+from _mechanisms import kneed
 
 import jaxbiped as jb
 from jaxbiped import plot
@@ -112,17 +112,16 @@ def mcgeer():
 
 
 def mcgeer_kneed():
-    yield from kneed(found("mcgeer-kneed"))
+    yield from multipliers_of(found("mcgeer-kneed"))
 
 
 def mcgeer_kneed_rigid():
     """On rigid feet, the knees locked from where they are straight until the next leg strikes."""
-    scene = jb.models.mcgeer(knees=True)
-    walker = dataclasses.replace(scene.walker, holds="until heel strike")
-    yield from kneed(jb.find_gait(jb.RigidScene(walker, scene.ground), **PLAIN))
+    scene = jb.RigidScene(kneed(), jb.models.mcgeer(knees=True).ground)
+    yield from multipliers_of(jb.find_gait(scene, **PLAIN))
 
 
-def kneed(gait):
+def multipliers_of(gait):
     multipliers = np.asarray(gait.multipliers)
     pair, real = multipliers[0], multipliers[2:4].real
     yield Printed("leading multipliers: modulus", "0.447", abs(pair))
