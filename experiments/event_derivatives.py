@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _experiment import Options, experiment
+from _quote_words import row
 from _scenes import rigid_seed, seed_with
 from tqdm import tqdm
 
@@ -259,14 +260,13 @@ def _tables(endings, laws):
         return f"[{notes.index(value) + 1}]"
 
     def table(heads, rows):
-        lines = [heads, ["---"] * len(heads), *rows]
-        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+        return "\n".join(row(*line) for line in (heads, ["---"] * len(heads), *rows))
 
     rows = [[each["model"], each["ends"], *map(cell, each["errors"].values())] for each in endings]
     yield table(["model", "ends", *endings[0]["errors"]], rows)
     rows = [
-        [name, *(" / ".join(map(cell, each)) for each in row.values())]
-        for name, row in laws.items()
+        [name, *(" / ".join(map(cell, each)) for each in found.values())]
+        for name, found in laws.items()
     ]
     yield table([" / ".join(ACCURACIES), *next(iter(laws.values()))], rows)
     yield from (f"[{k}] {note}" for k, note in enumerate(notes, 1))

@@ -23,6 +23,7 @@ from _mechanisms import Case, cases, kneed
 from _pictures import draw_by, label
 from _scalar_field import address_of
 from _timing import seconds_of, timed
+from _walks import perturbed
 from reference.numbalsoda_solves import lsoda_batch
 
 import jaxbiped as jb
@@ -72,7 +73,8 @@ def main(options: Options):
 
 def batches(case: Case, options: Options):
     """Rows of ways and tolerances: what they simulate in a second, and how exactly."""
-    starts = perturbed(case, options.sized(COUNT, QUICK_COUNT))
+    begin = np.array([float(leaf) for leaf in case.guess])
+    starts = perturbed(options.sized(COUNT, QUICK_COUNT), begin)
     checked, rows = starts[: options.sized(CHECKED, 4)], []
     exact, rounds = run_lanes(case, EXACT, checked), options.sized(2, 1)
     work = {
@@ -121,13 +123,6 @@ def run_lanes(case: Case, rtol: float, starts: np.ndarray) -> np.ndarray:
         return jb.simulate(case.scene, state, max_solver_steps=10**6, **how).final
 
     return np.stack(jax.vmap(one)(*jnp.asarray(starts.T)), axis=1)
-
-
-def perturbed(case: Case, count: int) -> np.ndarray:
-    """Starts about the case's, every number off by about a thousandth of itself."""
-    start = np.array([float(leaf) for leaf in case.guess])
-    noise = np.random.default_rng(0).standard_normal((count, len(start)))
-    return start * (1.0 + 1e-3 * noise)
 
 
 def on_a_spring(scene: jb.Scene) -> jb.Scene:
