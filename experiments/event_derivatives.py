@@ -88,18 +88,8 @@ def _walk(scene, start, **how):
     def run(rate, by):
         state, given = start._replace(omega_1=rate), {"save": "end"} | how
         walk = jb.simulate(scene, state, engine=by.engine, **by.tolerance, **given)
-        return _moments(walk) if walk.arrivals is None else _moments(walk.arrivals, 2)
-
-    return run
-
-
-def _rolls(start, **how):
-    """Times and states of a rigid walk by the rate of the swing leg."""
-
-    def run(rate, by):
-        state, strikes = start._replace(omega_1=rate), how.get("max_arrivals", 0)
-        walk = jb.rigid_walk(RIGID, state, engine=by.engine, **by.tolerance, **how)
-        return _moments(walk.arrivals, strikes) if strikes else _moments(walk)
+        struck = isinstance(given["save"], jb.HeelStrike)
+        return _moments(walk.arrivals, 2) if struck else _moments(walk)
 
     return run
 
@@ -149,6 +139,7 @@ def cases():
     stop = START._replace(omega_2=-1.3137, theta_1=-0.4124, hip_vx=0.3559)
     trip = START._replace(omega_2=-0.2945, theta_1=-0.1838, hip_vx=0.7326)
     rigid = jb.dynamics.rigid_state(START)
+    fast = rigid._replace(omega_2=-1.9)
     hinged = jb.RedundantScene(SEED, "baumgarte")
     times, strikes = jnp.array([0.2, 0.5, 0.9]), jb.HeelStrike()
     rate = float(START.omega_1)
@@ -170,11 +161,11 @@ def cases():
         Case("bristle", "footsteps", _walk(bristles, START, footsteps=2), rate),
         Case("bristle", "arrivals", _walk(bristles, START, duration=0.9, save=strikes), rate),
         Case("bristle", "return map", _returns(bristles, still), rate),
-        Case("rigid", "duration", _rolls(rigid, duration=0.9), rate),
-        Case("rigid", "footsteps", _rolls(rigid, footsteps=2), rate),
-        Case("rigid", "arrivals", _rolls(rigid, duration=0.9, max_arrivals=2), rate),
-        Case("rigid", "fell forward", _rolls(rigid._replace(omega_2=-1.9), duration=9.0), rate),
-        Case("rigid", "fell back", _rolls(rigid, duration=9.0), 1.5),
+        Case("rigid", "duration", _walk(RIGID, rigid, duration=0.9), rate),
+        Case("rigid", "footsteps", _walk(RIGID, rigid, footsteps=2), rate),
+        Case("rigid", "arrivals", _walk(RIGID, rigid, duration=0.9, save=strikes), rate),
+        Case("rigid", "fell forward", _walk(RIGID, fast, duration=9.0), rate),
+        Case("rigid", "fell back", _walk(RIGID, rigid, duration=9.0), 1.5),
         Case("rigid", "return map", _returns(RIGID, rigid), rate),
         Case("redundant", "footsteps", _walk(hinged, START, footsteps=1), rate),
         Case("redundant", "return map", _returns(hinged, START), rate, truth="xla"),

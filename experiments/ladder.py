@@ -126,11 +126,8 @@ def walked(scene, rtol, *, single=False):
     """A walk of ten seconds as a compiled function of its start; of a batch unless `single`."""
 
     def end(start):
-        how = dict(duration=DURATION, rtol=rtol, engine="lanes")
-        if isinstance(scene, jb.RigidScene):
-            walk = jb.rigid_walk(scene, start, **how)
-        else:
-            walk = jb.simulate(scene, start, save="end", max_solver_steps=MOST_STEPS, **how)
+        how = dict(rtol=rtol, save="end", max_solver_steps=MOST_STEPS, engine="lanes")
+        walk = jb.simulate(scene, start, duration=DURATION, **how)
         return walk.final, walk.ending
 
     return jax.jit(end if single else jax.vmap(end))
