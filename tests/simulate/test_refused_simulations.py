@@ -61,7 +61,7 @@ OF_EITHER_KIND = [
 ]
 CASES = [
     *((door, how, said) for door in (walked, rolled) for how, said in OF_EITHER_KIND),
-    (walked, dict(solver="euler9"), "solver = 'euler9' is not known: choose one of rodas3p, rodas4"),
+    (walked, dict(solver="euler9"), "solver = 'euler9' is not known: choose one of rodas3p"),
     (walked, dict(atol=-1e-9), "atol = -1e-09 is not allowed"),
     (walked, dict(max_arrivals=0), "max_arrivals = 0 is not allowed"),
     (walked, dict(save=jb.MidStance(), max_arrivals=0), "max_arrivals = 0 is not allowed"),
