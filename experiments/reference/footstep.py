@@ -16,6 +16,8 @@ from .mechanism_pieces import TINY
 
 MID_STANCE = np.array([0.0, 0.399354, 0.0959, 0.0, 0.27801, -0.00053, 2.3765, -0.695])
 """Hip x, z, both angles and their rates, leg 2 standing upright (SI)."""
+UPRIGHT = 2
+"""The angle among them that is 0 where a footstep ends."""
 PARAMETERS = ("K", "c", "mu_static", "mu_kinetic")
 LAWS = numbers()[[LAWS_AT[name] for name in PARAMETERS]]
 """What footsteps are differentiated with respect to unless told, and their values."""
@@ -73,7 +75,7 @@ def footstep(
     found = flow(tree, start, _LONGEST, np.reshape(rows, (-1, len(tree.p))), upright=0, **how)
     if found.time >= _LONGEST:
         raise RuntimeError(f"no footstep within {_LONGEST:g} s")
-    later = -found.gradient[2] / found.rates[2]
+    later = -found.gradient[UPRIGHT] / found.rates[UPRIGHT]
     gradient = found.gradient + np.outer(found.rates, later)
     peak = max(_peak(*each) for each in found.steps)
     return Footstep(found.time, found.state, later, gradient, found.switches, peak)
