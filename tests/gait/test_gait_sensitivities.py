@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from reference.compliant import SEED, jacobian, numbers
-from reference.gait import EXCHANGED, gait, turn
+from reference.footstep import EXCHANGED, gait, turn
 from reference.scipy_solves import solution
 
 import jaxbiped as jb
