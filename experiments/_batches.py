@@ -1,16 +1,20 @@
-"""Batches of starts to label, and how long that takes."""
+"""Batches of starts to label: a slice through the seed's basin, draws from it, and their times."""
 
 import functools
 import warnings
 from collections.abc import Callable
 from typing import Any
 
-import _basin_slice
 from _scenes import rigid_seed
 from _timing import seconds_of
 
 import jaxbiped as jb
 
+THETA, OMEGA = (-0.5, 0.8), (-4.0, 5.0)
+"""The slice: angle [rad] and rate [rad/s] of the swing leg at mid-stance, all else the gait's."""
+AXES = ("angle of the swing leg at mid-stance, θ", "its rate, ω")
+UNITS = ("rad", "rad/s")
+WALKING = int(jb.basins.Label.WALKING)
 RIGID = {"theta_stance": (0.1, 0.4), "omega_stance": (-2.4, -0.6)}
 """Starts of the rigid walker just after a strike: stance angle [rad] and its rate [rad/s]."""
 
@@ -28,11 +32,11 @@ def labelling_of(model: str, **options: Any) -> jb.labels.Labelling:
 def starts_of(
     scene: Any, count: int, *, method: str = "uniform", seed: int = 0
 ) -> jb.starts.Sample:
-    """So many random starts: of the compliant walker in the slice of basin_seed.py."""
+    """So many random starts: of the compliant walker in the slice."""
     how: dict[str, Any] = dict(method=method, seed=seed)
     if isinstance(scene, jb.RigidScene):
         return jb.starts.sample(scene, RIGID, count, follow=rolling_on, **how)
-    bounds = {"theta_swing": _basin_slice.THETA, "omega_swing": _basin_slice.OMEGA}
+    bounds = {"theta_swing": THETA, "omega_swing": OMEGA}
     return jb.starts.sample(scene, bounds, count, **how)
 
 

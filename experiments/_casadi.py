@@ -5,10 +5,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from _footstep_ways import UPRIGHT
 from _gradient_ways import Answer, Run
 from reference.compliant import SEED, START, numbers, on_numbers
-from reference.footstep import LAWS, MID_STANCE
+from reference.footstep import LAWS, MID_STANCE, UPRIGHT
 
 
 def sensitivities(duration: float, rtol: float) -> Callable[[], tuple[np.ndarray, np.ndarray]]:

@@ -5,13 +5,15 @@ from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from _timing import seconds_of
+from _walks import scattered
 
 import jaxbiped as jb
 
 METHODS = tuple(jb.constraints.CONSTRAINT_METHODS)
+MOVING = ("theta_1", "omega")
+"""What starts of a batch differ in, by a thousandth."""
 FLOOR = 1e-18
 """Where a violation of exactly nothing is drawn [m]."""
 
@@ -28,20 +30,6 @@ def truth_of(scene: jb.Scene, duration: float) -> np.ndarray:
     """The minimal formulation's state at the end, at a tolerance of 1e-10."""
     how: dict[str, Any] = dict(rtol=1e-10, save="end", max_solver_steps=1 << 22)
     return np.array(jb.simulate(scene, jb.seed_state(), duration=duration, **how).final)
-
-
-def scattered(count: int) -> jb.State:
-    """Starts about the seed's, angle and rates by a thousandth, leaves of shape (count,)."""
-    generator = np.random.default_rng(0)
-    factors = 1.0 + 1e-3 * generator.uniform(-1.0, 1.0, (8, count))
-    moving = ("theta_1", "omega_1", "omega_2")
-    leaves = jb.seed_state()._asdict().items()
-    return jb.State(
-        **{
-            name: leaf * jnp.asarray(f) if name in moving else jnp.full(count, leaf)
-            for (name, leaf), f in zip(leaves, factors, strict=True)
-        }
-    )
 
 
 def relative_costs(
@@ -76,7 +64,7 @@ def relative_costs(
 
     seconds = {
         "single": timed(single, lambda end: end, jb.seed_state()),
-        "batch": timed(batch, jax.vmap, scattered(count)),
+        "batch": timed(batch, jax.vmap, scattered(jb.seed_state(), count, 1e-3, MOVING)),
     }
     return {
         name: {f"{key}_s": found[name] for key, found in seconds.items()}

@@ -62,15 +62,6 @@ class Trial:
         return next(name for name in quantities if quantities[name].unit == "kg")
 
 
-def walk(trial: Trial) -> float:
-    return float(trial.walk.t[-1])
-
-
-def footsteps(trial: Trial) -> int:
-    found = jb.footsteps(trial.scene, trial.walk)
-    return len(found.period_s)
-
-
 def accurate_walk(trial: Trial) -> float:
     found = jb.simulate(trial.scene, trial.start, footsteps=2, accuracy=1e-6, save="end")
     return float(max(np.max(leaf) for leaf in jax.tree.leaves(found.error)))
@@ -99,6 +90,11 @@ def transport(trial: Trial) -> float:
     return float(np.mean(jb.measure.cost_of_transport(trial.scene, trial.walk).cost))
 
 
+def shock(trial: Trial) -> float:
+    how = dict(gradients=False, tolerance=1e-3)
+    return float(jb.labels.nearest_failure(trial.labelling, **how).distance)
+
+
 def slope_of_walk(trial: Trial) -> float:
     def place(slope: Any) -> Any:
         scene = jb.with_parameters(trial.scene, {"slope": slope})
@@ -121,27 +117,12 @@ def modes(trial: Trial) -> float:
     return float(np.max(np.abs(np.array(found) * 2e-4 * slope / (sides[0] - sides[1]) - 1.0)))
 
 
-def period_of(found: jb.Gait, where: str) -> float:
+def period_of(where: str, *given: Any) -> float:
+    """Of a gait that is searched from a scene, and from a guess or from none."""
+    found = jb.find_gait(*given, parameters=(), radius_sensitivities=False)
     if found.outcome != jb.gait.Search.FOUND:
         raise LookupError(f"no gait {where}: {found.outcome}.")
     return float(found.measures.period)
-
-
-def gait(trial: Trial) -> float:
-    return float(trial.gait.measures.period)
-
-
-def without_guess(trial: Trial) -> float:
-    found = jb.find_gait(trial.scene, parameters=(), radius_sensitivities=False)
-    return period_of(found, "without a guess")
-
-
-def radius(trial: Trial) -> float:
-    return float(trial.gait.measures.spectral_radius)
-
-
-def unit_multiplier(trial: Trial) -> float:
-    return float(trial.gait.unit_multiplier_error)
 
 
 def elasticity(trial: Trial) -> float:
@@ -191,12 +172,6 @@ def basin(trial: Trial) -> float:
     return float(jb.basins.fractions(found.label)["walking"].estimate)
 
 
-def shock(trial: Trial) -> float:
-    return float(
-        jb.labels.nearest_failure(trial.labelling, gradients=False, tolerance=1e-3).distance
-    )
-
-
 def optimum(trial: Trial) -> float:
     values = jb.parameter_values(trial.scene)
     mass = float(values[trial.mass])
@@ -229,11 +204,6 @@ def redundant(trial: Trial) -> float:
     return float(np.max(gaps) / np.max(np.abs(expected)))
 
 
-def rigid(trial: Trial) -> float:
-    found = jb.find_gait(*trial.case.on_rigid_feet(), parameters=(), radius_sensitivities=False)
-    return period_of(found, "on rigid feet")
-
-
 def engines(trial: Trial) -> float:
     """Explicit Euler through XLA, in steps at which friction is stable, beside lanes."""
     after = dict(duration=2e-3, save="end")
@@ -251,19 +221,6 @@ def device(trial: Trial) -> int:
     request = jb.Simulation.prepare(trial.scene, trial.start, **how).lane_request()
     lines = LANES.compile(request).kernel.ptx(ARCHITECTURES[9, 0]).splitlines()
     return sum(line.startswith("\t") and line.endswith(";") for line in lines)
-
-
-def operations(trial: Trial) -> int:
-    return sum(jb.measure.operation_counts(trial.scene).values())
-
-
-def dataset(trial: Trial) -> int:
-    return len(jb.measure.trajectory_dataset(trial.scene, trial.walk).data_vars)
-
-
-def picture(trial: Trial) -> int:
-    figure = jb.plot.leg_angles(trial.scene, trial.walk)
-    return len(figure.axes[0].lines)
 
 
 def animation(trial: Trial) -> int:
@@ -318,13 +275,21 @@ class Capability(NamedTuple):
 
 
 CAPABILITIES = {
-    "walk": Capability(walk, "time of four footsteps, s"),
-    "footsteps": Capability(footsteps, "in that walk"),
+    "walk": Capability(lambda t: float(t.walk.t[-1]), "time of four footsteps, s"),
+    "footsteps": Capability(lambda t: len(jb.footsteps(t.scene, t.walk).period_s), "in that walk"),
     "energy ledger": Capability(ledger, "residual over gravity's work"),
     "cost of transport": Capability(transport, "of the four footsteps"),
-    "operations": Capability(operations, "of one evaluation of the vector field"),
-    "dataset": Capability(dataset, "variables"),
-    "figure": Capability(picture, "lines of the angles' figure"),
+    "operations": Capability(
+        lambda t: sum(jb.measure.operation_counts(t.scene).values()),
+        "of one evaluation of the vector field",
+    ),
+    "dataset": Capability(
+        lambda t: len(jb.measure.trajectory_dataset(t.scene, t.walk).data_vars), "variables"
+    ),
+    "figure": Capability(
+        lambda t: len(jb.plot.leg_angles(t.scene, t.walk).axes[0].lines),
+        "lines of the angles' figure",
+    ),
     "animation": Capability(animation, "frames"),
     "viewer": Capability(viewer, "kB of the page"),
     "redundant coordinates": Capability(
@@ -333,15 +298,17 @@ CAPABILITIES = {
     "accuracy=1e-6": Capability(accurate_walk, "error bar of two footsteps"),
     "bristles": Capability(bristles, "time of four footsteps with LuGre's friction, s"),
     "trade": Capability(tradeoff, "error of `rodas4p` at 1e-6 after 0.5 s, scaled"),
-    "gait": Capability(gait, "period, s"),
-    "multipliers": Capability(radius, "spectral radius"),
-    "unit multiplier": Capability(unit_multiplier, "distance from 1"),
+    "gait": Capability(lambda t: float(t.gait.measures.period), "period, s"),
+    "multipliers": Capability(lambda t: float(t.gait.measures.spectral_radius), "spectral radius"),
+    "unit multiplier": Capability(lambda t: float(t.gait.unit_multiplier_error), "distance from 1"),
     "sensitivities": Capability(elasticity, "elasticity of the period with respect to the slope"),
     "branch": Capability(branch, "points from 0.9 to 1.1 of the slope"),
     "bifurcations": Capability(bifurcations, "on the branch from 0.25 to 3 times the slope"),
     "basin": Capability(basin, "share of 144 starts that walk"),
     "nearest_failure": Capability(shock, "smallest fatal push, scaled"),
-    "gait without a guess": Capability(without_guess, "period, s"),
+    "gait without a guess": Capability(
+        lambda t: period_of("without a guess", t.scene), "period, s"
+    ),
     "gait_sweep": Capability(grid, "gaits found at three slopes"),
     "optimum": Capability(optimum, "relative gain of speed, a mass varied by 2 %"),
     "fit": Capability(fit, "relative error of a mass"),
@@ -350,7 +317,9 @@ CAPABILITIES = {
     "both modes": Capability(
         modes, "of d time/d slope of a return, relative difference from differences"
     ),
-    "rigid feet": Capability(rigid, "period, s"),
+    "rigid feet": Capability(
+        lambda t: period_of("on rigid feet", *t.case.on_rigid_feet()), "period, s"
+    ),
     "command line": Capability(command, "footsteps of `jaxbiped walk --walker FILE.py:NAME`"),
     "playground": Capability(playground, "kB of the page"),
     "both engines": Capability(engines, "largest difference after 2 ms, XLA by explicit Euler"),

@@ -6,7 +6,7 @@ from typing import Any
 
 import _batches
 import numpy as np
-from _basin_slice import WALKING
+from _batches import WALKING
 from _trade_store import Case, Store, not_installed
 from _trade_walks import tolerances
 from reference import labels

@@ -9,8 +9,7 @@ from _scenes import rigid_seed
 from _trade_store import Case, Store
 from _trade_walks import tolerances
 from reference.compliant import numbers
-from reference.footstep import by_logarithms
-from reference.gait import gait
+from reference.footstep import by_logarithms, gait
 
 import jaxbiped as jb
 from jaxbiped.trade import GaitTrade, Row, Truth, Way, row_of, truth_of, work_of

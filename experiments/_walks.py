@@ -17,10 +17,20 @@ import jaxbiped as jb
 DURATION, ZEROS = 2.0, (0.0, 0.0, 0.0)
 
 
-def perturbed(count: int) -> np.ndarray:
-    """Starts about the seed's (n, 8), every number off by about a thousandth of itself."""
-    noise = np.random.default_rng(0).standard_normal((count, 8))
-    return START * (1.0 + 1e-3 * noise)
+def perturbed(count: int, start: np.ndarray = START) -> np.ndarray:
+    """Starts about one (n, k), every number off by about a thousandth of itself."""
+    noise = np.random.default_rng(0).standard_normal((count, len(start)))
+    return start * (1.0 + 1e-3 * noise)
+
+
+def scattered(state: Any, count: int, spread: float, moving: tuple[str, ...], *, seed: int = 0):
+    """States (count,), leaves whose names begin like these off by at most that share."""
+    generator = np.random.default_rng(seed)
+    leaves = {}
+    for name, leaf in state._asdict().items():
+        shares = spread * generator.uniform(-1.0, 1.0, count) * name.startswith(moving)
+        leaves[name] = leaf * (1.0 + jnp.asarray(shares))
+    return type(state)(**leaves)
 
 
 def walk_from(start: Any, rtol: Any, *, scene: Any = None, duration: float = DURATION, **how: Any):

@@ -176,17 +176,8 @@ def _gait(random):
     return _record(gait.error.met, True, pairs)
 
 
-def _named(random):
+def _named(scene, kind):
     """True errors and bars of derivatives by all parameters of a gait at "balanced"."""
-    return _named_gait(_scene(random, 2.0), "")
-
-
-def _named_rigid(random):
-    """The same of a rigid gait."""
-    return _named_gait(_rigid_scene(random), "rigid ")
-
-
-def _named_gait(scene, kind):
     gait = _quietly(jb.find_gait, scene)
     exact, checked = (
         jb.find_gait(scene, gait.measures.state, solver=solver, accuracy="tight")
@@ -274,8 +265,8 @@ KINDS = {
     "walks": _walk,
     "gaits": _gait,
     "rigid": _rigid,
-    "named": _named,
-    "named_rigid": _named_rigid,
+    "named": lambda random: _named(_scene(random, 2.0), ""),
+    "named_rigid": lambda random: _named(_rigid_scene(random), "rigid "),
 }
 
 

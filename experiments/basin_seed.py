@@ -7,7 +7,7 @@ import math
 import time
 
 import numpy as np
-from _basin_slice import AXES, OMEGA, THETA, UNITS, WALKING, axes, codes_on_grid
+from _batches import AXES, OMEGA, THETA, UNITS, WALKING
 from _experiment import Options, experiment
 
 import jaxbiped as jb
@@ -61,6 +61,17 @@ def main(options: Options):
         "along": {name: of_change(each) for name, each in changes.items()},
         "pictures": draw(options, labelling, codes, cycles, boundary, changes),
     }
+
+
+def axes(side):
+    """Values along the two axes; the angle runs fastest."""
+    return {"omega_swing": np.linspace(*OMEGA, side), "theta_swing": np.linspace(*THETA, side)}
+
+
+def codes_on_grid(labelling, side):
+    """Labels and cycles' footsteps of a square grid, shape (side, side)."""
+    found = jb.sweep(labelling, jb.starts.grid(labelling.scene, axes(side)))
+    return found["label"].values, found["cycle_footsteps"].values
 
 
 def measures(codes):

@@ -5,9 +5,11 @@ impact. Writes basin_simplest.png: above in the plane of stance angle and rate, 
 the rate that leads upright, so that the thin area can be seen.
 """
 
-import _simplest
 import numpy as np
 from _experiment import Options, experiment
+from reference.rigid import rigid_walker
+from reference.rigid_walks import rigid_walks
+from scipy.optimize import root
 
 import jaxbiped as jb
 from jaxbiped import plot
@@ -18,7 +20,11 @@ SIDES, QUICK_SIDES = (200, 400), (100, 200)
 TOLERANCES = {"draft": 1e-4, "balanced": 1e-6}
 DRAWN, QUICK_DRAWN = 400, 100
 CHECKED, QUICK_CHECKED = 300, 40
-"""Starts that SciPy walks too, at each slope."""
+"""Starts that are walked by independent equations, too, at each slope."""
+NEAR, LONGEST = 1e-4, 1000.0
+"""How near the gait a start must come to walk, and in which time [√(l/g)]."""
+STABLE = {0.004: (0.153389, -0.156080), 0.009: (0.200310900544287, -0.199832473004977)}
+"""Stance angle and rate of the gait after a strike: published at 0.009, a guess at 0.004."""
 THETA, RATE = (0.0, 0.6), (-0.6, 0.0)
 """Stance angle [rad] and its rate [√(g/l)] just after a strike."""
 OFF = (-0.015, 0.005)
@@ -37,7 +43,7 @@ def main(options: Options):
 def basin_of(slope, sides, checked):
     """Fractions, reach and the independent check at a slope."""
     labellings = {name: labelling_of(slope, rtol=rtol) for name, rtol in TOLERANCES.items()}
-    best, gait = labellings["balanced"], _simplest.fixed_point(slope)
+    best, gait = labellings["balanced"], fixed_point(slope)
     rows = [
         {"accuracy": name, "side": side, **vars(fraction_of(labelling, side))}
         for name, labelling in labellings.items()
@@ -54,6 +60,18 @@ def basin_of(slope, sides, checked):
     }
 
 
+def fixed_point(slope):
+    """Stance angle and rate after a strike that repeat themselves, by independent equations."""
+    walker = rigid_walker(jb.models.garcia(slope))
+
+    def missed(point):
+        theta, rate = point
+        start = np.array([-theta, theta, np.cos(2.0 * theta) * rate, rate])
+        return walker.footstep(start)[0][[1, 3]] - point
+
+    return root(missed, STABLE[slope], tol=1e-12).x
+
+
 def just_struck(scene, states):
     """Both feet on the ground, and the swing leg's rate from the impact."""
     theta, rate = states.theta_2, states.omega_2
@@ -61,11 +79,15 @@ def just_struck(scene, states):
 
 
 def labelling_of(slope, **options):
-    """A labelling that knows the gait, found from the published equations' own."""
-    theta, rate = _simplest.fixed_point(slope)
+    """A labelling that knows the gait."""
     scene = jb.models.garcia(slope)
-    guess = just_struck(scene, jb.dynamics.RigidState(0.0, -theta, theta, rate, rate))
+    guess = start_at(scene, *fixed_point(slope))
     return jb.labelling(scene, guess=guess, footsteps=FOOTSTEPS, **options)
+
+
+def start_at(scene, theta, rate):
+    """The state just after a strike with this stance angle and rate."""
+    return just_struck(scene, jb.dynamics.RigidState(0.0 * theta, -theta, theta, rate, rate))
 
 
 def labels_at(labelling):
@@ -101,13 +123,14 @@ def reach(labelling, gait):
 
 
 def compared(labelling, slope, count):
-    """Whether starts in the strip walk, by the labels and by SciPy on the published equations."""
+    """Whether starts in the strip walk, by the labels and by independent equations."""
     spread = np.random.default_rng(0).random((count, 2))
     theta = 0.05 + 0.4 * spread[:, 0]
     off = OFF[0] + (OFF[1] - OFF[0]) * spread[:, 1]
     points = np.stack([theta, upright(theta, slope) + off], axis=1)
-    ours, gait = labels_at(labelling)(points) == WALKING, _simplest.fixed_point(slope)
-    theirs = [_simplest.walks(point, gait, slope, footsteps=FOOTSTEPS) for point in points]
+    ours, starts = labels_at(labelling)(points) == WALKING, start_at(labelling.scene, *points.T)
+    after = rigid_walks(labelling.scene, starts, FOOTSTEPS, duration=LONGEST).after[:, :, [1, 3]]
+    theirs = np.any(np.max(np.abs(after - fixed_point(slope)), axis=2) < NEAR, axis=1)
     return {
         "starts": count,
         "walking": int(ours.sum()),
@@ -126,7 +149,7 @@ def draw(options, side):
     grid = figure.subplots(2, 2)
     theta, rate, off = (np.linspace(*ends, side) for ends in (THETA, RATE, OFF))
     for (plane, strip), slope in zip(grid.T, SLOPES, strict=True):
-        label, gait = labels_at(labelling_of(slope)), _simplest.fixed_point(slope)
+        label, gait = labels_at(labelling_of(slope)), fixed_point(slope)
 
         def codes(angle, rate, label=label):
             return label(np.stack([angle.ravel(), rate.ravel()], axis=1)).reshape(side, side)

@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _experiment import Options, experiment
+from _quote_words import row
 from _scenes import rigid_seed, seed_with
 from tqdm import tqdm
 
@@ -87,18 +88,8 @@ def _walk(scene, start, **how):
     def run(rate, by):
         state, given = start._replace(omega_1=rate), {"save": "end"} | how
         walk = jb.simulate(scene, state, engine=by.engine, **by.tolerance, **given)
-        return _moments(walk) if walk.arrivals is None else _moments(walk.arrivals, 2)
-
-    return run
-
-
-def _rolls(start, **how):
-    """Times and states of a rigid walk by the rate of the swing leg."""
-
-    def run(rate, by):
-        state, strikes = start._replace(omega_1=rate), how.get("max_arrivals", 0)
-        walk = jb.rigid_walk(RIGID, state, engine=by.engine, **by.tolerance, **how)
-        return _moments(walk.arrivals, strikes) if strikes else _moments(walk)
+        struck = isinstance(given["save"], jb.HeelStrike)
+        return _moments(walk.arrivals, 2) if struck else _moments(walk)
 
     return run
 
@@ -148,6 +139,7 @@ def cases():
     stop = START._replace(omega_2=-1.3137, theta_1=-0.4124, hip_vx=0.3559)
     trip = START._replace(omega_2=-0.2945, theta_1=-0.1838, hip_vx=0.7326)
     rigid = jb.dynamics.rigid_state(START)
+    fast = rigid._replace(omega_2=-1.9)
     hinged = jb.RedundantScene(SEED, "baumgarte")
     times, strikes = jnp.array([0.2, 0.5, 0.9]), jb.HeelStrike()
     rate = float(START.omega_1)
@@ -169,11 +161,11 @@ def cases():
         Case("bristle", "footsteps", _walk(bristles, START, footsteps=2), rate),
         Case("bristle", "arrivals", _walk(bristles, START, duration=0.9, save=strikes), rate),
         Case("bristle", "return map", _returns(bristles, still), rate),
-        Case("rigid", "duration", _rolls(rigid, duration=0.9), rate),
-        Case("rigid", "footsteps", _rolls(rigid, footsteps=2), rate),
-        Case("rigid", "arrivals", _rolls(rigid, duration=0.9, max_arrivals=2), rate),
-        Case("rigid", "fell forward", _rolls(rigid._replace(omega_2=-1.9), duration=9.0), rate),
-        Case("rigid", "fell back", _rolls(rigid, duration=9.0), 1.5),
+        Case("rigid", "duration", _walk(RIGID, rigid, duration=0.9), rate),
+        Case("rigid", "footsteps", _walk(RIGID, rigid, footsteps=2), rate),
+        Case("rigid", "arrivals", _walk(RIGID, rigid, duration=0.9, save=strikes), rate),
+        Case("rigid", "fell forward", _walk(RIGID, fast, duration=9.0), rate),
+        Case("rigid", "fell back", _walk(RIGID, rigid, duration=9.0), 1.5),
         Case("rigid", "return map", _returns(RIGID, rigid), rate),
         Case("redundant", "footsteps", _walk(hinged, START, footsteps=1), rate),
         Case("redundant", "return map", _returns(hinged, START), rate, truth="xla"),
@@ -259,14 +251,13 @@ def _tables(endings, laws):
         return f"[{notes.index(value) + 1}]"
 
     def table(heads, rows):
-        lines = [heads, ["---"] * len(heads), *rows]
-        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+        return "\n".join(row(*line) for line in (heads, ["---"] * len(heads), *rows))
 
     rows = [[each["model"], each["ends"], *map(cell, each["errors"].values())] for each in endings]
     yield table(["model", "ends", *endings[0]["errors"]], rows)
     rows = [
-        [name, *(" / ".join(map(cell, each)) for each in row.values())]
-        for name, row in laws.items()
+        [name, *(" / ".join(map(cell, each)) for each in found.values())]
+        for name, found in laws.items()
     ]
     yield table([" / ".join(ACCURACIES), *next(iter(laws.values()))], rows)
     yield from (f"[{k}] {note}" for k, note in enumerate(notes, 1))

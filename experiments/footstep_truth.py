@@ -2,33 +2,60 @@
 
 Writes footstep_truth.png. Ours differentiates the time and the end of one footstep with respect to
 its start, stiffness, damping and friction. The truth is by collocation on one smooth piece of the
-laws at a time (`reference/footstep.py`), which shares nothing with ours. Beside it are plain
-diffrax, equal steps, CasADi's CVODES where it is installed, and differences of SciPy's solves.
+laws at a time (`reference/footstep.py`), which shares nothing with ours. Beside it is what other
+tools' users would write: plain diffrax and equal steps in JAX, differentiated through the steps
+taken; CasADi's CVODES where it is installed; and differences of SciPy's solves. An event, or the
+step taken, ends each where leg 1 is upright.
 """
 
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from _ball_ways import KVAERNO5
+from _casadi import by_cvodes
 from _experiment import Options, by, experiment
-from _footstep_peers import PEERS
-from _footstep_ways import INPUTS, OUTPUTS, ours, references
-from _gradient_ways import Way, draw_way, row_of, versions
+from _gradient_ways import (
+    Answer,
+    Run,
+    Way,
+    draw_way,
+    relative_error,
+    row_of,
+    versions,
+    with_estimate,
+)
 from _pictures import label
-from reference.footstep import LAWS, PARAMETERS, footstep
+from reference.compliant import numbers
+from reference.footstep import LAWS, PARAMETERS, UPRIGHT, Footstep, footstep
 from reference.footstep import MID_STANCE as START
+from reference.scipy_solves import solution
 from tqdm import tqdm
 
+import jaxbiped as jb
 from jaxbiped.plot.style import new_figure
 
-OURS = Way("jaxbiped", "rtol", (1e-4, 3e-7, 1e-9), ours)
+OUTPUTS = ("time", "hip_x", "hip_z", "theta_2", "hip_vx", "hip_vz", "omega_1", "omega_2")
+"""Of a footstep, at whose end leg 1 is upright."""
+INPUTS = ("hip_z", "theta_1", "theta_2", "hip_vx", "hip_vz", "omega_1", "omega_2", *PARAMETERS)
+"""What they are differentiated with respect to: the start, and logarithms of parameters."""
+LONGEST = 1.0
+"""No footstep takes as long [s]."""
+MOST_STEPS = 1 << 18
+DIFFERENCES = (1e-4, 1e-5, 1e-6, 1e-7)
+"""Of the start [SI], and of logarithms of parameters."""
+TOLERANCES, TIME_STEPS = (1e-4, 1e-6, 1e-8), (1e-4, 1e-5, 1e-6)
 
 
 @experiment
 def main(options: Options):
-    return measured(options)
-
-
-def measured(options: Options):
-    """The problem with its truth, and the rows of all ways; draws them."""
     truth, change, apart = references()
-    ways = options.sized((OURS, *PEERS), (OURS, PEERS[-1]._replace(settings=(1e-4,))))
+    ways = options.sized(WAYS, (WAYS[0], WAYS[-1]._replace(settings=(1e-4,))))
     work = [(way, value) for way in ways for value in way.settings]
     rows = [
         row_of("footstep", way, value, truth, truth, repeats=1, least=1e-2)
@@ -58,6 +85,162 @@ def _draw(options, rows):
     label(ax, "relative error of the footstep [1]", "relative error of its gradient [1]")
     ax.legend(fontsize="small")
     return options.save(figure, "footstep_truth.png")
+
+
+def answer_of(found: Footstep) -> Answer:
+    """Outputs and their derivatives."""
+    rows = np.vstack([found.time_gradient, np.delete(found.gradient, UPRIGHT, 0)])[:, 1:]
+    return Answer(np.append(found.time, np.delete(found.state, UPRIGHT)), rows)
+
+
+def references() -> tuple[Answer, float, float]:
+    """The truth, its change by coarser collocation, and its difference to our finest solve."""
+    fine, coarse = (answer_of(footstep(stages=s, resolution=r)) for s, r in ((9, 1e-10), (7, 1e-9)))
+    ours = _linearised(1e-11)
+    apart = (relative_error(each.gradient, fine.gradient) for each in (coarse, ours))
+    return fine, *apart
+
+
+def ours(truth: Answer, rtol: float) -> Run:
+    """Tolerances as named accuracies have them, witnesses as walks with a number for accuracy."""
+    return with_estimate(_linearised, rtol)
+
+
+def _linearised(rtol: float, *, solver: str = "rodas4") -> Answer:
+    found = jb.gait.linearise_return_map(
+        jb.seed_scene(),
+        jb.State(*map(jnp.asarray, START)),
+        rtol=rtol,
+        tangent_rtol=10.0 * rtol,
+        parameters=PARAMETERS,
+        solver=solver,
+        engine="lanes",
+        max_solver_steps=1 << 20,
+    )
+    if int(found.code) != 0:
+        raise RuntimeError(f"no footstep at rtol = {rtol:g}: code {int(found.code)}")
+    # The legs are renamed at its end.
+    state, rows = np.asarray(found.recurring), np.asarray(found.jacobian)
+    own = [0, 1, 3, 4, 6, 5]
+    return Answer(
+        np.concatenate([[found.period], np.ravel(found.advance), state[own]]),
+        np.vstack([found.period_row, np.ravel(found.advance_rows), rows[own]]),
+    )
+
+
+def rates(scene: jb.Scene, y: jax.Array) -> jax.Array:
+    """Rates of the eight numbers of the state."""
+    return jnp.stack(jb.dynamics.vector_field(0.0, jb.State(*y), scene))
+
+
+def by_diffrax(solver: diffrax.AbstractSolver, _: Answer, rtol: float) -> Run:
+    """Its own event ends the solve, whose time it differentiates by the implicit function."""
+
+    def follow(scene: jb.Scene, start: jax.Array) -> tuple[jax.Array, jax.Array]:
+        upright = lambda t, y, args, **kwargs: y[UPRIGHT]  # noqa: E731
+        found = diffrax.diffeqsolve(
+            diffrax.ODETerm(lambda t, y, args: rates(args, y)),
+            solver,
+            0.0,
+            LONGEST,
+            None,
+            start,
+            scene,
+            stepsize_controller=diffrax.PIDController(rtol=rtol, atol=1e-2 * rtol),
+            adjoint=diffrax.ForwardMode(),
+            event=diffrax.Event(upright, optx.Newton(1e-12, 1e-12), direction=False),
+            max_steps=MOST_STEPS,
+        )
+        return found.ts[-1], found.ys[-1]
+
+    return _compiled(follow)
+
+
+def by_semi_implicit_euler(_: Answer, dt: float) -> Run:
+    """Equal steps until leg 1 has been upright, and a straight line over the last of them."""
+
+    def follow(scene: jb.Scene, start: jax.Array) -> tuple[jax.Array, jax.Array]:
+        def step(carry: Any) -> Any:
+            steps, _, y = carry
+            speeds = y[4:] + dt * rates(scene, y)[4:]
+            return steps + 1, y, jnp.concatenate([y[:4] + dt * speeds, speeds])
+
+        def goes_on(carry: Any) -> Any:
+            steps, before, after = carry
+            passed = (before[UPRIGHT] > 0.0) & (after[UPRIGHT] <= 0.0)
+            return ~passed & (steps * dt < LONGEST)
+
+        steps, before, after = jax.lax.while_loop(goes_on, step, (0, start, start))
+        share = before[UPRIGHT] / (before[UPRIGHT] - after[UPRIGHT])
+        return (steps - 1 + share) * dt, before + share * (after - before)
+
+    return _compiled(follow)
+
+
+def _compiled(follow: Callable[[jb.Scene, jax.Array], tuple[jax.Array, jax.Array]]) -> Run:
+    """Time and state where leg 1 is upright, with their forward derivatives, by one program."""
+
+    def outputs(inputs: jax.Array) -> tuple[jax.Array, jax.Array]:
+        start = jnp.asarray(START).at[1:].add(inputs[: len(START) - 1])
+        laws = jnp.asarray(LAWS) * jnp.exp(inputs[len(START) - 1 :])
+        scene = jb.seed_scene(**dict(zip(PARAMETERS, laws, strict=True)))
+        time, end = follow(scene, start)
+        found = jnp.concatenate([time[None], jnp.delete(end, UPRIGHT)])
+        return found, found
+
+    program = jax.jit(jax.jacfwd(outputs, has_aux=True))
+    zeros = jnp.zeros(len(INPUTS))
+
+    def run() -> Answer:
+        rows, values = program(zeros)
+        return Answer(np.asarray(values), np.asarray(rows))
+
+    return run
+
+
+def by_differences(method: str, truth: Answer, rtol: float) -> Run:
+    """Central differences of a method's solves, by the best of four steps: the truth chooses it."""
+
+    def differences(step: float) -> Answer:
+        columns = []
+        for name in INPUTS:
+            up, down = (_end(method, name, sign * step, rtol) for sign in (1.0, -1.0))
+            columns.append((up - down) / (2.0 * step))
+        ends, at = _end(method, INPUTS[0], 0.0, rtol), UPRIGHT + 1
+        return Answer(np.delete(ends, at), np.delete(np.stack(columns, axis=1), at, 0))
+
+    best = min(DIFFERENCES, key=lambda h: relative_error(differences(h).gradient, truth.gradient))
+    return lambda: differences(best)
+
+
+def _end(method: str, name: str, change: float, rtol: float) -> np.ndarray:
+    """Time and state at the footstep's end, one input changed."""
+    start, laws = START.copy(), LAWS.copy()
+    if name in PARAMETERS:
+        laws[PARAMETERS.index(name)] *= np.exp(change)
+    else:
+        start[1 + INPUTS.index(name)] += change
+    moved = numbers(**dict(zip(PARAMETERS, laws, strict=True)))
+
+    def upright(t: float, y: np.ndarray, *_: Any) -> float:
+        return y[UPRIGHT]
+
+    upright.terminal, upright.direction = True, -1.0  # type: ignore[attr-defined]
+    found = solution(LONGEST, rtol, method=method, start=start, p=moved, events=upright)
+    return np.append(found.t[-1], found.y[:, -1])
+
+
+TSIT5, KVAERNO = (functools.partial(by_diffrax, each) for each in (diffrax.Tsit5(), KVAERNO5))
+LSODA, RADAU = (functools.partial(by_differences, method) for method in ("LSODA", "Radau"))
+WAYS = (
+    Way("jaxbiped", "rtol", (1e-4, 3e-7, 1e-9), ours),
+    Way("diffrax Tsit5", "rtol", TOLERANCES, TSIT5),
+    Way("diffrax Kvaerno5", "rtol", TOLERANCES, KVAERNO),
+    Way("semi-implicit Euler in JAX", "dt", TIME_STEPS, by_semi_implicit_euler),
+    Way("CasADi CVODES", "rtol", TOLERANCES, by_cvodes, "casadi"),
+    Way("differences of SciPy's LSODA", "rtol", (*TOLERANCES, 1e-10), LSODA),
+    Way("differences of SciPy's Radau", "rtol", TOLERANCES, RADAU),
+)
 
 
 if __name__ == "__main__":

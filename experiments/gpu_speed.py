@@ -11,7 +11,7 @@ import _ptxas
 import jax
 import jax.numpy as jnp
 import numpy as np
-from _basin_slice import OMEGA, THETA
+from _batches import OMEGA, THETA
 from _experiment import Options, experiment
 from _pictures import label
 from _timing import seconds_of

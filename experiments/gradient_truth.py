@@ -21,11 +21,6 @@ REPEATS = 3
 
 @experiment
 def main(options: Options):
-    return measured(options)
-
-
-def measured(options: Options):
-    """The problems with their truths, and the rows of all ways; draws them."""
     work = [(problem, way) for problem in PROBLEMS for way in (*OUR_WAYS, *PEERS)]
     rows = [row for pair in tqdm(work, desc="ways") for row in _rows(options, *pair)]
     problems = [_problem(problem) for problem in PROBLEMS]

@@ -4,10 +4,9 @@ Writes kneed_limit.png: how far the period, the step length and the leading mult
 kneed walker are from those on rigid feet, over the factor by which its contacts are stiffer.
 """
 
-import dataclasses
-
 import numpy as np
 from _experiment import Options, experiment
+from _mechanisms import kneed
 from _pictures import COLOURS, MARKERS
 
 import jaxbiped as jb
@@ -19,8 +18,6 @@ TITLES = {"c with K": "$c$ grows as $K$", "c with K^(3/2)": "$c$ grows as $K^{3/
 DOUBLINGS, QUICK_DOUBLINGS = 8, 4
 EVERY = 2
 """Doublings from one point of a path to the next."""
-HOLDS = "until heel strike"
-"""A knee that has come to its stop stays there until its leg has struck and stood."""
 PLAIN = dict(parameters=(), radius_sensitivities=False)
 MEASURES = ("period", "step_length", "pair", "third")
 WORDS = {
@@ -34,8 +31,7 @@ WORDS = {
 @experiment
 def main(options: Options):
     soft = jb.models.mcgeer(knees=True)
-    walker = dataclasses.replace(soft.walker, holds=HOLDS)
-    rigid = jb.find_gait(jb.RigidScene(walker, soft.ground), **PLAIN)
+    rigid = jb.find_gait(jb.RigidScene(kneed(), soft.ground), **PLAIN)
     doublings = options.sized(DOUBLINGS, QUICK_DOUBLINGS)
     chosen = options.sized([*PATHS], [*PATHS][1:])
     paths = {name: stiffened(soft, PATHS[name], doublings) for name in chosen}

@@ -8,8 +8,7 @@ walker by rodas5p, which gives no label, held against rodas4; of the rigid walke
 import itertools
 
 import numpy as np
-from _basin_slice import AXES, OMEGA, THETA, UNITS, WALKING
-from _batches import labelled
+from _batches import AXES, OMEGA, THETA, UNITS, WALKING, labelled
 from _experiment import Options, experiment
 from _pictures import label
 from _scenes import rigid_seed

@@ -7,11 +7,11 @@ rigid_limit.png, how the seed's gait approaches the rigid walker's as its contac
 import os
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from _experiment import Options, experiment
 from _pictures import COLOURS, MARKERS
 from _timing import seconds_of
+from _walks import scattered
 
 import jaxbiped as jb
 from jaxbiped.plot.style import legend_below, new_figure
@@ -106,7 +106,8 @@ def cost_of(scene, gait, batch, tolerances, *, error=np.inf):
     `error`: median over the starts of the largest error of an angle or rate after ten seconds;
     `single_us`, `batch_us`: time of a footstep in one walk, and in a batch on all cores [µs].
     """
-    starts = starts_about(gait.measures.state, batch)
+    # No compliant foot is lifted by it.
+    starts = scattered(gait.measures.state, batch, SPREAD, ("theta", "omega"))
     some, one = (jax.tree.map(lambda leaf, at=at: leaf[at], starts) for at in (slice(WITNESSES), 0))
     exact = walked(scene, EXACT)(some)
     for rtol in tolerances:
@@ -121,26 +122,12 @@ def cost_of(scene, gait, batch, tolerances, *, error=np.inf):
     return dict(rtol=rtol, error=reached, single_us=1e6 * single, batch_us=1e6 * together)
 
 
-def starts_about(state, count):
-    """Starts scattered about a gait's state; a compliant foot is not lifted by it."""
-    generator = np.random.default_rng(0)
-    leaves = {}
-    for name, leaf in state._asdict().items():
-        moves = name.startswith(("theta", "omega"))
-        spread = SPREAD * generator.uniform(-1.0, 1.0, count) * moves
-        leaves[name] = leaf * (1.0 + jnp.asarray(spread))
-    return type(state)(**leaves)
-
-
 def walked(scene, rtol, *, single=False):
     """A walk of ten seconds as a compiled function of its start; of a batch unless `single`."""
 
     def end(start):
-        how = dict(duration=DURATION, rtol=rtol, engine="lanes")
-        if isinstance(scene, jb.RigidScene):
-            walk = jb.rigid_walk(scene, start, **how)
-        else:
-            walk = jb.simulate(scene, start, save="end", max_solver_steps=MOST_STEPS, **how)
+        how = dict(rtol=rtol, save="end", max_solver_steps=MOST_STEPS, engine="lanes")
+        walk = jb.simulate(scene, start, duration=DURATION, **how)
         return walk.final, walk.ending
 
     return jax.jit(end if single else jax.vmap(end))

@@ -1,6 +1,7 @@
 """Speed of a walker with five links beside numbalsoda and MuJoCo, and how a step's cost grows.
 
-Writes mechanism_speed.png. Rates are for a second of the processor, all threads together.
+Writes mechanism_speed.png. Rates are for a second of the processor, all threads together. Also the
+attempted steps and the time of rigid walks with knees beside the seed's rigid walk.
 """
 
 # ruff: noqa: E402 (the cores are settled before JAX is imported)
@@ -18,10 +19,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _experiment import Options, experiment
-from _mechanisms import Case, cases
+from _mechanisms import Case, cases, kneed
 from _pictures import draw_by, label
 from _scalar_field import address_of
 from _timing import seconds_of, timed
+from _walks import perturbed
 from reference.numbalsoda_solves import lsoda_batch
 
 import jaxbiped as jb
@@ -43,6 +45,11 @@ STEPS, QUICK_STEPS = (1e-3, 3e-4, 1e-4, 3e-5), (1e-3,)
 """Of MuJoCo [s]."""
 BODIES, QUICK_BODIES = (2, 3, 4, 6, 8, 10), (2, 4)
 """Of the chains whose steps are counted."""
+FOOTSTEPS, WALKS, QUICK_WALKS = 10, 1024, 32
+"""Of rigid walks, and walks of each walker in one call."""
+SCATTER = 1e-3
+"""Of the rates at their starts, as a share of themselves."""
+SEED = "seed"
 FLOPS = {"fadd": 1, "fsub": 1, "fmul": 1, "fdiv": 1, "sqrt": 1, "fma": 2}
 """Of each operation of a graph."""
 
@@ -59,13 +66,15 @@ def main(options: Options):
         "chains": chains,
         "exponent": float(np.polyfit(*logs.T, 1)[0]),
         "gait_cpu_s": warm_gait(case, options.sized(5, 1)),
+        "rigid_walks": rigid_rows(options.sized(WALKS, QUICK_WALKS), options.sized(9, 1)),
         "picture": draw(options, rates["rows"], chains),
     }
 
 
 def batches(case: Case, options: Options):
     """Rows of ways and tolerances: what they simulate in a second, and how exactly."""
-    starts = perturbed(case, options.sized(COUNT, QUICK_COUNT))
+    begin = np.array([float(leaf) for leaf in case.guess])
+    starts = perturbed(options.sized(COUNT, QUICK_COUNT), begin)
     checked, rows = starts[: options.sized(CHECKED, 4)], []
     exact, rounds = run_lanes(case, EXACT, checked), options.sized(2, 1)
     work = {
@@ -116,13 +125,6 @@ def run_lanes(case: Case, rtol: float, starts: np.ndarray) -> np.ndarray:
     return np.stack(jax.vmap(one)(*jnp.asarray(starts.T)), axis=1)
 
 
-def perturbed(case: Case, count: int) -> np.ndarray:
-    """Starts about the case's, every number off by about a thousandth of itself."""
-    start = np.array([float(leaf) for leaf in case.guess])
-    noise = np.random.default_rng(0).standard_normal((count, len(start)))
-    return start * (1.0 + 1e-3 * noise)
-
-
 def on_a_spring(scene: jb.Scene) -> jb.Scene:
     """The walker with its torso on a spring instead of motors, which MuJoCo has no likes of."""
     given = scene.mechanism.arguments()
@@ -162,6 +164,59 @@ def warm_gait(case: Case, rounds: int) -> float:
         return jax.block_until_ready(jb.find_gait(case.scene, case.guess).elasticities)
 
     return seconds_of({0: find}, rounds, clock=time.process_time)[0]
+
+
+def rigid_rows(count: int, rounds: int):
+    """Steps of rigid walks, and their time over that of the seed's; walkers take turns."""
+    work = {name: rigid_walks(*each, count) for name, each in rigid_walkers().items()}
+    found = {name: run() for name, run in work.items()}
+    seconds = seconds_of(work, rounds, warm=False, clock=time.process_time)
+    return [
+        {
+            "walker": name,
+            "footsteps": FOOTSTEPS,
+            "accepted": float(np.mean(walks.accepted)),
+            "rejected": float(np.mean(walks.rejected)),
+            "walked": float(np.mean(np.asarray(walks.ending) == int(jb.Ending.WALKING))),
+            "cpu_s_a_walk": seconds[name] / count,
+            "ratio": seconds[name] / seconds[SEED],
+        }
+        for name, walks in found.items()
+    ]
+
+
+def rigid_walkers():
+    """Of each walker the scene and a start on its gait, by name."""
+    seed, mcgeer = jb.seed_scene(), jb.models.mcgeer(knees=True)
+    scenes = {
+        SEED: jb.RigidScene(seed.walker, seed.ground),
+        "Hsu Chen": jb.models.hsu_chen(),
+        "McGeer, knees": jb.RigidScene(kneed(), mcgeer.ground),
+    }
+    guess = scenes["Hsu Chen"].state(**jb.models.MODELS["hsu-chen"].starts["gait"])
+    guesses, plain = {"Hsu Chen": guess}, dict(parameters=(), radius_sensitivities=False)
+    return {
+        name: (scene, jb.find_gait(scene, guesses.get(name), **plain).measures.state)
+        for name, scene in scenes.items()
+    }
+
+
+def rigid_walks(scene, state, count):
+    """A call that walks from starts about a gait; what is held keeps its rates alike."""
+    names, begin = state._fields, np.array([float(leaf) for leaf in state])
+    noise = SCATTER * np.random.default_rng(0).standard_normal((len(names), count))
+    starts = np.repeat(begin[:, None], count, axis=1)
+    for i, name in enumerate(names):
+        if name.startswith("omega"):
+            like = name.replace("shank_2", "thigh_2")
+            starts[i] *= 1.0 + noise[names.index(like)]
+
+    def one(*values):
+        how = dict(footsteps=FOOTSTEPS, save="end", engine="lanes")
+        return jb.simulate(scene, type(state)(*values), **how)
+
+    batch, columns = jax.vmap(one), tuple(map(jnp.asarray, starts))
+    return lambda: batch(*columns)
 
 
 def draw(options: Options, rows, chains):

@@ -4,12 +4,13 @@ Each row is a number as its source prints it, ours, and their difference; docs/p
 has the table. Writes published_walkers.png, doublings of the simplest walker and the compass gait.
 """
 
-import dataclasses
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from _experiment import Options, experiment
+from _mechanisms import kneed
 
 import jaxbiped as jb
 from jaxbiped import plot
@@ -19,6 +20,11 @@ PLAIN = dict(parameters=(), radius_sensitivities=False)
 SLOPES = {"garcia": (0.008, 0.0185), "goswami": (math.radians(2.8), math.radians(5.3))}
 """Where branches are followed; their first doublings are sought there."""
 DOUBLINGS = {"garcia": 1, "goswami": 3}
+PROGRAM = {
+    "bhounsule": ("0.200161072169750", "-0.199906060087682", "-0.015805473227965"),
+    "bhounsule-round": ("0.189472782205104", "-0.239124222551699", "-0.053691703909393"),
+}
+"""What Bhounsule's program prints of its gaits."""
 
 
 class Printed(NamedTuple):
@@ -43,10 +49,11 @@ class Printed(NamedTuple):
 @experiment
 def main(options: Options):
     walkers = {
-        "garcia": garcia, "goswami": goswami, "mcgeer": mcgeer, "mcgeer-kneed": mcgeer_kneed,
+        "garcia": garcia, "goswami": goswami, "mcgeer": mcgeer,
+        "mcgeer-kneed": lambda: multipliers_of(found("mcgeer-kneed")),
         "mcgeer-kneed, rigid": mcgeer_kneed_rigid, "hsu-chen": hsu_chen,
-        "rimless-wheel": rimless_wheel, "kuo": kuo, "bhounsule": bhounsule,
-        "bhounsule-round": bhounsule_round,
+        "rimless-wheel": rimless_wheel, "kuo": kuo,
+        **{name: partial(program, name) for name in PROGRAM},
     }  # fmt: skip
     rows = [each.row(name) for name, of in walkers.items() for each in of()]
     names = options.sized(list(DOUBLINGS), list(DOUBLINGS)[:1])
@@ -111,18 +118,13 @@ def mcgeer():
     yield Printed("period, read in a figure", "2.5", float(gait.measures.period))
 
 
-def mcgeer_kneed():
-    yield from kneed(found("mcgeer-kneed"))
-
-
 def mcgeer_kneed_rigid():
     """On rigid feet, the knees locked from where they are straight until the next leg strikes."""
-    scene = jb.models.mcgeer(knees=True)
-    walker = dataclasses.replace(scene.walker, holds="until heel strike")
-    yield from kneed(jb.find_gait(jb.RigidScene(walker, scene.ground), **PLAIN))
+    scene = jb.RigidScene(kneed(), jb.models.mcgeer(knees=True).ground)
+    return multipliers_of(jb.find_gait(scene, **PLAIN))
 
 
-def kneed(gait):
+def multipliers_of(gait):
     multipliers = np.asarray(gait.multipliers)
     pair, real = multipliers[0], multipliers[2:4].real
     yield Printed("leading multipliers: modulus", "0.447", abs(pair))
@@ -152,21 +154,9 @@ def kuo():
     yield Printed("P̂/(v tan α)", "1.000000000000", ratio)
 
 
-def bhounsule():
-    yield from program("bhounsule", "0.200161072169750", "-0.199906060087682", "-0.015805473227965")
-
-
-def bhounsule_round():
-    numbers = "0.189472782205104", "-0.239124222551699", "-0.053691703909393"
-    yield from program("bhounsule-round", *numbers)
-
-
-def program(name, *printed):
+def program(name):
     theta, rate, swing = struck(found(name))
-    for words, text, ours in zip(
-        ("q1", "u1", "u2"), printed, (theta, rate, rate - swing), strict=True
-    ):
-        yield Printed(words, text, ours)
+    return map(Printed, ("q1", "u1", "u2"), PROGRAM[name], (theta, rate, rate - swing))
 
 
 def cascade_of(name):

@@ -99,34 +99,9 @@ def keep(path: Path, *, untimed: bool) -> Path:
 
 
 QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
-    "accuracy_coverage": accuracy.of_accuracy_coverage,
-    "basin_seed": accuracy.of_basin_seed,
-    "basin_simplest": accuracy.of_basin_simplest,
-    "bifurcation_elasticities": gaits.of_bifurcation_elasticities,
-    "extremes": accuracy.of_extremes,
-    "footstep_truth": accuracy.of_footstep_truth,
-    "force_models": gaits.of_force_models,
-    "fraction_coverage": accuracy.of_fraction_coverage,
-    "gpu_speed": accuracy.of_gpu_speed,
-    "gradient_accuracy": accuracy.of_gradient_accuracy,
-    "gradient_cost": accuracy.of_gradient_cost,
-    "gradient_truth": accuracy.of_gradient_truth,
-    "identify": gaits.of_identify,
-    "label_accuracy": accuracy.of_label_accuracy,
-    "kneed_ladder": gaits.of_kneed_ladder,
-    "ladder": gaits.of_ladder,
-    "level_ground": gaits.of_level_ground,
-    "long_walks": accuracy.of_long_walks,
-    "mechanism_matrix": gaits.of_mechanism_matrix,
-    "mechanism_speed": gaits.of_mechanism_speed,
-    "optimise_speed": gaits.of_optimise_speed,
-    "period_doubling": gaits.of_period_doubling,
-    "published_walkers": gaits.of_published_walkers,
-    "reproducibility": accuracy.of_reproducibility,
-    "radius_map": gaits.of_radius_map,
-    "search_robustness": gaits.of_search_robustness,
-    "slope_branch": gaits.of_slope_branch,
-    "trade": accuracy.of_trade,
+    name.removeprefix("of_"): function
+    for name, function in (vars(accuracy) | vars(gaits)).items()
+    if name.startswith("of_")
 }
 """Of each experiment: the phrases and rows that the pages quote."""
 

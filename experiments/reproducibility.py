@@ -17,6 +17,9 @@ import numpy as np
 from _batches import labelling_of, swept
 from _experiment import Options, experiment
 from _pictures import label
+from _walks import scattered
+from reference.compliant import numbers
+from reference.scipy_solves import scales
 from tqdm import tqdm
 
 import jaxbiped as jb
@@ -128,23 +131,16 @@ def one(path, setting, count):
 
 def starts(count, ulps):
     """Random starts about the seed's, the same in every process."""
-    random = np.random.default_rng(8)
-    leaves = {}
-    for name, leaf in jb.seed_state()._asdict().items():
-        own = float(leaf) * (1.0 + SPREAD * random.uniform(-1.0, 1.0, count))
-        leaves[name] = own if name not in ("hip_x", "hip_z") else np.full(count, float(leaf))
+    moving = ("theta", "hip_v", "omega")
+    found = scattered(jb.seed_state(), count, SPREAD, moving, seed=8)
     for _ in range(ulps):
-        leaves["omega_2"] = np.nextafter(leaves["omega_2"], 0.0)
-    return jb.State(**{name: jnp.asarray(leaf) for name, leaf in leaves.items()})
+        found = found._replace(omega_2=jnp.nextafter(found.omega_2, 0.0))
+    return found
 
 
 def apart(own, other):
     """Largest difference of each walk's end, in units of l, √(l/g) and radians."""
-    scene = jb.seed_scene()
-    length, gravity = float(scene.walker.l), float(scene.ground.g)
-    time = np.sqrt(length / gravity)
-    units = np.array([length] * 2 + [1.0] * 2 + [length / time] * 2 + [1.0 / time] * 2)
-    return np.max(np.abs(own["ends"] - other["ends"]) / units, axis=1)
+    return np.max(np.abs(own["ends"] - other["ends"]) / scales(numbers(), 8), axis=1)
 
 
 def compared(setting, own, other):

@@ -9,7 +9,6 @@ import dataclasses
 import operator
 
 import _trade_basins
-import _trade_batches
 import _trade_gaits
 import _trade_slopes
 import _trade_walks
@@ -25,7 +24,7 @@ CASES = (
     _trade_walks.cases,
     _trade_slopes.cases,
     _trade_gaits.cases,
-    _trade_batches.cases,
+    _trade_walks.batch_cases,
     _trade_basins.cases,
     _trade_gaits.stepping_cases,
     _trade_gaits.cases_through_xla,

@@ -162,6 +162,12 @@ def reference():
 
 
 @pytest.fixture(scope="session")
+def seed_gait():
+    """The seed's gait with all its sensitivities, by lanes."""
+    return jb.find_gait(jb.seed_scene())
+
+
+@pytest.fixture(scope="session")
 def simplest():
     """A labelling of the simplest walker on its slope of 0.009, with its gait."""
     guess = simplest_state(*STABLE)

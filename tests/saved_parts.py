@@ -1,4 +1,4 @@
-"""Classes and functions of a user's own, for files that name them."""
+"""Classes and functions of a user's own, for tests of laws and for files that name them."""
 
 import enum
 from typing import NamedTuple

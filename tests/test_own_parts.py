@@ -13,6 +13,7 @@ from jaxbiped import cli
 from jaxbiped.cli import COMMANDS
 from jaxbiped.cli._options import Command
 from jaxbiped.compiler import BY_NAME, XLA, AbstractEngine
+from tests.saved_parts import Grip
 
 SEED, START = jb.seed_scene(), jb.seed_state()
 RIGID, ROLLING = jb.ladder()["rigid"], jb.dynamics.rigid_state(jb.seed_state())
@@ -74,21 +75,9 @@ def test_a_normal_law():
     np.testing.assert_allclose(*map(np.array, ends), rtol=1e-9, atol=1e-12)
 
 
-class Grip(jb.laws.AbstractFrictionLaw):
-    """F = grip F_N V_T, opposing V_T: `Viscous` by another name."""
-
-    grip: float = jb.laws.parameter("grip", "$G$", "s/m", minimum=0.0)
-
-    def force(self, normal_force, slip_speed):
-        return -self.grip * normal_force * slip_speed
-
-    def switches(self, slip_speed):
-        return ()
-
-
 def test_a_friction_law():
     class Named(Grip):
-        """In the catalogue."""
+        """In the catalogue: `Viscous` by another name."""
 
         name: ClassVar[str] = "grip"
 

@@ -1,7 +1,8 @@
-"""A footstep of the compliant walker and its derivatives, by collocation on smooth pieces.
+"""A footstep of the compliant walker and its gait, with derivatives: collocation on smooth pieces.
 
 From mid-stance to mid-stance, one heel strike between: its time, its end, and their derivatives
-with respect to the start and to logarithms of the walker's numbers, by `mechanism_flow`.
+with respect to the start and to logarithms of the walker's numbers, by `mechanism_flow`. Gaits are
+found by Newton's method on footsteps.
 """
 
 from collections.abc import Iterable
@@ -16,9 +17,13 @@ from .mechanism_pieces import TINY
 
 MID_STANCE = np.array([0.0, 0.399354, 0.0959, 0.0, 0.27801, -0.00053, 2.3765, -0.695])
 """Hip x, z, both angles and their rates, leg 2 standing upright (SI)."""
+UPRIGHT = 2
+"""The angle among them that is 0 where a footstep ends."""
 PARAMETERS = ("K", "c", "mu_static", "mu_kinetic")
 LAWS = numbers()[[LAWS_AT[name] for name in PARAMETERS]]
 """What footsteps are differentiated with respect to unless told, and their values."""
+EXCHANGED = [1, 3, 2, 4, 5, 7, 6]
+"""What recurs of a state, leg 2 now the one that stands."""
 _LONGEST = 2.0
 """Time within which a footstep must come to its end [s]."""
 
@@ -40,6 +45,29 @@ class Footstep(NamedTuple):
     gradient: np.ndarray
     switches: list[tuple[str, float]]
     peak: float
+
+
+class Gait(NamedTuple):
+    """A gait at mid-stance of leg 2, θ2 = 0.
+
+    Attributes:
+        state: hip z, θ1, θ2 and the rates, (7,).
+        measures: period [s], step length [m], speed [m/s] and peak of the normal force [N].
+        jacobian: of the return map, (7, 7).
+        changes: derivatives of the fixed point along the directions, (7, k).
+        elasticities: of the period's logarithm, (k,).
+    """
+
+    state: np.ndarray
+    measures: np.ndarray
+    jacobian: np.ndarray
+    changes: np.ndarray
+    elasticities: np.ndarray
+
+    @property
+    def radius(self) -> float:
+        """Absolute value of the largest multiplier."""
+        return float(np.max(np.abs(np.linalg.eigvals(self.jacobian))))
 
 
 def by_logarithms(p: np.ndarray, names: Iterable[str] = PARAMETERS) -> np.ndarray:
@@ -73,7 +101,7 @@ def footstep(
     found = flow(tree, start, _LONGEST, np.reshape(rows, (-1, len(tree.p))), upright=0, **how)
     if found.time >= _LONGEST:
         raise RuntimeError(f"no footstep within {_LONGEST:g} s")
-    later = -found.gradient[2] / found.rates[2]
+    later = -found.gradient[UPRIGHT] / found.rates[UPRIGHT]
     gradient = found.gradient + np.outer(found.rates, later)
     peak = max(_peak(*each) for each in found.steps)
     return Footstep(found.time, found.state, later, gradient, found.switches, peak)
@@ -129,3 +157,32 @@ def _peak(step: Step, h: float, end: np.ndarray) -> float:
             low, high = ((at, value), high) if value > 0.0 else (low, (at, value))
             largest = max(largest, load(stages[-1], k).real)
     return largest
+
+
+def turn(x: np.ndarray, p: np.ndarray, directions: np.ndarray | None = None) -> Gait:
+    """The next mid-stance after x (7,), with a footstep's measures and derivatives.
+
+    Those of the fixed point are along the directions in p, (k, SIZE), as if x were it.
+    """
+    along = np.zeros((0, len(p))) if directions is None else directions
+    found = footstep(np.append(0.0, x), p, directions=along)
+    t, length = found.time, found.state[0]
+    reached, rows = found.state[EXCHANGED], found.gradient[EXCHANGED, 1:]
+    jacobian, columns = rows[:, :7], rows[:, 7:]
+    # How the fixed point moves, and the period with it.
+    moved = np.linalg.solve(np.eye(7) - jacobian, columns)
+    later = found.time_gradient[1:8] @ moved + found.time_gradient[8:]
+    measures = np.array([t, length, length / t, found.peak])
+    return Gait(reached, measures, jacobian, moved, later / t)
+
+
+def gait(guess: np.ndarray, p: np.ndarray, directions: np.ndarray | None = None) -> Gait:
+    """The gait near a state (7,) on the section; directions as for `turn`."""
+    x = np.array(guess, float)
+    for _ in range(12):
+        next_ = turn(x, p, directions)
+        step = np.linalg.solve(next_.jacobian - np.eye(7), next_.state - x)
+        x = x - step
+        if np.max(np.abs(step)) < 1e-11:
+            return next_._replace(state=x)
+    raise RuntimeError("no gait near the start")

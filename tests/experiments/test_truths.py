@@ -1,16 +1,11 @@
 """Truths of gradients: closed form and collocation against SciPy, and what tools say of them."""
 
 import dataclasses
-import json
-import sys
 from importlib.metadata import version
 
 import _gradient_ways
-import footstep_truth
-import gradient_truth
 import numpy as np
 import pytest
-import truth_of_all
 from _ball_closed_form import PROBLEMS, closed_form
 from reference.collocation import radau
 from reference.compliant import numbers
@@ -18,14 +13,6 @@ from reference.footstep import LAWS, MID_STANCE, PARAMETERS, footstep
 from scipy.integrate import solve_ivp
 
 from tests.experiments.quick import drawn_run
-
-ROWS = [
-    {"problem": "spring", "way": "ours", "setting": "rtol", "value": 1e-4, "outcome": "answered"}
-    | {"state_error": 2e-5, "gradient_error": 3e-5, "said": 4e-3, "seconds": 0.2, "cpu_s": 0.1},
-    {"problem": "spring", "way": "another", "setting": "dt", "outcome": "not installed"},
-    {"problem": "footstep", "way": "third", "setting": "dt", "value": 1e-3, "outcome": "answered"}
-    | {"state_error": 1e-1, "gradient_error": 7.5, "said": None, "seconds": 2.0, "cpu_s": 3.0},
-]
 
 
 def _followed(problem):
@@ -141,20 +128,3 @@ def test_versions_are_those_installed():
     found = _gradient_ways.versions()
     assert found["jax"] == version("jax")
     assert set(found) == set(_gradient_ways.PACKAGES)
-
-
-def test_both_truths_come_in_one_table_and_a_file_each(tmp_path, monkeypatch, capsys):
-    parts = {gradient_truth: ROWS[:2], footstep_truth: ROWS[2:]}
-    for module, rows in parts.items():
-        made = {"rows": rows, "picture": f"{module.__name__}.png"}
-        monkeypatch.setattr(module, "measured", lambda options, made=made: made)
-    monkeypatch.setattr(sys, "argv", ["truth_of_all", "--out", str(tmp_path)])
-    truth_of_all.main()
-    said = [line.split() for line in capsys.readouterr().out.splitlines()]
-    (ours,) = (line for line in said if "ours" in line)
-    assert {"2e-05", "3e-05", "0.1", "0.004"} <= set(ours)
-    assert any("another" in line and "installed" in line for line in said)
-    (third,) = (line for line in said if "third" in line)
-    assert "–" in third
-    for module, rows in parts.items():
-        assert json.loads((tmp_path / f"{module.__name__}.json").read_text())["rows"] == rows

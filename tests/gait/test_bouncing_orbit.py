@@ -11,11 +11,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, search
-from jaxbiped.gait._newton import Method
-from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.solve._accuracy import precision_of
+from tests.systems import Plain, orbit_near
 
 HEIGHT, DRIFT = 0.3, 0.7
 """Height of the section [m], and what the cyclic coordinate gains of the squared speed [s/m]."""
@@ -35,7 +32,7 @@ class Numbers(NamedTuple):
     curb: Scalar
 
 
-class Trampoline(jb.gait.AbstractSystem):
+class Trampoline(Plain):
     """A mass (x, y, v), in free flight above the ground; neither spring nor push take energy."""
 
     cyclic_coordinates = (0,)
@@ -48,9 +45,6 @@ class Trampoline(jb.gait.AbstractSystem):
 
     def switches(self, args, y):
         return (Switch(y[1] - args.level, True, force_jumps=self.jumps),)
-
-    def ending(self, args, y):
-        return jnp.asarray(0)
 
     def reset_map(self, args, y):
         x, height, speed = y
@@ -93,14 +87,9 @@ def test_an_orbit_with_its_multiplier_and_all_derivatives():
     spec = ReturnMapSpec(Trampoline(False), ABOVE, jb.solvers.Rodas4(), 20.0, 1, 32768, "lanes")
     guess = tuple(map(jnp.asarray, (0.0, HEIGHT, 2.0)))
 
-    @jax.jit
-    def run(args):
-        tight = precision_of("tight")
-        problem = FixedPointProblem(spec, args, (), guess, tight, Method(None, 40, 1e-10))
-        asked = problem._replace(active=active)
-        return orbit_of(asked, with_parameter_columns(asked, search(problem)), radius=True)
-
-    found = run(jax.tree.map(jnp.asarray, SPRING))
+    found = jax.jit(lambda args: orbit_near(spec, args, guess, active))(
+        jax.tree.map(jnp.asarray, SPRING)
+    )
     last, stability, slopes = found.found.last, found.stability, found.slopes
     ours = (found.state[2], last.period, last.advance[0], last.peak, stability.spectral_radius)
     np.testing.assert_allclose(ours, gait(SPRING), rtol=1e-7)

@@ -11,24 +11,19 @@ from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def found():
-    return jb.find_gait(jb.seed_scene())
+def test_seed_gait(seed_gait):
+    assert seed_gait.outcome == jb.gait.Search.FOUND
+    assert seed_gait.critical == jb.gait.Bifurcation.NONE
+    assert bool(seed_gait.stable)
+    assert float(seed_gait.measures.period) == pytest.approx(0.4408349, abs=1e-7)
+    assert float(seed_gait.measures.step_length) == pytest.approx(0.1792270, abs=1e-7)
+    assert float(seed_gait.measures.peak_normal) == pytest.approx(308.7904, abs=1e-3)
+    assert float(seed_gait.residual) < 1e-7
+    assert float(seed_gait.unit_multiplier_error) < 1e-4
+    assert seed_gait.multipliers.shape == (6,)
 
 
-def test_seed_gait(found):
-    assert found.outcome == jb.gait.Search.FOUND
-    assert found.critical == jb.gait.Bifurcation.NONE
-    assert bool(found.stable)
-    assert float(found.measures.period) == pytest.approx(0.4408349, abs=1e-7)
-    assert float(found.measures.step_length) == pytest.approx(0.1792270, abs=1e-7)
-    assert float(found.measures.peak_normal) == pytest.approx(308.7904, abs=1e-3)
-    assert float(found.residual) < 1e-7
-    assert float(found.unit_multiplier_error) < 1e-4
-    assert found.multipliers.shape == (6,)
-
-
-def test_no_return_is_solved_twice(found, monkeypatch):
+def test_no_return_is_solved_twice(seed_gait, monkeypatch):
     """The records of two turns are read at a search's end: they waited on the host."""
     most, run_table = [], CompiledProgram.run_table
 
@@ -42,10 +37,10 @@ def test_no_return_is_solved_twice(found, monkeypatch):
     # and the second derivatives there and back.
     assert len(most) == int(again.evaluations) + 4
     assert [room > 0 for room in most] == [True] * (len(most) - 1) + [False]
-    np.testing.assert_array_equal(again.orbit[0], found.orbit[0])
+    np.testing.assert_array_equal(again.orbit[0], seed_gait.orbit[0])
 
 
-def test_far_from_a_gait_derivatives_are_those_in_the_state(found):
+def test_far_from_a_gait_derivatives_are_those_in_the_state():
     """By lanes: the return map's slopes are right there, of parameters nothing is claimed."""
     gait = jb.find_gait(jb.seed_scene(), max_evaluations=2)
     assert gait.outcome == jb.gait.Search.NOT_CONVERGED

@@ -14,12 +14,6 @@ from tests.unknown_to_lanes import ErrorFunction
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def gait():
-    """The seed's, by lanes."""
-    return jb.find_gait(jb.seed_scene(), engine="lanes")
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     "scene",
@@ -65,7 +59,7 @@ def test_the_radius_of_a_cycle_of_two_is_that_of_one_squared(scene, names, accur
 
 
 @pytest.mark.nightly
-def test_many_scenes_at_once_give_what_each_gives_alone(gait):
+def test_many_scenes_at_once_give_what_each_gives_alone(seed_gait):
     """A large batch, in which batched calls of LAPACK once waited for each other for ever."""
     slopes, own = jnp.linspace(0.019, 0.021, 257), 128
 
@@ -75,8 +69,10 @@ def test_many_scenes_at_once_give_what_each_gives_alone(gait):
 
     measures, elasticities, endings = jax.jit(jax.vmap(measured))(slopes)
     assert np.all(np.asarray(endings) == int(jb.gait.Search.FOUND))
-    assert float(measures.period[own]) == pytest.approx(float(gait.measures.period), abs=1e-8)
-    np.testing.assert_allclose(elasticities[own], gait.elasticities.period, rtol=5e-4, atol=1e-8)
+    assert float(measures.period[own]) == pytest.approx(float(seed_gait.measures.period), abs=1e-8)
+    np.testing.assert_allclose(
+        elasticities[own], seed_gait.elasticities.period, rtol=5e-4, atol=1e-8
+    )
     assert np.all(np.diff(measures.period) > 0.0)
     assert np.all(np.abs(np.diff(measures.spectral_radius)) < 1e-3)
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from reference.compliant import SEED, jacobian, numbers
-from reference.gait import EXCHANGED, gait, turn
+from reference.footstep import EXCHANGED, gait, turn
 from reference.scipy_solves import solution
 
 import jaxbiped as jb
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 MEASURES = ("period", "step_length", "speed", "peak_normal", "spectral_radius")
 MID_SWING = 0.25  # [s]: leg 1 passes the normal as the swinging leg before, as the standing after
 RADIUS_FLOOR = 2e-8
-ACCURACIES = [("found", 5e-4), ("tight", 1e-5)]
+ACCURACIES = [("seed_gait", 5e-4), ("tight", 1e-5)]
 
 # Steps of log p (of the hip's mass itself, in kg): wide where p matters little and the solve's
 # noise of 1e-12 is felt, narrow for n, an exponent, and l, which matters most.
@@ -46,11 +46,6 @@ SCALINGS = {
     "mass": (dict(m=1, J=1, K=1, c=1), (0, 0, 0, 1, 0)),
     "length": (dict(l=1, d=1, r=1, J=2, g=1, K=-0.5, c=-1, v0=1, xi=-1), (0, 1, 1, 1, 0)),
 }
-
-
-@pytest.fixture(scope="module")
-def found():
-    return jb.find_gait(jb.seed_scene())
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +148,7 @@ def test_multipliers_agree_with_an_independent_solve(accuracy, tolerance, multip
         for name in STEPS
     ],
 )
-def test_sensitivities_agree_with_an_independent_solve(name, found, tight, start):
+def test_sensitivities_agree_with_an_independent_solve(name, seed_gait, tight, start):
     expected = sensitivities(start, name, STEPS[name])
     # The state is one vector: its entries are measured against the largest.
     sizes = np.abs(expected)
@@ -166,19 +161,19 @@ def test_sensitivities_agree_with_an_independent_solve(name, found, tight, start
     # Second derivatives cancel at heel strike and keep this much error however tight the solve; it
     # is felt by μ_static and v0, whose effects on the radius are below 2e-4.
     noise[-1] = max(noise[-1], RADIUS_FLOOR)
-    for each, tolerance in ((found, 5e-4), (tight, 1e-5)):
+    for each, tolerance in ((seed_gait, 5e-4), (tight, 1e-5)):
         k, slopes = each.parameters.index(name), each.sensitivities
         leaves = (*slopes.state[1:], *(getattr(slopes, measure) for measure in MEASURES))
         ours = np.array([float(leaf[k]) for leaf in leaves]) * (SEED[name] or 1.0)
         assert np.all(np.abs(ours - expected) <= tolerance * sizes + noise)
 
 
-def test_every_parameter_is_compared(found):
-    assert set(found.parameters) == set(STEPS)
+def test_every_parameter_is_compared(seed_gait):
+    assert set(seed_gait.parameters) == set(STEPS)
 
 
 @pytest.mark.parametrize("unit", SCALINGS)
-@pytest.mark.parametrize(("accuracy", "tolerance"), [("found", 5e-5), ("tight", 1e-6)])
+@pytest.mark.parametrize(("accuracy", "tolerance"), [("seed_gait", 5e-5), ("tight", 1e-6)])
 def test_elasticities_obey_the_scaling_of_units(accuracy, tolerance, unit, request):
     each = request.getfixturevalue(accuracy)
     powers, follow = SCALINGS[unit]
@@ -221,12 +216,14 @@ def test_steep_friction_keeps_the_derivatives_of_the_radius():
     assert abs(told - difference) <= bar < 1e-4 * difference
 
 
-def test_the_section_does_not_matter(found):
+def test_the_section_does_not_matter(seed_gait):
     """Multipliers and their derivatives belong to the orbit, though heel strike is a switch."""
     other = jb.find_gait(jb.seed_scene(), section=jb.HeelStrike())
-    assert np.abs(other.multipliers)[:3] == pytest.approx(np.abs(found.multipliers)[:3], rel=1e-4)
+    assert np.abs(other.multipliers)[:3] == pytest.approx(
+        np.abs(seed_gait.multipliers)[:3], rel=1e-4
+    )
     for measure in MEASURES:
-        mine, theirs = (getattr(each.elasticities, measure) for each in (found, other))
+        mine, theirs = (getattr(each.elasticities, measure) for each in (seed_gait, other))
         # ξ hardly matters at all; and g's effect on the radius is what is left of terms thirty
         # times as large, each as exact as the columns.
         least = 1e-4 * np.max(np.abs(mine)) if measure == "spectral_radius" else 1e-7

@@ -13,41 +13,19 @@ from scipy.optimize import brentq
 
 import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, search
-from jaxbiped.gait._newton import Method
-from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.solve._accuracy import ACCURACIES, precision_of
+from jaxbiped.solve._accuracy import ACCURACIES
+from tests.systems import Plain, orbit_near
 
 pytestmark = pytest.mark.slow
 
 
-class Smooth(jb.gait.AbstractSystem):
-    """Without switches, endings or load."""
-
-    def switches(self, args, y):
-        return ()
-
-    def ending(self, args, y):
-        return jnp.asarray(0)
-
-    def load(self, args, y):
-        return None
-
-
-class Flowing(Smooth):
-    """Nothing is done to the state at an arrival."""
-
-    def reset_map(self, args, y):
-        return y
-
-
-class VanDerPol(Flowing):
+class VanDerPol(Plain):
     def vector_field(self, t, y, args):
         return y[1], args * (1.0 - y[0] * y[0]) * y[1] - y[0]
 
 
-class Oscillator(Flowing):
+class Oscillator(Plain):
     """x'' + 2 ζ ω x' + ω² x = 0, given as (x, v) and (ω, ζ)."""
 
     def vector_field(self, t, y, args):
@@ -55,7 +33,7 @@ class Oscillator(Flowing):
         return y[1], -2.0 * zeta * omega * y[1] - omega * omega * y[0]
 
 
-class Ball(Smooth):
+class Ball(Plain):
     """A ball in air with linear drag on a paddle: v⁺ = −e v⁻ + u at the ground."""
 
     def vector_field(self, t, y, args):
@@ -198,13 +176,6 @@ def test_a_linearised_turn_of_the_oscillator(engine):
     assert area == pytest.approx(math.exp(-2 * ZETA * OMEGA * PERIOD), rel=1e-5)
 
 
-def _orbit(spec, args, guess):
-    tight = precision_of("tight")
-    problem = FixedPointProblem(spec, args, (), guess, tight, Method(None, 40, 1e-10))
-    asked = problem._replace(active=(0,))
-    return orbit_of(asked, with_parameter_columns(asked, search(problem)), radius=True)
-
-
 @pytest.mark.parametrize("engine", ["xla", "lanes"])
 def test_van_der_pol_multiplier_and_its_sensitivities(engine):
     """λ = exp(∮ μ (1 − x²) dt); period, amplitude and λ against SciPy, and their derivatives."""
@@ -226,7 +197,7 @@ def test_van_der_pol_multiplier_and_its_sensitivities(engine):
         return np.array([y[0], period, math.exp(total)])
 
     spec = ReturnMapSpec(VanDerPol(), TURNING_POINT, jb.solvers.Rodas4(), 20.0, 1, 32768, engine)
-    orbit = jax.jit(lambda mu: _orbit(spec, mu, (jnp.asarray(-2.1), jnp.asarray(0.1))))(
+    orbit = jax.jit(lambda mu: orbit_near(spec, mu, (jnp.asarray(-2.1), jnp.asarray(0.1))))(
         jnp.asarray(1.0)
     )
     expected = reference(1.0)
@@ -248,7 +219,7 @@ def test_bouncing_ball_in_a_cycle_of_two():
     for steps in (1, 2):
         spec = ReturnMapSpec(Ball(), DOWN, jb.solvers.Rodas4(), 20.0, steps, 32768, "xla")
         guess = (jnp.asarray(0.0), jnp.asarray(4.0))
-        found.append(_orbit(spec, args, guess))
+        found.append(orbit_near(spec, args, guess))
     once, twice = found
     assert float(twice.found.last.period) == pytest.approx(2 * float(once.found.last.period))
     one, two = (float(orbit.found.last.jacobian[1, 1]) for orbit in found)
@@ -292,7 +263,7 @@ def test_what_does_not_return_says_so(monkeypatch):
             assert jb.Ending(int(found.code)) is ending
 
 
-class Held(Flowing):
+class Held(Plain):
     """The oscillator with its frequency as a field, given ζ alone."""
 
     omega: Any
@@ -342,7 +313,7 @@ def test_what_systems_and_sections_hold_is_refused_where_it_would_not_be_seen():
         jax.jacfwd(lambda level: _swung(2.0, zeta, section=Level(level)))(zeta)
 
 
-class Step(Flowing):
+class Step(Plain):
     """A force that jumps: y'' = −a above the ground y = s, and +b below it; given as (a, b, s)."""
 
     def vector_field(self, t, y, args):
@@ -402,7 +373,7 @@ def test_second_derivatives_that_steps_do_not_see_are_refused(mode, said):
         jax.jacfwd(derivative(turned, mode))(jnp.asarray(1.3))
 
 
-class Pad(Flowing):
+class Pad(Plain):
     """Nothing acts above y = s; below, w' = −b (s − y)^¼ w brakes what comes down; given (b, s)."""
 
     def vector_field(self, t, y, args):

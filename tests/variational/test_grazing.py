@@ -19,6 +19,7 @@ from jaxbiped.variational._variational_solve import (
     seeded_directions,
     solve_variational,
 )
+from tests.systems import Plain
 
 pytestmark = pytest.mark.slow
 
@@ -30,7 +31,7 @@ DEPTHS = np.array([1e-3, 1e-6, 1e-7, 1e-8, -1e-8, -1e-7, -1e-3])
 UNKNOWN = np.array([1e-10, 1e-13, -1e-13, -1e-10])
 
 
-class Pulled(jb.gait.AbstractSystem):
+class Pulled(Plain):
     """y'' = a, and a + b under the ground, given as (a, b): its force jumps there."""
 
     def vector_field(self, t, y, args):
@@ -39,15 +40,6 @@ class Pulled(jb.gait.AbstractSystem):
 
     def switches(self, args, y):
         return (Switch(y[0], True, force_jumps=True),)
-
-    def ending(self, args, y):
-        return jnp.asarray(0)
-
-    def reset_map(self, args, y):
-        return y
-
-    def load(self, args, y):
-        return None
 
 
 def start(depth):

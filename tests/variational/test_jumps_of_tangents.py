@@ -26,6 +26,7 @@ from jaxbiped.variational._saltation import saltation_at
 from jaxbiped.variational._switch_locator import SwitchLocator
 from jaxbiped.variational._tangent_solver import TangentSolver, VariationalField
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch
+from tests.systems import Plain
 
 BEFORE, AFTER = -9.8, 14.0
 """Accelerations above the level and below [m/s²]."""
@@ -181,7 +182,7 @@ def test_a_jacobian_without_bound_at_a_switch_has_no_jump(power):
     assert np.all(np.isnan(jump_of(jnp.asarray(_beside_a_switch(power)))))
 
 
-class Flight(jb.gait.AbstractSystem):
+class Flight(Plain):
     """y'' = −a; what arrives is turned: (y, v) → (y v, sin v + a)."""
 
     def vector_field(self, t, y, args):
@@ -190,14 +191,8 @@ class Flight(jb.gait.AbstractSystem):
     def switches(self, args, y):
         return (Switch(y[0] - args[0], True),)
 
-    def ending(self, args, y):
-        return jnp.asarray(0)
-
     def reset_map(self, args, y):
         return y[0] * y[1], jnp.sin(y[1]) + args[0]
-
-    def load(self, args, y):
-        return None
 
 
 def section(args, y):
