@@ -75,6 +75,13 @@ def unbatched(leaf: object) -> object:
     return leaf
 
 
+def undifferentiated(leaf: Any) -> Any:
+    """What a tracer of derivatives holds: by itself that is known where nothing else traces it."""
+    while isinstance(leaf, jax.core.Tracer) and hasattr(leaf, "primal"):
+        leaf = leaf.primal
+    return leaf
+
+
 @contextlib.contextmanager
 def untraced() -> Iterator[None]:
     """Within, nothing is traced: for what depends on known numbers alone."""

@@ -68,6 +68,11 @@ def is_traced(tree: PyTree) -> bool:
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(tree))
 
 
+def is_real(leaf: Any) -> bool:
+    """Whether a number is a real one, and not a whole one or a boolean."""
+    return jnp.issubdtype(jnp.result_type(leaf), jnp.inexact)
+
+
 def by_numpy(function: Callable[..., Any], *given: Any) -> Any:
     """`function(numpy, *given)` of arrays: by JAX's NumPy where any is traced, else by NumPy.
 
@@ -79,6 +84,11 @@ def by_numpy(function: Callable[..., Any], *given: Any) -> Any:
     if all(isinstance(each, float | int) for each in given):
         return function(np, *given)
     return jtu.tree_map(as_array, function(np, *map(np.asarray, given)))
+
+
+def in_64_bits(tree: SomeTree) -> SomeTree:
+    """A tree of real numbers in 64 bits."""
+    return jtu.tree_map(lambda leaf: jnp.asarray(leaf, float), tree)
 
 
 def as_float(value: Parameter) -> Scalar:

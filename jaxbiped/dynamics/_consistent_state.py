@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, holds_somewhere
-from jaxbiped._types import Scalar, by_numpy
+from jaxbiped._types import Scalar, by_numpy, in_64_bits
 from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._linkage_constraints import masses_of
@@ -94,7 +94,7 @@ def consistent_state(
                 f"state violates its constraints by {float(np.max(np.asarray(value))):.3g} {unit} "
                 f"({name}), which is too far to correct: at most {float(bound):g} is allowed."
             )
-    return _nearest_state(scene, state, off)
+    return _nearest_state(scene, in_64_bits(state), off)
 
 
 @kept_alone

@@ -13,7 +13,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import check_choice, check_count, check_unbatched
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._progress import Stage, stage
-from jaxbiped._types import is_traced
+from jaxbiped._types import in_64_bits, is_traced
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._consistent_state import consistent_state
@@ -245,7 +245,8 @@ def _check_start(
     start = default_guess(scene) if guess is None else guess
     if scene.redundant and not isinstance(guess, Gait):  # whose state is minimal
         start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
-    return with_leg_names_of(section, scene.minimal, state_of_guess(scene.minimal, start))
+    start = in_64_bits(state_of_guess(scene.minimal, start))
+    return with_leg_names_of(section, scene.minimal, start)
 
 
 def _without_held(scene: AbstractWalkerScene, gait: Gait) -> Gait:

@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive, check_type
 from jaxbiped._jax_versions import without_switches
-from jaxbiped._types import Scalar, Time, as_float, select
+from jaxbiped._types import Scalar, Time, as_float, in_64_bits, select
 from jaxbiped.dynamics._equivalent_states import minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import check_leaves, without_whole_turns
@@ -98,7 +98,7 @@ def return_map(
         args = check_scene(args, Scene, RigidScene, RedundantScene)
         if not hasattr(state, "_fields"):
             raise ArgumentError(f"state = {state!r} is not allowed: give a State.")
-        state = without_whole_turns(args, check_leaves(state, "state"))
+        state = without_whole_turns(args, in_64_bits(check_leaves(state, "state")))
     arrivals = arrivals_of(args, footsteps)
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
     enters = system is None and isinstance(args, RedundantScene) and not is_redundant(state)

@@ -13,7 +13,8 @@ import jax.tree_util as jtu
 from jaxtyping import ArrayLike
 
 from jaxbiped._checks import ArgumentError, check_type, is_number, traced_rules
-from jaxbiped._types import SomeTree, as_float, is_traced
+from jaxbiped._jax_versions import undifferentiated
+from jaxbiped._types import SomeTree, as_float, is_real, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import OfObjects
 
@@ -32,13 +33,14 @@ def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
     exact = [_in_64_bits(leaf) for leaf in leaves]
     if any(a is not b for a, b in zip(leaves, exact, strict=True)):
         scene = jtu.tree_unflatten(structure, exact)
-    if is_traced(exact):
+    told = jtu.tree_map(undifferentiated, scene) if is_traced(exact) else scene
+    if is_traced(told):
         with traced_rules() as rules:
             _check_parts(scene)
         return where_allowed(rules, scene)
     # Within a caller's trace, too, what is computed of known numbers is known.
     with jax.ensure_compile_time_eval():
-        _CHECKED(scene, lambda: _check_parts(scene))
+        _CHECKED(told, lambda: _check_parts(told))
     return scene
 
 
@@ -53,18 +55,22 @@ def _check_parts(scene: Any) -> None:
 
 
 def where_allowed(
-    rules: list[ArrayLike], tree: SomeTree, otherwise: float = float("nan")
+    rules: list[ArrayLike], tree: SomeTree, otherwise: float | None = None
 ) -> SomeTree:
-    """The tree, its numbers others where one of the rules (see `traced_rules`) does not hold."""
+    """The tree, its numbers others where one of the rules (see `traced_rules`) does not hold.
+
+    None: NaN, and so are their derivatives.
+    """
     return _kept(rules, tree, otherwise) if rules and jtu.tree_leaves(tree) else tree
 
 
 @cached_jit  # many small operations
-def _kept(rules: list[ArrayLike], tree: SomeTree, otherwise: float) -> SomeTree:
+def _kept(rules: list[ArrayLike], tree: SomeTree, otherwise: float | None) -> SomeTree:
     kept = jnp.all(jnp.stack(rules))
-    return jtu.tree_map(
-        lambda leaf: jnp.where(kept, leaf, jnp.asarray(otherwise, jnp.result_type(leaf))), tree
-    )
+    if otherwise is not None:
+        return jtu.tree_map(lambda leaf: jnp.where(kept, leaf, otherwise), tree)
+    factor = jnp.where(kept, 1.0, jnp.nan)  # a selection has a derivative of 0
+    return jtu.tree_map(lambda leaf: leaf * factor if is_real(leaf) else leaf, tree)
 
 
 def _in_64_bits(leaf: Any) -> Any:

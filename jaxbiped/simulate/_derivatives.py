@@ -19,7 +19,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._jax_versions import unbatched, untraced
-from jaxbiped._types import Scalar, is_traced
+from jaxbiped._types import Scalar, is_real, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.simulate._slopes import Slopes
 from jaxbiped.solve._trajectory import Trajectory
@@ -142,7 +142,7 @@ def _tangent_of(found: Trajectory, t_dot: Scalar, leaf_dots: list[Scalar]) -> Tr
         )
         moving = dataclasses.replace(moving, mode_history=unknown)
     return jtu.tree_map(
-        lambda dot, leaf: dot.astype(leaf.dtype) if _is_real(leaf) else dot, moving, found
+        lambda dot, leaf: dot.astype(leaf.dtype) if is_real(leaf) else dot, moving, found
     )
 
 
@@ -157,10 +157,6 @@ def _is_still(dot: object) -> bool:
 
 
 def _no_tangent(leaf: Scalar) -> Scalar | np.ndarray:
-    if _is_real(leaf):
+    if is_real(leaf):
         return jnp.zeros_like(leaf)
     return np.zeros(jnp.shape(leaf), dtype=jax.dtypes.float0)
-
-
-def _is_real(leaf: Scalar) -> bool:
-    return jnp.issubdtype(jnp.result_type(leaf), jnp.inexact)

@@ -68,7 +68,7 @@ def simulate(
         state: start, a `State`; if friction has bristles, also a `BristleState` (in a `State`, they
             are zero). The precision of the solve is that of the most precise leaf, by default 64
             bits. A redundant scene also accepts a redundant state, which is first moved onto its
-            constraints (see `consistent_state`).
+            constraints (see `consistent_state`), and always has 64 bits.
         duration: simulated time [s].
         footsteps: number of footsteps (heel strikes) to simulate. If `duration` is also given, the
             first limit that is reached ends the walk; its outcome is "walking" in both cases.

@@ -9,7 +9,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import Scalar, select
+from jaxbiped._types import Scalar, in_64_bits, select
 from jaxbiped.compiler import CUDA, host_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
@@ -87,11 +87,9 @@ def slopes_of(
         places, active: of the leaves that are differentiated.
         device: whether CUDA devices carry the columns; else it is lanes where they can, else XLA.
     """
-    wide: tuple[Scene, PyTree, PyTree] = jtu.tree_map(_widened, (scene, state, found.state))
-    scene, state, saved = wide
-    t = _widened(found.t)
+    scene, state, saved, t = in_64_bits((scene, state, found.state, found.t))
     if found.arrivals is not None:
-        t = jnp.concatenate([_widened(found.arrivals.t), t])
+        t = jnp.concatenate([in_64_bits(found.arrivals.t), t])
     by_clock = jnp.isfinite(t)
     if until is not None:
         last = jnp.arange(len(t)) == len(t) - 1
@@ -178,10 +176,6 @@ def _at_events(
     return found
 
 
-def _widened(leaf: Scalar) -> Scalar:
-    return jnp.asarray(leaf, jnp.float64)
-
-
 class _Strike(NamedTuple):
     """A heel strike's time and the state after it, with their derivatives."""
 
@@ -211,7 +205,7 @@ def rigid_slopes_of(
         end, ending: when and how the walk ended.
         places, active: of the leaves that are differentiated.
     """
-    scene, state = jtu.tree_map(_widened, (walk.scene, walk.state))
+    scene, state = in_64_bits((walk.scene, walk.state))
     start, seeded = seeded_directions(scene, state, places, active)
     watch = _IN_MODES if hasattr(state, "mode") else _ROLLING
     how = motion_solve(watch, Rodas5P(), walk.rtol)

@@ -57,6 +57,14 @@ def test_far_from_a_gait_derivatives_are_those_in_the_state():
     np.testing.assert_allclose(gait.return_jacobian[m, m - 1], slope, rtol=2e-3)
 
 
+def test_a_guess_in_float32_is_followed_in_64_bits():
+    coarse = jax.tree.map(np.float32, jb.seed_state())
+    starts = coarse, jax.tree.map(float, coarse)
+    periods = [jb.find_gait(jb.seed_scene(), y).measures.period for y in starts]
+    times = [jb.return_map(jb.seed_scene(), y).time for y in starts]
+    assert (float(periods[0]), float(times[0])) == (float(periods[1]), float(times[1]))
+
+
 def test_a_start_that_falls_gives_no_gait():
     state = jb.seed_state()._replace(omega_2=jnp.asarray(-3.0), hip_vx=jnp.asarray(1.5))
     gait = jb.find_gait(jb.seed_scene(), state)

@@ -258,6 +258,19 @@ def test_derivatives_do_not_depend_on_the_engine():
     np.testing.assert_allclose(xla, lanes, rtol=1e-12)
 
 
+def test_a_lane_that_is_not_allowed_has_no_derivative():
+    """By itself it is refused by name."""
+
+    def end(mass):
+        scene = jb.with_parameters(SEED, {"m": mass})
+        return jb.simulate(scene, START, duration=0.02, save="end").final.hip_z
+
+    values, slopes = jax.vmap(jax.value_and_grad(end))(jnp.array([1.0, -1.0]))
+    assert np.isnan(values).tolist() == np.isnan(slopes).tolist() == [False, True]
+    with pytest.raises(jb.ArgumentError, match=r"^m = -1 is not allowed"):
+        jax.grad(end)(-1.0)
+
+
 @pytest.mark.parametrize(
     ("differentiate", "how", "said"),
     [

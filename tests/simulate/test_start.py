@@ -30,6 +30,11 @@ def test_one_leaf_in_float32_loses_nothing_of_the_others():
         assert {leaf.dtype for leaf in start} == {np.dtype("float64")}
 
 
+def test_a_redundant_start_is_put_on_its_constraints_in_64_bits():
+    start, _ = start_for(jb.RedundantScene(SEED), jax.tree.map(np.float32, jb.seed_state()))
+    assert {leaf.dtype for leaf in start} == {np.dtype("float64")}
+
+
 def test_plain_numbers_are_float64():
     start, _ = start_for(SEED, jb.State(*map(float, jb.seed_state())))
     assert {leaf.dtype for leaf in start} == {np.dtype("float64")}
