@@ -270,12 +270,13 @@ def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeCha
     count = len(periods)
     if scene.actuation is None and not scene.mechanism.joints:
         return _Works(*[np.zeros(count) for _ in _Works._fields])
-    # Powers jump where the mode changes, so that no panel straddles a change.
+    # Powers jump where the mode changes, so that no panel straddles a change, and settle behind it.
     even = np.linspace(0.0, 1.0, _PANELS + 1)
-    edges = [
-        np.unique(np.append(period * even, changes.since[changes.number == k]))
-        for k, period in enumerate(periods)
-    ]
+    early = np.append(0.0, even[1] * 0.5 ** np.arange(5))
+    edges = []
+    for k, period in enumerate(periods):
+        behind = np.add.outer([0.0, *changes.since[changes.number == k]], period * early)
+        edges.append(np.unique(np.minimum(np.append(period * even, behind), period)))
     number = np.repeat(np.arange(count), [len(each) - 1 for each in edges])
     widths = np.concatenate([np.diff(each) for each in edges])
     begins = np.concatenate([each[:-1] for each in edges])
