@@ -189,6 +189,16 @@ def test_equal_parts_are_computed_once_and_unused_ones_never():
     assert compiled(wasteful, ()).kernel.instructions() < once + 15
 
 
+def test_what_numbers_alone_decide_is_known_before():
+    """A diagonal leaves nothing to compute but its own entries."""
+
+    def scaled(x, _):
+        row, column = jnp.arange(3)[:, None], jnp.arange(3)
+        return jnp.where(row + 1 <= column, x, 0.0) + jnp.where(row == column, x * x, 0.0)
+
+    assert count_operations(scaled, 2.0, ()) == {"fmul": 1}
+
+
 def test_equal_calls_are_lowered_once():
     """Their conditionals, too, which are not shared by themselves."""
     called = jax.jit(lambda x: jax.lax.cond(x > 0.5, jnp.exp, lambda x: 2.0 * x, x))
