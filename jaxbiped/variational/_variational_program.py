@@ -173,7 +173,8 @@ class AdaptiveColumns:
         zero, field = jnp.zeros(()), self.watch.field
         rates = field(zero, now.state, given.args)
         by_state, by_parameter = at_fixed_time(rates, now.columns, now.shifts)
-        by_parameter = jnp.where(given.carries_parameters > 0.0, by_parameter, jnp.nan)
+        unknown = jnp.where(given.carries_parameters > 0.0, 0.0, jnp.nan)
+        by_parameter = jax.lax.map(lambda column: column + unknown, by_parameter)
         seeded, columns = self._seeded(given), jnp.concatenate([by_state, by_parameter]).T
         y, t, peak = Tangents(now.state, columns), now.t, jnp.zeros(())
         time_columns = peak_columns = jnp.zeros(columns.shape[1])

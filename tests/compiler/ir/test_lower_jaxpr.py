@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.compiler.runtime._machine_code import host
+from jaxbiped.compiler.runtime._program import count_operations
 from tests.compiler.one_shot import compiled, evaluate, stepped
 
 POINTS = np.concatenate([np.linspace(-3.0, 3.0, 21), [0.0, np.inf, -np.inf, np.nan]])
