@@ -10,7 +10,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Primitive, jaxpr_as_fun
+from jax.extend.core import Jaxpr, JaxprEqn, Primitive
 from jax.interpreters import ad, batching, mlir
 
 from jaxbiped._types import Scalar
@@ -41,10 +41,11 @@ def partial_derivatives(
     In a function of arrays none is known to be zero.
     """
     program, consts = _tangents_of(function, list(inputs))
+    rows: Sequence[Sequence[Weight]]
     try:
         rows = eliminated_rows(program, consts, inputs, _TRACED)
     except NoRuleError:
-        rows = list(pulled_back(*consts, *inputs, program=program))
+        rows = [[*row] for row in pulled_back(*consts, *inputs, program=program)]
     dtype = jnp.result_type(inputs[0])
     return {
         (i, j): jnp.asarray(weight, dtype=dtype)
@@ -76,13 +77,12 @@ def parted(program: Jaxpr, operands: Sequence[Any]) -> tuple[Sequence[Any], Sequ
 def pulled_back(*operands: Scalar, program: Jaxpr) -> Scalar:
     """`JACOBIAN` by reverse mode, which has rules for all operations."""
     consts, inputs = parted(program, operands)
-    run = jaxpr_as_fun(ClosedJaxpr(program, consts))
-    pull = jax.linear_transpose(lambda *tangents: run(*inputs, *tangents), *inputs)
+    run = functools.partial(jax.core.eval_jaxpr, program, consts, *inputs)
+    pull = jax.linear_transpose(run, *inputs)
     rows = jnp.eye(len(program.outvars), dtype=jnp.result_type(inputs[0]))
     return jnp.stack(jax.vmap(lambda *row: pull(list(row)))(*rows), axis=-1)
 
 
-@JACOBIAN.def_abstract_eval
 def _shape(*operands: Any, program: Jaxpr) -> Any:
     _, inputs = parted(program, operands)
     return jax.core.ShapedArray((len(program.outvars), len(inputs)), inputs[0].dtype)
@@ -98,6 +98,7 @@ def _differentiated(primals: Any, tangents: Any, **how: Any) -> Any:
 
 
 JACOBIAN.def_impl(pulled_back)
+JACOBIAN.def_abstract_eval(_shape)
 mlir.register_lowering(JACOBIAN, mlir.lower_fun(pulled_back, multiple_results=False))
 batching.primitive_batchers[JACOBIAN] = _batching
 ad.primitive_jvps[JACOBIAN] = _differentiated

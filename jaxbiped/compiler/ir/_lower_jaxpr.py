@@ -242,9 +242,9 @@ def _size(jaxpr: Jaxpr) -> int:
     """How many equations a jaxpr has, with those inside of calls and of derivatives."""
     count = 0
     for equation in jaxpr.eqns:
-        inner, tangents = called_program(equation), equation.params.get("program")
+        inner = called_program(equation)
         count += 1 if inner is None else _size(inner[0])
-        count += _size(tangents) if equation.primitive is JACOBIAN else 0
+        count += _size(equation.params["program"]) if equation.primitive is JACOBIAN else 0
     return count
 
 
