@@ -232,7 +232,7 @@ def optimised_module(
 
 
 def _load(stored: bytes, machine: llvm.TargetMachine, entry: str) -> MachineCode:
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly("", llvm.create_context()), machine)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     engine.add_object_file(llvm.ObjectFileRef.from_data(stored))
     engine.finalize_object()
     return MachineCode(engine, entry)
