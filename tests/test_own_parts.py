@@ -199,9 +199,6 @@ def test_an_engine():
             self.runs += 1
             return XLA.run(request)
 
-        def jacobian(self, function, inputs):
-            return XLA.jacobian(function, inputs)
-
     own = BY_NAME["counting"] = Counting()
     same(*(
         jb.rigid_walk(RIGID, ROLLING, footsteps=2, engine=name) for name in ("counting", "xla")

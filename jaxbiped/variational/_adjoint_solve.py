@@ -18,7 +18,7 @@ from jaxtyping import PyTree, PyTreeDef
 
 from jaxbiped._types import Scalar
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import AbstractEngine, Program, Recorded, Recording, Request
+from jaxbiped.compiler import AbstractEngine, Program, Recorded, Recording, Request, jacobian
 from jaxbiped.variational._collocated_step import Linear, Rows, linearise_about
 from jaxbiped.variational._first_variation import (
     FirstVariation,
@@ -128,7 +128,7 @@ def carry_tangents(
     """Leading tangents (v, c) carried along a motion to its arrival; and the steps of that."""
     count = nodes.steps.astype(leading.dtype)
     request = Request(
-        _program(_Kind.of(engine, flow), False),
+        _program(_Kind.of(flow), False),
         FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, leading, count),
         room=nodes.ends.room,
         stream=nodes.ends,
@@ -159,7 +159,7 @@ def pull_back(
         after: adjoints behind the arrival, of tangents on the section.
     """
     given = _Given(flow.args.args, nodes.arrival, leading, after)
-    program = _program(_Kind.of(engine, flow), True)
+    program = _program(_Kind.of(flow), True)
     adjoints: Adjoints = engine.run(Request(program, given, stream=steps, quick=True)).outputs
     return adjoints
 
@@ -167,15 +167,14 @@ def pull_back(
 class _Kind(NamedTuple):
     """What programs are compiled for."""
 
-    engine: AbstractEngine
     system: AbstractSystem
     arrival: Arrival
     active: tuple[int, ...]
     state: PyTreeDef
 
     @staticmethod
-    def of(engine: AbstractEngine, flow: Flow) -> "_Kind":
-        return _Kind(engine, flow.system, flow.arrival, flow.args.active, flow.structure)
+    def of(flow: Flow) -> "_Kind":
+        return _Kind(flow.system, flow.arrival, flow.args.active, flow.structure)
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
@@ -191,21 +190,21 @@ def _program(kind: _Kind, backwards: bool) -> Program:
 
     c = kind.state.num_leaves
     if not backwards:
-        return FirstVariationSolve(kind.engine, flow, 1 + c).program()
-    return _AdjointSolve(kind.engine, flow, Step.zero(c, COUNT)).program()
+        return FirstVariationSolve(flow, 1 + c).program()
+    return _AdjointSolve(flow, Step.zero(c, COUNT)).program()
 
 
 class _AdjointSolve:
     """The functions of the program: its input stream's rows are steps, read backwards."""
 
-    def __init__(self, engine: AbstractEngine, flow: Callable[[_Given], Flow], step: Step) -> None:
-        self.engine, self.flow = engine, flow
+    def __init__(self, flow: Callable[[_Given], Flow], step: Step) -> None:
+        self.flow = flow
         row, self.read = ravel_pytree(step)
         self.size = len(row)
 
     def __fingerprint__(self) -> object:
         """See `jaxbiped.caching._fingerprint`: a row is read as one of a step of this size."""
-        return self.engine, self.flow, self.size
+        return self.flow, self.size
 
     def program(self) -> Program:
         return Program(self.start, self.attempt, self.finish, stream=self.size, backwards=True)
@@ -216,13 +215,13 @@ class _AdjointSolve:
         order, parameters = field_order(flow)
         z = jnp.concatenate([flow.earlier(given.arrival, parameters)[1:], parameters])
         after, c = given.after, len(given.after.family)
-        jacobian = self.engine.jacobian(lambda z: flow.rates(z[:c], z[c:]), list(z))
+        by_state = jacobian(lambda z: flow.rates(z[:c], z[c:]), list(z))
 
         def behind(before: Adjoints) -> tuple[Scalar, Scalar]:
             family, every = jnp.concatenate([before.family, before.parameters]), []
             for leading, second in zip(given.leading.leading, before.second, strict=True):
                 v, q = jnp.concatenate([leading, jnp.zeros_like(parameters)]), family
-                v, q, second = on_section(flow, jacobian, z, v, q, second)
+                v, q, second = on_section(flow, by_state, z, v, q, second)
                 reached, second = after_reset(flow, z, v, q, second)
                 every.append(second)
             return reached, jnp.stack(every)
@@ -239,7 +238,7 @@ class _AdjointSolve:
     def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
         flow, step = self.flow(given), self.read(row)
         order, parameters = field_order(flow)
-        rows = Rows(self.engine, flow.rates, order, list(parameters))
+        rows = Rows(flow.rates, order, list(parameters))
         crossed, ends = step.which > 0.0, (step.before, now.state)
         linear = linearise_about(rows, *ends, step.points, step.share, crossed)
         early = jax.lax.cond(

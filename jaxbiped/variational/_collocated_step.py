@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import AbstractEngine
+from jaxbiped.compiler import jacobian
 from jaxbiped.linalg._elimination import BlockFactors, factorise
 from jaxbiped.solve.rosenbrock._linearisation import linearise
 from jaxbiped.variational._flow import SIDES, jump_of
@@ -181,11 +181,8 @@ class Stages(NamedTuple):
 class Rows:
     """Rates and their derivatives at one point, of `field` for components in this `order`."""
 
-    def __init__(
-        self, engine: AbstractEngine, field: Field, order: Order, parameters: Sequence[Scalar]
-    ) -> None:
+    def __init__(self, field: Field, order: Order, parameters: Sequence[Scalar]) -> None:
         self.field, self.order, self.parameters = field, order, list(parameters)
-        self.jacobian = engine.jacobian
         # Compiled by themselves, these are traced once, not at each use.
         self.by_state, self.curved = jax.jit(self._by_state), jax.jit(self._curved)
 
@@ -194,7 +191,7 @@ class Rows:
 
     def _by_state(self, y: Scalar) -> Scalar:
         """Derivatives of the kept rates with respect to the components, (k, c)."""
-        return self.order.sorted(self.jacobian(lambda z: self._kept(z, self.parameters), list(y)))
+        return self.order.sorted(jacobian(lambda z: self._kept(z, self.parameters), list(y)))
 
     def gradient(self, y: Scalar) -> Scalar:
         """Derivatives of the kept rates, (k, n)."""
@@ -219,7 +216,7 @@ class Rows:
 
     def _by_all(self, function: Callable[..., list[Scalar]], y: list[Scalar]) -> Scalar:
         c = len(y)
-        found = self.jacobian(lambda z: function(z[:c], z[c:]), [*y, *self.parameters])
+        found = jacobian(lambda z: function(z[:c], z[c:]), [*y, *self.parameters])
         return jnp.concatenate([self.order.sorted(found[:, :c]), found[:, c:]], axis=1)
 
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, VectorField
-from jaxbiped.compiler import LANES
+from jaxbiped.compiler import jacobian
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve.rosenbrock._abstract_linearisation import Components
 from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm
@@ -129,7 +129,7 @@ def _derivatives(
         )
 
     def at_point(point: Scalar) -> tuple[Scalar, Scalar]:
-        return apart(LANES.jacobian(rates, [*point, *parameters]), 0.0)
+        return apart(jacobian(rates, [*point, *parameters]), 0.0)
 
     def at_start(both: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
         along, constant = list(both[0]), both[1]
@@ -137,7 +137,7 @@ def _derivatives(
         def directional_derivative(z: Components) -> Components:
             return jax.jvp(lambda y: kept_rates(y, z[count:]), (z[:count],), (along,))[1]
 
-        return apart(LANES.jacobian(directional_derivative, [*start, *parameters]), constant)
+        return apart(jacobian(directional_derivative, [*start, *parameters]), constant)
 
     # Two short loops: what one keeps in registers and caches the other one need not.
     stacked = [jnp.stack([jnp.stack(each) for each in array]) for array in (points, directions)]

@@ -17,7 +17,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.compiler import AbstractEngine, Program
+from jaxbiped.compiler import Program
 from jaxbiped.variational._collocated_step import (
     KnownStep,
     Order,
@@ -129,10 +129,8 @@ class FirstVariationSolve:
     stays in the tangents.
     """
 
-    def __init__(
-        self, engine: AbstractEngine, flow: Callable[[FirstVariationInputs], Flow], row: int
-    ) -> None:
-        self.engine, self.flow, self.row = engine, flow, row
+    def __init__(self, flow: Callable[[FirstVariationInputs], Flow], row: int) -> None:
+        self.flow, self.row = flow, row
 
     def program(self) -> Program:
         return Program(self.start, self.attempt, self.finish, record=self.record, stream=self.row)
@@ -174,7 +172,7 @@ class FirstVariationSolve:
             fresh=now.fresh,
             crossed=crossing.crossed,
         )
-        rows = Rows(self.engine, flow.rates, order, list(parameters))
+        rows = Rows(flow.rates, order, list(parameters))
         points, share, velocity = collocate_step(rows, known)
         stages = Stages.of(order, share, jax.lax.map(rows.by_state, points))
         begun, _ = without_flow(now.leading, order.sorted(velocity), now.fresh)

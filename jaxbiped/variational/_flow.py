@@ -144,10 +144,10 @@ def earlier_at(flow: Flow, landed: Scalar, which: Scalar, parameters: Scalar) ->
     """
     z = jnp.concatenate([landed, parameters])
 
-    def values(z: Scalar) -> Scalar:
-        return jnp.stack([jnp.zeros(()), *(surface.value for surface in flow.surfaces(z))])
+    def value(z: Scalar) -> Scalar:
+        return _pick(which, [surface.value for surface in flow.surfaces(z)], jnp.zeros(()))
 
-    gradient = _pick(which, list(jax.jacrev(values)(z)[1:]), jnp.zeros_like(z))
+    gradient = jax.grad(value)(z)
     return gradient / jnp.where(which > 0, gradient @ _rate(flow, parameters)(z), 1.0)
 
 
@@ -169,12 +169,17 @@ def jump_of(at_sides: Scalar) -> Scalar:
     Extrapolated to the switch itself, in the root of time: that is how Hertz's law leaves it. NaN
     where an entry grows without bound towards it, as behind Tsuji's touchdown.
     """
-    new, old = (8.0 * at_sides[k] - 6.0 * at_sides[k + 1] + at_sides[k + 2] for k in (0, 3))
-    # Times are 1 to 4 to 16: what goes as t^q there has a ratio of 4^-q, above 1 if q < 0.
-    changes = jnp.abs(at_sides[:-1] - at_sides[1:])
-    near, far = changes[0::3], changes[1::3]
-    steep = (near > _STEEPER * far) & (near > _LARGE * jnp.max(jnp.abs(at_sides)))
-    return jnp.where(jnp.any(steep), jnp.nan, (new - old) / 3.0)
+
+    def row(sides: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+        new, old = (8.0 * sides[k] - 6.0 * sides[k + 1] + sides[k + 2] for k in (0, 3))
+        # Times are 1 to 4 to 16: what goes as t^q there has a ratio of 4^-q, above 1 if q < 0.
+        changes = jnp.abs(sides[:-1] - sides[1:])
+        near, far = changes[0::3], changes[1::3]
+        steep = jnp.where(near > _STEEPER * far, near, 0.0)
+        return (new - old) / 3.0, jnp.max(steep), jnp.max(jnp.abs(sides))
+
+    jump, steep, largest = jax.lax.map(row, jnp.moveaxis(at_sides, 1, 0))
+    return jnp.where(jnp.max(steep) > _LARGE * jnp.max(largest), jnp.nan, jump)
 
 
 def on_section(

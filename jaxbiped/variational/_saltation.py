@@ -92,7 +92,7 @@ def at_fixed_time(
     """Columns at a fixed time where the state changes at these rates."""
     velocity = jnp.stack(jtu.tree_leaves(rates))
     pairs = zip(columns, shifts, strict=True)
-    return [column - shift[:, None] * velocity for column, shift in pairs]
+    return [jax.lax.map(lambda each: each[0] - each[1] * velocity, pair) for pair in pairs]
 
 
 class Saltation(NamedTuple):

@@ -170,10 +170,10 @@ class AdaptiveColumns:
         ended = jnp.where(now.t >= given.max_time, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
-        zero, field = jnp.zeros(()), self.watch.field
-        rates = field(zero, now.state, given.args)
+        zero, field, carries = jnp.zeros(()), self.watch.field, given.carries_parameters > 0.0
+        rates, unknown = field(zero, now.state, given.args), jnp.where(carries, 0.0, jnp.nan)
         by_state, by_parameter = at_fixed_time(rates, now.columns, now.shifts)
-        by_parameter = jnp.where(given.carries_parameters > 0.0, by_parameter, jnp.nan)
+        by_parameter = jax.lax.map(lambda column: column + unknown, by_parameter)
         seeded, columns = self._seeded(given), jnp.concatenate([by_state, by_parameter]).T
         y, t, peak = Tangents(now.state, columns), now.t, jnp.zeros(())
         time_columns = peak_columns = jnp.zeros(columns.shape[1])

@@ -71,3 +71,20 @@ def test_spells_that_the_user_made_longer_stay_so() -> None:
     with long_trace():
         assert sys.getswitchinterval() == pytest.approx(LONG)
     assert sys.getswitchinterval() == pytest.approx(LONG)
+
+
+def test_what_a_trace_made_counts_as_old_when_it_ends() -> None:
+    gc.unfreeze()  # the suite's own
+    with long_trace():
+        made = [[None] for _ in range(5000)]
+    assert not any(each is made[0] for each in gc.get_objects(generation=0))
+
+
+def test_what_the_user_froze_stays_frozen() -> None:
+    gc.freeze()
+    try:
+        with long_trace():
+            pass
+        assert gc.get_freeze_count()
+    finally:
+        gc.unfreeze()

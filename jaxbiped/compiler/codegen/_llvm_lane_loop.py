@@ -4,7 +4,7 @@ A lane whose simulation is over takes the next one at once, so that a long simul
 up its neighbours.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from jaxbiped.compiler.codegen._lane_scheduler import LaneScheduler, Sizes
 from jaxbiped.compiler.codegen._llvm_from_graph import GraphWriter, Place
 from jaxbiped.compiler.codegen._llvm_function import BYTES, WEIGHTS, vector
 from jaxbiped.compiler.ir._elementwise_primitives import Array
-from jaxbiped.compiler.ir._graph import Kind, Value
+from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.ir._liveness import Liveness
 from jaxbiped.compiler.runtime._program import Graph
 
@@ -68,13 +68,31 @@ class _Kernel:
         for offset, value in enumerate(graph.row):
             w.homes[id(value)] = Place(rooms.row, offset)
         w.homes[id(graph.next_time)] = Place(rooms.next_time, 0)
+        blocks = (graph.begin, graph.body, graph.end, graph.notes)
+        used = self._used_in((*graph.results(), *blocks))
+        rooms_of: dict[Kind, list[Value]] = {}
         for value in graph.prepare.values:
             stored = value in self.needed and id(value) not in self.needed.absorbed
-            if not stored or value.op in ("const", "input", "if"):
-                continue
-            self.kept.append((value, Place(self._zeroed_room(value.kind, 1), 0)))
+            if stored and id(value) in used and value.op not in ("const", "input", "if"):
+                rooms_of.setdefault(value.kind, []).append(value)
+        for kind, values in rooms_of.items():
+            pointer = self._zeroed_room(kind, len(values))
+            self.kept += [(value, Place(pointer, i)) for i, value in enumerate(values)]
         for array in graph.carried:
             self._carry_room(array)
+
+    def _used_in(self, args: Iterable[object]) -> set[int]:
+        """Ids of arguments of operations, and of all that blocks among them take from outside."""
+        used: set[int] = set()
+        for arg in args:
+            if isinstance(arg, Value):
+                used.add(id(arg))
+            elif isinstance(arg, Block):
+                for value in arg.values:
+                    used |= self._used_in(value.args) if value in self.needed else set()
+            elif isinstance(arg, list | tuple):
+                used |= self._used_in(arg)
+        return used
 
     def _carry_room(self, array: Array) -> None:
         """Memory for what is carried: along its first axis one behind the other, for maps."""

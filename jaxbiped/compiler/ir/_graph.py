@@ -187,6 +187,7 @@ def _ieee(function: Callable[..., float]) -> Callable[..., float]:
     return apply
 
 
+_ORDERS = {"lt": operator.lt, "le": operator.le, "gt": operator.gt, "ge": operator.ge}
 _NUMBERS: dict[str, Callable[..., float]] = {
     "fadd": _ieee(operator.add),
     "fsub": _ieee(operator.sub),
@@ -198,6 +199,13 @@ _NUMBERS: dict[str, Callable[..., float]] = {
     "and": operator.and_,
     "or": operator.or_,
     "xor": operator.xor,
+    "not": operator.not_,
+    "add": operator.add,
+    "sub": operator.sub,
+    **{f"fcmp o{how}": compare for how, compare in _ORDERS.items()},
+    **{f"icmp s{how}": compare for how, compare in _ORDERS.items()},
+    "icmp eq": operator.eq,
+    "icmp ne": operator.ne,
 }
 
 _FOLDED = {*_NUMBERS, "select"}

@@ -3,9 +3,11 @@
 Arrays disappear here: each entry becomes a value of its own, which a lane can keep in a register.
 """
 
+import functools
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
+import jax
 import numpy as np
 import numpy.typing as npt
 from jax.extend.core import Jaxpr, JaxprEqn, Literal, Var
@@ -23,6 +25,13 @@ from jaxbiped.compiler.ir._elementwise_primitives import (
     elementwise,
 )
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
+from jaxbiped.compiler.ir._jacobian import JACOBIAN, parted, pulled_back
+from jaxbiped.compiler.ir._vertex_elimination import (
+    Arithmetic,
+    NoRuleError,
+    Weight,
+    eliminated_rows,
+)
 
 _LONGEST_UNROLLED, _LARGEST_UNROLLED = 4, 2000
 """Loops over arrays of up to this length are written out, and up to so many equations in all."""
@@ -49,9 +58,7 @@ def lower_jaxpr(
     known.update(zip(jaxpr.invars, args, strict=True))
 
     def read(atom: Atom) -> Array:
-        if isinstance(atom, Literal):
-            return _constant(block, np.asarray(atom.val, dtype=atom.aval.dtype))  # type: ignore[attr-defined]
-        return known[atom]
+        return _literal(block, atom) if isinstance(atom, Literal) else known[atom]
 
     for equation in jaxpr.eqns:
         inputs = [read(atom) for atom in equation.invars]
@@ -67,6 +74,10 @@ def lower_jaxpr(
             ) from None
         known.update(zip(equation.outvars, results, strict=True))
     return [read(atom) for atom in jaxpr.outvars]
+
+
+def _literal(block: Block, atom: Literal) -> Array:
+    return _constant(block, np.asarray(atom.val, dtype=atom.aval.dtype))  # type: ignore[attr-defined]
 
 
 def _constant(block: Block, value: npt.ArrayLike) -> Array:
@@ -103,7 +114,52 @@ def _apply(block: Block, equation: JaxprEqn, inputs: list[Array]) -> list[Array]
         return _branches(block, params["branches"], inputs)
     if name == "scan":
         return _scan(block, params, inputs)
+    if equation.primitive is JACOBIAN:
+        return _jacobian(block, inputs, **params)
     raise NotImplementedError
+
+
+def _jacobian(block: Block, operands: list[Array], program: Jaxpr) -> list[Array]:
+    consts, inputs = parted(program, operands)
+    kind = inputs[0].item().kind
+    try:
+        rows = eliminated_rows(program, consts, inputs, _arithmetic(block, kind))
+    except NoRuleError:
+        shapes = [v.aval for v in (*program.constvars, *program.invars[: len(inputs)])]
+        closed = jax.make_jaxpr(functools.partial(pulled_back, program=program))(*shapes)
+        return lower_jaxpr(block, closed.jaxpr, closed.consts, operands)
+    values = [_value(block, kind, weight) for row in rows for weight in row]
+    return [array_of(values, (len(rows), len(inputs)))]
+
+
+def _value(block: Block, kind: Kind, weight: Weight) -> Value:
+    """A weight that may be a plain number."""
+    return block.const(weight, kind) if isinstance(weight, float) else weight
+
+
+def _arithmetic(block: Block, kind: Kind) -> Arithmetic:
+    """Of a block's values, the weights of this kind."""
+
+    def weight(value: Value) -> Weight:
+        return value if value.constant is None else float(value.constant)
+
+    def operation(op: str, *args: Weight) -> Weight:
+        return weight(block.add(op, *(_value(block, kind, arg) for arg in args), kind=kind))
+
+    def choice(which: Array) -> tuple[Weight, Weight]:
+        here = convert(block, which.item(), Kind.BOOL)
+        return operation("select", here, 1.0, 0.0), operation("select", here, 0.0, 1.0)
+
+    return Arithmetic(
+        literal=functools.partial(_literal, block),
+        evaluate=functools.partial(_apply, block),
+        weight=lambda array: weight(array.item()),
+        product=functools.partial(operation, "fmul"),
+        sum=functools.partial(operation, "fadd"),
+        negative=functools.partial(operation, "fneg"),
+        inverse=functools.partial(operation, "fdiv", 1.0),
+        choice=choice,
+    )
 
 
 def _branches(block: Block, branches: Sequence[ClosedJaxpr], inputs: list[Array]) -> list[Array]:
@@ -183,9 +239,13 @@ def _scan(block: Block, params: dict[str, Any], inputs: list[Array]) -> list[Arr
 
 
 def _size(jaxpr: Jaxpr) -> int:
-    """How many equations a jaxpr has, with those inside of calls."""
-    inner = [called_program(equation) for equation in jaxpr.eqns]
-    return sum(1 if each is None else _size(each[0]) for each in inner)
+    """How many equations a jaxpr has, with those inside of calls and of derivatives."""
+    count = 0
+    for equation in jaxpr.eqns:
+        inner = called_program(equation)
+        count += 1 if inner is None else _size(inner[0])
+        count += _size(equation.params["program"]) if equation.primitive is JACOBIAN else 0
+    return count
 
 
 def _repeat(

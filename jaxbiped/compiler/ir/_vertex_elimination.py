@@ -8,59 +8,57 @@ there were, wherever it is (Griewank and Walther, Evaluating Derivatives, chapte
 
 import heapq
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
-import jax
-import jax.numpy as jnp
 from jax.extend.core import Jaxpr, JaxprEqn, Literal, Var
 
 from jaxbiped._jax_versions import called_program
-from jaxbiped._types import Numbers, Scalar
 
-Weight: TypeAlias = float | Scalar
-"""Of an edge: a traced scalar, or a plain number."""
+Weight: TypeAlias = Any
+"""Of an edge: what an `Arithmetic` computes with, or a plain number."""
 _PASSED_ON = ("copy", "copy_p", "convert_element_type", "optimization_barrier", "neg")
 
 
-def jacobian(function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]) -> Scalar:
-    """Derivatives of every output with respect to every input, shape (outputs, inputs)."""
-    rows, dtype = _rows(function, list(inputs)), jnp.result_type(inputs[0])
-    return jnp.stack([jnp.stack([jnp.asarray(w, dtype=dtype) for w in row]) for row in rows])
+class Arithmetic(NamedTuple):
+    """What known values and weights of edges are in a compiler, and how they are computed.
 
-
-def partial_derivatives(
-    function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]
-) -> dict[tuple[int, int], Scalar]:
-    """Derivatives by (output, input), without those that are zero whatever the inputs.
-
-    In a function of arrays none is known to be zero.
+    Attributes:
+        literal: a program's constant as a known value.
+        evaluate: results of an equation of known values.
+        weight: a known value as a weight.
+        product, sum, negative, inverse: of weights that are not all plain numbers.
+        choice: 1 where a condition holds and 0 elsewhere, and the other way about.
     """
-    dtype = jnp.result_type(inputs[0])
-    return {
-        (i, j): jnp.asarray(weight, dtype=dtype)
-        for i, row in enumerate(_rows(function, list(inputs)))
-        for j, weight in enumerate(row)
-        if not _is(weight, 0.0)
-    }
+
+    literal: Callable[[Literal], Any]
+    evaluate: Callable[[JaxprEqn, list[Any]], Sequence[Any]]
+    weight: Callable[[Any], Weight]
+    product: Callable[[Weight, Weight], Weight]
+    sum: Callable[[Weight, Weight], Weight]
+    negative: Callable[[Weight], Weight]
+    inverse: Callable[[Weight], Weight]
+    choice: Callable[[Any], tuple[Weight, Weight]]
 
 
-def _rows(
-    function: Callable[[list[Scalar]], list[Scalar]], inputs: list[Scalar]
+def eliminated_rows(
+    program: Jaxpr, consts: Sequence[Any], inputs: Sequence[Any], arithmetic: Arithmetic
 ) -> list[list[Weight]]:
-    outputs, pushed = jax.linearize(function, inputs)
-    closed, graph = jax.make_jaxpr(pushed)(inputs), _Graph(len(inputs))
-    try:
-        ends = _linear(graph, closed.jaxpr, closed.consts, list(range(len(inputs))))
-    except _NoRuleError:
-        pull = jax.linear_transpose(pushed, inputs)
-        unit = jnp.eye(len(outputs))
-        return [pull(list(row))[0] for row in unit]
-    found = [graph.output(end) for end in ends]
+    """Derivatives of every output by every input, from the program of their tangents.
+
+    Its arguments are known inputs, and then their tangents, in which it is linear.
+
+    Raises:
+        NoRuleError: an operation is not one of scalars.
+    """
+    count = len(inputs)
+    graph = _Graph(count, arithmetic)
+    given: list[_Operand] = [*map(_Known, inputs), *range(count)]
+    found = [graph.output(end) for end in _linear(graph, program, consts, given)]
     graph.eliminate()
-    return [[graph.weight(i, output) for i in range(len(inputs))] for output in found]
+    return [[graph.weight(i, output) for i in range(count)] for output in found]
 
 
-class _NoRuleError(NotImplementedError):
+class NoRuleError(NotImplementedError):
     """An operation that is not one of scalars."""
 
 
@@ -74,7 +72,7 @@ _ZERO = _Zero()
 class _Known:
     """A value that does not depend on the inputs' tangents."""
 
-    def __init__(self, value: Numbers) -> None:
+    def __init__(self, value: Any) -> None:
         self.value = value
 
 
@@ -85,18 +83,18 @@ _Operand: TypeAlias = int | _Known | _Zero
 class _Graph:
     """Vertices by number, inputs first; edges lead from earlier ones to later ones."""
 
-    def __init__(self, inputs: int) -> None:
-        self.inputs = inputs
+    def __init__(self, inputs: int, arithmetic: Arithmetic) -> None:
+        self.inputs, self.arithmetic = inputs, arithmetic
         self.into: list[dict[int, Weight]] = [{} for _ in range(inputs)]
         self.out_of: list[dict[int, Weight]] = [{} for _ in range(inputs)]
         self.outputs: set[int] = set()
 
     def vertex(self, edges: Sequence[tuple[int, Weight]]) -> "int | _Zero":
         """A sum of earlier ones; itself an earlier one, where it is nothing else."""
-        edges = [(source, weight) for source, weight in edges if not _is(weight, 0.0)]
+        edges = [(source, weight) for source, weight in edges if not is_number(weight, 0.0)]
         if not edges:
             return _ZERO
-        if len(edges) == 1 and _is(edges[0][1], 1.0):
+        if len(edges) == 1 and is_number(edges[0][1], 1.0):
             return edges[0][0]
         return self._new(edges)
 
@@ -138,7 +136,7 @@ class _Graph:
 
     def _join(self, source: int, target: int, weight: Weight) -> None:
         known = self.into[target].get(source)
-        total = weight if known is None else _sum(known, weight)
+        total = weight if known is None else self.arithmetic.sum(known, weight)
         self.into[target][source] = self.out_of[source][target] = total
 
     def _cost(self, v: int) -> int:
@@ -155,28 +153,35 @@ class _Graph:
             del self.out_of[source][v]
         for source, first in before.items():
             for target, second in after.items():
-                self._join(source, target, _product(first, second))
+                self._join(source, target, self._product(first, second))
         return {*before, *after}
+
+    def _product(self, a: Weight, b: Weight) -> Weight:
+        for one, other in ((a, b), (b, a)):
+            if is_number(one, 1.0):
+                return other
+            if is_number(one, -1.0):
+                return -other if isinstance(other, float) else self.arithmetic.negative(other)
+        return self.arithmetic.product(a, b)
 
 
 def _linear(
-    graph: _Graph, jaxpr: Jaxpr, consts: Sequence[Numbers], args: Sequence[_Operand]
+    graph: _Graph, jaxpr: Jaxpr, consts: Sequence[Any], args: Sequence[_Operand]
 ) -> list[_Operand]:
-    """Adds a linear program's vertices; what its results are."""
+    """Adds vertices of a program that is linear in these; what its results are."""
     known: dict[Var, _Operand] = {
         variable: _Known(const) for variable, const in zip(jaxpr.constvars, consts, strict=True)
     }
     known.update(zip(jaxpr.invars, args, strict=True))
 
     def read(atom: Var | Literal) -> _Operand:
-        return _Known(atom.val) if isinstance(atom, Literal) else known[atom]
+        return _Known(graph.arithmetic.literal(atom)) if isinstance(atom, Literal) else known[atom]
 
     for equation in jaxpr.eqns:
         given: list[Any] = [read(atom) for atom in equation.invars]
         inner = called_program(equation)
         if all(isinstance(g, _Known) for g in given):
-            found = equation.primitive.bind(*[g.value for g in given], **equation.params)
-            found = found if equation.primitive.multiple_results else [found]
+            found = graph.arithmetic.evaluate(equation, [g.value for g in given])
             results: list[_Operand] = [_Known(each) for each in found]
         elif inner is not None:
             results = _linear(graph, *inner, given)
@@ -188,7 +193,9 @@ def _linear(
 
 def _vertex(graph: _Graph, equation: JaxprEqn, given: list[Any]) -> int | _Zero:
     """What a linear operation on scalars gives."""
-    name = equation.primitive.name
+    name, numbers = equation.primitive.name, graph.arithmetic
+    if any(v.aval.shape for v in (*equation.invars, *equation.outvars)):  # type: ignore[attr-defined]
+        raise NoRuleError(name)
 
     def scaled(each: _Operand, weight: Weight) -> list[tuple[int, Weight]]:
         # What a linear program knows beforehand of a sum or a choice can only be a zero.
@@ -203,39 +210,15 @@ def _vertex(graph: _Graph, equation: JaxprEqn, given: list[Any]) -> int | _Zero:
     if name == "mul":
         (factor,) = (g.value for g in given if isinstance(g, _Known))
         (other,) = (g for g in given if not isinstance(g, _Known))
-        weight = factor if isinstance(factor, jax.core.Tracer) else float(factor)
-        return graph.vertex(scaled(other, weight))
+        return graph.vertex(scaled(other, numbers.weight(factor)))
     if name == "div":
-        return graph.vertex(scaled(given[0], 1.0 / given[1].value))
+        return graph.vertex(scaled(given[0], numbers.inverse(numbers.weight(given[1].value))))
     if name == "select_n":
-        which = given[0].value
-        no, yes = given[1:]
-        dtype = equation.outvars[0].aval.dtype  # type: ignore[attr-defined]
-        one, zero = jnp.ones((), dtype), jnp.zeros((), dtype)
-        chosen = scaled(yes, jax.lax.select_n(which, zero, one))
-        return graph.vertex([*chosen, *scaled(no, jax.lax.select_n(which, one, zero))])
-    raise _NoRuleError(name)
+        chosen, other = numbers.choice(given[0].value)
+        return graph.vertex([*scaled(given[2], chosen), *scaled(given[1], other)])
+    raise NoRuleError(name)
 
 
-def _is(weight: Weight, number: float) -> bool:
+def is_number(weight: Weight, number: float) -> bool:
+    """Whether it is this plain number."""
     return isinstance(weight, float) and weight == number
-
-
-def _product(a: Weight, b: Weight) -> Weight:
-    for one, other in ((a, b), (b, a)):
-        if _is(one, 1.0):
-            return other
-        if _is(one, -1.0):
-            return _negative(other)
-    return a * b if isinstance(a, float) or isinstance(b, float) else jax.lax.mul(a, b)
-
-
-# Of traced scalars the primitives themselves: NumPy's operators take ten times as long to trace.
-
-
-def _sum(a: Weight, b: Weight) -> Weight:
-    return a + b if isinstance(a, float) or isinstance(b, float) else jax.lax.add(a, b)
-
-
-def _negative(a: Weight) -> Weight:
-    return -a if isinstance(a, float) else jax.lax.neg(a)

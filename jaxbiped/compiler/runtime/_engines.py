@@ -4,7 +4,6 @@ By lanes programs are machine code, one simulation a lane of a vector or a devic
 """
 
 import abc
-from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import jax
@@ -13,10 +12,8 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
-from jaxbiped.compiler.ir._vertex_elimination import jacobian
 from jaxbiped.compiler.runtime._compiled_program import HOST, CompiledProgram
 from jaxbiped.compiler.runtime._lane_call import Schedule
 from jaxbiped.compiler.runtime._primitive import Recording, call
@@ -85,13 +82,6 @@ class AbstractEngine(abc.ABC):
     def run(self, request: Request) -> Result:
         """Runs a request that it can run, at once or as part of a program of JAX."""
 
-    @abc.abstractmethod
-    def jacobian(
-        self, function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]
-    ) -> Scalar:
-        """Derivatives of scalars with respect to scalars, shape (outputs, inputs), in the way that
-        makes the better program here."""
-
 
 class LaneEngine(AbstractEngine):
     """Compiles a program on its first request. Computes in 64 bits; has no derivatives.
@@ -127,12 +117,6 @@ class LaneEngine(AbstractEngine):
         if isinstance(found, Recording):
             return Result(outputs, recording=found)
         return Result(outputs, found)
-
-    def jacobian(
-        self, function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]
-    ) -> Scalar:
-        """By eliminating vertices: fewest operations."""
-        return jacobian(function, inputs)
 
     def compile(self, request: Request) -> CompiledProgram:
         """The compiled program of requests with inputs of these shapes, traced when needed."""

@@ -1,5 +1,6 @@
 """Machine code from LLVM's text for the host's CPU, kept, and the threads that run it."""
 
+import ctypes
 import hashlib
 import os
 import threading
@@ -10,6 +11,7 @@ from typing import NamedTuple
 import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
+from llvmlite.binding import ffi
 
 from jaxbiped._files import THREADS_VARIABLE, VECTOR_VARIABLE, environment_number
 from jaxbiped.caching._caches import Once, bounded_cache
@@ -144,16 +146,38 @@ def stored_code(
     """The code of this name; None where nobody has it, unless the module's `text` is known."""
     with _LOCK:
         code = _LOADED.get(name)
-        if code is None:
-            machine = _target_machine(host, as_written)
-            stored = read_entry(_KIND, f"{name}.o")
-            if stored is None:
-                if text is None:
-                    return None
-                stored = bytes(machine.emit_object(_module(text, machine, as_written)))
-                write_entry(_KIND, f"{name}.o", stored)
-            code = _LOADED[name] = _load(stored, machine, entry)
-        return code
+    if code is None:
+        machine = _target_machine(host, as_written)
+        stored = read_entry(_KIND, f"{name}.o")
+        if stored is None:
+            if text is None:
+                return None
+            stored = _object_code(_module(text, machine, as_written), machine)
+            write_entry(_KIND, f"{name}.o", stored)
+        with _LOCK:
+            code = _LOADED.get(name)
+            if code is None:
+                code = _LOADED[name] = _load(stored, machine, entry)
+    return code
+
+
+def _object_code(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> bytes:
+    """As `machine.emit_object`, which lets no other thread use LLVM meanwhile, for seconds.
+
+    A module in a context of its own shares nothing with others.
+    """
+    library, known = ffi.lib, ffi.lib.LLVMPY_TargetMachineEmitToMemory
+    emit = ctypes.CDLL(library._name, handle=library._handle).LLVMPY_TargetMachineEmitToMemory
+    emit.argtypes, emit.restype = known.argtypes, known.restype
+    reason = ctypes.c_char_p()
+    buffer = emit(machine, module, True, ctypes.byref(reason))
+    if not buffer:
+        raise RuntimeError(reason.value)
+    try:
+        start, size = library.LLVMPY_GetBufferStart(buffer), library.LLVMPY_GetBufferSize(buffer)
+        return ctypes.string_at(start, size)
+    finally:
+        library.LLVMPY_DisposeMemoryBuffer(buffer)
 
 
 def assembly(text: str, host: Host, *, as_written: bool) -> str:
@@ -171,7 +195,7 @@ def _target_machine(host: Host, as_written: bool) -> llvm.TargetMachine:
 def _module(text: str, machine: llvm.TargetMachine, as_written: bool) -> llvm.ModuleRef:
     if not as_written:
         return optimised_module(text, machine)
-    module = llvm.parse_assembly(text)
+    module = llvm.parse_assembly(text, llvm.create_context())
     module.verify()
     return module
 
@@ -195,7 +219,7 @@ def optimised_module(
     text: str, machine: llvm.TargetMachine, *, triple: str | None = None
 ) -> llvm.ModuleRef:
     """A module after LLVM's passes, ready to be written for a machine; `triple` if not the host."""
-    module = llvm.parse_assembly(text)
+    module = llvm.parse_assembly(text, llvm.create_context())
     if triple is not None:
         module.triple, module.data_layout = triple, str(machine.target_data)
     module.verify()

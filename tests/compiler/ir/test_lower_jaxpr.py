@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.compiler.runtime._machine_code import host
+from jaxbiped.compiler.runtime._program import count_operations
 from tests.compiler.one_shot import compiled, evaluate, stepped
 
 POINTS = np.concatenate([np.linspace(-3.0, 3.0, 21), [0.0, np.inf, -np.inf, np.nan]])
@@ -187,6 +188,16 @@ def test_equal_parts_are_computed_once_and_unused_ones_never():
 
     once = compiled(jnp.exp, ()).kernel.instructions()
     assert compiled(wasteful, ()).kernel.instructions() < once + 15
+
+
+def test_what_numbers_alone_decide_is_known_before():
+    """A diagonal leaves nothing to compute but its own entries."""
+
+    def scaled(x, _):
+        row, column = jnp.arange(3)[:, None], jnp.arange(3)
+        return jnp.where(row + 1 <= column, x, 0.0) + jnp.where(row == column, x * x, 0.0)
+
+    assert count_operations(scaled, 2.0, ()) == {"fmul": 1}
 
 
 def test_equal_calls_are_lowered_once():

@@ -123,14 +123,3 @@ def test_a_stream_may_be_an_array_and_ends_with_its_last_row(engine):
     run = lambda most: engine.run(Request(program, jnp.asarray(most), stream=rows)).outputs
     assert float(run(2.0)) == 14.0
     assert float(run(5.0)) == 44.0 + 2.0 * 30.0
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_jacobians_of_scalars(engine):
-    def function(z):
-        x, y = z
-        return [x * jnp.sin(y), y / x, x + 0.0 * y]
-
-    found = jax.jit(lambda *z: engine.jacobian(function, z))(2.0, 0.3)
-    expected = [[np.sin(0.3), 2.0 * np.cos(0.3)], [-0.3 / 4.0, 0.5], [1.0, 0.0]]
-    np.testing.assert_allclose(found, expected, rtol=1e-15)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.compiler.ir import _vertex_elimination
+from jaxbiped.compiler.ir import _lower_jaxpr
 from jaxbiped.compiler.ir._graph import Block
+from jaxbiped.compiler.ir._jacobian import jacobian, partial_derivatives
 from jaxbiped.compiler.ir._liveness import Liveness
-from jaxbiped.compiler.ir._vertex_elimination import jacobian
 from jaxbiped.compiler.runtime._program import inputs_of, lower_function
+from tests.compiler.one_shot import evaluate
 
 POINT = [0.7, -1.3, 2.1]
 
@@ -40,26 +41,61 @@ def _arrays(z):
 CASES = {"mixed": _mixed, "trivial": _trivial, "second": _second, "arrays": _arrays}
 
 
+def _by_xla(function, point):
+    return jax.jit(lambda *z: jacobian(function, z))(*point)
+
+
+def _by_lanes(function, point):
+    return evaluate(lambda *z: jacobian(function, z), *(x[None] for x in point))[0]
+
+
+def _by_entries(function, point):
+    """Before any compiler sees it, as implicit steps take it; what is zero is left out."""
+    found = partial_derivatives(function, point)
+    rows = range(len(function(point)))
+    return [[found.get((i, j), 0.0) for j in range(len(point))] for i in rows]
+
+
 @pytest.mark.parametrize("name", CASES)
-def test_entries_are_those_of_jax(name):
+@pytest.mark.parametrize("how", [_by_xla, _by_lanes, _by_entries])
+def test_entries_are_those_of_jax(name, how):
     function, point = CASES[name], [jnp.asarray(x) for x in POINT]
     expected = np.array(jax.jacrev(lambda z: jnp.stack(function(z)))(point)).T
-    found = jax.jit(lambda *z: jacobian(function, z))(*point)
-    np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(how(function, point), expected, rtol=1e-13, atol=1e-15)
+
+
+def test_it_is_mapped_and_differentiated_as_other_functions_are():
+    def entry(x):
+        return jacobian(_mixed, [x, 2.0 * x, jnp.asarray(POINT[2])])[0, 1]
+
+    def expected(x):
+        return jax.grad(lambda y: _mixed([x, y, POINT[2]])[0])(2.0 * x)
+
+    points = jnp.array([0.4, 0.7])
+    for ours, own in ((entry, expected), (jax.grad(entry), jax.grad(expected))):
+        found = jax.vmap(ours)(points)
+        np.testing.assert_allclose(found, [own(x) for x in points], rtol=1e-12)
+
+
+def test_a_jacobian_may_hold_what_the_function_around_it_has():
+    def scaled(x):
+        return jax.jit(lambda y: jacobian(lambda z: [x * z[0] * z[0]], [y])[0, 0])(x + 1.0)
+
+    assert float(jax.jit(scaled)(2.0)) == 12.0
+    assert evaluate(scaled, [2.0])[0] == 12.0
 
 
 def test_only_arrays_are_pulled_back(monkeypatch):
     """What has a rule is eliminated: nothing falls back on reverse mode unseen."""
-    pulled = []
-    transpose = jax.linear_transpose
+    pulled, whole = [], _lower_jaxpr.pulled_back
     monkeypatch.setattr(
-        _vertex_elimination.jax, "linear_transpose", lambda *a: pulled.append(a) or transpose(*a)
+        _lower_jaxpr, "pulled_back", lambda *a, **how: pulled.append(a) or whole(*a, **how)
     )
     point = [jnp.asarray(x) for x in POINT]
     for name in ("mixed", "trivial", "second"):
-        jacobian(CASES[name], point)
+        _by_lanes(CASES[name], point)
     assert not pulled
-    jacobian(_arrays, point)
+    _by_lanes(_arrays, point)
     assert len(pulled) == 1
 
 
@@ -82,7 +118,8 @@ def test_the_walker_in_fewer_operations_than_by_reverse_mode():
     def eliminated(*z):
         return jacobian(rates, z)
 
-    found, expected = (np.asarray(jax.jit(f)(*numbers)) for f in (eliminated, by_reverse))
+    found = evaluate(eliminated, *(x[None] for x in numbers))[0]
+    expected = np.asarray(jax.jit(by_reverse)(*numbers))
     sizes = np.max(np.abs(expected), axis=1, keepdims=True)
     assert np.max(np.abs(found - expected) / sizes) < 1e-14
     counts = [_operations(f, numbers) for f in (eliminated, by_reverse)]
