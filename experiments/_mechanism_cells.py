@@ -14,8 +14,7 @@ import numpy as np
 from _mechanisms import Case
 
 import jaxbiped as jb
-from jaxbiped.compiler import LANES
-from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES
+from jaxbiped.compiler import ARCHITECTURES, LANES
 from jaxbiped.trade import WalkTrade, Way
 
 CLEARANCES = {jb.laws.StanceRotation: "stance-rotation", jb.laws.AlwaysTouching: "always-touching"}

@@ -34,7 +34,7 @@ def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
     if any(a is not b for a, b in zip(leaves, exact, strict=True)):
         scene = jtu.tree_unflatten(structure, exact)
     told = jtu.tree_map(undifferentiated, scene) if is_traced(exact) else scene
-    if is_traced(told):
+    if is_traced(jtu.tree_leaves(told)):
         with traced_rules() as rules:
             _check_parts(scene)
         return where_allowed(rules, scene)
