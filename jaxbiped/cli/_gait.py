@@ -223,7 +223,8 @@ def _print(report: Report, numbers: JsonObject, gait: "jb.Gait") -> None:
         numbers["search"],
     )
     if gait.critical is not jb.gait.Bifurcation.NONE:
-        report.say(f"AT A BIFURCATION: {gait.critical} (a multiplier lies on the unit circle)")
+        within = "a multiplier lies on the unit circle, within its error"
+        report.say(f"AT A BIFURCATION: {gait.critical} ({within})")
     elasticities = [{"parameter": name} | row for name, row in numbers["elasticities"].items()]
     report.say(
         "",

@@ -98,7 +98,7 @@ class BranchPoint(NamedTuple):
         multiplier_errors: estimated errors of the multipliers, shape (m − 1,); infinite if the gait
             grazes a switch.
         unit_multiplier_error: distance from 1 of the multiplier that must be 1.
-        bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
+        bifurcation: code of a `Bifurcation`: whether one lies within its error of the unit circle.
         residual: largest change of a component over the cycle, SI units.
         place, tangent: point and tangent of the curve of gaits, scaled by the sizes of the
             components and the range, shape (m + 1,).

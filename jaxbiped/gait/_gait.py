@@ -64,7 +64,7 @@ class Gait(eqx.Module, Tabular):
         return_jacobian: derivatives of the returning state, the period and the step length with
             respect to the state on the section, shape (m + 2, m).
         unit_multiplier_error: distance from 1 of the multiplier that must be exactly 1.
-        bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
+        bifurcation: code of a `Bifurcation`: whether one lies within its error of the unit circle.
         sensitivities: derivatives of the measures with respect to each parameter, with leaves of
             shape (p,); NaN if the search did not converge.
         sensitivity_errors: estimated errors of the sensitivities, from two further solves and with
