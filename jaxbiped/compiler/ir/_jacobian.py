@@ -110,8 +110,8 @@ def _evaluate(equation: JaxprEqn, values: list[Any]) -> Sequence[Any]:
     return found if equation.primitive.multiple_results else [found]
 
 
-def _choice(which: Any) -> tuple[Weight, Weight]:
-    one, zero = jnp.ones(()), jnp.zeros(())
+def _choice(which: Any, dtype: Any) -> tuple[Weight, Weight]:
+    one, zero = jnp.ones((), dtype), jnp.zeros((), dtype)
     return jax.lax.select_n(which, zero, one), jax.lax.select_n(which, one, zero)
 
 

@@ -146,7 +146,7 @@ def _arithmetic(block: Block, kind: Kind) -> Arithmetic:
     def operation(op: str, *args: Weight) -> Weight:
         return weight(block.add(op, *(_value(block, kind, arg) for arg in args), kind=kind))
 
-    def choice(which: Array) -> tuple[Weight, Weight]:
+    def choice(which: Array, _: object) -> tuple[Weight, Weight]:
         here = convert(block, which.item(), Kind.BOOL)
         return operation("select", here, 1.0, 0.0), operation("select", here, 0.0, 1.0)
 

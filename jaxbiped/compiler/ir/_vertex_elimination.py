@@ -27,7 +27,7 @@ class Arithmetic(NamedTuple):
         evaluate: results of an equation of known values.
         weight: a known value as a weight.
         product, sum, negative, inverse: of weights that are not all plain numbers.
-        choice: 1 where a condition holds and 0 elsewhere, and the other way about.
+        choice: 1 where a condition holds and 0 elsewhere, and the other way about, of a dtype.
     """
 
     literal: Callable[[Literal], Any]
@@ -37,7 +37,7 @@ class Arithmetic(NamedTuple):
     sum: Callable[[Weight, Weight], Weight]
     negative: Callable[[Weight], Weight]
     inverse: Callable[[Weight], Weight]
-    choice: Callable[[Any], tuple[Weight, Weight]]
+    choice: Callable[[Any, Any], tuple[Weight, Weight]]
 
 
 def eliminated_rows(
@@ -214,7 +214,8 @@ def _vertex(graph: _Graph, equation: JaxprEqn, given: list[Any]) -> int | _Zero:
     if name == "div":
         return graph.vertex(scaled(given[0], numbers.inverse(numbers.weight(given[1].value))))
     if name == "select_n":
-        chosen, other = numbers.choice(given[0].value)
+        dtype = equation.outvars[0].aval.dtype  # type: ignore[attr-defined]
+        chosen, other = numbers.choice(given[0].value, dtype)
         return graph.vertex([*scaled(given[2], chosen), *scaled(given[1], other)])
     raise NoRuleError(name)
 
