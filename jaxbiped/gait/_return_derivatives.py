@@ -5,7 +5,7 @@ By lanes all directions of a derivative share one solve; by diffrax each has one
 
 import functools
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import equinox as eqx
 import equinox.internal as eqxi
@@ -289,7 +289,7 @@ def _sizes(args: PyTree, active: tuple[int, ...]) -> list[Scalar]:
 
 def _leaves_with_none(tangents: PyTree, like: PyTree) -> list[PyTree]:
     """Tangents of every leaf, None where JAX left them out; a part that there is not has none."""
-    structure = jtu.tree_structure(like)
+    structure: Any = jtu.tree_structure(like)
     if tangents is None:
         return [None] * structure.num_leaves
     return list(structure.flatten_up_to(tangents))
