@@ -71,9 +71,10 @@ def check_walker(option: str, told: str) -> None:
         symbols = symtable.symtable(source, str(path), "exec").get_symbols()
     except (OSError, UnicodeDecodeError, SyntaxError) as error:
         raise ArgumentError(f"{option} = {told!r} cannot be read ({error}).") from None
-    bound = {each.get_name() for each in symbols if each.is_assigned() or each.is_imported()}
+    imported = {each.get_name() for each in symbols if each.is_imported()}
+    bound = imported | {each.get_name() for each in symbols if each.is_assigned()}
     if name not in bound and "import *" not in source:
-        known = ", ".join(sorted(bound)) or "nothing"
+        known = ", ".join(sorted(bound - imported)) or "nothing"
         raise ArgumentError(
             f"{option} = {told!r} is not allowed: {path} does not define {name}; it defines "
             f"{known}."
