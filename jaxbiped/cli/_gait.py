@@ -223,8 +223,8 @@ def _print(report: Report, numbers: JsonObject, gait: "jb.Gait") -> None:
         numbers["search"],
     )
     if gait.critical is not jb.gait.Bifurcation.NONE:
-        within = "a multiplier lies on the unit circle, within its error"
-        report.say(f"AT A BIFURCATION: {gait.critical} ({within})")
+        where = "a multiplier lies within its error of the unit circle"
+        report.say(f"AT A BIFURCATION: {gait.critical} ({where})")
     elasticities = [{"parameter": name} | row for name, row in numbers["elasticities"].items()]
     report.say(
         "",

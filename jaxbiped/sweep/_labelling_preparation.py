@@ -91,8 +91,7 @@ def labelling(
         engine=engine,
     )
     values = parameter_axes(scene, parameters, "parameters") if parameters else {}
-    near = state_of_guess(scene, guess)
-    start = default_guess(scene) if near is None else near
+    start = state_of_guess(scene, default_guess(scene) if guess is None else guess)
     family = find_family(scene, effort, parameters=values, guess=start)
     missing = sum(not row for row in family.rows)
     if missing:
