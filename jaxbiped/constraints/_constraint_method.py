@@ -8,7 +8,7 @@ import equinox as eqx
 from jaxbiped._checks import check_at_least
 from jaxbiped._parameter_declaration import AbstractPart
 from jaxbiped._types import Scalar, by_numpy
-from jaxbiped.linalg._elimination import symmetric_factors
+from jaxbiped.linalg._small_matrices import symmetric_factors
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar

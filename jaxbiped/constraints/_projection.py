@@ -20,7 +20,7 @@ from jaxbiped.constraints._constraint_method import (
 )
 from jaxbiped.constraints._linkage import Linkage
 from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of, row_times
-from jaxbiped.linalg._elimination import symmetric_factors
+from jaxbiped.linalg._small_matrices import symmetric_factors
 
 _LEAST = 1e-10
 """Smallest eigenvalue of J M⁻¹ Jᵀ, in units of the largest, of constraints that are independent."""

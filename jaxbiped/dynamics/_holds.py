@@ -16,7 +16,7 @@ import numpy as np
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._implicit_field import fold
 from jaxbiped.dynamics._stance import Stance, angles_and_rates, stance_on
-from jaxbiped.linalg._elimination import symmetric_factors
+from jaxbiped.linalg._small_matrices import symmetric_factors
 from jaxbiped.linalg._sparse_lu import SparseFactors
 from jaxbiped.scene._couplings import with_fixed
 from jaxbiped.scene._mechanism import Mechanism

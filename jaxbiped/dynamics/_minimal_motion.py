@@ -32,8 +32,7 @@ from jaxbiped.dynamics._tree_inertia import (
     composites,
     eliminate,
 )
-from jaxbiped.linalg._elimination import times
-from jaxbiped.linalg._sparse_lu import SparseMatrix
+from jaxbiped.linalg._sparse_lu import SparseMatrix, times
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._scene import CompliantScene, Scene

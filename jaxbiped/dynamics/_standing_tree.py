@@ -14,7 +14,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.dynamics._implicit_field import Weights, free_weights
 from jaxbiped.dynamics._tree_inertia import Composites, composites
-from jaxbiped.linalg._elimination import Entry, plus
+from jaxbiped.linalg._sparse_lu import Entry, plus
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._structure import Structure, weighted
 

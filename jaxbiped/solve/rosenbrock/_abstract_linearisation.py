@@ -15,7 +15,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._jax_versions import ClosedJaxpr, called_program
 from jaxbiped._types import Scalar
-from jaxbiped.linalg._elimination import Entry
+from jaxbiped.linalg._sparse_lu import Entry
 
 Components: TypeAlias = list[Scalar]
 """A point of the state space: its scalars one by one, or one vector that holds them all."""

@@ -9,8 +9,15 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import partial_derivatives
 from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
-from jaxbiped.linalg._elimination import Entry, plus, times
-from jaxbiped.linalg._sparse_lu import SparseFactors, SparseMatrix, factorise, product
+from jaxbiped.linalg._sparse_lu import (
+    Entry,
+    SparseFactors,
+    SparseMatrix,
+    factorise,
+    plus,
+    product,
+    times,
+)
 from jaxbiped.solve.rosenbrock._abstract_linearisation import (
     AbstractLinearisation,
     Components,

@@ -15,7 +15,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._implicit_field import AbstractImplicitField
-from jaxbiped.linalg._elimination import Entry, Matrix, inverse, matmul
+from jaxbiped.linalg._small_matrices import Matrix, inverse
+from jaxbiped.linalg._sparse_lu import Entry
 from jaxbiped.solve.rosenbrock._abstract_linearisation import (
     AbstractLinearisation,
     Components,
@@ -113,7 +114,8 @@ class _ScalarLinearisation(AbstractLinearisation):
             entries = [(matrix.jacobian[i][p], value) for p, value in direct_right.items()]
             terms = [entry * value for entry, value in entries if entry is not None]
             reduced.append(own + matrix.step * sum(terms[1:], terms[0]) if terms else own)
-        return matmul(matrix.factors, reduced)
+        products = [[a * b for a, b in zip(row, reduced, strict=True)] for row in matrix.factors]
+        return [sum(row[1:], row[0]) for row in products]
 
     def solution_matrices(self, matrix: StepMatrix) -> tuple[Scalar, Scalar]:
         jacobian, step, factors = matrix
