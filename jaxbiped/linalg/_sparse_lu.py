@@ -105,10 +105,7 @@ def product(matrix: SparseMatrix, right: Mapping[int, Entry]) -> dict[int, Entry
     """A matrix times a vector, each by row; None for what is zero."""
     found: dict[int, Entry] = {}
     for (i, j), entry in matrix.items():
-        value = right.get(j)
-        if value is not None:
-            own = found.get(i)
-            found[i] = entry * value if own is None else own + entry * value
+        found[i] = plus(found.get(i), times(entry, right.get(j)))
     return found
 
 

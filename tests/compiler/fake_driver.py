@@ -17,7 +17,7 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
-from jaxbiped.compiler.runtime import _cuda_device, _device_processor, _kernel
+from jaxbiped.compiler.runtime import _cuda_device, _kernel, _processors
 from jaxbiped.compiler.runtime._machine_code import host, machine_code
 
 OUT_OF_MEMORY, NOT_READY, LAUNCH_FAILED = 2, 600, 719
@@ -235,5 +235,5 @@ def install(monkeypatch, **options):
     monkeypatch.setenv("JAXBIPED_CACHE", "")
     monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
     monkeypatch.setattr(_kernel, "ptx_text", lambda text, architecture: text)
-    monkeypatch.setattr(_device_processor, "devices", functools.cache(_cuda_device.find_devices))
+    monkeypatch.setattr(_processors, "devices", functools.cache(_cuda_device.find_devices))
     return fake

@@ -10,7 +10,7 @@ import pytest
 
 from jaxbiped._checks import ResourceError
 from jaxbiped.compiler import CUDA, LANES, LaneEngine, Program, Request
-from jaxbiped.compiler.runtime import _cuda_device, _device_processor
+from jaxbiped.compiler.runtime import _cuda_device, _processors
 from jaxbiped.compiler.runtime._cuda_device import CudaDriver, CudaError, find_devices
 from tests.compiler.fake_driver import FakeDriver, install
 
@@ -93,7 +93,7 @@ def test_several_devices_share_a_batch(monkeypatch):
 
 def test_parts_have_room_on_a_device(monkeypatch):
     fake = install(monkeypatch, lanes=2, multiprocessors=1)
-    monkeypatch.setattr(_device_processor, "_MOST_BYTES", 4000)
+    monkeypatch.setattr(_processors, "_MOST_BYTES", 4000)
     lengths = 1 + np.arange(200) % 17
     _same(run_counting(CUDA, lengths), run_counting(LANES, lengths))
     assert len(fake.launches) > 4

@@ -12,9 +12,13 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.scene._state_types import BristleState
-from jaxbiped.solve.rosenbrock._abstract_linearisation import StepMatrix
-from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, ImplicitLinearisation
-from jaxbiped.solve.rosenbrock._linearisation import linearise, split
+from jaxbiped.solve.rosenbrock._implicit_linearisation import (
+    ImplicitForm,
+    ImplicitLinearisation,
+    linearise,
+    split,
+)
+from jaxbiped.solve.rosenbrock._linearisation import StepMatrix
 
 MASS, BOB, LENGTH, GRAVITY = 2.0, 0.7, 0.9, 9.81
 

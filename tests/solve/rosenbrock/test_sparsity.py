@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.solve.rosenbrock._abstract_linearisation import structure_of
+from jaxbiped.solve.rosenbrock._linearisation import structure_of
 
 
 def _structure(function, inputs):
