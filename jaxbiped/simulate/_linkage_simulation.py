@@ -34,9 +34,8 @@ from jaxbiped.solve._solvers import (
     wrap_projected,
 )
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.controllers._solve_ends import first_step
 from jaxbiped.solve.controllers._step_size import step_control
-from jaxbiped.solve.controllers._wrapped_control import StepControl
+from jaxbiped.solve.controllers._wrapped_control import StepControl, first_step
 
 _FAR = 0.5
 """Distance of a start from its joints, in units of the longest arm, beyond which it is refused."""

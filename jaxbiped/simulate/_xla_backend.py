@@ -16,15 +16,14 @@ from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._solvers import with_projection, with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.controllers._contact_steps import MissedContacts
-from jaxbiped.solve.controllers._solve_ends import (
+from jaxbiped.solve.controllers._event_steps import FootstepLimit, LocatedEnding, MissedContacts
+from jaxbiped.solve.controllers._step_size import walk_control
+from jaxbiped.solve.controllers._wrapped_control import (
     PATIENCE,
-    FootstepLimit,
-    LocatedEnding,
+    Extremes,
+    GivenFirstStep,
     first_step,
 )
-from jaxbiped.solve.controllers._step_size import walk_control
-from jaxbiped.solve.controllers._wrapped_control import Extremes, GivenFirstStep
 
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulation import Simulation
