@@ -162,9 +162,7 @@ class Kernel:
     def code(self, width: int) -> MachineCode:
         """The machine code, for vectors of this width."""
         with self._making:
-            if self._known_code(width) is None:
-                self._code[width] = self._make_code(width)
-            return self._code[width]
+            return self._known_code(width) or self._make_code(width)
 
     def has_code(self, width: int) -> bool:
         """Whether `code` takes no tracing and no compiling."""
@@ -241,7 +239,7 @@ class Kernel:
 
     def _make_code(self, width: int) -> MachineCode:
         text, maps = self.text(width), self.signature.maps
-        code = machine_code(text, ENTRY, host(), as_written=maps)
+        code = self._code[width] = machine_code(text, ENTRY, host(), as_written=maps)
         self._write(_code_entry(width), code_name(text, ENTRY, host(), as_written=maps))
         return code
 
