@@ -16,10 +16,14 @@ from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._solvers import with_projection, with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.controllers._event_steps import FootstepLimit, LocatedEnding, MissedContacts
+from jaxbiped.solve.controllers._event_steps import (
+    PATIENCE,
+    FootstepLimit,
+    LocatedEnding,
+    MissedContacts,
+)
 from jaxbiped.solve.controllers._step_size import walk_control
 from jaxbiped.solve.controllers._wrapped_control import (
-    PATIENCE,
     Extremes,
     GivenFirstStep,
     first_step,

@@ -284,4 +284,4 @@ def _map(
         if value.block is not inside:
             row[:] = value
     shapes = [np.empty((*array.shape, length), dtype=object) for array in found]
-    return [np.moveaxis(each, -1, 0) for each in _reshape(results.ravel(), shapes)]
+    return [np.moveaxis(each, -1, 0) for each in _reshape(results.ravel().tolist(), shapes)]

@@ -30,7 +30,6 @@ from jaxbiped.compiler.codegen._ptx_kernel import (
 )
 from jaxbiped.compiler.runtime._machine_code import (
     MachineCode,
-    assembly,
     code_name,
     host,
     machine_code,
@@ -152,12 +151,6 @@ class Kernel:
         graph = self.graph
         with long_trace():
             return kernel_text(graph, host_target(width, host()))
-
-    def instructions(self) -> int:
-        """How many machine instructions it has, for vectors of the host's width."""
-        text = self.text(host().width)
-        lines = assembly(text, as_written=self.signature.maps).splitlines()
-        return sum(line.startswith("\t") and not line.startswith("\t.") for line in lines)
 
     def code(self, width: int) -> MachineCode:
         """The machine code, for vectors of this width."""

@@ -180,12 +180,6 @@ def _object_code(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> bytes:
         library.LLVMPY_DisposeMemoryBuffer(buffer)
 
 
-def assembly(text: str, *, as_written: bool) -> str:
-    """A module as the host's assembly, to look at; see `machine_code`."""
-    machine = _target_machine(as_written)
-    return str(machine.emit_assembly(_module(text, machine, as_written)))
-
-
 def _target_machine(as_written: bool) -> llvm.TargetMachine:
     cpu, effort = host(), 1 if as_written else 2
     target = llvm.Target.from_triple(cpu.triple)
