@@ -11,6 +11,7 @@ import numpy as np
 import jaxbiped as jb
 from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
+from jaxbiped._types import rows_of
 from jaxbiped.cli._options import OutputOptions
 from jaxbiped.cli._report import Report, columns
 from jaxbiped.cli._walk_warnings import (
@@ -23,7 +24,6 @@ from jaxbiped.constraints._constraint_methods import name_of
 from jaxbiped.measure._footsteps import footstep_dataset
 from jaxbiped.measure._samples import from_start, places_of_standing
 from jaxbiped.solve._error_estimate import error_numbers, error_sentence
-from jaxbiped.solve._trajectory import rows_of
 
 _MOST_ROWS = 24
 _SHOWN = 60.0

@@ -15,8 +15,7 @@ from jaxbiped._files import check_writable_file
 from jaxbiped.plot import style
 from jaxbiped.plot._samples import AnyScene, DrawnMotion
 from jaxbiped.plot._skeleton import Pose, poses, skeleton_of, upright
-from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
 _TICK = 0.1
 """Distance between the marks on the slope [m], by which one sees the camera move."""

@@ -18,8 +18,7 @@ from jaxbiped.plot._gait_charts import check_drawable
 from jaxbiped.plot._samples import AnyScene, DrawnMotion
 from jaxbiped.plot._skeleton import Part, Skeleton, skeleton_of
 from jaxbiped.plot._symbols import angle_of, rate_of
-from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
 _PLACES = (0.12, 0.37, 0.62, 0.87)
 """Of the arrows, in parts of the curve's length."""

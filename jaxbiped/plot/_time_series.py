@@ -20,8 +20,7 @@ from jaxbiped.plot._skeleton import Part, Sole, skeleton_of
 from jaxbiped.plot._symbols import PENETRATION, TIME, angle_of
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.simulate._simulate import rigid_walk
-from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
 
 def leg_angles(scene: AnyScene, trajectory: Trajectory[Any], *, ax: Axes | None = None) -> Figure:

@@ -15,7 +15,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._identity import provenance
 from jaxbiped._progress import stage
-from jaxbiped._types import as_float
+from jaxbiped._types import as_float, rows_of
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
@@ -29,7 +29,6 @@ from jaxbiped.scene._parameter_access import (
 )
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
-from jaxbiped.solve._trajectory import rows_of
 from jaxbiped.sweep._gait_grid import open_gait_grid
 from jaxbiped.sweep._gait_waves import GaitWaves
 from jaxbiped.sweep._grid_waves import LARGE, Place

@@ -12,10 +12,10 @@ from typing import TypeAlias
 import numpy as np
 
 from jaxbiped._progress import Stage
+from jaxbiped._types import rows_of
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.solve._trajectory import rows_of
 from jaxbiped.sweep._gait_grid import GaitGrid
 from jaxbiped.sweep._grid_waves import (
     LARGE,

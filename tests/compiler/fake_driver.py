@@ -108,7 +108,8 @@ class FakeDriver:
         self._handles = itertools.count(1)
         for name in dir(type(self)):
             if name.startswith("cu"):
-                setattr(self, name, _Function(getattr(self, name)))
+                # Unlike a method it takes the attributes of ctypes' functions.
+                setattr(self, name, functools.partial(getattr(self, name)))
 
     def cuInit(self, _):
         return 0
@@ -212,16 +213,6 @@ class FakeDriver:
     def cuGetErrorString(self, code, text):
         text._obj.value = {OUT_OF_MEMORY: b"out of memory"}.get(code, b"launch failed")
         return 0
-
-
-class _Function:
-    """A method that takes the attributes of ctypes' functions."""
-
-    def __init__(self, method):
-        self.method = method
-
-    def __call__(self, *args):
-        return self.method(*args)
 
 
 def _give(pointer, value):

@@ -1,6 +1,7 @@
 """Batches on an emulated CUDA device, against lanes: queue, endings, refill, failures."""
 
 import ctypes
+import functools
 import threading
 
 import jax
@@ -175,18 +176,13 @@ def test_why_there_is_no_device(monkeypatch, options, why):
 
 def test_a_driver_that_fails_is_no_device(monkeypatch):
     fake = FakeDriver()
-    fake.cuInit = _Failing()
+    fake.cuInit = functools.partial(lambda *args: 100)
     monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
     assert "finds no device" in find_devices().missing
     monkeypatch.setattr(_cuda_device, "load_library", lambda: None)
     assert find_devices().missing == "no CUDA driver is installed"
     with pytest.raises(CudaError, match="cuInit: launch failed"):
         CudaDriver(fake).call("cuInit", 0)
-
-
-class _Failing:
-    def __call__(self, *args):
-        return 100
 
 
 def test_batches_fill_a_device(monkeypatch):
