@@ -171,9 +171,9 @@ class GraphWriter:
 
     def _write_repeat(self, head: Value, width: int) -> None:
         length, inside, starts, held, ends = head.args
-        start, again, after = self.text.label, self.text.fresh("again"), self.text.fresh("done")
+        start = self.text.label
         first = [self.use(v, width) for v in starts]
-        with self.text.loop(again, after, length):
+        with self.text.loop(length):
             at = len(self.text.lines)
             names = ["%" + self.text.fresh("h") for _ in held]
             for value, text in zip(held, names, strict=True):
@@ -199,8 +199,7 @@ class GraphWriter:
         sources = [self._row(value.args[0].args[0][value.args[1]], padded) for value in rows]
         parts = _parts_of(head)
         targets = self._targets(head, parts, padded)
-        again, after = self.text.fresh("each"), self.text.fresh("all")
-        with self.text.loop(again, after, length, step=step) as counter, self.text.scope():
+        with self.text.loop(length, step=step) as counter, self.text.scope():
             entry = {
                 stride: self.text.assign(f"mul i64 {counter}, {stride * self.width}")
                 for stride in sorted({1, *(stride for _, stride in sources)})
