@@ -119,14 +119,9 @@ class GraphWriter:
         wanted = [i for i in every if i not in stored]
         mask = self.use(here, width)
         before = [self.use(defaults[i], width) for i in wanted]
-        start, rare, after = self.text.label, self.text.fresh("some"), self.text.fresh("none")
-        hint = RARELY if inside.rare else ""
-        self.text.line(
-            f"br i1 {self.text.any_lane(mask, width)}, label %{rare}, label %{after}{hint}"
-        )
-        self.text.begin(rare)
+        start, hint = self.text.label, RARELY if inside.rare else ""
         chosen, either = [], dict[tuple[str, str, int], str]()
-        with self.text.scope():
+        with self.text.where(self.text.any_lane(mask, width), hint), self.text.scope():
             self.write(inside, width)
             for i in stored:
                 apart = self._apart(values[i], defaults[i])
@@ -136,9 +131,7 @@ class GraphWriter:
                 of, new = vector(values[i].kind, width), self.use(values[i], width)
                 text = f"select {vector(Kind.BOOL, width)} {mask}, {of} {new}, {of} {old}"
                 chosen.append(self.text.assign(text))
-        end = self.text.label
-        self.text.line(f"br label %{after}")
-        self.text.begin(after)
+            end = self.text.label
         for i, old, new in zip(wanted, before, chosen, strict=True):
             of = vector(values[i].kind, width)
             text = f"phi {of} [ {old}, %{start} ], [ {new}, %{end} ]"

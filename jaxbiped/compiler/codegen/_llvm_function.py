@@ -91,10 +91,10 @@ class FunctionBuilder:
         self.begin(after)
 
     @contextmanager
-    def where(self, condition: str) -> Iterator[None]:
-        """What is written within runs only where a condition holds."""
+    def where(self, condition: str, hint: str = "") -> Iterator[None]:
+        """What is written within runs only where a condition holds; `hint` may be `RARELY`."""
         here, after = self.fresh("where"), self.fresh("after")
-        self.line(f"br i1 {condition}, label %{here}, label %{after}")
+        self.line(f"br i1 {condition}, label %{here}, label %{after}{hint}")
         self.begin(here)
         yield
         self.line(f"br label %{after}")
