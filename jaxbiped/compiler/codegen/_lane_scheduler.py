@@ -115,8 +115,7 @@ class LaneScheduler:
     def read(self, lane: str) -> None:
         """A lane reads the next row of its stream, behind the last one that one again."""
         t = self.text
-        at = t.address(self.bits["rows"], Kind.I64, lane)
-        place = t.assign(f"load i64, ptr {at}")
+        place = self._get(self.bits["rows"], lane)
         index = self._get(self.bits["index"], lane)
         first = t.assign(f"inttoptr i64 {self._get(self.field['streams'], index)} to ptr")
         row = t.assign(f"mul i64 {place}, {self.field['stream_stride']}")
@@ -125,7 +124,8 @@ class LaneScheduler:
         following = t.assign(f"add i64 {place}, 1")
         length = self._get(self.field["stream_lengths"], index)
         more = t.assign(f"icmp slt i64 {following}, {length}")
-        t.line(f"store i64 {t.assign(f'select i1 {more}, i64 {following}, i64 {place}')}, ptr {at}")
+        chosen = t.assign(f"select i1 {more}, i64 {following}, i64 {place}")
+        self._put(chosen, self.bits["rows"], lane)
 
     def _get(self, array: str, place: str) -> str:
         """A whole number of an array."""
