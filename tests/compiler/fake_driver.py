@@ -226,5 +226,5 @@ def install(monkeypatch, **options):
     monkeypatch.setenv("JAXBIPED_CACHE", "")
     monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
     monkeypatch.setattr(_kernel, "ptx_text", lambda text, architecture: text)
-    monkeypatch.setattr(_processors, "devices", functools.cache(_cuda_device.find_devices))
+    monkeypatch.setattr(_processors, "devices", functools.cache(_cuda_device.devices.__wrapped__))
     return fake
