@@ -18,8 +18,7 @@ from jaxbiped.constraints._constraint_method import (
     gram,
     inverse_masses,
 )
-from jaxbiped.constraints._linkage import Linkage
-from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of, row_times
+from jaxbiped.constraints._linkage import Linkage, constraints_of, masses_of, row_times
 from jaxbiped.linalg._elimination import symmetric_factors
 
 _LEAST = 1e-10

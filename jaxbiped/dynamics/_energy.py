@@ -19,7 +19,9 @@ from jaxbiped.dynamics._equivalent_states import motion_in, poses_of
 from jaxbiped.dynamics._footfalls import FootMotion, touches
 from jaxbiped.dynamics._joint_loads import JointEnergy, joint_energy
 from jaxbiped.dynamics._motor_motion import motor_powers
+from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.dynamics._tree import PointMotion, point_motion
+from jaxbiped.linalg._sparse_lu import product
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._state_types import State
@@ -172,3 +174,17 @@ def _actuator_powers(scene: Scene, state: State) -> ActuatorPowers:
 
 def _elastic_energy(scene: Scene, foot: FootMotion) -> Scalar:
     return jnp.where(touches(foot), scene.normal.elastic_energy(foot.penetration), 0.0)
+
+
+def kinetic_energy(scene: AbstractWalkerScene, state: Any) -> Scalar:
+    """Kinetic energy of a rigid walker in a state [J]."""
+
+    def energy(stance: Stance) -> Scalar:
+        motion = stance.pose.motion
+        rates = dict(enumerate((motion.vx, motion.vz, *motion.rates)))
+        momenta: Any = product(stance.mass_matrix(), rates)
+        others = (rates[i] * momenta[i] for i in range(1, len(rates)))
+        found: Scalar = 0.5 * sum(others, rates[0] * momenta[0])
+        return found
+
+    return of_stance(scene, state, energy)

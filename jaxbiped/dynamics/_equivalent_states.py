@@ -1,4 +1,4 @@
-"""Equivalent states: one motion in minimal and in redundant coordinates, and in a mirror's names.
+"""Equivalent states: one motion in the coordinates of other scenes, and in a mirror's names.
 
 In redundant coordinates each body has its own.
 """
@@ -14,9 +14,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._joint_loads import motion_of
-from jaxbiped.dynamics._stance import stance_on
-from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import OF_BODIES
+from jaxbiped.dynamics._stance import angles_and_rates, of_stance, stance_on
+from jaxbiped.dynamics._state import OF_BODIES, state_type
 from jaxbiped.dynamics._tree import Motion, Pose, point_motion, pose_of
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._linkages import loaded_bodies
@@ -233,3 +232,36 @@ def _turned(structure: Structure, state: SomeState, times: int) -> dict[str, Any
         own = values[first], values[second]
         values |= {first: c * own[0] - s * own[1], second: s * own[0] + c * own[1]}
     return values
+
+
+@kept_alone
+def whole_state(scene: AbstractWalkerScene, state: Any) -> Any:
+    """The same motion in the compliant walker's coordinates, with the stance foot just touching.
+
+    Args:
+        scene: the walker, of any kind.
+        state: state of a rigid walker, leaves of any common shape, SI units.
+
+    Returns:
+        A state of the compliant walker (a `State` for `Walker`), leaves shaped as the state's.
+    """
+    z, vx, vz = of_stance(scene, state, lambda stance: stance.root[1:4])
+    structure = scene.mechanism.structure
+    angles, rates = angles_and_rates(structure, state)
+    kind = state_type_of((*structure.coordinates, *structure.rates))
+    return kind(state[0], z, *angles, vx, vz, *rates)
+
+
+def rigid_state(state: Any) -> Any:
+    """The part of a compliant walker's state that a rigid walker's state has.
+
+    Args:
+        state: state in which the second of each mirrored pair stands, leaves of any common shape,
+            SI units.
+
+    Returns:
+        Place of the root point, angles and rates, leaves shaped as the state's.
+    """
+    place, *names = state._fields
+    kept = [place, *(name for name in names if name.startswith(("theta_", "omega_")))]
+    return state_type_of(kept)(*(getattr(state, name) for name in kept))

@@ -26,12 +26,7 @@ from jaxbiped.dynamics._implicit_field import (
 from jaxbiped.dynamics._joint_loads import with_constraint_torques
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, Pose, point_motion, pose_of
-from jaxbiped.dynamics._tree_inertia import (
-    Composites,
-    centrifugal_loads,
-    composites,
-    eliminate,
-)
+from jaxbiped.dynamics._tree_inertia import Composites, centrifugal_loads, composites, eliminate
 from jaxbiped.linalg._elimination import times
 from jaxbiped.linalg._sparse_lu import SparseMatrix
 from jaxbiped.scene._ground import gravity_on

@@ -15,15 +15,15 @@ from jaxbiped._parameter_declaration import check_parameters, parameter, with_fi
 from jaxbiped._types import Parameter, Scalar, by_numpy, is_traced
 from jaxbiped.caching._caches import OfObjects
 from jaxbiped.scene._bodies import Body, Foot, check_name
-from jaxbiped.scene._couplings import fixed_angles
 from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Motor, Stop
-from jaxbiped.scene._mechanism_names import check_parameter_names, mechanism_parameter_names
 from jaxbiped.scene._mechanism_pieces import (
     angle_of_part,
+    check_parameter_names,
     check_pieces,
     check_state_names,
-    check_zero_pose,
+    fixed_angles,
     foot_names_of,
+    mechanism_parameter_names,
     named_angle,
     number_of,
     parents_of,
@@ -36,6 +36,7 @@ from jaxbiped.scene._mirror import (
     symmetric_part,
     whole_part,
 )
+from jaxbiped.scene._placement import check_zero_pose
 from jaxbiped.scene._structure import Indices, Structure
 from jaxbiped.scene._turn import (
     check_nothing_turns_along,

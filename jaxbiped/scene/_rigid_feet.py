@@ -12,10 +12,9 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._types import Parameter, Scalar, as_float, by_numpy, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.scene._couplings import angles_and_rates_named
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode, Modes, limits_named, modes_of
-from jaxbiped.scene._placement import feet_named, foot_motion
+from jaxbiped.scene._placement import angles_and_rates_named, feet_named, foot_motion
 from jaxbiped.scene._structure import Indices, Structure
 
 

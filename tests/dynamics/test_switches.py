@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._switches import switches
+from jaxbiped.dynamics._surfaces import switches
 from jaxbiped.scene.laws._catalogue import normal_law_like
 
 SEED = jb.seed_scene()

@@ -31,8 +31,8 @@ from jaxbiped.scene.laws.friction._coulomb import RegularisedCoulomb as Regulari
 from jaxbiped.scene.laws.friction._coulomb import Threlfall as Threlfall
 from jaxbiped.scene.laws.friction._coulomb import Ambrosio as Ambrosio
 from jaxbiped.scene.laws.friction._stribeck import Stribeck as Stribeck
-from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay as BengisuAkay
-from jaxbiped.scene.laws.friction._bengisu_akay import SmoothBengisuAkay as SmoothBengisuAkay
+from jaxbiped.scene.laws.friction._stribeck import BengisuAkay as BengisuAkay
+from jaxbiped.scene.laws.friction._stribeck import SmoothBengisuAkay as SmoothBengisuAkay
 from jaxbiped.scene.laws.friction._stribeck import Andersson as Andersson
 from jaxbiped.scene.laws.friction._stribeck import BrownMcPhee as BrownMcPhee
 from jaxbiped.scene.laws.friction._bristles import Dahl as Dahl

@@ -12,7 +12,7 @@ from jaxbiped.scene.laws._abstract_laws import (
     AbstractFrictionLaw,
     AbstractNormalLaw,
 )
-from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
+from jaxbiped.scene.laws.friction._stribeck import BengisuAkay
 from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
 
 _CATALOGUES: tuple[dict[str, Any], ...] = (NORMAL_LAWS, FRICTION_LAWS)
