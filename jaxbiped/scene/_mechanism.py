@@ -14,7 +14,7 @@ from jaxbiped._jax_versions import current_trace
 from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
 from jaxbiped._types import Parameter, Scalar, by_numpy, is_traced
 from jaxbiped.caching._caches import OfObjects
-from jaxbiped.scene._bodies import Body, Foot, check_name
+from jaxbiped.scene._bodies import Body, Foot
 from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Motor, Stop
 from jaxbiped.scene._mechanism_pieces import (
     angle_of_part,
@@ -94,7 +94,6 @@ class Mechanism(eqx.Module):
         mirror: Sequence[tuple[str, str]] = (),
         turn: Mapping[str, int] | None = None,
     ) -> None:
-        check_name("root", root)
         check_pieces(root, bodies, feet, joints)
         names = [each.name for each in bodies]
         parents = parents_of(bodies, names)

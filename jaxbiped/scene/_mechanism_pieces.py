@@ -14,7 +14,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped.scene._bodies import RESERVED, Body, Foot
+from jaxbiped.scene._bodies import RESERVED, Body, Foot, check_name
 from jaxbiped.scene._joint_parts import AbstractJointPart
 from jaxbiped.scene._structure import Angle, Fixed, Indices, Structure, pair_name, weighted
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 def check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
     """Raises `ArgumentError` for pieces of the wrong kind, no foot, or a name that stands twice."""
+    check_name("root", root)
     for argument, kind, group in (
         ("bodies", Body, bodies), ("feet", Foot, feet), ("joints", AbstractJointPart, joints)
     ):  # fmt: skip
