@@ -1,7 +1,7 @@
 """Linkages: rigid bodies in a plane, the pins and held angles that join them, and constraints."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -10,7 +10,9 @@ from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped._parameter_declaration import AbstractPart, check_parameters, parameter
 from jaxbiped._trigonometry import angle_of_vector, sine_cosine
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.constraints._constraint_method import Row
+
+Row: TypeAlias = dict[int, Scalar]
+"""A row of a Jacobian: its entries by coordinate, those left out that are always zero."""
 
 ORIENTATIONS = ("angle", "euler")
 """How a body's orientation is written.
@@ -165,6 +167,19 @@ class Heading(NamedTuple):
     sine_convective: Scalar
     cosine_convective: Scalar
 
+    def point(self, q: Sequence[Scalar], first: int, place: tuple[Scalar, Scalar]) -> Point:
+        """A point of the body, given in its own frame [m]; `first` is its first coordinate."""
+        x, z = place
+        sine, cosine, one = self.sine_row, self.cosine_row, jnp.ones_like(q[first])
+        return Point(
+            x=q[first] + self.cosine * x - self.sine * z,
+            z=q[first + 1] + self.sine * x + self.cosine * z,
+            row_x={first: one} | {c: cosine[c] * x - sine[c] * z for c in sine},
+            row_z={first + 1: one} | {c: sine[c] * x + cosine[c] * z for c in sine},
+            convective_x=self.cosine_convective * x - self.sine_convective * z,
+            convective_z=self.sine_convective * x + self.cosine_convective * z,
+        )
+
 
 class Turn(NamedTuple):
     """A body's angle [rad], its derivatives, and its acceleration at constant rates of these."""
@@ -186,35 +201,12 @@ def turn_of(linkage: Linkage, q: Sequence[Scalar], v: Sequence[Scalar], body: in
     return Turn(2.0 * angle_of_vector(s, c), row, -double * rate * (c * c_rate + s * s_rate))
 
 
-def point_of(
-    linkage: Linkage,
-    q: Sequence[Scalar],
-    headings: Sequence[Heading],
-    body: int,
-    point: tuple[Scalar, Scalar],
-) -> Point:
-    """A point of a body, given in the body's own frame [m]."""
-    first, heading = linkage.coordinates * body, headings[body]
-    x, z = point
-    return Point(
-        x=q[first] + heading.cosine * x - heading.sine * z,
-        z=q[first + 1] + heading.sine * x + heading.cosine * z,
-        row_x={first: jnp.ones_like(q[first])}
-        | {c: heading.cosine_row[c] * x - heading.sine_row[c] * z for c in heading.sine_row},
-        row_z={first + 1: jnp.ones_like(q[first])}
-        | {c: heading.sine_row[c] * x + heading.cosine_row[c] * z for c in heading.sine_row},
-        convective_x=heading.cosine_convective * x - heading.sine_convective * z,
-        convective_z=heading.sine_convective * x + heading.cosine_convective * z,
-    )
-
-
-def headings_of(
+def _headings(
     linkage: Linkage,
     q: Sequence[Scalar],
     v: Sequence[Scalar],
-    circular: Sequence[tuple[Scalar, Scalar]] | None = None,
+    circular: Sequence[tuple[Scalar, Scalar]] | None,
 ) -> list[Heading]:
-    """Every body's heading; `circular` are sines and cosines of the angles, where known already."""
     found = []
     for body in range(len(linkage.bodies)):
         first = linkage.coordinates * body + 2
@@ -240,20 +232,24 @@ def constraints_of(
     linkage: Linkage,
     q: Sequence[Scalar],
     v: Sequence[Scalar],
-    headings: Sequence[Heading] | None = None,
+    circular: Sequence[tuple[Scalar, Scalar]] | None = None,
 ) -> Constraints:
-    """Φ, Φ̇, J and γ at coordinates and rates, one scalar each, in the linkage's order."""
-    headings = headings_of(linkage, q, v) if headings is None else headings
+    """Φ, Φ̇, J and γ at coordinates and rates, one scalar each, in the linkage's order.
+
+    `circular` are sines and cosines of the bodies' angles, where known already.
+    """
+    headings = _headings(linkage, q, v, circular)
     violation: list[Scalar] = []
     rows: list[Row] = []
     bias: list[Scalar] = []
     still = jnp.zeros_like(q[0])
     for joint in linkage.joints:
-        one = point_of(linkage, q, headings, joint.body_1, joint.point_1)
+        body, size = joint.body_1, linkage.coordinates
+        one = headings[body].point(q, size * body, joint.point_1)
         if joint.body_2 is None:
             other = Point(*joint.point_2, {}, {}, still, still)
         else:
-            other = point_of(linkage, q, headings, joint.body_2, joint.point_2)
+            other = headings[joint.body_2].point(q, size * joint.body_2, joint.point_2)
         violation += [one.x - other.x, one.z - other.z]
         for own, opposite in ((one.row_x, other.row_x), (one.row_z, other.row_z)):
             rows.append(own | {c: -entry for c, entry in opposite.items()})

@@ -18,9 +18,10 @@ from jaxbiped.constraints._constraint_method import (
     AbstractConstraintMethod,
     AbstractProjectingMethod,
     Constrained,
+    correct_step,
+    nearest_consistent,
 )
-from jaxbiped.constraints._linkage import Heading, Linkage, constraints_of, masses_of
-from jaxbiped.constraints._projection import correct_step, nearest_consistent
+from jaxbiped.constraints._linkage import Linkage, constraints_of, masses_of
 from jaxbiped.dynamics._equivalent_states import BodiesState, CompliantState, redundant_state
 from jaxbiped.dynamics._state import state_for
 from jaxbiped.scene._linkages import LinkageScene
@@ -62,10 +63,13 @@ def motion_under(
     q: Sequence[Scalar],
     v: Sequence[Scalar],
     applied: list[Scalar],
-    headings: Sequence[Heading] | None = None,
+    circular: Sequence[tuple[Scalar, Scalar]] | None = None,
 ) -> LinkageMotion:
-    """Motion under applied generalised forces Q: M q̈ = Q − Jᵀ λ with the method's λ."""
-    masses, at = masses_of(linkage), constraints_of(linkage, q, v, headings)
+    """Motion under applied generalised forces Q: M q̈ = Q − Jᵀ λ with the method's λ.
+
+    `circular` as of `constraints_of`.
+    """
+    masses, at = masses_of(linkage), constraints_of(linkage, q, v, circular)
     system = Constrained(masses, applied, at.rows, at.violation, at.rate, at.bias)
     multipliers = method.multipliers(system) if at.rows else []
     forces = list(applied)

@@ -7,7 +7,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.compiler import kept_alone
-from jaxbiped.constraints._linkage import headings_of, row_times, torque_on, turn_of
+from jaxbiped.constraints._linkage import row_times, torque_on, turn_of
 from jaxbiped.dynamics._constrained_motion import (
     LinkageMotion,
     coordinates_of,
@@ -139,9 +139,8 @@ def _linkage_motion(scene: RedundantScene, state: BodiesState) -> LinkageMotion:
     q, v = coordinates_of(scene, state)
     poses, linkage = poses_of(scene, state), scene.linkage
     circular = list(zip(poses[0].sines, poses[0].cosines, strict=True))
-    headings = headings_of(linkage, q, v, circular)
     applied = _applied_forces(scene, state, poses)
-    return motion_under(linkage, scene.method, q, v, applied, headings)
+    return motion_under(linkage, scene.method, q, v, applied, circular)
 
 
 def _applied_forces(
