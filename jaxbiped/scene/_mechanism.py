@@ -179,7 +179,7 @@ class Mechanism(eqx.Module):
             part: Any = with_fields(self.pieces[own], name=name)
             if own in s.joint_pieces[:k]:
                 part = with_fields(part, angle=named_angle(s.joints[k], s.bodies))
-            if s.changes_sign(k) and isinstance(part, Stop):
+            if s.changes_sign(k) and isinstance(part, Stop) and part.upper is not None:
                 part = with_fields(part, lower=-part.upper)  # the mirror's
             found.append(part)
         return tuple(found)
