@@ -14,9 +14,8 @@ from equinox import AbstractVar
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, by_numpy
-from jaxbiped.dynamics._actuation import actuator_powers
 from jaxbiped.dynamics._contacts import feet
-from jaxbiped.dynamics._energy import is_driven, kinetic_energy, powers
+from jaxbiped.dynamics._energy import actuator_powers, is_driven, kinetic_energy, powers
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
