@@ -20,7 +20,7 @@ from jaxbiped.dynamics._footfalls import (
 )
 from jaxbiped.dynamics._joint_loads import Pressed, stop_limits
 from jaxbiped.dynamics._tree import Pose, point_motion
-from jaxbiped.scene._ground import drop_under
+from jaxbiped.scene._ground import SteppedGround
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene._state_types import SomeState
@@ -59,7 +59,7 @@ def feet_at(
     scene: CompliantScene, poses: tuple[Pose, ...], bristles: tuple[Scalar | None, ...]
 ) -> tuple[FootMotion, ...]:
     """The feet of bodies in these poses."""
-    mechanism = scene.mechanism
+    mechanism, ground = scene.mechanism, cast("object", scene.ground)
     structure, given = mechanism.structure, mechanism.feet
     points = tuple(
         point_motion(structure, poses[body], body, foot.centre)
@@ -77,9 +77,8 @@ def feet_at(
         slip = point.vx
         if radius is not None:
             depth, slip = radius - point.z, point.vx + radius * poses[body].motion.rates[body]
-        drop = drop_under(scene.ground, leg)
-        if drop is not None:
-            depth = depth - drop
+        if isinstance(ground, SteppedGround) and leg == ground.leg:
+            depth = depth - ground.drop
         moved = preload(scene, legs[leg])
         if moved is not None:
             depth, depth_rate = depth + moved[0], depth_rate + moved[1]

@@ -24,7 +24,7 @@ from jaxbiped.dynamics._contacts import (
     normal_forces,
 )
 from jaxbiped.dynamics._equivalent_states import motion_in, poses_of
-from jaxbiped.dynamics._footfalls import FootMotion, LegMotion, touches
+from jaxbiped.dynamics._footfalls import LegMotion, touches
 from jaxbiped.dynamics._joint_loads import JointEnergy, angle_value, joint_energy
 from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.dynamics._tree import Motion, PointMotion, point_motion
@@ -104,7 +104,10 @@ def energies(scene: Scene, state: State) -> Energies:
         The three energies [J], leaves shaped as the state's.
     """
     kinetic, moment = kinetic_and_moment(scene, state)
-    elastic = sum(_elastic_energy(scene, foot) for foot in feet(scene, state))
+    elastic = sum(
+        jnp.where(touches(foot), scene.normal.elastic_energy(foot.penetration), 0.0)
+        for foot in feet(scene, state)
+    )
     joints = _joint_energy(scene, state)
     if joints is not None:
         elastic = elastic + joints.stored
@@ -192,10 +195,6 @@ def _actuator_powers(scene: Scene, state: State) -> ActuatorPowers:
     of_parts = actuator_powers(scene, hip, list(zip(forces, of_feet, strict=True)))
     told = motor_powers(scene.mechanism, motion, scene.ground.slope, legs, shares)
     return ActuatorPowers(sum(told, of_parts.total), of_parts.motors + tuple(told))
-
-
-def _elastic_energy(scene: Scene, foot: FootMotion) -> Scalar:
-    return jnp.where(touches(foot), scene.normal.elastic_energy(foot.penetration), 0.0)
 
 
 def kinetic_energy(scene: AbstractWalkerScene, state: Any) -> Scalar:

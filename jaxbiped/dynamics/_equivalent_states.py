@@ -45,12 +45,9 @@ class BodyMotion(NamedTuple):
     rate: Scalar
 
 
-def body_motions(structure: Structure, state: BodiesState) -> tuple[BodyMotion, ...]:
-    """Every body in a redundant state."""
-    return tuple(_body_motion(state, name) for name in structure.bodies)
-
-
 def _body_motion(state: BodiesState, body: str) -> BodyMotion:
+    """A body, by its name, in a redundant state."""
+
     def own(name: str) -> Scalar:
         return getattr(state, f"{name}_{body}")
 
@@ -93,7 +90,8 @@ def poses_of(scene: AbstractWalkerScene, state: CompliantState) -> tuple[Pose, .
     structure = mechanism.structure
     if not is_redundant(state):
         return (pose_of(mechanism, motion_in(scene, state)),) * len(structure.bodies)
-    bodies, origin = body_motions(structure, state), jnp.zeros_like(state[0])
+    bodies = [_body_motion(state, name) for name in structure.bodies]
+    origin = jnp.zeros_like(state[0])
     turned = tuple(each.angle for each in bodies), tuple(each.rate for each in bodies)
     pose = pose_of(mechanism, Motion(origin, origin, origin, origin, *turned))
     found = []
