@@ -59,8 +59,8 @@ def feet_at(
     scene: CompliantScene, poses: tuple[Pose, ...], bristles: tuple[Scalar | None, ...]
 ) -> tuple[FootMotion, ...]:
     """The feet of bodies in these poses."""
-    mechanism, ground = scene.mechanism, cast("object", scene.ground)
-    structure, given = mechanism.structure, mechanism.feet
+    ground: object = scene.ground
+    structure, given = scene.mechanism.structure, scene.mechanism.feet
     points = tuple(
         point_motion(structure, poses[body], body, foot.centre)
         for body, foot in zip(structure.feet, given, strict=True)
