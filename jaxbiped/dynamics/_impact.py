@@ -25,7 +25,7 @@ from jaxbiped.dynamics._mode_changes import (
     with_mode,
     with_rates,
 )
-from jaxbiped.dynamics._plastic_impact import Grip, Impulse, plastic_impact
+from jaxbiped.dynamics._plastic_impact import Impulse, plastic_impact
 from jaxbiped.dynamics._rolling import rolling
 from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.dynamics._state import state_type
@@ -79,14 +79,12 @@ def impact(scene: RigidScene, state: Any) -> Impact:
 
 def _impact(scene: RigidScene, state: Any, old: Stance) -> Impact:
     mechanism, feet = old.mechanism, old.next_feet
-    grip = Grip((), ()) if old.mode is None else grip_at_strike(scene, old)
     lands = _lands(old, feet) if len(feet) > 1 else ()
-    found = plastic_impact(
-        old, feet, lands, push_off_impulse(scene, old), rigid_modes(mechanism), grip
-    )
+    modes, pushed = rigid_modes(mechanism), push_off_impulse(scene, old)
+    found = plastic_impact(old, feet, lands, pushed, modes, grip_at_strike(scene, old))
     lifting = mean([found.stance.foot(k).vz for k in old.feet])
     after = with_rates(state, found.stance)
-    if old.mode is None:
+    if not modes.any:
         return Impact(exchange_legs(scene, after), *found.impulse, lifting)
     then = with_mode(scene, exchange_legs(scene, after), mode_after_strike(scene, old, found))
     leg = leg_after_strike(mechanism.structure, old.leg)

@@ -181,14 +181,14 @@ class Stance(NamedTuple):
         leg: number of the leg that does.
         tree: of it there.
         pose: of that tree, in a frame in which the foot's centre is over 0 at its body's angle 0.
-        mode: what stands, and what is held; None where only one mode can occur.
+        mode: what stands, and what is held; nothing where only one mode can occur.
     """
 
     mechanism: Mechanism
     leg: int
     tree: StandingTree
     pose: Pose
-    mode: Mode | None = None
+    mode: Mode = Mode((), (), ())
 
     @property
     def feet(self) -> Indices:
@@ -209,14 +209,13 @@ class Stance(NamedTuple):
     @property
     def stands(self) -> tuple[Scalar, ...]:
         """Which of two feet stand; none where the leg has one."""
-        if self.mode is None or len(self.feet) < 2:
+        if not self.mode.stands or len(self.feet) < 2:
             return ()
         return rigid_modes(self.mechanism).stands_of(self.mode, self.leg)
 
     @property
     def held(self) -> list[Scalar]:
         """Which rows of `Holds` are held; booleans."""
-        assert self.mode is not None
         stands = self.stands
         return [*([stands[0] & stands[1]] if stands else []), *self.mode.held]
 
@@ -260,9 +259,9 @@ def stance_on(scene: AbstractWalkerScene, state: Any, leg: int) -> Stance:
     mechanism, zero = scene.mechanism, jnp.zeros_like(state[0])
     angles, turning = angles_and_rates(mechanism.structure, state)
     modes, feet = rigid_modes(mechanism), mechanism.structure.feet_of_leg[leg]
-    mode = modes.decoded(jnp, state.mode) if modes.any else None
+    mode = modes.decoded(jnp, state.mode) if modes.any else Mode((), (), ())
     sole = sole_of(mechanism, feet[0])
-    if mode is not None and len(feet) > 1:
+    if mode.stands and len(feet) > 1:
         first, _ = modes.stands_of(mode, leg)
         sole = either(first, sole, sole_of(mechanism, feet[1]))
     tree = standing_tree(mechanism, sole)
@@ -276,7 +275,6 @@ def of_stance(scene: AbstractWalkerScene, state: Any, function: Callable[[Stance
     found = function(stance_on(scene, state, last))
     for leg in others:
         other = stance_on(scene, state, leg)
-        assert other.mode is not None
         stands = rigid_modes(scene.mechanism).stands_on(other.mode, leg)
         found = select(stands, function(other), found)
     return found
