@@ -3,7 +3,7 @@
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state import STATE_QUANTITIES
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.plot import _parameter_charts, _symbols
 from jaxbiped.solve._accuracy import units_of

@@ -12,9 +12,9 @@ from jaxbiped.continuation._continue_gait import first_gait, traces_from
 from jaxbiped.continuation._trace import Trace
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import state_of_guess
+from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
 
 FACTOR = 8.0
 """How far a parameter is followed to both sides of its own value."""

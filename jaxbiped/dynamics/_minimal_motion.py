@@ -26,12 +26,7 @@ from jaxbiped.dynamics._implicit_field import (
 from jaxbiped.dynamics._joint_loads import with_constraint_torques
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, Pose, point_motion, pose_of
-from jaxbiped.dynamics._tree_inertia import (
-    Composites,
-    centrifugal_loads,
-    composites,
-    eliminate,
-)
+from jaxbiped.dynamics._tree_inertia import Composites, composites, eliminate, inertial_loads
 from jaxbiped.linalg._elimination import times
 from jaxbiped.linalg._sparse_lu import SparseMatrix
 from jaxbiped.scene._ground import gravity_on
@@ -57,7 +52,7 @@ def accelerations(scene: Scene, state: Any) -> Any:
     """
     at = _at(scene, state)
     structure, known, pose = at.mechanism.structure, at.known, at.pose
-    loads = _with_applied_loads(centrifugal_loads(structure, known, pose), scene, at)
+    loads = _with_applied_loads(inertial_loads(structure, known, pose), scene, at)
     factors = eliminate(structure, known, pose)
     moved = with_constraint_torques(structure, at.mechanism.joints, factors, loads)
     downhill, weight = gravity_on(scene.ground)

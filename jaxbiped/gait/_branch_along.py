@@ -11,7 +11,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._state_quantities import state_of_recurring
+from jaxbiped.dynamics._state import state_of_recurring
 from jaxbiped.gait._fixed_point_search import (
     ROUGH,
     FixedPointProblem,

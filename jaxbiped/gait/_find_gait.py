@@ -16,9 +16,9 @@ from jaxbiped._progress import Stage, stage
 from jaxbiped._types import in_64_bits, is_traced
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._consistent_state import consistent_state
+from jaxbiped.dynamics._constrained_motion import consistent_state
 from jaxbiped.dynamics._equivalent_states import BodiesState, minimal_state
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
@@ -36,11 +36,10 @@ from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._search_compilation import compile_once
 from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_unknown
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene, check_scene
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._rigid_feet import held_count
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
 from jaxbiped.solve._error_estimate import check_wanted

@@ -15,7 +15,7 @@ from jaxbiped._summary import notebook_html, summary
 from jaxbiped._tables import Tabular, variables_of
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,

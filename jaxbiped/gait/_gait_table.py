@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry
-from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
+from jaxbiped.dynamics._state import recurring_names, state_quantity
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._measures import QUANTITIES

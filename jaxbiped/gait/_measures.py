@@ -11,7 +11,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._footfalls import FootMotion, landings, standing_leg, touches
-from jaxbiped.dynamics._state_quantities import state_of_recurring
+from jaxbiped.dynamics._state import state_of_recurring
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, crossings_of
 from jaxbiped.gait._orbit_derivatives import Orbit, Slopes, change_terms
 from jaxbiped.gait._poincare_map import LinearisedReturn

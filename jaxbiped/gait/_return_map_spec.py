@@ -12,7 +12,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._types import Scalar, Time, by_numpy
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import RedundantScene, is_rigid
 from jaxbiped.scene._state_types import is_redundant

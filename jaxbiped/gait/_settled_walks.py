@@ -9,8 +9,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._section import in_nearest_names
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves
+from jaxbiped.dynamics._surfaces import in_nearest_names
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.simulate._simulate import rigid_walk, simulate

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._progress import stage
-from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
+from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
 from jaxbiped.gait._search_starts import (
     rolling_starts,
     scattered_start_count,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_provenance import explain_search
 from jaxbiped.optimise._cycle_functionals import Functional, weighted_sum

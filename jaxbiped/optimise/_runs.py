@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxbiped._progress import Stage
 from jaxbiped.continuation._nearest_bifurcation import allows, range_of
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
 from jaxbiped.optimise._optimality import OPTIMAL, optimality_of

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.dynamics._state_quantities import state_quantity
+from jaxbiped.dynamics._state import state_quantity
 from jaxbiped.measure._samples import evaluate_along, from_start
 from jaxbiped.plot import style
 from jaxbiped.plot._samples import AnyScene, DrawnMotion, sample

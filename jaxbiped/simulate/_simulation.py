@@ -24,10 +24,10 @@ from jaxbiped._checks import (
 )
 from jaxbiped._types import Numbers, Scalar, as_array, as_float, is_traced
 from jaxbiped.compiler import BY_NAME, Request
-from jaxbiped.dynamics._consistent_state import Consistent
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._constrained_motion import Consistent
+from jaxbiped.dynamics._surfaces import AbstractSection
+from jaxbiped.scene._abstract_scene import check_scene, where_allowed
 from jaxbiped.scene._scene import RedundantScene, Scene
-from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._derivatives import with_derivatives
 from jaxbiped.simulate._lane_backend import by_lanes, choose_engine, lane_request, prepare_lanes
 from jaxbiped.simulate._slopes import Slopes, slopes_of

@@ -12,7 +12,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import BoolScalarLike, RealScalarLike, Time
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
-from jaxbiped.dynamics._consistent_state import project
+from jaxbiped.dynamics._constrained_motion import project
 from jaxbiped.scene._scene import RedundantScene
 
 _Solver = TypeVar("_Solver", bound=diffrax.AbstractSolver[PyTree])

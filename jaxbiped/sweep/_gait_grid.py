@@ -13,7 +13,7 @@ from jaxbiped._files import strict_json
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import variables_of
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._state_quantities import recurring_names
+from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._gait_table import gait_coordinates, gait_entries

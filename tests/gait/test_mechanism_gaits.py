@@ -11,7 +11,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._state_quantities import recurring_names
+from jaxbiped.dynamics._state import recurring_names
 from tests.mechanisms import FEET, LEGS, PAIR, leg
 
 STANCE = jb.laws.StanceRotation()

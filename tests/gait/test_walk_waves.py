@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._state_quantities import recurring_names
+from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait import _walk_waves
 from jaxbiped.gait._homotopy import homotopy_to, line_from_model
 from jaxbiped.gait._settled_walks import Walks

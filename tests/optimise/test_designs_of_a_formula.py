@@ -11,7 +11,8 @@ from reference.rigid import rigid_walker
 import jaxbiped as jb
 from jaxbiped._progress import Stage
 from jaxbiped.continuation._nearest_bifurcation import farthest_allowed, range_of
-from jaxbiped.dynamics._actuation import actuator_powers, hip_torques
+from jaxbiped.dynamics._actuation import hip_torques
+from jaxbiped.dynamics._energy import actuator_powers
 from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
 from jaxbiped.optimise import _certificate, _design_gaits

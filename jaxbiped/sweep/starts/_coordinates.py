@@ -8,8 +8,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped._quantity import Quantity
-from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
+from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, with_parameters
 from jaxbiped.scene._placement import placement

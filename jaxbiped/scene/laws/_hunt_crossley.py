@@ -14,9 +14,8 @@ import jax.numpy as jnp
 from jaxbiped._checks import check_choice, check_positive, check_within
 from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
-from jaxbiped.scene.laws._abstract_laws import depth_in_contact, power, pushing
-from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractHertzianLaw
+from jaxbiped.scene.laws._abstract_laws import AbstractHertzianLaw, depth_in_contact, power, pushing
+from jaxbiped.scene.laws._ristow_schafer import RistowSchafer, Standing
 
 
 class Restitution(NamedTuple):

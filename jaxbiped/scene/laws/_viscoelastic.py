@@ -6,9 +6,13 @@ import jax.numpy as jnp
 
 from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene.laws._abstract_laws import depth_in_contact, pushing
-from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, AbstractHertzianLaw
+from jaxbiped.scene.laws._abstract_laws import (
+    AbstractDampedLaw,
+    AbstractHertzianLaw,
+    depth_in_contact,
+    pushing,
+)
+from jaxbiped.scene.laws._ristow_schafer import RistowSchafer, Standing
 
 
 class AbstractMatchedLaw(AbstractDampedLaw):

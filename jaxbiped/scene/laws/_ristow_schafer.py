@@ -9,6 +9,7 @@ from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.compiler import kept_alone
 from jaxbiped.scene.laws._abstract_laws import (
+    AbstractHertzianLaw,
     AbstractNormalLaw,
     depth_in_contact,
     hertz_energy,
@@ -17,7 +18,6 @@ from jaxbiped.scene.laws._abstract_laws import (
     pushing,
     smooth_ramp,
 )
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractHertzianLaw
 
 
 class RistowSchafer(AbstractHertzianLaw):

@@ -7,9 +7,13 @@ import jax.numpy as jnp
 from jaxbiped._checks import check_positive, check_within
 from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
-from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, hertz_energy, hertz_force
-from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
-from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
+from jaxbiped.scene.laws._abstract_laws import (
+    AbstractNormalLaw,
+    hertz_energy,
+    hertz_force,
+    matched_to_weight,
+)
+from jaxbiped.scene.laws._ristow_schafer import RistowSchafer, Standing
 
 
 class Hertz(AbstractNormalLaw):

@@ -7,7 +7,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.compiler import host_jit
-from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of
+from jaxbiped.constraints._linkage import constraints_of, masses_of
 from jaxbiped.dynamics._state import state_type
 
 SCENE = jb.RedundantScene(jb.seed_scene())
