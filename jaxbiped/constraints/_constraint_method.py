@@ -15,7 +15,7 @@ from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._linkage import Linkage, Row, constraints_of, masses_of, row_times
-from jaxbiped.linalg._elimination import symmetric_factors
+from jaxbiped.linalg._small_matrices import symmetric_factors
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar

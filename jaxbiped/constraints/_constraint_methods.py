@@ -21,7 +21,7 @@ from jaxbiped.constraints._constraint_method import (
     stabilised_residual,
 )
 from jaxbiped.constraints._linkage import Row
-from jaxbiped.linalg._elimination import SymmetricFactors, symmetric_factors
+from jaxbiped.linalg._small_matrices import SymmetricFactors, symmetric_factors
 
 
 class Standard(AbstractConstraintMethod):

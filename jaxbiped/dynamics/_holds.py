@@ -19,7 +19,7 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._implicit_field import fold
 from jaxbiped.dynamics._stance import Stance, angles_and_rates, stance_on
 from jaxbiped.dynamics._state import recurring_leaves, recurring_names
-from jaxbiped.linalg._elimination import symmetric_factors
+from jaxbiped.linalg._small_matrices import symmetric_factors
 from jaxbiped.linalg._sparse_lu import SparseFactors
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._mechanism_pieces import with_fixed

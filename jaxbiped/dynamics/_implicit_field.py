@@ -18,8 +18,7 @@ from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._joint_loads import of_all_bodies
 from jaxbiped.dynamics._tree import Loads, Pose
 from jaxbiped.dynamics._tree_inertia import Composites, inertial_loads, mass_entries
-from jaxbiped.linalg._elimination import Entry
-from jaxbiped.linalg._sparse_lu import SparseMatrix
+from jaxbiped.linalg._sparse_lu import Entry, SparseMatrix
 from jaxbiped.scene._structure import Structure, weighted
 
 Residual: TypeAlias = dict[int, Scalar]

@@ -10,7 +10,8 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._tree import Loads, Motion
 from jaxbiped.dynamics._tree_inertia import Elimination, substitute
-from jaxbiped.linalg._elimination import inverse, plus
+from jaxbiped.linalg._small_matrices import inverse
+from jaxbiped.linalg._sparse_lu import plus
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism

@@ -11,8 +11,7 @@ from jaxbiped.dynamics._implicit_field import fold, fold_matrix
 from jaxbiped.dynamics._joint_loads import of_all_bodies
 from jaxbiped.dynamics._stance import Sole, Stance, either, sole_of
 from jaxbiped.dynamics._tree import Loads
-from jaxbiped.linalg._elimination import plus
-from jaxbiped.linalg._sparse_lu import factorise, product
+from jaxbiped.linalg._sparse_lu import factorise, plus, product
 from jaxbiped.scene._modes import Modes
 from jaxbiped.scene._structure import Indices
 

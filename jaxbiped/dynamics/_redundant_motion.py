@@ -31,8 +31,7 @@ from jaxbiped.dynamics._tree import (
     point_acceleration,
     point_motion,
 )
-from jaxbiped.linalg._elimination import times
-from jaxbiped.linalg._sparse_lu import SparseMatrix
+from jaxbiped.linalg._sparse_lu import SparseMatrix, times
 from jaxbiped.scene._bodies import Point
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._linkages import loaded_bodies

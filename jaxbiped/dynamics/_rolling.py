@@ -16,8 +16,7 @@ from jaxbiped.dynamics._stance import Stance, angles_and_rates, of_stance
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, rehung
 from jaxbiped.dynamics._tree_inertia import inertial_loads
-from jaxbiped.linalg._elimination import Entry
-from jaxbiped.linalg._sparse_lu import factorise
+from jaxbiped.linalg._sparse_lu import Entry, factorise
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._rigid_feet import rigid_modes
 from jaxbiped.scene._scene import RigidScene

@@ -17,8 +17,7 @@ from jaxbiped.dynamics._implicit_field import Weights, free_weights
 from jaxbiped.dynamics._joint_loads import motion_of
 from jaxbiped.dynamics._tree import Motion, PointMotion, Pose, point_motion, pose_of, rehung
 from jaxbiped.dynamics._tree_inertia import Composites, composites, mass_entries
-from jaxbiped.linalg._elimination import Entry, plus
-from jaxbiped.linalg._sparse_lu import SparseMatrix
+from jaxbiped.linalg._sparse_lu import Entry, SparseMatrix, plus
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode

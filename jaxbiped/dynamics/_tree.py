@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jaxbiped._trigonometry import sine_cosine
 from jaxbiped._types import Scalar
-from jaxbiped.linalg._elimination import Entry, plus, times
+from jaxbiped.linalg._sparse_lu import Entry, plus, times
 from jaxbiped.scene._bodies import Point
 from jaxbiped.scene._structure import Structure, weighted
 

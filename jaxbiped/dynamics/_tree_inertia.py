@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._tree import Arm, Loads, Pose, Tree, Vector, arm_of
-from jaxbiped.linalg._elimination import Entry, plus, times
-from jaxbiped.linalg._sparse_lu import SparseMatrix
+from jaxbiped.linalg._sparse_lu import Entry, SparseMatrix, plus, times
 from jaxbiped.scene._structure import Structure
 
 

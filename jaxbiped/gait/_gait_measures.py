@@ -15,7 +15,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._measures import Measures
 from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.gait._return_map_spec import AbstractGradient, Implicit
-from jaxbiped.linalg._elimination import solution
+from jaxbiped.linalg._small_matrices import solution
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState

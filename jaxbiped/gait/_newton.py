@@ -15,7 +15,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import RealScalarLike, Scalar, choose
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.linalg._elimination import solution
+from jaxbiped.linalg._small_matrices import solution
 
 if TYPE_CHECKING:
     import optax

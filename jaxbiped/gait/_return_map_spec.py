@@ -17,8 +17,7 @@ from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import RedundantScene, is_rigid
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for
-from jaxbiped.solve._projected_solver import with_projection
-from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._solvers import solver_named, with_projection
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._hybrid_system import (
     AbstractSystem,

@@ -11,10 +11,21 @@ from typing import TypeAlias
 import equinox as eqx
 
 from jaxbiped._types import Scalar
-from jaxbiped.linalg._elimination import Entry
 
+Entry: TypeAlias = Scalar | None
+"""None: zero whatever the state."""
 Place: TypeAlias = tuple[int, int]
 SparseMatrix: TypeAlias = dict[Place, Scalar]
+
+
+def plus(a: Entry, b: Entry) -> Entry:
+    if a is None:
+        return b
+    return a if b is None else a + b
+
+
+def times(a: Entry, b: Entry) -> Entry:
+    return None if a is None or b is None else a * b
 
 
 class SparseFactors(eqx.Module):
@@ -94,10 +105,7 @@ def product(matrix: SparseMatrix, right: Mapping[int, Entry]) -> dict[int, Entry
     """A matrix times a vector, each by row; None for what is zero."""
     found: dict[int, Entry] = {}
     for (i, j), entry in matrix.items():
-        value = right.get(j)
-        if value is not None:
-            own = found.get(i)
-            found[i] = entry * value if own is None else own + entry * value
+        found[i] = plus(found.get(i), times(entry, right.get(j)))
     return found
 
 

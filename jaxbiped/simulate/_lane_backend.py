@@ -20,7 +20,8 @@ from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adapt
 from jaxbiped.solve._engine_names import ENGINES, engine_for
 from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
-from jaxbiped.solve.controllers._solve_ends import PATIENCE, just_before_end
+from jaxbiped.solve.controllers._event_steps import PATIENCE
+from jaxbiped.solve.controllers._wrapped_control import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 if TYPE_CHECKING:

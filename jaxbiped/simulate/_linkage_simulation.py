@@ -31,12 +31,15 @@ from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._linkages import LinkageScene
 from jaxbiped.simulate._start import Options, check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
-from jaxbiped.solve._projected_solver import check_adjoint, wrap_projected
-from jaxbiped.solve._solvers import solver_named, with_root_tolerances
+from jaxbiped.solve._solvers import (
+    check_adjoint,
+    solver_named,
+    with_root_tolerances,
+    wrap_projected,
+)
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.controllers._solve_ends import first_step
 from jaxbiped.solve.controllers._step_size import step_control
-from jaxbiped.solve.controllers._wrapped_control import StepControl
+from jaxbiped.solve.controllers._wrapped_control import StepControl, first_step
 
 _FAR = 0.5
 """Distance of a start from its joints, in units of the longest arm, beyond which it is refused."""

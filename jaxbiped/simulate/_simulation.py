@@ -50,11 +50,10 @@ from jaxbiped.solve._accuracy import (
 )
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._failure_events import WATCHES
-from jaxbiped.solve._projected_solver import check_adjoint
 from jaxbiped.solve._scene_key import scene_key
-from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._solvers import check_adjoint, solver_named
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.controllers._solve_ends import PATIENCE
+from jaxbiped.solve.controllers._event_steps import PATIENCE
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 

@@ -14,18 +14,20 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.solve._failure_events import ending_code, ending_events
-from jaxbiped.solve._projected_solver import with_projection
-from jaxbiped.solve._solvers import with_root_tolerances
+from jaxbiped.solve._solvers import with_projection, with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.controllers._contact_steps import MissedContacts
-from jaxbiped.solve.controllers._solve_ends import (
+from jaxbiped.solve.controllers._event_steps import (
     PATIENCE,
     FootstepLimit,
     LocatedEnding,
-    first_step,
+    MissedContacts,
 )
 from jaxbiped.solve.controllers._step_size import walk_control
-from jaxbiped.solve.controllers._wrapped_control import Extremes, GivenFirstStep
+from jaxbiped.solve.controllers._wrapped_control import (
+    Extremes,
+    GivenFirstStep,
+    first_step,
+)
 
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulation import Simulation

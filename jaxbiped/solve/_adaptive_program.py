@@ -24,14 +24,14 @@ from jaxbiped.solve._accuracy import Units
 from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve._saved_outputs import LastStep, Saved
-from jaxbiped.solve.controllers._solve_ends import (
-    FootstepLimit,
-    LocatedEnding,
+from jaxbiped.solve.controllers._event_steps import FootstepLimit, LocatedEnding
+from jaxbiped.solve.controllers._step_size import walk_control
+from jaxbiped.solve.controllers._wrapped_control import (
+    StepControl,
     clip_step,
     first_step,
+    widened_extremes,
 )
-from jaxbiped.solve.controllers._step_size import walk_control
-from jaxbiped.solve.controllers._wrapped_control import StepControl, widened_extremes
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
 
 

@@ -42,11 +42,6 @@ class SurfaceCourse(NamedTuple):
     turning: tuple[Scalar, ...] = ()
 
 
-def has_modes(scene: RigidScene) -> bool:
-    """Whether the mode may change between strikes; known before anything runs."""
-    return rigid_modes(scene.mechanism).may_change
-
-
 def course_of(scene: RigidScene, state: Any) -> SurfaceCourse:
     """The surfaces at a state, followed along its motion."""
 

@@ -8,8 +8,9 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._mode_changes import change_mode
 from jaxbiped.dynamics._rolling import ground_force, rolling_rates
 from jaxbiped.dynamics._stance import Stance, of_stance
+from jaxbiped.scene._rigid_feet import rigid_modes
 from jaxbiped.scene._scene import RigidScene
-from jaxbiped.solve._mode_steps import SurfaceCourse, course_of, has_modes
+from jaxbiped.solve._mode_steps import SurfaceCourse, course_of
 
 _FIRST_STEP = 0.03
 """First step, in units of √(l/g)."""
@@ -109,7 +110,7 @@ def initial_progress(walk: RigidWalk) -> RigidProgress:
     step = jnp.minimum(step, walk.duration)
     no = jnp.asarray(False)
     state, modes = walk.state, None
-    if has_modes(walk.scene):
+    if rigid_modes(walk.scene.mechanism).may_change:
         state = change_mode(walk.scene, state)
         course = course_of(walk.scene, state)
         paces = jnp.zeros(1 + len(course.values), zero.dtype)

@@ -1,16 +1,27 @@
-"""Solvers by name: the Rosenbrock family of this project and diffrax's own."""
+"""Solvers by name, this project's Rosenbrock family and diffrax's own; and projected ones.
 
+A projected solver's steps end on the constraints.
+"""
+
+import dataclasses
 from collections.abc import Callable
+from typing import Any, TypeVar, cast
 
 import diffrax
 import equinox as eqx
+import jax.numpy as jnp
 import optimistix
 from jaxtyping import PyTree
 
-from jaxbiped._checks import check_choice
-from jaxbiped._types import Numbers
+from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._types import BoolScalarLike, Numbers, RealScalarLike, Time
+from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
+from jaxbiped.dynamics._constrained_motion import project
+from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas3P, Rodas4, Rodas4P, Rodas5P
+
+_Solver = TypeVar("_Solver", bound=diffrax.AbstractSolver[PyTree])
 
 
 def _chord() -> optimistix.AbstractRootFinder[PyTree, PyTree, PyTree, PyTree]:
@@ -70,3 +81,105 @@ def with_root_tolerances(
         (rtol, atol, rms_norm),
         is_leaf=lambda leaf: leaf is root_finder.rtol or leaf is root_finder.norm,
     )
+
+
+_SCAN_KINDS: dict[type, str | None] = {
+    diffrax.RecursiveCheckpointAdjoint: None,
+    diffrax.DirectAdjoint: "bounded",
+    diffrax.ForwardMode: "lax",
+}
+"""Adjoints that go through the steps themselves, and how Runge–Kutta methods loop for them."""
+
+
+def check_adjoint(
+    method: AbstractConstraintMethod, adjoint: diffrax.AbstractAdjoint | None
+) -> None:
+    """Raises `ArgumentError` for an adjoint that would not see a method's projections."""
+    if method.projects and adjoint is not None and type(adjoint) not in _SCAN_KINDS:
+        raise ArgumentError(
+            f"adjoint = {type(adjoint).__name__} is not allowed for method = "
+            f"{type(method).__name__}, which projects after each step: choose one that sees the "
+            f"steps, {', '.join(kind.__name__ for kind in _SCAN_KINDS)}."
+        )
+
+
+class Projected(diffrax.AbstractWrappedSolver):  # type: ignore[type-arg]
+    """Wraps a solver: what a step arrives at is projected before anything else sees it.
+
+    The error estimate is the solver's own. A solver that keeps a slope from its last step finds it
+    anew, for it belonged to the state before the projection.
+
+    Attributes:
+        solver: any one-step solver.
+        project: `project(args, y)`, the state on the constraints.
+    """
+
+    solver: diffrax.AbstractSolver[PyTree]  # type: ignore[misc]
+    project: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
+
+    @property
+    def term_structure(self) -> PyTree:
+        return self.solver.term_structure
+
+    @property
+    def interpolation_cls(self) -> Callable[..., diffrax.AbstractLocalInterpolation]:  # type: ignore[override]
+        return self.solver.interpolation_cls
+
+    @property
+    def scan_kind(self) -> str | None:
+        """The solver's, where it has one: diffrax asks Runge–Kutta methods."""
+        return getattr(self.solver, "scan_kind", None)
+
+    @property
+    def root_finder(self) -> Any:
+        """The solver's, where it has one: diffrax hands it the tolerances of the steps."""
+        return getattr(self.solver, "root_finder", None)
+
+    def order(self, terms: Any) -> int | None:
+        return self.solver.order(terms)
+
+    def error_order(self, terms: Any) -> RealScalarLike | None:
+        return self.solver.error_order(terms)
+
+    def init(self, terms: Any, t0: Time, t1: Time, y0: PyTree, args: PyTree) -> Any:
+        return self.solver.init(terms, t0, t1, y0, args)
+
+    def func(self, terms: Any, t0: Time, y0: PyTree, args: PyTree) -> PyTree:
+        return self.solver.func(terms, t0, y0, args)
+
+    def step(
+        self,
+        terms: Any,
+        t0: Time,
+        t1: Time,
+        y0: PyTree,
+        args: PyTree,
+        solver_state: Any,
+        made_jump: BoolScalarLike,
+    ) -> tuple[PyTree, PyTree, dict[str, PyTree], Any, Any]:
+        anew = jnp.ones_like(jnp.asarray(made_jump))
+        y1, error, dense, state, result = self.solver.step(
+            terms, t0, t1, y0, args, solver_state, anew
+        )
+        y1 = self.project(args, y1)
+        return y1, error, dense | ({"y1": y1} if "y1" in dense else {}), state, result
+
+
+def wrap_projected(
+    solver: _Solver,
+    project: Callable[[PyTree, PyTree], PyTree],
+    adjoint: diffrax.AbstractAdjoint | None = None,
+) -> _Solver:
+    """A `Projected` solver, ready for what will differentiate it."""
+    kind = _SCAN_KINDS.get(type(adjoint))
+    if kind is not None and getattr(solver, "scan_kind", "none") is None:
+        # diffrax would set it, but cannot through a wrapper.
+        solver = dataclasses.replace(solver, scan_kind=kind)  # type: ignore[call-arg]
+    return cast("_Solver", Projected(solver, project))  # as adaptive as what it wraps
+
+
+def with_projection(
+    scene: RedundantScene, solver: _Solver, adjoint: diffrax.AbstractAdjoint | None = None
+) -> _Solver:
+    """The solver, wrapped where the scene's method projects after each step."""
+    return wrap_projected(solver, project, adjoint) if scene.method.projects else solver

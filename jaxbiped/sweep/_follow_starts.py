@@ -20,7 +20,7 @@ from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._rigid_progress import RigidWalk
-from jaxbiped.solve.controllers._solve_ends import just_before_end
+from jaxbiped.solve.controllers._wrapped_control import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import Goals
 from jaxbiped.sweep._labelling_loop import CompliantLabelling, Labelled, RigidLabelling, Start

@@ -13,8 +13,8 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.compiler import Recorded, Recording
 from jaxbiped.solve._accuracy import rms_norm, units_of
-from jaxbiped.solve.controllers._solve_ends import first_step
 from jaxbiped.solve.controllers._step_size import step_control
+from jaxbiped.solve.controllers._wrapped_control import first_step
 from jaxbiped.variational._switch_locator import SwitchLocator, SwitchLocatorState
 from jaxbiped.variational._tangent_solver import (
     TangentControl,

@@ -17,7 +17,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar, Time
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._accuracy import rms_norm
-from jaxbiped.solve._projected_solver import Projected
+from jaxbiped.solve._solvers import Projected
 from jaxbiped.solve.controllers._wrapped_control import AbstractMemorylessControl, Adapted, Attempt
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
     AbstractMemorylessSolver,

@@ -16,7 +16,7 @@ from jaxbiped._types import RealScalarLike, Scalar, select
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import LANES, XLA, AbstractEngine, Program, Recorded, Recording, Request
 from jaxbiped.solve._accuracy import Precision, units_of
-from jaxbiped.solve.controllers._solve_ends import just_before_end
+from jaxbiped.solve.controllers._wrapped_control import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival
 from jaxbiped.variational._tangents import (

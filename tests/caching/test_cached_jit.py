@@ -13,7 +13,7 @@ from jaxbiped.caching import _compiled_store
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._disk_cache import CACHE_VARIABLE, disk_use
 from jaxbiped.simulate._xla_backend import by_xla
-from jaxbiped.solve.controllers._solve_ends import just_before_end
+from jaxbiped.solve.controllers._wrapped_control import just_before_end
 
 
 @pytest.fixture
@@ -129,7 +129,7 @@ def test_beside_the_cache_of_jax_none_is_kept_twice(cache, tmp_path, monkeypatch
     """Kept again, what JAX loaded from its own would fail where it is run."""
     monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path / "jax"))
     program = """
-from jaxbiped.solve.controllers._solve_ends import just_before_end
+from jaxbiped.solve.controllers._wrapped_control import just_before_end
 print(float(just_before_end(2.0)) < 2.0)
 """
     for _ in range(3):

@@ -59,17 +59,12 @@ def test_the_last_of_several_threads_leaves_both_as_they_were_found() -> None:
     assert _as_found()
 
 
-def test_a_collector_that_the_user_switched_off_stays_off() -> None:
+def test_a_collector_switched_off_and_longer_spells_stay_as_the_user_chose() -> None:
     gc.disable()
-    with long_trace(), long_trace():
-        assert not gc.isenabled()
-    assert not gc.isenabled()
-
-
-def test_spells_that_the_user_made_longer_stay_so() -> None:
     sys.setswitchinterval(LONG)
-    with long_trace():
+    with long_trace(), long_trace():
         assert sys.getswitchinterval() == pytest.approx(LONG)
+    assert not gc.isenabled()
     assert sys.getswitchinterval() == pytest.approx(LONG)
 
 

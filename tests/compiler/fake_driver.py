@@ -17,8 +17,8 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
-from jaxbiped.compiler.runtime import _cuda_device, _device_processor, _kernel
-from jaxbiped.compiler.runtime._machine_code import host, machine_code
+from jaxbiped.compiler.runtime import _cuda_device, _kernel, _processors
+from jaxbiped.compiler.runtime._machine_code import machine_code
 
 OUT_OF_MEMORY, NOT_READY, LAUNCH_FAILED = 2, 600, 719
 _WARP = 32
@@ -85,7 +85,7 @@ def host_text(text):
 def host_code(text, entry=ENTRY):
     """Its machine code."""
     llvm.add_symbol(_VOTE, ctypes.cast(_CALLED, ctypes.c_void_p).value)
-    return machine_code(host_text(text), entry, host(), as_written=False)
+    return machine_code(host_text(text), entry, as_written=False)
 
 
 class FakeDriver:
@@ -235,5 +235,5 @@ def install(monkeypatch, **options):
     monkeypatch.setenv("JAXBIPED_CACHE", "")
     monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
     monkeypatch.setattr(_kernel, "ptx_text", lambda text, architecture: text)
-    monkeypatch.setattr(_device_processor, "devices", functools.cache(_cuda_device.find_devices))
+    monkeypatch.setattr(_processors, "devices", functools.cache(_cuda_device.find_devices))
     return fake

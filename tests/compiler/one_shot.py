@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._machine_code import host, machine_code
+from jaxbiped.compiler.runtime._machine_code import machine_code
 from jaxbiped.compiler.runtime._program import Program
 
 NUMBER = jax.ShapeDtypeStruct((), jnp.float64)
@@ -43,6 +43,6 @@ def evaluate(function, *columns, **options):
 
 def loaded(text, entry, count):
     """A function of so many numbers in a module of LLVM's, on this machine."""
-    code = machine_code(text, entry, host(), as_written=False)
+    code = machine_code(text, entry, as_written=False)
     function = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * count)(code.address)
     return lambda *numbers, _keep=code: function(*numbers)

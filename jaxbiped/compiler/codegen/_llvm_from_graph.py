@@ -1,6 +1,7 @@
 """Graph code generation: LLVM's text, each value one vector over the lanes."""
 
 import contextlib
+import itertools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -282,10 +283,5 @@ class GraphWriter:
 def _parts_of(head: Value) -> list[Value]:
     """A region's results: they follow it in its block."""
     block = head.block.values
-    start = block.index(head) + 1
-    parts = []
-    for value in block[start:]:
-        if value.op != "part" or value.args[0] is not head:
-            break
-        parts.append(value)
-    return parts
+    after = block[block.index(head) + 1 :]
+    return list(itertools.takewhile(lambda v: v.op == "part" and v.args[0] is head, after))

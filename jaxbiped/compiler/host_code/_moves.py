@@ -153,8 +153,12 @@ def _concatenate(w: HostWriter, op: Operation) -> list[Value]:
     axis = op.params["dimension"]
     given = [each for each in op.inputs if each.shape[axis]]
     pieces: list[Value] = []
+
+    def single(value: Value) -> object:
+        return value.shape == (1,) and value.held == () and (id(value.block), True)
+
     # Single numbers one behind the other are one array, those known before a loop another one.
-    for key, group in itertools.groupby(given, lambda v: _single(v) and (id(v.block), True)):
+    for key, group in itertools.groupby(given, single):
         run = list(group)
         if not key:
             pieces += [w.full(each) for each in run]
@@ -163,10 +167,6 @@ def _concatenate(w: HostWriter, op: Operation) -> list[Value]:
     if len(pieces) == 1:
         return pieces
     return [w.emit(f"concatenate(({listed(len(pieces))}), {axis})", pieces, shape, dtype)]
-
-
-def _single(value: Value) -> bool:
-    return value.shape == (1,) and value.held == ()
 
 
 def _pad(w: HostWriter, op: Operation) -> list[Value]:

@@ -153,6 +153,12 @@ def convert(block: Block, a: Value, kind: Kind) -> Value:
     return block.add("to_float" if kind.is_float else "resize_int", a, kind=kind)
 
 
+def match_kinds(block: Block, arrays: Sequence[Array], like: Sequence[Array]) -> list[Array]:
+    """The same values, each as the kind of another one."""
+    pairs = zip(arrays, like, strict=True)
+    return [elementwise(lambda v, w: convert(block, v, w.kind), *pair) for pair in pairs]
+
+
 def _divide(block: Block, a: Value, b: Value, **_: object) -> Value:
     """By the reciprocal, which other divisions by the same number share."""
     if not a.kind.is_float:

@@ -4,6 +4,7 @@ Arrays disappear here: each entry becomes a value of its own, which a lane can k
 """
 
 import functools
+import itertools
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
@@ -23,6 +24,7 @@ from jaxbiped.compiler.ir._elementwise_primitives import (
     array_of,
     convert,
     elementwise,
+    match_kinds,
 )
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.ir._jacobian import JACOBIAN, parted, pulled_back
@@ -203,11 +205,10 @@ def _conditional(
 
 
 def _reshape(values: Sequence[Value], like: list[Array]) -> list[Array]:
-    arrays, place = [], 0
-    for array in like:
-        arrays.append(array_of(values[place : place + array.size], array.shape))
-        place += array.size
-    return arrays
+    ends = itertools.accumulate(array.size for array in like)
+    return [
+        array_of(values[end - a.size : end], a.shape) for a, end in zip(like, ends, strict=True)
+    ]
 
 
 def _scan(block: Block, params: dict[str, Any], inputs: list[Array]) -> list[Array]:
@@ -255,11 +256,8 @@ def _repeat(
     starts = [v for array in carry for v in array.ravel()]
     held = inside.region("held", (), [v.kind for v in starts])
     found = lower_jaxpr(inside, jaxpr.jaxpr, jaxpr.consts, [*fixed, *_reshape(held, carry)])
-    ends = [
-        convert(inside, v, start.kind)
-        for v, start in zip([v for a in found for v in a.ravel()], starts, strict=True)
-    ]
-    args = (length, inside, tuple(starts), tuple(held), tuple(ends))
+    ends = tuple(v for array in match_kinds(inside, found, carry) for v in array.ravel())
+    args = (length, inside, tuple(starts), tuple(held), ends)
     return _reshape(block.region("repeat", args, [v.kind for v in starts]), carry)
 
 
@@ -285,9 +283,5 @@ def _map(
     for row, value in zip(results, values, strict=True):
         if value.block is not inside:
             row[:] = value
-    arrays, place = [], 0
-    for array in found:
-        part = results[place : place + array.size].reshape(*array.shape, length)
-        arrays.append(np.moveaxis(part, -1, 0))
-        place += array.size
-    return arrays
+    shapes = [np.empty((*array.shape, length), dtype=object) for array in found]
+    return [np.moveaxis(each, -1, 0) for each in _reshape(results.ravel().tolist(), shapes)]

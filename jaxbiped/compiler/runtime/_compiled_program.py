@@ -13,7 +13,7 @@ from jaxtyping import PyTree
 
 from jaxbiped.compiler.runtime._kernel import Kernel
 from jaxbiped.compiler.runtime._machine_code import default_threads, run_in_threads
-from jaxbiped.compiler.runtime._processor import (
+from jaxbiped.compiler.runtime._processors import (
     AbstractProcessor,
     HostProcessor,
     InputTable,

@@ -11,7 +11,7 @@ import time
 import weakref
 from collections.abc import Iterator
 from ctypes import POINTER, c_char_p, c_int, c_size_t, c_uint, c_uint64, c_void_p
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,9 @@ from jaxbiped.compiler.codegen._lane_scheduler import FIELDS
 from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
 from jaxbiped.compiler.codegen._ptx_kernel import THREADS, Architecture, architecture_of
 from jaxbiped.compiler.runtime._kernel import Kernel
-from jaxbiped.compiler.runtime._processor import Launch
+
+if TYPE_CHECKING:
+    from jaxbiped.compiler.runtime._processors import Launch
 
 _LIBRARY = "nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1"
 _NOT_READY = 600
@@ -169,7 +171,7 @@ class CudaDevice:
         blocks = driver.number("cuOccupancyMaxActiveBlocksPerMultiprocessor", function, THREADS, 0)
         return LoadedKernel(function, blocks)
 
-    def run(self, kernel: LoadedKernel, part: Launch, stop: np.ndarray) -> None:
+    def run(self, kernel: LoadedKernel, part: "Launch", stop: np.ndarray) -> None:
         """Launches a kernel over a part and waits for its end; `stop` not zero ends it early.
 
         The part's arrays are contiguous; those of `WRITTEN` are overwritten. Its streams are places
@@ -188,7 +190,7 @@ class CudaDevice:
             )
             raise ResourceError(f"the device {self.name} failed: {error}; {mend}.") from None
 
-    def _run(self, kernel: LoadedKernel, part: Launch, stop: np.ndarray) -> None:
+    def _run(self, kernel: LoadedKernel, part: "Launch", stop: np.ndarray) -> None:
         driver = self._driver
         driver.call("cuCtxSetCurrent", self._context)
         with contextlib.ExitStack() as stack:
@@ -202,7 +204,7 @@ class CudaDevice:
                 [{**address, **part.numbers}[name] for name in FIELDS], dtype=np.int64
             )
             at = ctypes.c_uint64(stack.enter_context(self._copied(fields)))
-            blocks = -(-part.simulations // THREADS)
+            blocks = -(-part.table.simulations // THREADS)
             blocks = min(blocks, max(kernel.blocks, 1) * self.multiprocessors)
             self._launch(kernel, blocks, at, stop, address["stop"])
             for name in WRITTEN:

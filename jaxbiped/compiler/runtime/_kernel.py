@@ -30,7 +30,6 @@ from jaxbiped.compiler.codegen._ptx_kernel import (
 )
 from jaxbiped.compiler.runtime._machine_code import (
     MachineCode,
-    assembly,
     code_name,
     host,
     machine_code,
@@ -153,18 +152,10 @@ class Kernel:
         with long_trace():
             return kernel_text(graph, host_target(width, host()))
 
-    def instructions(self) -> int:
-        """How many machine instructions it has, for vectors of the host's width."""
-        text = self.text(host().width)
-        lines = assembly(text, host(), as_written=self.signature.maps).splitlines()
-        return sum(line.startswith("\t") and not line.startswith("\t.") for line in lines)
-
     def code(self, width: int) -> MachineCode:
         """The machine code, for vectors of this width."""
         with self._making:
-            if self._known_code(width) is None:
-                self._code[width] = self._make_code(width)
-            return self._code[width]
+            return self._known_code(width) or self._make_code(width)
 
     def has_code(self, width: int) -> bool:
         """Whether `code` takes no tracing and no compiling."""
@@ -235,14 +226,14 @@ class Kernel:
             name = None if signature is None else self._read(_code_entry(width))
             if name is None or signature is None:
                 return None
-            return stored_code(name, ENTRY, host(), as_written=signature.maps)
+            return stored_code(name, ENTRY, as_written=signature.maps)
 
         return _remembered(self._code, width, read)
 
     def _make_code(self, width: int) -> MachineCode:
         text, maps = self.text(width), self.signature.maps
-        code = machine_code(text, ENTRY, host(), as_written=maps)
-        self._write(_code_entry(width), code_name(text, ENTRY, host(), as_written=maps))
+        code = self._code[width] = machine_code(text, ENTRY, as_written=maps)
+        self._write(_code_entry(width), code_name(text, ENTRY, as_written=maps))
         return code
 
     def _read(self, what: str) -> str | None:

@@ -18,7 +18,7 @@ from jaxbiped._types import Numbers
 from jaxbiped.caching._caches import half_of_cache_bytes, register_cache
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._machine_code import default_threads
-from jaxbiped.compiler.runtime._processor import InputTable
+from jaxbiped.compiler.runtime._processors import InputTable
 from jaxbiped.compiler.runtime._program import Recorded
 
 BLOCK = 512

@@ -121,33 +121,33 @@ _LOCK = threading.Lock()
 _KIND = "lanes"
 
 
-def machine_code(text: str, entry: str, host: Host, *, as_written: bool) -> MachineCode:
+def machine_code(text: str, entry: str, *, as_written: bool) -> MachineCode:
     """The code of a module, compiled where neither the process nor the disk has it.
 
     A module may be compiled `as_written`, without LLVM's passes. These take out of a long loop all
     that its turns share, which then waits in memory for want of registers.
     """
-    name = code_name(text, entry, host, as_written=as_written)
-    code = stored_code(name, entry, host, as_written=as_written, text=text)
+    name = code_name(text, entry, as_written=as_written)
+    code = stored_code(name, entry, as_written=as_written, text=text)
     assert code is not None
     return code
 
 
-def code_name(text: str, entry: str, host: Host, *, as_written: bool) -> str:
+def code_name(text: str, entry: str, *, as_written: bool) -> str:
     """By what the code of a module is found again."""
     versions = llvmlite.__version__, llvm.llvm_version_info
-    parts = [text, entry, *map(str, (as_written, *host, *versions))]
+    parts = [text, entry, *map(str, (as_written, *host(), *versions))]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 def stored_code(
-    name: str, entry: str, host: Host, *, as_written: bool, text: str | None = None
+    name: str, entry: str, *, as_written: bool, text: str | None = None
 ) -> MachineCode | None:
     """The code of this name; None where nobody has it, unless the module's `text` is known."""
     with _LOCK:
         code = _LOADED.get(name)
     if code is None:
-        machine = _target_machine(host, as_written)
+        machine = _target_machine(as_written)
         stored = read_entry(_KIND, f"{name}.o")
         if stored is None:
             if text is None:
@@ -180,16 +180,10 @@ def _object_code(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> bytes:
         library.LLVMPY_DisposeMemoryBuffer(buffer)
 
 
-def assembly(text: str, host: Host, *, as_written: bool) -> str:
-    """A module as the host's assembly, to look at; see `machine_code`."""
-    machine = _target_machine(host, as_written)
-    return str(machine.emit_assembly(_module(text, machine, as_written)))
-
-
-def _target_machine(host: Host, as_written: bool) -> llvm.TargetMachine:
-    target = llvm.Target.from_triple(host.triple)
-    effort = 1 if as_written else 2
-    return target.create_target_machine(cpu=host.cpu, features=host.features, opt=effort, jit=True)
+def _target_machine(as_written: bool) -> llvm.TargetMachine:
+    cpu, effort = host(), 1 if as_written else 2
+    target = llvm.Target.from_triple(cpu.triple)
+    return target.create_target_machine(cpu=cpu.cpu, features=cpu.features, opt=effort, jit=True)
 
 
 def _module(text: str, machine: llvm.TargetMachine, as_written: bool) -> llvm.ModuleRef:

@@ -16,7 +16,13 @@ from jaxtyping import PyTree
 
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.compiler.ir._elementwise_primitives import KINDS, Array, array_of, convert
+from jaxbiped.compiler.ir._elementwise_primitives import (
+    KINDS,
+    Array,
+    array_of,
+    convert,
+    match_kinds,
+)
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.ir._liveness import Liveness, sink_code
 from jaxbiped.compiler.ir._lower_jaxpr import lower_jaxpr
@@ -156,8 +162,8 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
         notes=notes,
         inputs=[v for array in given for v in array.ravel()],
         carried=carried,
-        first=_match_kinds(begin, first, carried),
-        following=_match_kinds(body, following, carried),
+        first=match_kinds(begin, first, carried),
+        following=match_kinds(body, following, carried),
         row=row,
         done=done.item(),
         outputs=[v for v in outputs if v.constant is None],
@@ -197,17 +203,6 @@ def lower_function(
     found = lower_jaxpr(block, closed.jaxpr, closed.consts, arrays)
     block.forget_calls()
     return found
-
-
-def _match_kinds(block: Block, arrays: list[Array], like: list[Array]) -> list[Array]:
-    """The same values, each as the kind that is carried."""
-    return [
-        array_of(
-            [convert(block, v, w.kind) for v, w in zip(a.ravel(), b.ravel(), strict=True)],
-            b.shape,
-        )
-        for a, b in zip(arrays, like, strict=True)
-    ]
 
 
 class Recorded(NamedTuple):

@@ -24,7 +24,7 @@ from jaxbiped.dynamics._footfalls import FootMotion
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.laws._coulomb import Frictionless
 from jaxbiped.solve._accuracy import Units, rms_norm
-from jaxbiped.solve.controllers._contact_steps import ShallowContact, TouchdownAhead
+from jaxbiped.solve.controllers._event_steps import ShallowContact, TouchdownAhead
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractControl,
     AbstractMemorylessControl,

@@ -1,21 +1,68 @@
-"""Linearisation of a vector field by its implicit form, whose matrices have the zeros of a tree."""
+"""Linearisation of a vector field by its implicit form, whose matrices have the zeros of a tree.
 
+Where a field has none, by its program.
+"""
+
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import jax
+import jax.extend
+import jax.flatten_util
 import jax.numpy as jnp
+import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import partial_derivatives
 from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
-from jaxbiped.linalg._elimination import Entry, plus, times
-from jaxbiped.linalg._sparse_lu import SparseFactors, SparseMatrix, factorise, product
-from jaxbiped.solve.rosenbrock._abstract_linearisation import (
+from jaxbiped.linalg._sparse_lu import (
+    Entry,
+    SparseFactors,
+    SparseMatrix,
+    factorise,
+    plus,
+    product,
+    times,
+)
+from jaxbiped.solve.rosenbrock._linearisation import (
     AbstractLinearisation,
     Components,
+    DenseLinearisation,
+    ScalarLinearisation,
     StepMatrix,
+    structure_of,
 )
+
+_MOST_SCALARS = 24
+"""Up to this size a Jacobian is eliminated scalar by scalar; beyond, as one dense matrix."""
+
+
+def split(y: PyTree, field: object = None) -> tuple[Components, Callable[[Components], PyTree]]:
+    """The components of `y` and the map back; scalars if `field` has an implicit form."""
+    leaves, structure = jtu.tree_flatten(y)
+    few = sum(jnp.size(leaf) for leaf in leaves) <= _MOST_SCALARS
+    if not few and not isinstance(field, AbstractImplicitField):
+        vector, unravel = jax.flatten_util.ravel_pytree(y)
+        return [vector], lambda components: unravel(components[0])
+    shapes = [jnp.shape(leaf) for leaf in leaves]
+    scalars: Components = []
+    for leaf in leaves:
+        scalars.extend([leaf] if jnp.ndim(leaf) == 0 else list(jnp.ravel(leaf)))
+
+    def join(components: Components) -> PyTree:
+        rest = iter(components)
+        joined = []
+        for shape in shapes:
+            if shape == ():
+                joined.append(next(rest))
+            else:
+                parts = [next(rest) for _ in range(math.prod(shape))]
+                joined.append(jnp.stack(parts).reshape(shape))
+        return jtu.tree_unflatten(structure, joined)
+
+    return scalars, join
 
 
 class ImplicitForm(NamedTuple):
@@ -96,8 +143,7 @@ class ImplicitLinearisation(AbstractLinearisation):
         kept, (jacobian, step, factors) = self.kept(), matrix
         total = product(jacobian.mass, dict(zip(kept, right, strict=True)))
         for i, value in product(jacobian.direct, direct_right).items():
-            moved = times(step, value)
-            total[i] = plus(total.get(i), moved)
+            total[i] = plus(total.get(i), times(step, value))
         return _filled(factors.solve(total), kept, step)
 
     def solution_matrices(self, matrix: StepMatrix) -> tuple[Scalar, Scalar]:
@@ -116,3 +162,19 @@ class ImplicitLinearisation(AbstractLinearisation):
 def _filled(vector: dict[int, Entry], rows: list[int], like: Scalar) -> Components:
     """The entries in these rows, zeros too."""
     return [jnp.zeros_like(like) if (own := vector[i]) is None else own for i in rows]
+
+
+def linearise(
+    field: Callable[[Scalar, Components], Components],
+    t: Scalar,
+    y: Components,
+    form: ImplicitForm | None = None,
+) -> AbstractLinearisation:
+    """Linearises a vector field of components (as `split` makes them) about (t, y)."""
+    program = jax.make_jaxpr(lambda t, *y: field(t, list(y)))(t, *y)
+    run = jax.extend.core.jaxpr_as_fun(program)
+    if form is not None and form.exists:
+        return ImplicitLinearisation(run, structure_of(program), t, tuple(y), form)
+    dense = len(y) == 1 and jnp.ndim(y[0]) == 1
+    kind = DenseLinearisation if dense else ScalarLinearisation
+    return kind(run, structure_of(program), t, tuple(y))

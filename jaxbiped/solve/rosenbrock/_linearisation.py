@@ -1,76 +1,171 @@
-"""Linearisation of a vector field: value, exact Jacobian, and (I − g J)⁻¹ on vectors.
+"""Linearisation of a vector field about a point: value, exact Jacobian, (I − g J)⁻¹ on vectors.
 
-Entries that are zero by structure, read off the field's own program, are left out.
+Which entries are zero by structure, to be left out, and which components are plain copies, is read
+off the field's own program.
 """
 
-import math
+import abc
 from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
 
+import equinox as eqx
 import jax
-import jax.extend
-import jax.flatten_util
 import jax.numpy as jnp
-import jax.tree_util as jtu
+from jax.extend.core import Jaxpr, JaxprEqn, Literal, Var
 from jaxtyping import PyTree
 
+from jaxbiped._jax_versions import ClosedJaxpr, called_program
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._implicit_field import AbstractImplicitField
-from jaxbiped.linalg._elimination import Entry, Matrix, inverse, matmul
-from jaxbiped.solve.rosenbrock._abstract_linearisation import (
-    AbstractLinearisation,
-    Components,
-    StepMatrix,
-    structure_of,
-)
-from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, ImplicitLinearisation
+from jaxbiped.linalg._small_matrices import Matrix, inverse
+from jaxbiped.linalg._sparse_lu import Entry, plus, times
 
-_MOST_SCALARS = 24
-"""Up to this size a Jacobian is eliminated scalar by scalar; beyond, as one dense matrix."""
+Components: TypeAlias = list[Scalar]
+"""A point of the state space: its scalars one by one, or one vector that holds them all."""
 
 
-def split(y: PyTree, field: object = None) -> tuple[Components, Callable[[Components], PyTree]]:
-    """The components of `y` and the map back; scalars if `field` has an implicit form."""
-    leaves, structure = jtu.tree_flatten(y)
-    few = sum(jnp.size(leaf) for leaf in leaves) <= _MOST_SCALARS
-    if not few and not isinstance(field, AbstractImplicitField):
-        vector, unravel = jax.flatten_util.ravel_pytree(y)
-        return [vector], lambda components: unravel(components[0])
-    shapes = [jnp.shape(leaf) for leaf in leaves]
-    scalars: Components = []
-    for leaf in leaves:
-        scalars.extend([leaf] if jnp.ndim(leaf) == 0 else list(jnp.ravel(leaf)))
+class Structure(NamedTuple):
+    """Structure of a function of scalars.
 
-    def join(components: Components) -> PyTree:
-        rest = iter(components)
-        joined = []
-        for shape in shapes:
-            if shape == ():
-                joined.append(next(rest))
-            else:
-                parts = [next(rest) for _ in range(math.prod(shape))]
-                joined.append(jnp.stack(parts).reshape(shape))
-        return jtu.tree_unflatten(structure, joined)
+    Attributes:
+        depends: for each output, the positions of the inputs that it can depend on.
+        copies: for each output, the position of the input that it is a plain copy of, or None.
+    """
 
-    return scalars, join
+    depends: tuple[frozenset[int], ...]
+    copies: tuple[int | None, ...]
 
 
-def linearise(
-    field: Callable[[Scalar, Components], Components],
-    t: Scalar,
-    y: Components,
-    form: ImplicitForm | None = None,
-) -> AbstractLinearisation:
-    """Linearises a vector field of components (as `split` makes them) about (t, y)."""
-    program = jax.make_jaxpr(lambda t, *y: field(t, list(y)))(t, *y)
-    run = jax.extend.core.jaxpr_as_fun(program)
-    if form is not None and form.exists:
-        return ImplicitLinearisation(run, structure_of(program), t, tuple(y), form)
-    dense = len(y) == 1 and jnp.ndim(y[0]) == 1
-    kind = _DenseLinearisation if dense else _ScalarLinearisation
-    return kind(run, structure_of(program), t, tuple(y))
+def structure_of(program: ClosedJaxpr) -> Structure:
+    """Structure of a traced program. Conservative: a dependence may be reported in vain."""
+    jaxpr = program.jaxpr
+    inputs: list[frozenset[int]] = [frozenset([i]) for i in range(len(jaxpr.invars))]
+    copies: list[int | None] = list(range(len(jaxpr.invars)))
+    depends, copied = _propagate(jaxpr, inputs, copies)
+    return Structure(tuple(depends), tuple(copied))
 
 
-class _DenseLinearisation(AbstractLinearisation):
+def _propagate(
+    jaxpr: Jaxpr, inputs: list[frozenset[int]], copies: list[int | None]
+) -> tuple[list[frozenset[int]], list[int | None]]:
+    depends: dict[Var, frozenset[int]] = dict(zip(jaxpr.invars, inputs, strict=True))
+    copied: dict[Var, int | None] = dict(zip(jaxpr.invars, copies, strict=True))
+
+    def read(atom: Var | Literal) -> tuple[frozenset[int], int | None]:
+        if isinstance(atom, Literal):
+            return frozenset(), None
+        return depends.get(atom, frozenset()), copied.get(atom)
+
+    for equation in jaxpr.eqns:
+        arguments = [read(atom) for atom in equation.invars]
+        called = called_program(equation)
+        if called is None:
+            union: frozenset[int] = frozenset().union(*(used for used, _ in arguments))
+            results = [union] * len(equation.outvars)
+            source = arguments[0][1] if _is_copy(equation) else None
+            results_copied: list[int | None] = [source] * len(equation.outvars)
+        else:
+            results, results_copied = _propagate(
+                called[0], [used for used, _ in arguments], [source for _, source in arguments]
+            )
+        for variable, used, origin in zip(equation.outvars, results, results_copied, strict=True):
+            depends[variable], copied[variable] = used, origin
+    outputs = [read(atom) for atom in jaxpr.outvars]
+    return [used for used, _ in outputs], [source for _, source in outputs]
+
+
+def _is_copy(equation: JaxprEqn) -> bool:
+    """Whether its result is its argument, as where only a weak type becomes a strong one."""
+    if equation.primitive.name != "convert_element_type":
+        return False
+    before, after = (atom.aval for atom in (*equation.invars, *equation.outvars))
+    return bool(before.dtype == after.dtype)  # type: ignore[attr-defined]
+
+
+class StepMatrix(NamedTuple):
+    """I − step J of a step, with what its `factorise` made of it."""
+
+    jacobian: PyTree
+    step: Scalar
+    factors: PyTree
+
+
+class AbstractLinearisation(eqx.Module):
+    """A vector field about one point, its state split into components.
+
+    Attributes:
+        run: the field, of the time and the components.
+        structure: of that program.
+        t, y: the point.
+    """
+
+    run: Callable[..., Components]
+    structure: Structure
+    t: Scalar
+    y: tuple[Scalar, ...]
+
+    @abc.abstractmethod
+    def jacobian(self) -> PyTree:
+        """J = ∂f/∂y at the point of linearisation, in a form of its own."""
+
+    @abc.abstractmethod
+    def factorise(self, jacobian: PyTree, step: Scalar) -> PyTree:
+        """What `solve_kept` needs of I − step J."""
+
+    @abc.abstractmethod
+    def solve_kept(
+        self, matrix: StepMatrix, right: Components, direct_right: dict[int, Scalar]
+    ) -> Components:
+        """The kept components of (I − step J)⁻¹ r.
+
+        `right` holds r of the kept components, `direct_right` of the direct ones.
+        """
+
+    @abc.abstractmethod
+    def solution_matrices(self, matrix: StepMatrix) -> tuple[Scalar, Scalar]:
+        """What `solve_kept` takes r to, as matrices: of the kept components (k, k), and of the d
+        direct ones (k, d)."""
+
+    def evaluate(self, t: Scalar, y: Components) -> Components:
+        """The vector field at any point."""
+        return self.run(t, *y)
+
+    def time_derivative(self) -> list[Entry]:
+        """∂f/∂t at the point of linearisation; None for a component that has none."""
+        return self._column(0)
+
+    def direct(self) -> dict[int, int]:
+        """Components whose rate *is* another, kept component, each with that one."""
+        direct: dict[int, int] = {}
+        for i, copied in enumerate(self.structure.copies):
+            source = None if copied is None else copied - 1
+            if source is None or source < 0 or source == i:
+                continue
+            if source not in direct and i not in direct.values():
+                direct[i] = source
+        return direct
+
+    def kept(self) -> list[int]:
+        """The other components, which remain when the direct ones are eliminated."""
+        direct = self.direct()
+        return [i for i in range(len(self.y)) if i not in direct]
+
+    def _column(self, position: int) -> list[Entry]:
+        """Derivatives of all rates with respect to one input (0: time, 1 on: components)."""
+        inputs = [self.t, *self.y]
+        if not any(position in used for used in self.structure.depends):
+            return [None] * len(self.y)
+
+        def along(value: Scalar) -> list[Scalar]:
+            return self.run(*inputs[:position], value, *inputs[position + 1 :])
+
+        _, tangents = jax.jvp(along, (inputs[position],), (jnp.ones_like(inputs[position]),))
+        return [
+            tangent if position in used else None
+            for tangent, used in zip(tangents, self.structure.depends, strict=True)
+        ]
+
+
+class DenseLinearisation(AbstractLinearisation):
     """One vector, one dense matrix."""
 
     def jacobian(self) -> PyTree:
@@ -90,7 +185,7 @@ class _DenseLinearisation(AbstractLinearisation):
         return jax.scipy.linalg.lu_solve(matrix.factors, jnp.eye(size)), jnp.zeros((size, 0))
 
 
-class _ScalarLinearisation(AbstractLinearisation):
+class ScalarLinearisation(AbstractLinearisation):
     """Scalars one by one, with what is zero by structure left out.
 
     A component whose rate *is* another component, as a position's rate is a velocity, is
@@ -113,7 +208,8 @@ class _ScalarLinearisation(AbstractLinearisation):
             entries = [(matrix.jacobian[i][p], value) for p, value in direct_right.items()]
             terms = [entry * value for entry, value in entries if entry is not None]
             reduced.append(own + matrix.step * sum(terms[1:], terms[0]) if terms else own)
-        return matmul(matrix.factors, reduced)
+        products = [[a * b for a, b in zip(row, reduced, strict=True)] for row in matrix.factors]
+        return [sum(row[1:], row[0]) for row in products]
 
     def solution_matrices(self, matrix: StepMatrix) -> tuple[Scalar, Scalar]:
         jacobian, step, factors = matrix
@@ -136,10 +232,9 @@ def _reduced_matrix(
         for j in kept:
             entry = jacobian[i][j]
             for position, source in direct.items():
-                indirect = jacobian[i][position]
-                if source == j and indirect is not None:
-                    entry = step * indirect if entry is None else entry + step * indirect
-            scaled = None if entry is None else step * entry
+                if source == j:
+                    entry = plus(entry, times(step, jacobian[i][position]))
+            scaled = times(step, entry)
             if i == j:
                 row.append(jnp.ones_like(step) if scaled is None else 1.0 - scaled)
             else:

@@ -89,17 +89,3 @@ def test_kept_for_the_next_process(monkeypatch, tmp_path):
     for a, b in zip(jax.tree.leaves(first), jax.tree.leaves(second), strict=True):
         np.testing.assert_array_equal(a, b)
     jb.clear_caches()
-
-
-@pytest.mark.parametrize("damage", [b"", bytes(5000)], ids=["emptied", "garbage"])
-def test_what_is_damaged_is_written_again(monkeypatch, tmp_path, damage):
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
-    jb.clear_caches()
-    scene, state = jb.seed_scene(), jb.seed_state()
-    first = jb.dynamics.energies(scene, state)
-    (kept,) = (tmp_path / "host").iterdir()
-    kept.write_bytes(damage)
-    jb.clear_caches()
-    np.testing.assert_array_equal(jb.dynamics.energies(scene, state), first)
-    assert kept.read_bytes() != damage
-    jb.clear_caches()

@@ -21,7 +21,7 @@ from jaxbiped.compiler.runtime import _compiled_program, _machine_code
 from jaxbiped.compiler.runtime._machine_code import default_threads, host
 from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
-from jaxbiped.solve.controllers._solve_ends import just_before_end
+from jaxbiped.solve.controllers._wrapped_control import just_before_end
 from tests.compiler.one_shot import stepped
 
 SCENE = jb.seed_scene()

@@ -10,7 +10,7 @@ from jaxbiped.compiler.runtime._primitive import call
 from tests.compiler.one_shot import NUMBER, stepped, two_zeros
 
 
-def _summing(backwards=False):
+def _summing():
     """Σ weight (a + 2 b) over as many rows (a, b) as the inputs say."""
 
     def attempt(given, carried, row):
@@ -19,7 +19,7 @@ def _summing(backwards=False):
         count = count + 1.0
         return (total + weight * (row[0] + 2.0 * row[1]), count), count >= steps
 
-    return stepped(attempt, (NUMBER, NUMBER), start=two_zeros, stream=2, backwards=backwards)
+    return stepped(attempt, (NUMBER, NUMBER), start=two_zeros, stream=2)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 19])
@@ -60,10 +60,3 @@ def test_a_stream_of_another_size_is_refused(stream, said):
     """By an error that `python -O` keeps: the machine code would read what is not there."""
     with pytest.raises(ValueError, match=said):
         _summing().run((np.ones(2), np.ones(2)), stream=stream)
-
-
-def test_a_stream_can_be_read_backwards():
-    backwards = _summing(backwards=True)
-    stream = [np.arange(6.0).reshape(3, 2), np.arange(4.0).reshape(2, 2)]
-    total, _ = backwards.run((np.ones(2), np.ones(2)), stream=stream).outputs
-    np.testing.assert_array_equal(total, [4.0 + 10.0, 2.0 + 6.0])

@@ -10,7 +10,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 import jaxbiped as jb
 from jaxbiped.compiler import LANES
-from jaxbiped.compiler.runtime._processor import InputTable
+from jaxbiped.compiler.runtime._processors import InputTable
 from jaxbiped.plot.viewer._playground import STEPS, played_request, recorded_names
 from jaxbiped.plot.viewer._view import page_of, script
 from tests.mechanisms import scene_of, start_of

@@ -11,7 +11,7 @@ import jaxbiped as jb
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve.controllers import _step_size
-from jaxbiped.solve.controllers._contact_steps import TouchdownAhead
+from jaxbiped.solve.controllers._event_steps import TouchdownAhead
 from jaxbiped.solve.controllers._step_size import ErrorControl
 
 SCENE = jb.seed_scene()

@@ -1,19 +1,27 @@
-"""Wrapped step-size controllers, against what diffrax looks for in the innermost."""
+"""Wrapped step-size controllers, against what diffrax looks for in the innermost; the last step."""
 
 import inspect
 
 import diffrax
+import equinox.internal as eqxi
+import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from jaxbiped.solve._accuracy import rms_norm
-from jaxbiped.solve.controllers._contact_steps import ShallowContact, TouchdownAhead
-from jaxbiped.solve.controllers._solve_ends import FootstepLimit, LocatedEnding
+from jaxbiped.solve.controllers._event_steps import (
+    FootstepLimit,
+    LocatedEnding,
+    ShallowContact,
+    TouchdownAhead,
+)
 from jaxbiped.solve.controllers._step_size import CrossedSwitches, InUnits
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractMemorylessControl,
     AbstractWrappedControl,
     Extremes,
+    just_before_end,
 )
 from jaxbiped.variational._switch_locator import SwitchLocator
 from jaxbiped.variational._tangent_solver import TangentControl
@@ -56,3 +64,18 @@ def test_no_wrapper_overrides_what_all_have_in_common(kind):
     assert {"rtol", "atol", "norm", "wrap"} <= shared
     assert not shared & set(vars(kind))
     assert not inspect.isabstract(kind)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_almost_is_a_hundred_numbers_before(sign):
+    ends = sign * np.concatenate([np.geomspace(1e-200, 1e200, 101), [0.0, 1.0, 1.0 + 1e-15, 2.0]])
+    expected = jnp.asarray(ends)
+    before = jax.jit(eqxi.prevbefore)
+    for _ in range(100):
+        expected = before(expected)
+    np.testing.assert_array_equal(just_before_end(jnp.asarray(ends)), expected)
+
+
+def test_almost_of_no_number_is_none_and_of_no_end_is_finite():
+    assert np.isnan(just_before_end(jnp.asarray(np.nan)))
+    assert np.isfinite(just_before_end(jnp.asarray(np.inf)))

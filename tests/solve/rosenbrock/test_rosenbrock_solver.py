@@ -26,7 +26,6 @@ def spring(t, y, k):
     return Oscillator(y.v, -k * y.x)
 
 
-TERM = diffrax.ODETerm(spring)
 START = Oscillator(jnp.asarray(1.0), jnp.asarray(0.0))
 
 
@@ -35,19 +34,13 @@ def _exact(t, k=SPRING):
     return Oscillator(np.cos(w * t), -w * np.sin(w * t))
 
 
-def _solve(y0=START, k=SPRING, t0=0.0, t1=END, controller=CONTROLLER, max_steps=256, **options):
-    return diffrax.diffeqsolve(
-        TERM,
-        jb.solvers.Rodas4(),
-        t0,
-        t1,
-        0.01 if t1 > t0 else -0.01,
-        y0,
-        jnp.asarray(k),
-        stepsize_controller=controller,
-        max_steps=max_steps,
-        **options,
-    )
+def _solve(
+    y0=START, k=SPRING, t0=0.0, t1=END, *, field=spring, dt0=0.01, controller=CONTROLLER, **options
+):
+    dt0 = dt0 if t1 > t0 else -dt0
+    how = dict(stepsize_controller=controller, max_steps=256) | options
+    term, solver = diffrax.ODETerm(field), jb.solvers.Rodas4()
+    return diffrax.diffeqsolve(term, solver, t0, t1, dt0, y0, jnp.asarray(k), **how)
 
 
 def _assert_close(mine, truth, tolerance=2e-7):
@@ -159,16 +152,12 @@ def test_a_driving_force_forwards_and_backwards():
     def exact(t):
         return (4.0 * jnp.cos(t) + 2.0 * jnp.sin(t)) / 5.0
 
+    def field(t, y, _):
+        return -2.0 * (y - jnp.cos(t))
+
+    how = dict(field=field, dt0=1.0 / 64.0, controller=diffrax.ConstantStepSize())
     for t0, t1 in ((0.0, 1.0), (1.0, 0.0)):
-        end = diffrax.diffeqsolve(
-            diffrax.ODETerm(lambda t, y, _: -2.0 * (y - jnp.cos(t))),
-            jb.solvers.Rodas4(),
-            t0,
-            t1,
-            (t1 - t0) / 64,
-            exact(jnp.asarray(t0)),
-            max_steps=128,
-        ).ys[0]
+        end = _solve(exact(jnp.asarray(t0)), t0=t0, t1=t1, **how).ys[0]
         np.testing.assert_allclose(end, exact(t1), atol=2e-9)
 
 
@@ -194,17 +183,17 @@ def test_an_event_and_the_gradient_of_its_time():
 
 
 def test_32_bits():
-    y0 = Oscillator(jnp.asarray(1.0, jnp.float32), jnp.asarray(0.0, jnp.float32))
-    span = [jnp.asarray(t, jnp.float32) for t in (0.0, END, 0.01)]
-    solution = diffrax.diffeqsolve(
-        TERM,
-        jb.solvers.Rodas4(),
-        *span,
-        y0,
-        jnp.asarray(SPRING, jnp.float32),
-        stepsize_controller=diffrax.PIDController(rtol=1e-4, atol=1e-4),
+    x0, v0, k, t0, t1, dt0 = (
+        jnp.asarray(x, jnp.float32) for x in (1.0, 0.0, SPRING, 0.0, END, 0.01)
+    )
+    solution = _solve(
+        Oscillator(x0, v0),
+        k,
+        t0,
+        t1,
+        dt0=dt0,
+        controller=diffrax.PIDController(rtol=1e-4, atol=1e-4),
         saveat=diffrax.SaveAt(ts=jnp.linspace(0.1, 1.4, 9, dtype=jnp.float32)),
-        max_steps=256,
     )
     assert {leaf.dtype for leaf in solution.ys} == {np.dtype("float32")}
     _assert_close(solution.ys, _exact(np.asarray(solution.ts, np.float64)), 1e-3)

@@ -1,28 +1,35 @@
-"""Contacts within a step: three step-size controllers that deal with them.
+"""Events within a step: step-size controllers that deal with contacts, footsteps and endings.
 
-All statements also hold for stops and their limits. A foot that is off the ground at both ends of a
-step may touch it in between, and a foot that is barely in the ground at an end may have been
-deeper. No error estimate sees this if no stage of the step feels the force: `ShallowContact` ends
-the step just past the beginning of the contact instead.
+All statements on contacts also hold for stops and their limits. A foot that is off the ground at
+both ends of a step may touch it in between, and a foot that is barely in the ground at an end may
+have been deeper. No error estimate sees this if no stage of the step feels the force:
+`ShallowContact` ends the step just past the beginning of the contact instead.
 
 At touchdown the force has a corner, because of which steps of any size that go far past it are
 rejected. Reducing the size step by step would cost some ten attempts at every touchdown of the
 seed's walker: `TouchdownAhead` lets the attempt after a rejected one end just past the touchdown.
 
-Steps of one size are not shortened: `MissedContacts` counts those that step over a contact. The
-solve's `args` must be the scene.
+Steps of one size are not shortened: `MissedContacts` counts those that step over a contact. A solve
+ends at a footstep (`FootstepLimit`) or just past another ending (`LocatedEnding`). Its `args` must
+be the scene.
 """
 
 import functools
 from typing import Any, cast
 
+import diffrax
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
-from jaxbiped.dynamics._contacts import Gap, gaps
+from jaxbiped._ending import Ending
+from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped.dynamics._contacts import Gap, feet, gaps
+from jaxbiped.dynamics._footfalls import any_of, landings, standing_leg
 from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.solve._ending_surfaces import ending_surface
+from jaxbiped.solve._failure_events import ending_events
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import (
@@ -33,10 +40,14 @@ from jaxbiped.solve.controllers._wrapped_control import (
     try_again,
 )
 
+PATIENCE = 100.0
+"""Time allowed for each footstep asked for [s]."""
 _OVERSHOOT = 5e-5
 """Part of the way to the ground that a step ends past it."""
+_PAST_ENDING = 1e-9
+"""Part of the way to an ending that the last step may go past it."""
 _MARGIN = 1e-12
-"""Time that it does besides [s]."""
+"""Time that either does besides [s]: on which side a step ends must be beyond doubt."""
 _BARELY = 1e-2
 """Depth and speed in the ground at a step's end, in units of height and speed at its beginning,
 below which a contact is shallow."""
@@ -175,3 +186,92 @@ def _misses(span: Scalar, before: Gap, after: Gap) -> Scalar | bool:
     if before.admitted is not None and after.admitted is not None:
         off = off & before.admitted & after.admitted
     return off & depth.turns() & (depth.at(depth.turning_point()) > 0.0)
+
+
+class FootstepLimit(AbstractWrappedControl):
+    """Wraps a controller; ends the solve at the end of the step with the last heel strike.
+
+    Its state carries what cannot be computed from the walker's state: the leg that struck last, and
+    the number of strikes.
+
+    Attributes:
+        limit: number of heel strikes after which the solve ends.
+    """
+
+    limit: RealScalarLike
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        first, inner = self.controller.init(*request)
+        _, _, _, y0, _, args, *_ = request
+        last = standing_leg(args.mechanism.structure, feet(args, y0))
+        return first, (inner, last, jnp.zeros_like(last))
+
+    def adapt(self, attempt: Attempt) -> Adapted:
+        inner, last, count = attempt.memory
+        adapted = attempt.by(self.controller, memory=inner)
+        structure = attempt.args.mechanism.structure
+        before, after = feet(attempt.args, attempt.y0), feet(attempt.args, attempt.y1)
+        lands = landings(structure, before, after)
+        # Of several legs another one made the strike before; a single leg hops.
+        strikes = [
+            adapted.keep & landed & (last != leg if len(lands) > 1 else True)
+            for leg, landed in enumerate(lands, 1)
+        ]
+        for leg, strike in reversed(list(enumerate(strikes, 1))):
+            last = jnp.where(strike, leg, last)
+        count = count + jnp.where(any_of(strikes), 1, 0)
+        successful = diffrax.RESULTS.successful
+        done = diffrax.RESULTS.where(
+            count >= self.limit, diffrax.RESULTS.event_occurred, successful
+        )
+        result = diffrax.RESULTS.where(adapted.result == successful, done, adapted.result)
+        return adapted._replace(memory=(adapted.memory, last, count), result=result)
+
+
+class LocatedEnding(AbstractMemorylessControl):
+    """Wraps a controller; a step in which the solve ends is retried up to just past that point.
+
+    The point is located with the secant of the ending's surface, in a few attempts. A step whose
+    ends are not on opposite sides of the surface stays as it is. After the last footstep, the
+    wrapped controller ends the solve.
+
+    Attributes:
+        watch: failures that end the solve.
+        probe: a state near the step's end at which failures are looked for first, if that costs
+            less; None if there is no such state.
+    """
+
+    watch: tuple[str, ...] = eqx.field(static=True)
+    probe: PyTree = None
+
+    def adapt(self, attempt: Attempt) -> Adapted:
+        adapted = attempt.by(self.controller)
+        scene, y1, t1 = attempt.args, attempt.y1, attempt.t1
+        start, span = jnp.asarray(attempt.t0), jnp.asarray(t1 - attempt.t0)
+        walked = jnp.asarray(adapted.result != diffrax.RESULTS.successful)
+        probe = y1 if self.probe is None else self.probe
+        failures = {
+            name: happens
+            for name, happens in ending_events(self.watch).items()
+            if name != Ending.SOLVER_FAILED
+        }
+        ends = adapted.keep & walked
+        for happens in failures.values():
+            ends = ends | (adapted.keep & jnp.asarray(happens(t1, probe, scene)))
+
+        def part_before() -> Scalar:
+            code = jnp.asarray(int(Ending.WALKING))
+            for name, happens in failures.items():
+                code = jnp.where(happens(t1, y1, scene), int(name), code)
+            before, after = (ending_surface(code, scene, y1, y) for y in (attempt.y0, y1))
+            crossed = (before < 0.0) & (after > 0.0)
+            crossed = crossed & (walked | (code != int(Ending.WALKING)))
+            return jnp.where(crossed, before / jnp.where(crossed, before - after, 1.0), 1.0)
+
+        way = span * jnp.where(ends, fusion_barrier(ends, part_before), 1.0)
+        again = ends & (span - way > jnp.maximum(_PAST_ENDING * way, 4.0 * _MARGIN))
+        target = start + way * (1.0 + 0.5 * _PAST_ENDING) + _MARGIN
+        possible = (target > start) & (target < start + span)
+        again, target = jax.lax.stop_gradient((again & possible, target))
+        result = diffrax.RESULTS.where(again, diffrax.RESULTS.successful, adapted.result)
+        return try_again(attempt, adapted, again, target)._replace(result=result)
