@@ -21,8 +21,7 @@ from jaxbiped.gait._search_provenance import (
     single_stage_origin,
 )
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
-from jaxbiped.gait._settled_walks import SHORTEST, Walks
-from jaxbiped.gait._walk_waves import is_far_from_seed, state_rows, walks_of
+from jaxbiped.gait._walk_waves import SHORTEST, Walks, is_far_from_seed, state_rows, walks_of
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.solve._accuracy import recurring_sizes
