@@ -2,8 +2,8 @@
 
 from jaxbiped.gait._find_gaits import Gaits as Gaits
 from jaxbiped.gait._fixed_point_search import Search as Search
+from jaxbiped.gait._gait import Measures as Measures
 from jaxbiped.gait._homotopy import BranchEnd as BranchEnd
-from jaxbiped.gait._measures import Measures as Measures
 from jaxbiped.gait._orbit_derivatives import Slopes as Slopes
 from jaxbiped.gait._orbit_derivatives import slopes_of as slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn as LinearisedReturn

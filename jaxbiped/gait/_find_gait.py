@@ -28,7 +28,8 @@ from jaxbiped.gait._fixed_point_search import (
     search_by_lanes,
     walks_only,
 )
-from jaxbiped.gait._gait import Gait, summarise_gait
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._gait_summary import summarise_gait
 from jaxbiped.gait._guess_free_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes

@@ -12,7 +12,7 @@ from jaxbiped._progress import stage
 from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped.compiler import deferred_checks
 from jaxbiped.gait._fixed_point_search import FixedPointProblem
-from jaxbiped.gait._gait import summarise_gait
+from jaxbiped.gait._gait_summary import summarise_gait
 from jaxbiped.gait._search_provenance import Origin
 
 
