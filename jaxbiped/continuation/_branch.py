@@ -20,7 +20,7 @@ from jaxbiped.dynamics._state import state_type
 from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
 from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._gait import QUANTITIES
-from jaxbiped.gait._homotopy import BranchEnd
+from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene

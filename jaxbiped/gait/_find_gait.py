@@ -31,9 +31,9 @@ from jaxbiped.gait._fixed_point_search import (
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._gait_summary import summarise_gait
 from jaxbiped.gait._guess_free_search import is_whole, origin_of, search_in_stages, spectral_radius
+from jaxbiped.gait._homotopy import search_along
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes
-from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._search_compilation import compile_once
 from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_unknown
 from jaxbiped.gait._search_starts import default_guess, state_of_guess

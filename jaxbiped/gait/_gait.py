@@ -17,8 +17,7 @@ from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._homotopy import BranchEnd
-from jaxbiped.gait._search_provenance import FoundBy, Origin, OtherGait
+from jaxbiped.gait._search_provenance import BranchEnd, FoundBy, Origin, OtherGait
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.solve._error_estimate import ErrorEstimate
 

@@ -7,13 +7,14 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._progress import Stage, stage
-from jaxbiped.gait._branch_along import Searching, branch_along, state_at
+from jaxbiped.gait._branch_along import FollowedBranch, Searching, branch_along, state_at
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, cycle_of
-from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, homotopy_to
+from jaxbiped.gait._homotopy import Homotopy, homotopy_to
 from jaxbiped.gait._relaxation import relaxed
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._search_provenance import (
     MOST_OTHERS,
+    BranchEnd,
     FoundBy,
     Origin,
     OtherGait,

@@ -20,8 +20,8 @@ from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.continuation._trace import LIMITS, Trace
 from jaxbiped.gait._fixed_point_search import looser
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint
+from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.optimise._cycle_functionals import Functional
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import MODULI

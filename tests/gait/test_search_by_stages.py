@@ -10,9 +10,8 @@ from jaxbiped._progress import Stage
 from jaxbiped.gait import _guess_free_search, _walk_waves
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._guess_free_search import origin_of, search_in_stages, spectral_radius
-from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.gait._search_provenance import FoundBy
+from jaxbiped.gait._search_provenance import BranchEnd, FoundBy
 from jaxbiped.gait._walk_waves import walks_from
 from jaxbiped.solve._accuracy import Precision, recurring_sizes
 
