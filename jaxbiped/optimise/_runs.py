@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jaxbiped._progress import Stage
-from jaxbiped.continuation._nearest_bifurcation import allows, range_of
+from jaxbiped.continuation._critical_values import allows, range_of
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem

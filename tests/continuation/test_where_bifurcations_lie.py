@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.continuation import _nearest_bifurcation as nearest
+from jaxbiped.continuation import _critical_values as nearest
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.optimise import _bifurcation_distance as distances
 from jaxbiped.optimise._bifurcation_distance import Sought

@@ -10,7 +10,7 @@ from reference.rigid import rigid_walker
 
 import jaxbiped as jb
 from jaxbiped._progress import Stage
-from jaxbiped.continuation._nearest_bifurcation import farthest_allowed, range_of
+from jaxbiped.continuation._critical_values import farthest_allowed, range_of
 from jaxbiped.dynamics._actuation import actuator_powers, hip_torques
 from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion

@@ -1,11 +1,12 @@
-"""The nearest bifurcation of a gait, against that of the whole branch."""
+"""Critical values against those of whole branches, and against differences of ones located anew."""
 
 import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.continuation import BranchEvent, bifurcation_sensitivities
+from jaxbiped.continuation._critical_values import range_of
 from jaxbiped.continuation._cycle import CycleProblem
-from jaxbiped.continuation._nearest_bifurcation import range_of
 
 pytestmark = pytest.mark.slow
 
@@ -21,7 +22,7 @@ def test_it_is_that_of_the_whole_branch(gait):
     found = jb.continuation.nearest_bifurcation(RIGID, gait)
     branch = jb.continue_gait(RIGID, "slope", bounds=(0.01, 0.11))
     (doubling,) = branch.bifurcations
-    assert found.kind is jb.continuation.BranchEvent.PERIOD_DOUBLING
+    assert found.kind is BranchEvent.PERIOD_DOUBLING
     assert found.value == pytest.approx(doubling.value, rel=1e-7)
     assert found.ratio == pytest.approx(doubling.value / float(RIGID.ground.slope))
 
@@ -55,7 +56,7 @@ def test_level_ground_is_left_to_both_sides():
     seen = jb.continue_gait(level, "slope", bounds=(-0.1, 0.1), guess=gait).bifurcations
     limit, fold, doubling = seen
     assert abs(limit.value) < 1e-6 < abs(fold.value) < doubling.value
-    assert found.kind is jb.continuation.BranchEvent.FOLD
+    assert found.kind is BranchEvent.FOLD
     assert found.value == pytest.approx(fold.value, rel=1e-7)
     assert found.ratio != found.ratio
 
@@ -85,3 +86,63 @@ def test_a_range_ends_where_a_constructor_refuses():
     for name in ("r", "l", "n"):
         for end in range_of(SEED, name):
             jb.with_parameters(SEED, {name: end})
+
+
+def _followed(scene, kind, bounds):
+    branch = jb.continue_gait(scene, bounds=bounds, accuracy="tight", max_points=40)
+    (found,) = [each for each in branch.bifurcations if each.kind is kind]
+    return branch, found
+
+
+@pytest.mark.parametrize(
+    ("scene", "kind", "bounds", "names"),
+    [
+        pytest.param(
+            jb.seed_scene(slope=0.0105),
+            BranchEvent.FOLD,
+            (0.009, 0.0108),
+            ("r", "K", "mu_kinetic"),
+            marks=pytest.mark.nightly,
+        ),
+        (
+            jb.with_parameters(RIGID, {"slope": 0.098}),
+            BranchEvent.PERIOD_DOUBLING,
+            (0.095, 0.105),
+            ("J",),
+        ),
+    ],
+    ids=["fold", "doubling"],
+)
+def test_slopes_are_differences_of_located_bifurcations(scene, kind, bounds, names):
+    found = bifurcation_sensitivities(*_followed(scene, kind, bounds), names)
+    assert found.along == "slope"
+    assert found.parameters == names
+    for name, slope, error in zip(names, found.slopes, found.errors, strict=True):
+        value = float(jb.parameter_values(scene)[name])
+        ends = [
+            _followed(jb.with_parameters(scene, {name: value * factor}), kind, bounds)[1].value
+            for factor in (1.001, 0.999)
+        ]
+        assert slope == pytest.approx((ends[0] - ends[1]) / (0.002 * value), rel=1e-5), name
+        assert error < 1e-5 * abs(slope)
+    values = np.array([float(jb.parameter_values(scene)[name]) for name in names])
+    assert found.elasticities == pytest.approx(found.slopes * values / found.value)
+
+
+def test_what_is_not_allowed_is_one_sentence():
+    branch, doubling = _followed(
+        jb.with_parameters(RIGID, {"slope": 0.098}), BranchEvent.PERIOD_DOUBLING, (0.095, 0.105)
+    )
+    limit = doubling._replace(kind=BranchEvent.LIMIT)
+    for bifurcation, options, said in (
+        (limit, {}, "limit has no derivative"),
+        (doubling, {"accuracy": "best"}, "accuracy = 'best'"),
+        (doubling, {"parameters": ("K",)}, "parameters = 'K'"),
+    ):
+        with pytest.raises(jb.ArgumentError, match=said) as refused:
+            bifurcation_sensitivities(branch, bifurcation, **options)
+        assert str(refused.value).endswith(".")
+    # A gait far from any bifurcation is none.
+    elsewhere = doubling._replace(point=branch.points[0])
+    with pytest.raises(jb.ArgumentError, match="not the gait's largest"):
+        bifurcation_sensitivities(branch, elsewhere, ("r", "J", "d"))
