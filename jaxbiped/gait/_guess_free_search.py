@@ -111,7 +111,8 @@ def search_in_stages(
 
     def add(found: Found, by: FoundBy) -> None:
         # What a walk itself settles on is one, however deep, but not where it stands and chatters.
-        sound = bool(found.sound) or (by is FoundBy.WALKING and _steps_ahead(found, modelled))
+        steps = float(np.sum(found.last.advance)) > SHORTEST * float(modelled.mechanism.height)
+        sound = bool(found.sound) or (by is FoundBy.WALKING and steps)
         known = any(_same(found, old) for old in seen)
         if int(found.ending) == int(Search.FOUND) and sound and not known:
             seen.append(Seen(found, by, spectral_radius(found), is_whole(found, problem)))
@@ -243,10 +244,6 @@ def spectral_radius(found: Found) -> float:
     if not np.all(np.isfinite(jacobian)):
         return float("inf")
     return float(np.max(np.abs(np.linalg.eigvals(jacobian))))
-
-
-def _steps_ahead(found: Found, scene: Scene | RigidScene) -> bool:
-    return float(np.sum(found.last.advance)) > SHORTEST * float(scene.mechanism.height)
 
 
 def _same(a: Found, b: Seen) -> bool:
