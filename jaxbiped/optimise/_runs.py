@@ -138,12 +138,12 @@ def _message(problem: DesignProblem, best: Design, ended: RunEnding) -> str:
 def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     """The best of the designs that runs came to."""
     best = runs.best
-    found = problem.objective(best.known)
+    found, scene = problem.objective(best.known), problem.scene_at(best.u)
     return Optimum(
         outcome=runs.outcome(),
         message=_message(problem, best, runs.ended),
-        scene=problem.scene_at(best.u),
-        gait=problem.gait_of(best),
+        scene=scene,
+        gait=problem.settings.find_near(scene, best.known.state),
         variables=problem.variables.by_name(best.u),
         objective=problem.sense * found.value,
         error=found.error,
