@@ -27,7 +27,7 @@ from jaxbiped.gait._search_starts import (
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.scene._walker import Walker
-from jaxbiped.simulate._simulate import rigid_walk, simulate
+from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._accuracy import recurring_sizes
 from jaxbiped.variational._hybrid_system import section_of
 
@@ -118,10 +118,9 @@ class Walks(NamedTuple):
 
 def walks_from(scene: Scene | RigidScene, starts: WalkerState) -> Walks:
     """Walks from starts, leaves of shape (n,), for 40 cycles at most."""
-    walked: Any = _arrivals if scene.compliant else _rigid_arrivals
     # Without last digits, in which versions of JAX differ: all come to the same gait, to the bit.
     rounded = jtu.tree_map(lambda leaf: np.round(np.asarray(leaf), _DIGITS), starts)
-    counts, arrivals, attempted = walked(scene, rounded)
+    counts, arrivals, attempted = _arrivals(scene, rounded)
     sizes = recurring_sizes(scene, arrivals)
     points = np.stack(recurring_leaves(arrivals), axis=-1) / sizes
     places = np.where(np.isfinite(arrivals[0]), arrivals[0], np.nan) / float(scene.mechanism.height)
@@ -129,37 +128,26 @@ def walks_from(scene: Scene | RigidScene, starts: WalkerState) -> Walks:
 
 
 @cached_jit
-def _arrivals(scene: Scene, starts: WalkerState) -> tuple[Scalar, WalkerState, Scalar]:
-    """Of each walk arrivals at the section, states at them, the stance leg standing, and steps."""
+def _arrivals(scene: Scene | RigidScene, starts: WalkerState) -> tuple[Scalar, WalkerState, Scalar]:
+    """Of each walk cycles, states at the arrivals that end them, the stance leg standing; steps."""
     section, footsteps = section_of(scene, None), scene.mechanism.structure.cycle_footsteps
+    each, how = footsteps // scene.arrival_footsteps, dict[str, Any]()
+    if scene.compliant:
+        how = dict(accuracy="draft", engine="lanes")
 
     def one(start: PyTree) -> tuple[Scalar, PyTree, Scalar]:
         walk = simulate(
             scene,
             start,
-            footsteps=footsteps * _CYCLES + 1,
-            accuracy="draft",
+            footsteps=footsteps * _CYCLES + scene.compliant,
             save=section,
-            max_arrivals=_CYCLES,
-            engine="lanes",
+            max_arrivals=each * _CYCLES,
+            **how,
         )
         assert walk.arrivals is not None
-        at = walk.arrivals.state
-        return walk.arrivals.total, in_nearest_names(section, scene, at, at), walk.attempted
-
-    return jax.vmap(one)(starts)
-
-
-@cached_jit
-def _rigid_arrivals(scene: RigidScene, starts: WalkerState) -> tuple[Scalar, WalkerState, Scalar]:
-    """Of each walk cycles, states just after the heel strike that ends each, and steps."""
-    each = scene.mechanism.structure.cycle_footsteps
-
-    def one(start: PyTree) -> tuple[Scalar, PyTree, Scalar]:
-        walk = rigid_walk(scene, start, footsteps=each * _CYCLES, max_arrivals=each * _CYCLES)
-        assert walk.arrivals is not None
-        last = jtu.tree_map(lambda leaf: leaf[each - 1 :: each], walk.arrivals.state)
-        return walk.arrivals.total // each, last, walk.attempted
+        at = jtu.tree_map(lambda leaf: leaf[each - 1 :: each], walk.arrivals.state)
+        named = in_nearest_names(section, scene, at, at) if scene.compliant else at
+        return walk.arrivals.total // each, named, walk.attempted
 
     return jax.vmap(one)(starts)
 

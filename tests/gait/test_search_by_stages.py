@@ -135,7 +135,7 @@ def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
     places = np.where(np.arange(6)[:, None] < 5, 0.2, 1e-8) * last
     states = jb.dynamics.RigidState(places, angle, zero, zero, zero)
     counts = np.array([40, 40, 40, 39, 40, 40])
-    monkeypatch.setattr(_walk_waves, "_rigid_arrivals", lambda *_: (counts, states, counts))
+    monkeypatch.setattr(_walk_waves, "_arrivals", lambda *_: (counts, states, counts))
     assert walks_from(SCENE, START).attempted == 239
     chosen = walks_from(SCENE, START).settled()
     # The third is where the first one is; the fourth fell.
