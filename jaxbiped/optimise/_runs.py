@@ -10,19 +10,19 @@ import numpy as np
 from jaxbiped._progress import Stage
 from jaxbiped.continuation._critical_values import allows, range_of
 from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.optimise._design_functions import Functions
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
 from jaxbiped.optimise._optimality import OPTIMAL, optimality_of
 from jaxbiped.optimise._optimisers import (
     Callback,
-    Functions,
     RunEnding,
     run_optax,
     run_slsqp,
     run_trust_constr,
+    run_trust_region,
 )
 from jaxbiped.optimise._optimum import Iteration, Optimum, Outcome
-from jaxbiped.optimise._trust_region import run_trust_region
 
 if TYPE_CHECKING:
     import optax

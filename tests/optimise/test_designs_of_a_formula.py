@@ -28,8 +28,8 @@ from jaxbiped.optimise._jacobian_weights import entry_weights, leading_multiplie
 from jaxbiped.optimise._local_model import Local
 from jaxbiped.optimise._objective_values import Evaluation, _cost_of_transport, _root_of_squares
 from jaxbiped.optimise._optimality import optimality_of
+from jaxbiped.optimise._optimisers import _damped_update
 from jaxbiped.optimise._optimum import Outcome
-from jaxbiped.optimise._trust_region import _damped_update
 from tests.optimise.drawn_designs import (
     BOTH,
     NAMES,
