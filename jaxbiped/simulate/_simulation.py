@@ -285,14 +285,14 @@ def _slopes(
     )
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class CompiledSimulation:
     """A compiled request; call it to run."""
 
-    program: Callable[[Simulation], Trajectory]
-    request: Simulation
+    _program: Callable[[Simulation], Trajectory]
+    _request: Simulation
 
     def __call__(self) -> Trajectory:
         """Runs the solve and waits for it."""
-        walk = trim(jax.block_until_ready(self.program(self.request)))
-        return dataclasses.replace(walk, scene_key=scene_key(self.request.scene))
+        walk = trim(jax.block_until_ready(self._program(self._request)))
+        return dataclasses.replace(walk, scene_key=scene_key(self._request.scene))
