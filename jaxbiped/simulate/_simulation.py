@@ -285,12 +285,11 @@ def _slopes(
     )
 
 
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class CompiledSimulation:
     """A compiled request; call it to run."""
 
-    _program: Callable[[Simulation], Trajectory]
-    _request: Simulation
+    def __init__(self, program: Callable[[Simulation], Trajectory], request: Simulation) -> None:
+        self._program, self._request = program, request
 
     def __call__(self) -> Trajectory:
         """Runs the solve and waits for it."""
