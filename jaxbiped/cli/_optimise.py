@@ -57,7 +57,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
     output: options.OutputOptions
 
     def run(self) -> int:
-        from jaxbiped.continuation._nearest_bifurcation import range_of
+        from jaxbiped.continuation._critical_values import range_of
 
         scene = self.scene.scene()
         assert not isinstance(scene, jb.RedundantScene)
@@ -95,7 +95,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
 
 def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[float, float]]:
     """Bounds by name from d=0.05:0.2,r,J."""
-    from jaxbiped.continuation._nearest_bifurcation import farthest_allowed
+    from jaxbiped.continuation._critical_values import farthest_allowed
 
     own, found = jb.parameter_values(scene), {}
     for part in text.split(","):

@@ -83,12 +83,9 @@ class DisturbedCycle(AbstractAugmentedSystem):
         return found
 
 
-def push_cycle(walker: AbstractSystem) -> DisturbedCycle:
-    return DisturbedCycle(walker, ("clock", PUSH), PUSH)
-
-
-def drop_cycle(walker: AbstractSystem) -> DisturbedCycle:
-    return DisturbedCycle(walker, ("clock", "fallen", DROP), DROP)
+def disturbed_cycle(walker: AbstractSystem, disturbance: str) -> DisturbedCycle:
+    more = (PUSH,) if disturbance == PUSH else ("fallen", DROP)
+    return DisturbedCycle(walker, ("clock", *more), disturbance)
 
 
 class SteppedSection(AbstractSection):

@@ -13,7 +13,7 @@ from jaxbiped._types import as_float
 from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.basins._labels import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock
-from jaxbiped.continuation._nearest_bifurcation import (
+from jaxbiped.continuation._critical_values import (
     NearestBifurcation,
     nearest_bifurcation,
     range_of,

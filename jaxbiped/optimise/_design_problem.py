@@ -199,9 +199,6 @@ class DesignProblem:
         found = np.stack(recurring_leaves(gait.measures.state))
         return None if np.any(np.abs(found - guess) > farthest) else self._keep(u, scene, gait)
 
-    def gait_of(self, design: Design) -> Gait:
-        return self.settings.find_near(self.scene_at(design.u), design.known.state)
-
     def scene_at(self, u: np.ndarray) -> Scene | RigidScene:
         """The scene of a design; raises `ArgumentError` where parameters do not go together."""
         return with_parameters(self.scene, self.variables.by_name(u))

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._measures import QUANTITIES
+from jaxbiped.gait._gait import QUANTITIES, Gait
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import row_label
 

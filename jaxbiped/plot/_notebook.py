@@ -16,8 +16,7 @@ from jaxbiped._checks import check_type
 from jaxbiped._types import is_traced
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._measures import QUANTITIES
+from jaxbiped.gait._gait import QUANTITIES, Gait
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.plot import style
 from jaxbiped.plot._multiplier_chart import multipliers

@@ -15,8 +15,7 @@ from jaxbiped._tables import variables_of
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._gait_table import gait_coordinates, gait_entries
+from jaxbiped.gait._gait import Gait, gait_coordinates, gait_entries
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.sweep._store_files import SETTINGS, continue_store, open_store, writing
 

@@ -1,20 +1,27 @@
-"""Multiplier cluster: conditions under which the three leading multipliers lie in a circle.
+"""Functions of a design problem: its scaled objective, and requirements as rows.
 
-Where multipliers meet the spectral radius is not smooth, and its derivatives are unbounded; the
-coefficients of the cluster's polynomial are smooth there. In x = z/ρ = (1 + w)/(1 − w) the circle
-is the imaginary axis of w, and all multipliers lie inside where the transformed polynomial
-E₃w³ + E₂w² + E₁w + E₀ is Hurwitz's: all E at least zero, and E₁E₂ ≥ E₀E₃ (Jury 1964). At a double
-or triple multiplier these conditions' gradients span the normals of the stable polynomials, of
-which Burke and Overton (Math. Programming 90, 2001) make the radius's subdifferential.
+A row must be at least zero, or zero. An upper bound of the spectral radius is the rows that bound
+its cluster, the three leading multipliers: where these meet the radius is not smooth, and its
+derivatives are unbounded; the coefficients of the cluster's polynomial are smooth there. In
+x = z/ρ = (1 + w)/(1 − w) the circle of radius ρ is the imaginary axis of w, and all multipliers lie
+inside where the transformed polynomial E₃w³ + E₂w² + E₁w + E₀ is Hurwitz's: all E at least zero,
+and E₁E₂ ≥ E₀E₃ (Jury 1964). At a double or triple multiplier these conditions' gradients span the
+normals of the stable polynomials, of which Burke and Overton (Math. Programming 90, 2001) make the
+radius's subdifferential.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from jaxbiped.optimise._design_problem import DesignProblem, scale_of
 from jaxbiped.optimise._jacobian_weights import SYMMETRIC
 from jaxbiped.optimise._objective_values import Evaluation
 
+_ACTIVE = 1e-4
+"""Largest part of its bound by which an active requirement is missed or kept too well."""
+RAISED = 10.0
+"""By how much the scaled objective is raised where there is no gait."""
 _LEADING = np.array([1.0, 3.0, 3.0, 1.0])
 _BY_COEFFICIENT = np.array([[1.0, 1, 1], [1, -1, -3], [-1, -1, 3], [-1, 1, -1]])
 """E = _LEADING + _BY_COEFFICIENT a for x³ + a₁x² + a₂x + a₃."""
@@ -28,6 +35,35 @@ _BISECTIONS = 50
 _ONE, _TWO, _THREE = 1e-4, 2e-2, 1e-1
 """Up to which the conditions of one, two and three multipliers at ±ρ are active: third roots of
 errors are a per cent."""
+
+
+class Row(NamedTuple):
+    """A requirement as a function that must be at least zero, or zero where `equality`.
+
+    Attributes:
+        name: of the measure; `bound` that it is held to, `sign` 1 from below and −1 from above.
+    """
+
+    name: str
+    bound: float
+    sign: float
+    equality: bool
+
+    def value(self, known: Evaluation) -> float:
+        """How much there is to spare, in units of the bound."""
+        return self.sign * (known.values[self.name] - self.bound) / scale_of(self.bound)
+
+    def slopes(self, known: Evaluation) -> np.ndarray:
+        return self.sign * known.slopes[self.name] / scale_of(self.bound)
+
+    def slope_errors(self, known: Evaluation) -> np.ndarray:
+        return known.slope_errors[self.name] / scale_of(self.bound)
+
+    def by_bound(self, known: Evaluation) -> float:
+        return -self.sign / scale_of(self.bound)
+
+    def is_active(self, known: Evaluation) -> bool:
+        return self.equality or self.value(known) <= _ACTIVE
 
 
 class Conditions(NamedTuple):
@@ -146,3 +182,68 @@ class ClusterRow(NamedTuple):
 
     def _by_symmetric(self, known: Evaluation) -> np.ndarray:
         return self._conditions(known).by_symmetric[self.place]
+
+
+AnyRow: TypeAlias = Row | ClusterRow
+
+
+def rows_of(problem: DesignProblem) -> tuple[AnyRow, ...]:
+    """The requirements one by one.
+
+    An upper bound of the spectral radius is the conditions on the cluster of leading multipliers,
+    and one on the next modulus: all of them are smooth where multipliers meet.
+    """
+    rows: list[AnyRow] = []
+    for each in problem.requirements:
+        if each.low is not None and each.low == each.high:
+            rows.append(Row(each.name, each.low, 1.0, True))
+            continue
+        if each.low is not None:
+            rows.append(Row(each.name, each.low, 1.0, False))
+        if each.high is not None:
+            if each.name == "spectral_radius" and problem.has_cluster:
+                rows += cluster_rows(problem, each.high)
+            else:
+                rows.append(Row(each.name, each.high, -1.0, False))
+    return tuple(rows)
+
+
+def cluster_rows(problem: DesignProblem, bound: float) -> list[AnyRow]:
+    """An upper bound of the spectral radius."""
+    errors = tuple(cluster_of(problem.asked[0].known).errors.tolist())
+    every: list[AnyRow] = [
+        ClusterRow("spectral_radius", bound, -1.0, False, place, errors)
+        for place in range(CONDITIONS)
+    ]
+    return [*every, Row("next_modulus", bound, -1.0, False)]
+
+
+class Functions:
+    """The scaled objective and the requirements of a problem, with their gradients."""
+
+    def __init__(self, problem: DesignProblem) -> None:
+        self.problem, self.rows = problem, rows_of(problem)
+        assert problem.latest is not None
+        self.scale = scale_of(problem.objective(problem.latest.known).value)
+
+    def objective(self, u: np.ndarray) -> tuple[float, np.ndarray]:
+        known, raised = self._evaluation(u)
+        found = self.problem.objective(known)
+        gradient = self.problem.gradient(u, found.slopes)
+        return found.value / self.scale + raised, gradient / self.scale
+
+    def spare(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
+        known, _ = self._evaluation(u)
+        return np.asarray([row.value(known) for row in rows])
+
+    def spare_gradients(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
+        known, _ = self._evaluation(u)
+        return np.stack([self.problem.gradient(u, row.slopes(known)) for row in rows])
+
+    def _evaluation(self, u: np.ndarray) -> tuple[Evaluation, float]:
+        u = np.clip(np.asarray(u, dtype=float), 0.0, 1.0)
+        known = self.problem.at(u)
+        if known is not None:
+            return known, 0.0
+        assert self.problem.latest is not None
+        return self.problem.latest.known, RAISED

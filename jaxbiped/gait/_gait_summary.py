@@ -1,33 +1,45 @@
-"""Measures of a periodic orbit: values at its fixed point, derivatives, errors; step lengths."""
+"""Summary of a search as a gait: measures, derivatives and errors of its orbit; step lengths."""
 
-from typing import NamedTuple
+import dataclasses
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
+from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._footfalls import FootMotion, landings, standing_leg, touches
-from jaxbiped.dynamics._state import state_of_recurring
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, crossings_of
-from jaxbiped.gait._orbit_derivatives import Orbit, Slopes, change_terms
+from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
+from jaxbiped.gait._fixed_point_search import (
+    FixedPointProblem,
+    Found,
+    Search,
+    crossings_of,
+    minimal_cycle,
+    search_by_lanes,
+)
+from jaxbiped.gait._gait import Gait, Measures
+from jaxbiped.gait._orbit_derivatives import (
+    Orbit,
+    Slopes,
+    change_terms,
+    orbit_of,
+    with_parameter_columns,
+)
 from jaxbiped.gait._poincare_map import LinearisedReturn
+from jaxbiped.gait._search_provenance import Origin
+from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._parameter_access import parameter_quantities
+from jaxbiped.scene._rigid_feet import held_count
 from jaxbiped.scene._structure import Structure
 
 _NOTHING = 1e-9
 """A measure (SI units) that is zero but for the solve's error has no elasticity."""
-QUANTITIES = {
-    "period": Quantity("period", "$T$", "s"),
-    "step_length": Quantity("step length", "$L$", "m"),
-    "speed": Quantity("speed", "$v$", "m/s"),
-    "peak_normal": Quantity("peak normal force", "$F$", "N"),
-    "spectral_radius": Quantity("spectral radius", "$\\rho$"),
-}
-"""What is measured of a gait by the fields of its `Measures`, the state left out."""
 _CHANGE_SHARE, _TERMS_SHARE = 1.0, 0.08
 """What a measure's error has of its change by a looser solve, and of that change's terms at least.
 
@@ -37,28 +49,98 @@ _ROUNDING = 1e-15
 """Relative error that no tolerance takes away."""
 
 
-class Measures(NamedTuple):
-    """Measures of a gait, or their derivatives; all leaves have one shape.
+@host_jit(search_by_lanes)
+def summarise_gait(
+    problem: FixedPointProblem, found: Found, names: tuple[str, ...], radius: bool, origin: Origin
+) -> Gait:
+    """The gait that a search found, with its stability and its derivatives.
 
-    The peak force of a rigid walker is that of single support; its impacts have impulses instead.
-
-    Attributes:
-        period: duration of the cycle [s].
-        step_length: advance along the slope in a cycle [m].
-        speed: mean speed along the slope [m/s].
-        peak_normal: largest normal force on a foot [N]; None if the gradient mode does not provide
-            it.
-        spectral_radius: largest absolute value of a Floquet multiplier, without the trivial one;
-            None if the gradient mode does not provide it.
-        state: the state on the section, a `State` or a `RigidState`, hip_x zero.
+    Args:
+        problem: what was searched; its active parameters are those that are asked for.
+        found: what the search came to.
+        names: of the active parameters.
+        radius: whether the spectral radius is differentiated.
+        origin: how the search came to it.
     """
+    path = nodes_of(found.last, problem.guess)  # of the search, whose steps are counted
+    found = with_parameter_columns(problem, found)
+    orbit = orbit_of(problem, found, radius=radius)
+    stability = orbit.stability
+    last, m = found.last, found.recurring.shape[0]
+    structure = problem.args.mechanism.structure
+    lost = found.ending == int(Search.NO_RETURN)
 
-    period: Scalar
-    step_length: Scalar
-    speed: Scalar
-    peak_normal: PyTree
-    spectral_radius: PyTree
-    state: PyTree
+    def known(tree: PyTree) -> PyTree:
+        """NaN where no cycle was ever completed."""
+        return jtu.tree_map(lambda leaf: jnp.where(lost, jnp.nan, leaf), tree)
+
+    measures = Measures(
+        period=last.period,
+        step_length=last.advance[0],
+        speed=last.advance[0] / last.period,
+        peak_normal=last.peak,
+        spectral_radius=stability.spectral_radius,
+        state=orbit.state,
+    )
+    measures = known(measures)._replace(state=orbit.state)
+    slopes = measure_slopes(orbit, measures, orbit.slopes, orbit.radius_slopes)
+    backwards = speed_backwards(measures)
+    slope_errors = measure_slopes(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
+    errors = measure_errors(measures, orbit)
+    rows = jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])
+    told = dict(
+        measure_errors=errors,
+        multipliers=stability.multipliers,
+        multiplier_errors=stability.errors,
+        directions=stability.directions,
+        monodromy=last.monodromy[:, :m],
+        step_lengths=step_lengths(problem, last, path[1]),
+        return_jacobian=rows[:, :m],
+        unit_multiplier_error=stability.unit_error,
+        sensitivities=jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes),
+        sensitivity_errors=jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors),
+        elasticities=elasticities_of(problem, measures, slopes),
+    )
+    off = jnp.stack(recurring_leaves(errors.state))
+    is_found = found.ending == int(Search.FOUND)
+    return Gait(
+        **known(told),
+        ending=found.ending,
+        walk_ending=found.code,
+        measures=measures,
+        residual=found.residual,
+        bifurcation=jnp.where(is_found, stability.bifurcation, int(Bifurcation.NONE)),
+        evaluations=found.evaluations,
+        history=found.history,
+        solver_steps=last.attempted,
+        grazes=last.grazes,
+        cycle_footsteps=problem.args.arrival_footsteps
+        * minimal_cycle(last, off, problem.precision.rtol),
+        sound=found.sound,
+        origin=jtu.tree_map(jnp.asarray, origin),
+        orbit=path,
+        parameters=names,
+        engine=problem.spec.engine,
+        cycle="stride" if len(structure.namings) == 1 else "step",
+        quantities=tuple(map(parameter_quantities(problem.args).__getitem__, names)),
+    )
+
+
+def without_held(scene: AbstractWalkerScene, gait: Gait) -> Gait:
+    """A gait without the multipliers, all zero, of what is held where its cycle begins.
+
+    Those of a state's mode and of the angles and rates that a stop or a flat foot holds.
+    """
+    mode = float(getattr(gait.measures.state, "mode", np.nan))
+    if not np.isfinite(mode):
+        return gait
+    own = slice(np.shape(gait.multipliers)[-1] - 1 - 2 * held_count(scene.mechanism, mode))
+    return dataclasses.replace(
+        gait,
+        multipliers=gait.multipliers[own],
+        multiplier_errors=gait.multiplier_errors[own],
+        directions=gait.directions[:, own],
+    )
 
 
 def measure_errors(measures: Measures, orbit: Orbit) -> Measures:
