@@ -1,8 +1,8 @@
 """Measures of a trajectory: footsteps, energy ledger, samples, datasets; and tables of datasets."""
 
-from jaxbiped._table_rows import to_csv as to_csv
-from jaxbiped._table_rows import to_dataframe as to_dataframe
-from jaxbiped._table_rows import to_latex as to_latex
+from jaxbiped._tables import to_csv as to_csv
+from jaxbiped._tables import to_dataframe as to_dataframe
+from jaxbiped._tables import to_latex as to_latex
 from jaxbiped.measure._cost_of_transport import CostOfTransport as CostOfTransport
 from jaxbiped.measure._cost_of_transport import cost_of_transport as cost_of_transport
 from jaxbiped.measure._dataset import trajectory_dataset as trajectory_dataset
