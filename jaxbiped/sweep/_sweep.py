@@ -23,7 +23,7 @@ from jaxbiped.sweep._labelling_preparation import (
     with_gaits_met,
     with_guesses,
 )
-from jaxbiped.sweep._store import ALL_GAITS, Store
+from jaxbiped.sweep._store import ALL_GAITS, DOUBT_FIELDS, Layout, Store, fields_of
 from jaxbiped.sweep._store_files import (
     GAITS,
     check_continued,
@@ -32,7 +32,6 @@ from jaxbiped.sweep._store_files import (
     what_is_kept,
     writing,
 )
-from jaxbiped.sweep._stored_fields import DOUBT_FIELDS, Layout, fields_of
 from jaxbiped.sweep._workers import compute_chunks
 from jaxbiped.sweep.starts._coordinates import coordinate_quantities, state_coordinates
 from jaxbiped.sweep.starts._starts import AbstractStarts
@@ -124,10 +123,7 @@ def sweep(
     with stage("seeking the gaits that starts converge to", show=progress, kept=kept):
         known = with_gaits_met(labelling, starts) if look_for_gaits else labelling
     settings = known.settings() | own
-    if path is None:
-        results = Store.in_memory(layout, settings, writer)
-    else:
-        results = Store.open(path, layout, settings, writer, any_version=any_version)
+    results = Store.of(path, layout, settings, writer, any_version=any_version)
     missing = results.behind()
     sizes = layout.sizes
     fresh = int(sizes[missing].sum())

@@ -15,8 +15,7 @@ import zarr
 import jaxbiped as jb
 from jaxbiped._identity import provenance
 from jaxbiped.sweep import _store, _store_files
-from jaxbiped.sweep._store import Store
-from jaxbiped.sweep._stored_fields import FIELDS, Layout
+from jaxbiped.sweep._store import FIELDS, Layout, Store
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results, simplest_grid, stacked
 
@@ -39,10 +38,7 @@ def swept(path=None, starts=None, *, labelling=LABELLING, chunk=4, look=False, *
 @pytest.mark.parametrize("on_disk", [False, True])
 def test_what_is_written_is_read_and_in_the_dataset(on_disk, tmp_path):
     layout, writer = Layout.of(simplest_grid(SCENE), 16), provenance(SCENE)
-    if on_disk:
-        store = Store.open(tmp_path / "store", layout, {}, writer)
-    else:
-        store = Store.in_memory(layout, {}, writer)
+    store = Store.of(tmp_path / "store" if on_disk else None, layout, {}, writer)
     label = np.arange(16, dtype=np.int8) % 7
     assert list(store.behind()) == list(range(layout.chunks))
     store.write(1, {"label": label})

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.sweep._stored_fields import Layout
+from jaxbiped.sweep._store import Layout
 
 NAMES = ("theta_stance", "theta_swing", "omega_stance", "omega_swing")
 
