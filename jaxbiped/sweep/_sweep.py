@@ -13,8 +13,15 @@ from jaxbiped._checks import ArgumentError, check_count, check_type
 from jaxbiped._files import JsonObject
 from jaxbiped._identity import provenance
 from jaxbiped._progress import stage
-from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_label_errors
-from jaxbiped.basins._labels import Doubt, Label, Witness
+from jaxbiped.basins._labels import (
+    ERRORS,
+    Doubt,
+    Label,
+    LabelErrors,
+    Seen,
+    Witness,
+    estimate_label_errors,
+)
 from jaxbiped.sweep._gait_family import Guesses
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import (

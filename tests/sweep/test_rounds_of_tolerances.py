@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins._label_errors import Seen
-from jaxbiped.basins._labels import Doubt, Witness
+from jaxbiped.basins._labels import Doubt, Seen, Witness
 from jaxbiped.sweep import _sweep
 from jaxbiped.sweep._store import Layout, Store
 from jaxbiped.sweep._sweep import tally_disagreements, tightened
