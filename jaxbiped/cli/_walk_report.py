@@ -18,7 +18,7 @@ from jaxbiped.cli._options import OutputOptions
 from jaxbiped.constraints._constraint_methods import name_of
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._footsteps import footstep_dataset
-from jaxbiped.measure._samples import at_steps, from_start, places_of_standing
+from jaxbiped.measure._samples import evaluate_along, from_start, places_of_standing
 from jaxbiped.solve._accuracy import unresolved_slip
 from jaxbiped.solve._error_estimate import error_numbers
 from jaxbiped.solve._trajectory import rows_of
@@ -205,7 +205,7 @@ def _constraint_numbers(scene: "jb.RedundantScene", walk: "jb.Trajectory[Any]") 
 def ending_name(scene: Any, trajectory: "jb.Trajectory[Any]") -> str:
     """How a walk ended, in words: its `Ending`, or that it never came to the ground."""
     if trajectory.outcome is jb.Ending.WALKING:
-        touching = at_steps(scene, trajectory, contacts).touching
+        touching = evaluate_along(scene, trajectory.state, contacts).touching
         if not np.any(np.stack(touching)):
             return AIRBORNE
     return str(trajectory.outcome)

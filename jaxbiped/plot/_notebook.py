@@ -21,9 +21,9 @@ from jaxbiped.gait._measures import QUANTITIES
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.plot import style
 from jaxbiped.plot._gait_charts import multipliers
+from jaxbiped.plot._motion_curves import gait_orbit
 from jaxbiped.plot._motion_pictures import corners_of, draw_bodies
 from jaxbiped.plot._parameter_charts import branch
-from jaxbiped.plot._phase_portrait import gait_orbit
 from jaxbiped.plot._samples import AnyScene
 from jaxbiped.plot._skeleton import skeleton_of
 from jaxbiped.plot._symbols import HEIGHT, HORIZONTAL

@@ -173,9 +173,7 @@ def _load(path: Path, empty: "xarray.Dataset") -> "xarray.Dataset":
         whole = all(each.nchunks_initialized == each.nchunks for each in arrays)
         whole = whole or not bool(stored[_DONE].any())
     if not whole:
-        warn(
-            f"store = {str(path)!r} was damaged: its gaits are searched again.",
-        )
+        warn(f"store = {str(path)!r} was damaged: its gaits are searched again.")
         return empty
     missing = sorted(set(map(str, empty.data_vars)) - set(map(str, stored.data_vars)))
     if missing:

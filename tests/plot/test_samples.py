@@ -10,7 +10,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._samples import evaluate_along, evaluate_at
-from jaxbiped.plot._contact_forces import sampled_forces
+from jaxbiped.plot._contact_charts import sampled_forces
 from jaxbiped.plot._samples import sample, state_at
 
 
