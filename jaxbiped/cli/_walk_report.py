@@ -49,7 +49,13 @@ def walk_numbers(
         numbers["error"] = error_numbers(walk.error)
     rolls = isinstance(scene, jb.RigidScene)
     if rolls:
-        numbers |= _rigid_numbers(scene, walk)
+        assert walk.arrivals is not None
+        numbers |= {
+            "model": "rigid",
+            "ending": str(walk.outcome),
+            "footsteps": max(int(walk.arrivals.total) - 1, 0),
+            "steps": _rigid_footsteps(scene, walk.arrivals),
+        }
         numbers["solver"]["attempted"] = int(walk.attempted)
     else:
         numbers |= _compliant_numbers(scene, walk)
@@ -80,16 +86,6 @@ def _compliant_numbers(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
     if scene.redundant:
         numbers["constraints"] = _constraint_numbers(scene, walk)
     return numbers
-
-
-def _rigid_numbers(scene: "jb.RigidScene", walk: "jb.Trajectory[Any]") -> JsonObject:
-    assert walk.arrivals is not None
-    return {
-        "model": "rigid",
-        "ending": str(walk.outcome),
-        "footsteps": max(int(walk.arrivals.total) - 1, 0),
-        "steps": _rigid_footsteps(scene, walk.arrivals),
-    }
 
 
 def footstep_rows(steps: Any) -> list[dict[str, float]]:

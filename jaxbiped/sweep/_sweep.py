@@ -252,23 +252,16 @@ def tightened(
             left = results.behind(ALL_GAITS + more)
             for chunk, fields in compute_chunks(finer, layout, left, executor, workers):
                 results.write(chunk, fields, mark=ALL_GAITS + more)
-        errors = estimate_label_errors(
-            tally_results(layout, results), wanted=wanted, rtol=tolerances[-1]
-        )
+        seen = Seen()
+        for chunk in range(layout.chunks):
+            seen += tally_disagreements(**results.read(chunk, tuple(DOUBT_FIELDS)))
+        errors = estimate_label_errors(seen, wanted=wanted, rtol=tolerances[-1])
         finest = tolerances[-1] <= 1.001 * FINEST_FIRST[compliant]
         too_few = errors.wrong <= wanted and errors.starts < errors.fewest
         if errors.met or too_few or finest or len(tolerances) >= _ROUNDS:
             return errors
         tolerances.append(max(tolerances[-1] / _FINER, FINEST_FIRST[compliant]))
         results.note({_TOLERANCES: json.dumps(tolerances)})
-
-
-def tally_results(layout: Layout, results: Store) -> Seen:
-    total = Seen()
-    for chunk in range(layout.chunks):
-        fields = results.read(chunk, tuple(DOUBT_FIELDS))
-        total += tally_disagreements(fields["doubt"], fields["disagreed"], fields["changed"])
-    return total
 
 
 def tally_disagreements(doubt: np.ndarray, disagreed: np.ndarray, changed: np.ndarray) -> Seen:
