@@ -10,7 +10,7 @@ import numpy as np
 from jaxbiped._checks import check_choice, check_not_negative, check_positive, check_type
 from jaxbiped._progress import Stage, stage
 from jaxbiped._types import as_float
-from jaxbiped.basins._fractions import Fraction, wilson_interval
+from jaxbiped.basins._label_statistics import Fraction, wilson_interval
 from jaxbiped.basins._labels import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock
 from jaxbiped.continuation._critical_values import (

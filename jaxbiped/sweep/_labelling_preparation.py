@@ -258,9 +258,7 @@ def label_at(
         labelled = labelling(batch.states, parameters=batch.parameters)
         remain = np.sum(labelled.doubt == int(Doubt.REMAINS)) if labelled.doubt is not None else 0
         if remain:
-            warn(
-                f"{remain} of {len(points)} labels remain in doubt at the finest tolerance.",
-            )
+            warn(f"{remain} of {len(points)} labels remain in doubt at the finest tolerance.")
         found = labelled.label.astype(int)
         return (found != int(Label.WALKING)).astype(int) if failing else found
 

@@ -128,12 +128,6 @@ def state_at(scene: AbstractWalkerScene, base: PyTree, columns: Mapping[str, np.
     return base._replace(**{leaves[name]: columns[name] for name in columns if name in leaves})
 
 
-def turns_bodies(scene: AbstractWalkerScene, names: Iterable[str]) -> bool:
-    """Whether an angle or a rate is among the names, as the state has it."""
-    structure = scene.mechanism.structure
-    return not {*structure.coordinates[2:], *structure.rates[2:]}.isdisjoint(names)
-
-
 def _held_along(
     scene: AbstractWalkerScene, base: PyTree, states: PyTree, named: Collection[str]
 ) -> PyTree:

@@ -1,5 +1,6 @@
-"""Phase portraits: bodies of a walk (paper, figure 5), and the periodic orbit of a gait."""
+"""Curves of a motion: over time (paper, figure 6), in the phase plane (figure 5), of a gait."""
 
+import itertools
 from collections.abc import Collection, Sequence
 from typing import Any
 
@@ -10,37 +11,137 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._checks import ArgumentError, check_choice, check_positive
 from jaxbiped._ending import Ending
+from jaxbiped._quantity import Quantity
+from jaxbiped.dynamics._state import state_quantity
 from jaxbiped.gait._gait import Gait
+from jaxbiped.measure._samples import from_start
 from jaxbiped.plot import style
 from jaxbiped.plot._gait_charts import check_drawable
 from jaxbiped.plot._samples import AnyScene, DrawnMotion
 from jaxbiped.plot._skeleton import Part, Skeleton, skeleton_of
-from jaxbiped.plot._symbols import angle_of, rate_of
+from jaxbiped.plot._symbols import TIME, angle_of, rate_of
+from jaxbiped.scene._scene import RigidScene
+from jaxbiped.simulate._simulate import rigid_walk
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
+_MOST_STRIKES = 4096
 _PLACES = (0.12, 0.37, 0.62, 0.87)
 """Of the arrows, in parts of the curve's length."""
-
-
-def _draw_arrows(ax: Axes, x: npt.ArrayLike, y: npt.ArrayLike, colour: str) -> None:
-    """Puts arrow heads along a curve, evenly over its length as it is seen."""
-    points = np.stack([np.asarray(x, dtype=float), np.asarray(y, dtype=float)], axis=-1)
-    spans = np.ptp(points, axis=0)
-    if len(points) < 2 or not (spans > 0.0).all():
-        return
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*(np.diff(points, axis=0) / spans).T))])
-    for place in _PLACES:
-        ends = np.array([place - 0.004, place + 0.004]) * along[-1]
-        tail, head = (tuple(np.interp(end, along, part) for part in points.T) for end in ends)
-        look = {"arrowstyle": "-|>", "color": colour, "linewidth": 0.0, "mutation_scale": 15.0}
-        ax.annotate("", head, tail, arrowprops=look | {"shrinkA": 0.0, "shrinkB": 0.0})
-
-
 _FAINT = 0.35
 """Opacity of the whole walk, behind its last stride."""
+
+
+def leg_angles(scene: AnyScene, trajectory: Trajectory[Any], *, ax: Axes | None = None) -> Figure:
+    """Draws the angles of all bodies from the slope's normal [rad] over time [s].
+
+    Args:
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        ax: axes to draw into. Default: a new figure.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
+
+    Raises:
+        ValueError: the trajectory was not saved step by step.
+    """
+    check_scene_of(trajectory, scene)
+    (t, motion), skeleton = DrawnMotion(scene, trajectory).sampled(), skeleton_of(scene.mechanism)
+    angles = [motion[f"theta_{part.name}"] for part in skeleton.parts]
+    noun = skeleton.noun
+    label = angle_of(noun).on_axis()
+    title = f"{noun.capitalize()} angles" + " on rigid feet" * isinstance(scene, RigidScene)
+    ax = style.axes_or_new(ax, 7.2, 3.4)
+    for part, angle in zip(skeleton.parts, angles, strict=True):
+        ax.plot(t, angle, linewidth=1.3, label=part.label, **part.look.line)
+    ax.margins(x=0.01)
+    style.dress(ax, title, TIME.on_axis(), label)
+    style.legend_above(ax)
+    return style.figure_of(ax)
+
+
+def time_series(
+    scene: AnyScene, trajectory: Trajectory[Any], *names: str, ax: Axes | None = None
+) -> Figure:
+    """Draws scalars of the state over time [s].
+
+    Args:
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        names: names of scalars of the state, or of angles and rates of bodies that couplings fix,
+            all with one unit, such as `theta_torso`, `omega_shank_1` or `hip_vx`.
+        ax: axes to draw into. Default: a new figure.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
+
+    Raises:
+        ArgumentError: there is no name, one is unknown, or the names have several units.
+        ValueError: the trajectory was not saved step by step.
+    """
+    check_scene_of(trajectory, scene)
+    t, known = DrawnMotion(scene, trajectory).sampled()
+    skeleton = skeleton_of(scene.mechanism)
+    if not names:
+        raise ArgumentError(
+            f"names is empty, which is not allowed: choose among {', '.join(known)}."
+        )
+    for name in names:
+        check_choice("names", name, known)
+    quantities = [state_quantity(name) or Quantity(name, "", "SI") for name in names]
+    units = {each.unit for each in quantities}
+    if len(units) > 1:
+        raise ArgumentError(
+            f"names = {names!r} is not allowed: they have the units {', '.join(sorted(units))}, "
+            "but one pair of axes has only one unit."
+        )
+    ax = style.axes_or_new(ax, 7.2, 3.4)
+    looks = {
+        f"{word}_{part.name}": part.look for part in skeleton.parts for word in ("theta", "omega")
+    }
+    for k, (name, quantity) in enumerate(zip(names, quantities, strict=True)):
+        look = looks[name].line if name in looks else style.line_of(k)
+        ax.plot(t, known[name], linewidth=1.3, label=quantity.in_row(), **look)
+    ax.margins(x=0.01)
+    several = f"{_common_words(quantities)} ({quantities[0].unit_in_figure})"
+    label = quantities[0].on_axis() if len(names) == 1 else several
+    style.dress(ax, "Motion", TIME.on_axis(), label)
+    style.legend_above(ax)
+    return style.figure_of(ax)
+
+
+def _common_words(quantities: Sequence[Quantity]) -> str:
+    """The words that all begin with, without their last preposition."""
+    lists = zip(*(each.words.split() for each in quantities), strict=False)
+    shared = [words[0] for words in itertools.takewhile(lambda words: len(set(words)) == 1, lists)]
+    while shared and shared[-1] in ("of", "leg", "along", "the"):
+        shared.pop()
+    return " ".join(shared) or "value"
+
+
+def rigid_leg_angles(
+    scene: RigidScene, state: Any, *, duration: float, ax: Axes | None = None
+) -> Figure:
+    """Draws the angles of all bodies of a rigid walk from its start, as `leg_angles` does.
+
+    Args:
+        scene: the walker.
+        state: start of the walk.
+        duration: duration to draw [s].
+        ax: axes to draw into. Default: a new figure.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
+
+    Raises:
+        ArgumentError: the duration is not above 0.
+    """
+    check_positive("duration", duration, "s")
+    walk = rigid_walk(scene, state, duration=duration, max_arrivals=_MOST_STRIKES)
+    return leg_angles(scene, from_start(scene, walk, state), ax=ax)
 
 
 def phase_portrait(
@@ -179,3 +280,17 @@ def _along_cycle(gait: Gait, word: str, name: str, twin: str) -> np.ndarray:
     own, others = (np.asarray(getattr(states, f"{word}_{each}")) for each in (name, twin))
     parts = [(others if k % 2 else own)[k, known] for k, known in enumerate(np.isfinite(times))]
     return np.concatenate(parts)
+
+
+def _draw_arrows(ax: Axes, x: npt.ArrayLike, y: npt.ArrayLike, colour: str) -> None:
+    """Puts arrow heads along a curve, evenly over its length as it is seen."""
+    points = np.stack([np.asarray(x, dtype=float), np.asarray(y, dtype=float)], axis=-1)
+    spans = np.ptp(points, axis=0)
+    if len(points) < 2 or not (spans > 0.0).all():
+        return
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*(np.diff(points, axis=0) / spans).T))])
+    for place in _PLACES:
+        ends = np.array([place - 0.004, place + 0.004]) * along[-1]
+        tail, head = (tuple(np.interp(end, along, part) for part in points.T) for end in ends)
+        look = {"arrowstyle": "-|>", "color": colour, "linewidth": 0.0, "mutation_scale": 15.0}
+        ax.annotate("", head, tail, arrowprops=look | {"shrinkA": 0.0, "shrinkB": 0.0})

@@ -1,4 +1,4 @@
-"""`jaxbiped optimise`: the parameters within bounds whose gait is best, and what certifies it."""
+"""Searches for parameters: `jaxbiped optimise` for the best gait, `fit` for the measured ones."""
 
 import dataclasses
 import math
@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
+from tyro.conf import Positional
+
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._files import JsonObject
+from jaxbiped._files import JsonObject, read_json, read_text
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._gait import gait_figures
 from jaxbiped.cli._report import Report, columns, records
@@ -20,6 +22,18 @@ _STABLE = {True: "stable", False: "NOT STABLE", None: "undecided within the erro
 _REDUNDANT = (
     "formulation = redundant is not allowed here: how the hip is held makes no difference to a "
     "gait; choose minimal."
+)
+_ESTIMATE = {
+    "parameter": "{0[0]}",
+    "unit": "{0[1].unit}",
+    "estimate": "{0[2]:.6g}",
+    "standard error": "{0[3]:.6g}",
+    "95 % from": "{0[4][0]:.6g}",
+    "to": "{0[4][1]:.6g}",
+}
+_REDUNDANT_FIT = 'formulation = "redundant" is not allowed here: it must be "minimal".'
+_IS_MEASURED = options.Check(
+    lambda name, path: (read_text if path.suffix.lower() == ".csv" else read_json)(name, path)
 )
 
 
@@ -62,14 +76,14 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         scene = self.scene.scene()
         assert not isinstance(scene, jb.RedundantScene)
         self.output.make_folder()
-        names = [name.strip() for name in self.bifurcations.split(",")]
+        names = map(str.strip, self.bifurcations.split(","))
         along = [name for name in names if name not in ("", "none")]
         for name in along:
             check_choice("bifurcations", name, jb.parameter_names(scene))
             range_of(scene, name)
-        how = self.arguments("optimise_gait")
+        vary = {"vary": _bounds(scene, self.vary), "subject_to": self.subject_to or None}
+        how = self.arguments("optimise_gait") | vary
         del how["footsteps"]  # of the certificate's walk
-        how |= {"vary": _bounds(scene, self.vary), "subject_to": self.subject_to or None}
         found = jb.optimise_gait(scene, **how)
         certificate = jb.optimise.certify(
             found,
@@ -81,16 +95,14 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         )
         sense = "minimise" if self.maximise is None else "maximise"
         goal = getattr(self, sense)
-        numbers = _optimum_numbers(found, certificate, goal, sense)
         report = Report(self.output.json, self.output.csv)
         _print(report, scene, found, goal)
         report.say(*_certificate_lines(certificate))
         figures = {"optimisation": lambda: jb.plot.optimisation(found)}
         report.wrote(self.output.draw(figures | gait_figures(found.gait)))
-        report.finish(numbers, found.to_csv)
+        report.finish(_optimum_numbers(found, certificate, goal, sense), found.to_csv)
         ended = jb.optimise.Outcome
-        good = (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE)
-        return 0 if found.outcome in good else 1
+        return int(found.outcome not in (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE))
 
 
 def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[float, float]]:
@@ -101,22 +113,20 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
     for part in text.split(","):
         name, given, bounds = (each.strip() for each in part.partition("="))
         check_choice("vary", name, jb.parameter_names(scene))
-        if not given:
-            value = float(own[name])
-            if value <= 0.0:
+        if given:
+            try:
+                low, high = map(float, bounds.split(":", 1))
+            except ValueError:
                 raise ArgumentError(
-                    f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
-                )
+                    f"vary = {part.strip()!r} is not understood: write {name}=low:high."
+                ) from None
+        elif (value := float(own[name])) > 0.0:
             low, high = (farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
-            found[name] = (low, high)
-            continue
-        try:
-            first, last = bounds.split(":", 1)
-            found[name] = (float(first), float(last))
-        except ValueError:
+        else:
             raise ArgumentError(
-                f"vary = {part.strip()!r} is not understood: write {name}=low:high."
-            ) from None
+                f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
+            )
+        found[name] = (low, high)
     return found
 
 
@@ -246,3 +256,44 @@ def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
             f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "
             f"{other.length_difference:.1e}, spectral radius by {other.radius_difference:.1e}"
         )
+
+
+class Fit(options.Command, of=("fit_gait",)):
+    """Fit parameters to measured gaits; print estimates, errors and undetermined parameters."""
+
+    file: Annotated[Positional[Path], _IS_MEASURED]
+    """File of measured gaits, CSV or JSON (see jaxbiped.identify.read_measured)."""
+    vary: str
+    """Names of the parameters to fit, separated by commas: K,c,mu_kinetic."""
+    scene: Annotated[SceneOptions, minimal(_REDUNDANT_FIT)]
+    accuracy: options.GaitAccuracy
+    engine: options.Engine
+    max_evaluations: options.Count
+    output: options.OutputOptions
+
+    def run(self) -> int:
+        scene = self.scene.scene()
+        assert not isinstance(scene, jb.RedundantScene)
+        self.output.make_folder()
+        names = tuple(name.strip() for name in self.vary.split(",") if name.strip())
+        measured, how = jb.identify.read_measured(self.file, scene), self.arguments("fit_gait")
+        fit = jb.fit_gait(scene, names, measured, **how)
+        report = Report(self.output.json, self.output.csv)
+        parts = (jb.parameter_quantities(scene), fit.estimates, fit.standard_errors, fit.intervals)
+        report.say(columns(_ESTIMATE, [(name, *(part[name] for part in parts)) for name in names]))
+        report.say(
+            f"{fit.ending} after {fit.evaluations} scenes; chi squared {fit.chi_squared:.3g} at "
+            f"{fit.freedom} degrees of freedom (p = {fit.p_value:.2g})"
+        )
+        if fit.undetermined:
+            report.say(f"these data do not determine {', '.join(fit.undetermined)}")
+        if fit.one_sided:
+            report.say(f"limited on one side only: {', '.join(fit.one_sided)}")
+        if fit.at_bounds:
+            report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
+        report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
+        numbers = vars(fit) | {"ending": str(fit.ending), "intervals_95": fit.intervals}
+        del numbers["intervals"]
+        also = {"chi_squared": fit.chi_squared, "p_value": fit.p_value}
+        report.finish(numbers | also, fit.to_csv)
+        return 0 if fit.ending is jb.identify.FitEnding.CONVERGED else 1

@@ -1,4 +1,4 @@
-"""Contact forces over time (paper, figure 8), and one heel strike of them."""
+"""Contacts over time: penetrations (paper, figure 7), forces (figure 8) and one heel strike."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from jaxbiped.measure._samples import evaluate_along
 from jaxbiped.plot import style
 from jaxbiped.plot._samples import sample, state_at
 from jaxbiped.plot._skeleton import Sole, skeleton_of
-from jaxbiped.plot._symbols import NORMAL_FORCE, TANGENTIAL_FORCE, TIME
+from jaxbiped.plot._symbols import NORMAL_FORCE, PENETRATION, TANGENTIAL_FORCE, TIME
 from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
@@ -175,3 +175,48 @@ def _mark_peak(ax: Axes, t: np.ndarray, force: np.ndarray) -> None:
     text = f"{force[peak]:.4g} N".replace("-", "−")
     shift, anchor = (3, "bottom") if force[peak] > 0.0 else (-3, "top")
     style.label_point(ax, text, (float(t[peak]), float(force[peak])), (7, shift), va=anchor)
+
+
+def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None) -> Figure:
+    """Draws the penetration of each touching foot into the ground [mm] over time [s].
+
+    A swing foot that the clearance rule lets pass below the surface does not touch, so its line is
+    interrupted.
+
+    Args:
+        scene: the scene that was simulated.
+        trajectory: the motion, with every step saved.
+        ax: axes to draw into. Default: a new figure.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
+
+    Raises:
+        ValueError: the trajectory was not saved step by step.
+    """
+    check_type("scene", scene, Scene, RedundantScene)
+    check_scene_of(trajectory, scene)
+    samples = sample(trajectory)
+    found = evaluate_along(scene, samples.state, contacts)
+    depths = [
+        _depth_mm(np.asarray(foot.penetration), touching)
+        for foot, touching in zip(found.feet, found.touching, strict=True)
+    ]
+    feet = skeleton_of(scene.mechanism).feet
+    ax = style.axes_or_new(ax, 7.2, 3.4)
+    for foot, depth in zip(feet, depths, strict=True):
+        ax.plot(samples.t, depth, linewidth=1.3, label=foot.label, **foot.look.line)
+    ax.margins(x=0.01)
+    style.dress(ax, "Penetration of the feet", TIME.on_axis(), PENETRATION.on_axis("mm"))
+    style.legend_above(ax)
+    ax.set_ylim(0.0, 1.1 * float(np.nanmax(np.stack(depths), initial=1e-3)))
+    return style.figure_of(ax)
+
+
+def _depth_mm(penetration: np.ndarray, touching: np.ndarray) -> np.ndarray:
+    """Penetration where the foot touches, zero at the samples just outside, nothing elsewhere."""
+    beside = np.zeros_like(touching)
+    beside[1:] |= touching[:-1]
+    beside[:-1] |= touching[1:]
+    at_surface = beside & ~touching & (penetration <= 0.0)
+    return np.where(touching | at_surface, np.maximum(penetration, 0.0) * 1e3, np.nan)

@@ -1,11 +1,12 @@
-"""Mechanical cost of transport: what energy a walker takes over its weight and its way."""
+"""Costs: of transport, in energy over weight and way; of a scene's vector field, in operations."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_increasing, check_type
-from jaxbiped.dynamics._state import state_type
+from jaxbiped.compiler import count_operations
+from jaxbiped.dynamics._state import field_of, state_type
 from jaxbiped.measure._energy_ledger import rigid_ledger
 from jaxbiped.measure._footsteps import driving_works, heel_strikes
 from jaxbiped.measure._samples import kept_strikes, places_of_standing
@@ -88,3 +89,21 @@ def cost_of_transport(
         ends = heel_strikes(scene, walk).time_s if times is None else np.asarray(times)
         distance, gravity, motors = driving_works(scene, walk, ends)
     return CostOfTransport((motors + gravity) / (weight * distance), motors, gravity, distance)
+
+
+def operation_counts(scene: Scene | RigidScene) -> dict[str, int]:
+    """Operations of one evaluation of the scene's vector field, by name, most frequent first.
+
+    These are the operations that the lanes engine computes for each stage of a step: equal
+    operations are shared, constants are folded, and operations that depend on the scene alone are
+    left out. An elementary function counts as the arithmetic of which it consists.
+
+    Args:
+        scene: the walker, compliant or rigid.
+
+    Returns:
+        The number of times that each operation occurs, by name.
+    """
+    kind, field = state_type(scene), field_of(scene)
+    state = kind(*[0.0] * len(kind._fields))
+    return count_operations(lambda y, args: field(0.0, y, args), state, scene)

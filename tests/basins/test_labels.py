@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins._label_errors import Seen, estimate_label_errors
+from jaxbiped.basins._labels import Seen, estimate_label_errors
 
 
 def _seen(random, wrong, recalls, starts=10_000):
