@@ -1,6 +1,6 @@
 """Numbers, rows and the matrix of capabilities as the pages write them, in Markdown."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 UNKNOWN = "…"
@@ -18,6 +18,11 @@ def small(number: float | None, digits: int = 1) -> str:
 def row(*cells: str) -> str:
     """A row of a table."""
     return f"| {' | '.join(cells)} |"
+
+
+def markdown(heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """A table."""
+    return "\n".join(row(*line) for line in (heads, ["---"] * len(heads), *lines))
 
 
 def percents(number: float) -> str:

@@ -35,26 +35,8 @@ def of_basin_simplest(numbers: dict[str, Any]) -> Iterator[str]:
     )
 
 
-def of_fraction_coverage(numbers: dict[str, Any]) -> Iterator[str]:
-    """How often intervals of fractions hold the truth, and how much less even starts scatter."""
-    yield f"In {numbers['draws']:,} draws of {numbers['starts']} starts"
-
-    def ends(method: str, measure: str, *names: str) -> tuple[float, float]:
-        labels = (each for name in names for each in numbers[name][method].values())
-        found = [each[measure] for each in labels if each["fraction"] > RARE]
-        return min(found), max(found)
-
-    for name in ("rigid", "compliant"):
-        low, high = ends("uniform", "inside_95", name)
-        yield f"{percents(low)} to {percents(high)} % for the {name} seed"
-    both = "rigid", "compliant"
-    low, high = ends("sobol", "scatter", *both)
-    yield f"only {low:.1f} to {high:.1f} times as much"
-    yield f"in {percents(ends('sobol', 'inside_95', *both)[0])} to 100.0 % of the draws"
-
-
 def of_gradient_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
-    """The unit multiplier's error against tolerance, stepping for the state and ours."""
+    """The unit multiplier's error against tolerance, and CPU time over the number of parameters."""
     points = numbers["points"]["exact laws"]
     for plain, both in zip(points["plain"], points["both"], strict=True):
         yield row(
@@ -64,18 +46,14 @@ def of_gradient_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
             str(both["steps"]),
             small(both["unit_multiplier"]),
         )
-
-
-def of_gradient_cost(numbers: dict[str, Any]) -> Iterator[str]:
-    """CPU time over the number of parameters."""
     costs = ("return_ms", "return_with_columns_ms", "radius_by_adjoint_ms")
-    for each in numbers["rows"]:
+    for each in numbers["costs"]["rows"]:
         times = (f"{each[name]:.1f}" for name in costs)
         yield row(str(each["parameters"]), *times, f"{each['radius_by_differences_ms']:.0f}")
 
 
 def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
-    """Errors of state and gradient of each way and setting, and what it says of them."""
+    """Errors of state and gradient of each way and setting, and what it says: ball, footstep."""
     answered = [each for each in numbers["rows"] if each["outcome"] == "answered"]
     for each in answered:
         yield row(each["problem"], each["way"], _setting(each), *_answer(each))
@@ -89,16 +67,13 @@ def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
     yield f"is {small(ours['gradient_error'])}, and its error bar is {small(ours['said'])}"
     others = small(tsit5["gradient_error"]), small(warp["gradient_error"])
     yield "{} with diffrax's Tsit5 and {} with Warp".format(*others)
-
-
-def of_footstep_truth(numbers: dict[str, Any]) -> Iterator[str]:
-    """Errors of a footstep and its gradient by each way and setting, and what it says of them."""
-    for each in numbers["rows"]:
-        answered = each.get("outcome", "answered") == "answered"
-        cells = _answer(each) if answered else (UNKNOWN, each["outcome"], UNKNOWN, UNKNOWN)
+    walked = numbers["footstep"]
+    for each in walked["rows"]:
+        known = each.get("outcome", "answered") == "answered"
+        cells = _answer(each) if known else (UNKNOWN, each["outcome"], UNKNOWN, UNKNOWN)
         yield row(each["way"], _setting(each), *cells)
-    yield f"changes by {small(numbers['problem']['coarser_collocation'])}"
-    yield f"differs from our finest solve by {small(numbers['problem']['our_finest'])}"
+    yield f"changes by {small(walked['problem']['coarser_collocation'])}"
+    yield f"differs from our finest solve by {small(walked['problem']['our_finest'])}"
 
 
 def of_reproducibility(numbers: dict[str, Any]) -> Iterator[str]:
@@ -140,7 +115,7 @@ def of_accuracy_coverage(numbers: dict[str, Any]) -> Iterator[str]:
 
 
 def of_label_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
-    """How many labels change with the tolerance, and what is known of those that do."""
+    """How many labels change with the tolerance, what is known of those, and of fractions."""
     named, starts = numbers["named"], numbers["starts"]
     changed = {each["way"]: each for each in named["rows"]}
     yield f"Of {starts:,} starts"
@@ -161,6 +136,21 @@ def of_label_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
                 f"{each['within_interval']} of {each['draws']}",
                 f"{each['met']} of {each['draws']}", f"{each['steps_ratio']:.1f}",
             )  # fmt: skip
+    fractions = numbers["fractions"]
+    yield f"In {fractions['draws']:,} draws of {fractions['starts']} starts"
+
+    def ends(method: str, measure: str, *names: str) -> tuple[float, float]:
+        labels = (each for name in names for each in fractions[name][method].values())
+        found = [each[measure] for each in labels if each["fraction"] > RARE]
+        return min(found), max(found)
+
+    for name in ("rigid", "compliant"):
+        low, high = ends("uniform", "inside_95", name)
+        yield f"{percents(low)} to {percents(high)} % for the {name} seed"
+    both = "rigid", "compliant"
+    low, high = ends("sobol", "scatter", *both)
+    yield f"only {low:.1f} to {high:.1f} times as much"
+    yield f"in {percents(ends('sobol', 'inside_95', *both)[0])} to 100.0 % of the draws"
 
 
 def of_trade(numbers: dict[str, Any]) -> Iterator[str]:

@@ -6,16 +6,6 @@ from typing import Any
 from _quote_words import UNKNOWN, row, small, table
 
 
-def of_bifurcation_elasticities(numbers: dict[str, Any]) -> Iterator[str]:
-    """How the critical slopes move with the contact's stiffness and the feet's radius."""
-    for name, found in numbers["cases"].items():
-        cells = [f"{found['slope_rad']:.6f}"]
-        for parameter in ("K", "c", "J", "d", "r"):
-            known = found["parameters"].get(parameter)
-            cells.append("–" if known is None else f"{known['elasticity']:.4f}")
-        yield row(name, *cells)
-
-
 def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
     """In how many fits the intervals hold the truth."""
     inside = {name: each["inside_95"] for name, each in numbers["parameters"].items()}
@@ -30,21 +20,6 @@ def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
             yield row(UNKNOWN, str(found["undetermined"]), str(found["one_sided"]), share)
 
 
-def of_kneed_ladder(numbers: dict[str, Any]) -> Iterator[str]:
-    """The kneed walker's gait on its way to the one on rigid feet."""
-    steps = numbers["paths"]["c with K^(3/2)"]
-    rows = [(f"{each['factor']:.0f}", each) for each in steps]
-    for words, found in [*rows, ("rigid", numbers["rigid"])]:
-        real, imaginary = found["pair"]
-        yield row(
-            words,
-            f"{found['period']:.5f}",
-            f"{found['step_length']:.5f}",
-            f"{real:.4f} ± {imaginary:.4f} i",
-            f"{found['third']:.4f}",
-        )
-
-
 def of_mechanism_speed(numbers: dict[str, Any]) -> Iterator[str]:
     """A walker with five links beside numbalsoda and MuJoCo, and how a step's cost grows."""
     for each in numbers["rates"]["rows"]:
@@ -57,7 +32,7 @@ def of_mechanism_speed(numbers: dict[str, Any]) -> Iterator[str]:
 
 
 def of_ladder(numbers: dict[str, Any]) -> Iterator[str]:
-    """Measures and costs of the rungs, and the rates of the way to the rigid limit."""
+    """Measures and costs of the rungs, and the way to the rigid limit, also of one with knees."""
     for name, found in numbers["measures"].items():
         cost = numbers["costs"][name]
         timed = "batch_us" in cost
@@ -77,6 +52,12 @@ def of_ladder(numbers: dict[str, Any]) -> Iterator[str]:
         f"s^−{both['step_length']:.2f}. If c alone grows, the period differs by "
         f"s^−{alone['period']:.1f}"
     )
+    kneed = numbers["kneed"]
+    steps = [(f"{each['factor']:.0f}", each) for each in kneed["paths"]["c with K^(3/2)"]]
+    for words, found in [*steps, ("rigid", kneed["rigid"])]:
+        lengths = f"{found['period']:.5f}", f"{found['step_length']:.5f}"
+        pair = "{:.4f} ± {:.4f} i".format(*found["pair"])
+        yield row(words, *lengths, pair, f"{found['third']:.4f}")
 
 
 def of_mechanism_matrix(numbers: dict[str, Any]) -> Iterator[str]:
@@ -159,7 +140,7 @@ def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
 
 
 def of_slope_branch(numbers: dict[str, Any]) -> Iterator[str]:
-    """Where each model of the seed's walker loses its stability, by the branch and by bisection."""
+    """Where each model loses its stability, by the branch and by bisection, and how that moves."""
     for name, found in numbers["scenes"].items():
         for loss in found["losses"]:
             kind, multiplier = loss["kind"].replace("-", " "), loss["multiplier"][0]
@@ -167,6 +148,13 @@ def of_slope_branch(numbers: dict[str, Any]) -> Iterator[str]:
                 name, kind, f"{loss['slope']:.9f}", f"{loss['bisection'][1]:.9f}",
                 small(abs(abs(multiplier) - 1.0)), small(loss["error"]),
             )  # fmt: skip
+    for name, found in numbers["cases"].items():
+        known = found["parameters"]
+        cells = (
+            f"{known[each]['elasticity']:.4f}" if each in known else "–"
+            for each in ("K", "c", "J", "d", "r")
+        )
+        yield row(name, f"{found['slope_rad']:.6f}", *cells)
 
 
 def of_period_doubling(numbers: dict[str, Any]) -> Iterator[str]:

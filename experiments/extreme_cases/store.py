@@ -12,8 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from _experiment import by
-from _row_store import RowStore
+from _experiment import RowStore, by
 from tqdm import tqdm
 
 Row = dict[str, Any]
