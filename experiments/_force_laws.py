@@ -44,7 +44,7 @@ MEASURES = {
 
 def walk_of(scene, duration, **how):
     """A walk from the seed's start by lanes, and its dataset."""
-    options = dict(duration=duration, engine="lanes", max_solver_steps=1 << 16) | how
+    options = dict(duration=duration, engine="lanes", max_solver_steps=1 << 17) | how
     walk = jb.simulate(scene, jb.seed_state(), **options)
     return walk, jb.measure.trajectory_dataset(scene, walk)
 

@@ -15,9 +15,20 @@ def small(number: float | None, digits: int = 1) -> str:
     return mantissa if int(exponent) == 0 else f"{mantissa}e{int(exponent)}"
 
 
-def row(*cells: str) -> str:
-    """A row of a table."""
-    return f"| {' | '.join(cells)} |"
+def row(*cells: str | int | float | None) -> str:
+    """A row of a table, numbers as the pages write them; a dash where there is none."""
+
+    def told(cell: str | int | float | None) -> str:
+        if cell is None:
+            return "–"
+        return small(cell) if isinstance(cell, float) else str(cell)
+
+    return f"| {' | '.join(map(told, cells))} |"
+
+
+def fixed(found: Mapping[str, Any], digits: int, *names: str) -> list[str]:
+    """Some of the numbers with so many digits behind the point."""
+    return [f"{found[name]:.{digits}f}" for name in names]
 
 
 def markdown(heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:

@@ -31,7 +31,7 @@ QUICK_LAWS = {
     "friction": ("bengisu-akay", "coulomb"),
 }
 REPEATS, QUICK_REPEATS = 15, 3
-DRAWN, RTOL = 1.0, 1e-10
+DRAWN, RTOL = 1.0, 1e-9
 """Time from the seed's start in which one step is drawn [s], and tolerance of what is drawn."""
 SLOPES, QUICK_SLOPES = (0.010, 0.015, 0.020, 0.025, 0.030, 0.040), (0.020, 0.040)
 DESCENT = 4.0

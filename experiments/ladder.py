@@ -75,8 +75,13 @@ def main(options: Options):
     first, *others = options.sized(TOLERANCES, TOLERANCES[:1])
     costs = {name: cost_of(*rungs[name], batch, [first]) for name in names if name != "rigid"}
     finer = [cost_of(*rungs["stribeck"], batch, [rtol]) for rtol in others]
-    pairs = [(cost, rigid_cost(rungs, batch, cost)) for cost in (costs["stribeck"], *finer)]
-    costs = {"rigid": pairs[0][1]} | costs
+    # The rigid walker at no larger an error.
+    rigid = [
+        cost_of(*rungs["rigid"], batch, RIGID_TOLERANCES, error=cost["error"])
+        for cost in (costs["stribeck"], *finer)
+    ]
+    pairs = zip((costs["stribeck"], *finer), rigid, strict=True)
+    costs = {"rigid": rigid[0]} | costs
     doublings = options.sized(DOUBLINGS, QUICK_DOUBLINGS)
     chosen = options.sized([*PATHS], [*PATHS][:2])
     paths = {path: approach(path, gaits["rigid"], doublings) for path in chosen}
@@ -110,11 +115,6 @@ def measures_of(gait):
         "multipliers": [[float(value.real), float(value.imag)] for value in leading],
         "unit_multiplier_error": float(gait.unit_multiplier_error),
     }
-
-
-def rigid_cost(rungs, batch, compliant):
-    """Cost of the rigid walker at no larger an error than another one has."""
-    return cost_of(*rungs["rigid"], batch, RIGID_TOLERANCES, error=compliant["error"])
 
 
 def cost_of(scene, gait, batch, tolerances, *, error=np.inf):
@@ -292,7 +292,7 @@ def draw_kneed(options, distances):
             ax.plot(factors, values, marker, color=colour, linestyle="-", label=words)
         ax.set_xscale("log", base=2)
         ax.set(yscale="log", xlabel="factor of the stiffness, $s$")
-        ax.set_title(path, loc="left")
+        ax.set_title(path.replace("with", "grows as"), loc="left")
         ax.grid(color="#DDDDDD")
         legend_below(ax, columns=2)
     axes[0].set_ylabel("distance from the rigid gait")

@@ -8,7 +8,6 @@ capabilities on two of the mechanisms.
 import dataclasses
 import math
 import time
-from pathlib import Path
 
 from _experiment import Options, experiment
 from _mechanism_cells import CAPABILITIES, Trial
@@ -41,7 +40,10 @@ def main(options: MatrixOptions):
     }
     wanted = options.capabilities or options.sized(tuple(CAPABILITIES), QUICK)
     store = options.store("mechanism_matrix")
-    trials = {name: Trial(name, case, folder_of(name, options)) for name, case in chosen.items()}
+    trials = {
+        name: Trial(name, case, options.path(name.replace(" ", "_")))
+        for name, case in chosen.items()
+    }
     rows = [
         {
             "capability": each,
@@ -56,13 +58,6 @@ def main(options: MatrixOptions):
     ]
     options.path("mechanism_matrix.md").write_text("\n".join(table(rows)) + "\n")
     return {"rows": rows, "picture": draw(options, chosen)}
-
-
-def folder_of(name: str, options: MatrixOptions) -> Path:
-    """Where a mechanism's pages and animations go."""
-    folder = options.path(name.replace(" ", "_"))
-    folder.mkdir(exist_ok=True)
-    return folder
 
 
 def cell(capability: str, mechanism: str, trial: Trial) -> float | int | str:
