@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from _mechanisms import cases
-from reference.mechanism_gait import checked_cycle
+from reference.mechanism_flow import checked_cycle
 
 import jaxbiped as jb
 from jaxbiped.continuation import BranchEvent

@@ -1,11 +1,9 @@
-"""Truth of a footstep's gradients: the walker's own, beside that of the ball.
+"""Ways to differentiate a footstep of the walker: ours, and what other tools' users would write.
 
-Writes footstep_truth.png. Ours differentiates the time and the end of one footstep with respect to
-its start, stiffness, damping and friction. The truth is by collocation on one smooth piece of the
-laws at a time (`reference/footstep.py`), which shares nothing with ours. Beside it is what other
-tools' users would write: plain diffrax and equal steps in JAX, differentiated through the steps
-taken; CasADi's CVODES where it is installed; and differences of SciPy's solves. An event, or the
-step taken, ends each where leg 1 is upright.
+Plain diffrax and equal steps in JAX are differentiated through the steps taken; CasADi's CVODES
+where it is installed; and differences of SciPy's solves. An event, or the step taken, ends each
+where leg 1 is upright. The truth is by collocation on one smooth piece of the laws at a time
+(`reference/footstep.py`), which shares nothing with ours.
 """
 
 import functools
@@ -17,28 +15,24 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from _ball_ways import KVAERNO5
 from _casadi import by_cvodes
-from _experiment import Options, by, experiment
 from _gradient_ways import (
+    KVAERNO5,
+    TOLERANCES,
     Answer,
     Run,
     Way,
-    draw_way,
+    differentiate,
+    diffrax_solution,
     relative_error,
-    row_of,
-    versions,
     with_estimate,
 )
-from _pictures import label
 from reference.compliant import numbers
 from reference.footstep import LAWS, PARAMETERS, UPRIGHT, Footstep, footstep
 from reference.footstep import MID_STANCE as START
 from reference.scipy_solves import solution
-from tqdm import tqdm
 
 import jaxbiped as jb
-from jaxbiped.plot.style import new_figure
 
 OUTPUTS = ("time", "hip_x", "hip_z", "theta_2", "hip_vx", "hip_vz", "omega_1", "omega_2")
 """Of a footstep, at whose end leg 1 is upright."""
@@ -46,45 +40,9 @@ INPUTS = ("hip_z", "theta_1", "theta_2", "hip_vx", "hip_vz", "omega_1", "omega_2
 """What they are differentiated with respect to: the start, and logarithms of parameters."""
 LONGEST = 1.0
 """No footstep takes as long [s]."""
-MOST_STEPS = 1 << 18
 DIFFERENCES = (1e-4, 1e-5, 1e-6, 1e-7)
 """Of the start [SI], and of logarithms of parameters."""
-TOLERANCES, TIME_STEPS = (1e-4, 1e-6, 1e-8), (1e-4, 1e-5, 1e-6)
-
-
-@experiment
-def main(options: Options):
-    truth, change, apart = references()
-    ways = options.sized(WAYS, (WAYS[0], WAYS[-1]._replace(settings=(1e-4,))))
-    work = [(way, value) for way in ways for value in way.settings]
-    rows = [
-        row_of("footstep", way, value, truth, truth, repeats=1, least=1e-2)
-        for way, value in tqdm(work, desc="ways")
-    ]
-    problem = {
-        "start": START.tolist(),
-        "parameters": dict(zip(PARAMETERS, LAWS.tolist(), strict=True)),
-        "outputs": list(OUTPUTS),
-        "inputs": list(INPUTS),
-        "values": truth.state.tolist(),
-        "gradient": truth.gradient.tolist(),
-        "switches": [list(each) for each in footstep().switches],
-        "coarser_collocation": change,
-        "our_finest": apart,
-    }
-    picture = _draw(options, [row for row in rows if row["outcome"] == "answered"])
-    return {"problem": problem, "rows": rows, "versions": versions(), "picture": picture}
-
-
-def _draw(options, rows):
-    figure = new_figure(6.5, 5.4)
-    ax = figure.subplots()
-    for name, own in by("way", rows).items():
-        draw_way(ax, name, own)
-    ax.axhline(1.0, color="black", linewidth=0.8)
-    label(ax, "relative error of the footstep [1]", "relative error of its gradient [1]")
-    ax.legend(fontsize="small")
-    return options.save(figure, "footstep_truth.png")
+TIME_STEPS = (1e-4, 1e-5, 1e-6)
 
 
 def answer_of(found: Footstep) -> Answer:
@@ -138,19 +96,9 @@ def by_diffrax(solver: diffrax.AbstractSolver, _: Answer, rtol: float) -> Run:
 
     def follow(scene: jb.Scene, start: jax.Array) -> tuple[jax.Array, jax.Array]:
         upright = lambda t, y, args, **kwargs: y[UPRIGHT]  # noqa: E731
-        found = diffrax.diffeqsolve(
-            diffrax.ODETerm(lambda t, y, args: rates(args, y)),
-            solver,
-            0.0,
-            LONGEST,
-            None,
-            start,
-            scene,
-            stepsize_controller=diffrax.PIDController(rtol=rtol, atol=1e-2 * rtol),
-            adjoint=diffrax.ForwardMode(),
-            event=diffrax.Event(upright, optx.Newton(1e-12, 1e-12), direction=False),
-            max_steps=MOST_STEPS,
-        )
+        event = diffrax.Event(upright, optx.Newton(1e-12, 1e-12), direction=False)
+        field = lambda t, y, args: rates(args, y)  # noqa: E731
+        found = diffrax_solution(field, solver, rtol, LONGEST, start, scene, event=event)
         return found.ts[-1], found.ys[-1]
 
     return _compiled(follow)
@@ -180,22 +128,14 @@ def by_semi_implicit_euler(_: Answer, dt: float) -> Run:
 def _compiled(follow: Callable[[jb.Scene, jax.Array], tuple[jax.Array, jax.Array]]) -> Run:
     """Time and state where leg 1 is upright, with their forward derivatives, by one program."""
 
-    def outputs(inputs: jax.Array) -> tuple[jax.Array, jax.Array]:
+    def outputs(inputs: jax.Array) -> jax.Array:
         start = jnp.asarray(START).at[1:].add(inputs[: len(START) - 1])
         laws = jnp.asarray(LAWS) * jnp.exp(inputs[len(START) - 1 :])
         scene = jb.seed_scene(**dict(zip(PARAMETERS, laws, strict=True)))
         time, end = follow(scene, start)
-        found = jnp.concatenate([time[None], jnp.delete(end, UPRIGHT)])
-        return found, found
+        return jnp.concatenate([time[None], jnp.delete(end, UPRIGHT)])
 
-    program = jax.jit(jax.jacfwd(outputs, has_aux=True))
-    zeros = jnp.zeros(len(INPUTS))
-
-    def run() -> Answer:
-        rows, values = program(zeros)
-        return Answer(np.asarray(values), np.asarray(rows))
-
-    return run
+    return differentiate(outputs, len(INPUTS))
 
 
 def by_differences(method: str, truth: Answer, rtol: float) -> Run:
@@ -241,7 +181,3 @@ WAYS = (
     Way("differences of SciPy's LSODA", "rtol", (*TOLERANCES, 1e-10), LSODA),
     Way("differences of SciPy's Radau", "rtol", TOLERANCES, RADAU),
 )
-
-
-if __name__ == "__main__":
-    main()
