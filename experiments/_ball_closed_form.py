@@ -122,29 +122,22 @@ def _final(values: dict[str, Any]) -> tuple[Any, Any, int]:
 def _contact(values: dict[str, Any], speed: Any, longest: Any) -> tuple[Any, Any, Any]:
     """Duration of a contact that begins at this speed, with height and velocity at its end."""
     K, c, g = values["K"], values["c"], values["g"] * values["weight_in_contact"]
-    if values["damps_rebound"]:
-        return _until_forceless(K, c, g, (mpf(0), speed), longest)
-    sunk = _phase(K, c, g, (mpf(0), speed))
-    turn = mp.findroot(lambda t: sunk(t)[1], _about(K, c, "0.4", "0.6"))
-    if turn >= longest:
-        depth, rate = sunk(longest)
-        return turn, -depth, -rate
-    span, z, v = _until_forceless(K, mpf(0), g, sunk(turn), longest - turn)
-    return turn + span, z, v
-
-
-def _until_forceless(K: Any, c: Any, g: Any, begin: Any, longest: Any) -> tuple[Any, Any, Any]:
-    """How long the floor pushes from a depth and its rate on, with height and velocity then."""
-    at = _phase(K, c, g, begin)
-
-    def force(t: Any) -> Any:
-        depth, rate = at(t)
-        return K * depth + c * rate
-
-    first, last = ("0.9", "1.05") if begin[0] == 0 else ("0.4", "0.6")
-    span = mp.findroot(force, _about(K, c, first, last))
-    depth, rate = at(min(span, longest))
-    return span, -depth, -rate
+    # Of each phase its damping, what is zero at its end, and when that is, in halves of a period.
+    phases: list[tuple[Any, Callable[[Any, Any], Any], tuple[str, str]]]
+    phases = [(c, lambda depth, rate: K * depth + c * rate, ("0.9", "1.05"))]
+    if not values["damps_rebound"]:
+        sinks = (c, lambda depth, rate: rate, ("0.4", "0.6"))
+        phases = [sinks, (mpf(0), lambda depth, rate: depth, ("0.4", "0.6"))]
+    passed, now = mpf(0), (mpf(0), speed)
+    for damping, left, about in phases:
+        at, half = _phase(K, damping, g, now), mp.pi / _frequency(K, damping)
+        span = mp.findroot(
+            lambda t, at=at, left=left: left(*at(t)), [mpf(each) * half for each in about]
+        )
+        now, passed = at(min(span, longest - passed)), passed + span
+        if passed >= longest:
+            break
+    return passed, -now[0], -now[1]
 
 
 def _phase(K: Any, c: Any, g: Any, begin: Any) -> Callable[[Any], tuple[Any, Any]]:
@@ -166,9 +159,3 @@ def _phase(K: Any, c: Any, g: Any, begin: Any) -> Callable[[Any], tuple[Any, Any
 
 def _frequency(K: Any, c: Any) -> Any:
     return mp.sqrt(K - c * c / 4)
-
-
-def _about(K: Any, c: Any, first: str, last: str) -> tuple[Any, Any]:
-    """Two times about a root, in halves of a period."""
-    half = mp.pi / _frequency(K, c)
-    return mpf(first) * half, mpf(last) * half

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _ball_closed_form import Problem
-from _ball_ways import TIME_STEPS, differentiate
+from _ball_ways import TIME_STEPS, by_logarithms
 from _gradient_ways import Answer, Way
 
 IMPEDANCE, RADIUS = 0.9999, 0.05
@@ -65,7 +65,7 @@ def by_mjx(problem, dt):
     model = mjx.put_model(mujoco.MjModel.from_xml_string(text))
     data = mjx.make_data(model)
 
-    def final(problem, values):
+    def final(values):
         zero = jnp.zeros(())
         gravity = jnp.stack([zero, zero, -values["g"]])
         solref = jnp.broadcast_to(jnp.stack([-values["K"], zero]), (2, 2))
@@ -75,7 +75,7 @@ def by_mjx(problem, dt):
         end = jax.lax.fori_loop(0, steps, lambda _, each: mjx.step(own, each), begin)
         return jnp.stack([end.qpos[0] - RADIUS, end.qvel[0]])
 
-    return differentiate(final, problem)
+    return by_logarithms(problem, final)
 
 
 def by_brax(problem, dt):
@@ -85,7 +85,7 @@ def by_brax(problem, dt):
 
     system = mjcf.loads(ball_model(dt, contact='friction="0 0 0" condim="3"'))
 
-    def final(problem, values):
+    def final(values):
         zero = jnp.zeros(())
         gravity = jnp.stack([zero, zero, -values["g"]])
         solref = jnp.broadcast_to(jnp.stack([-IMPEDANCE * values["K"], zero]), (2, 2))
@@ -95,7 +95,7 @@ def by_brax(problem, dt):
         end = jax.lax.fori_loop(0, steps, lambda _, each: pipeline.step(own, each, still), begin)
         return jnp.stack([end.q[0] - RADIUS, end.qd[0]])
 
-    return differentiate(final, problem)
+    return by_logarithms(problem, final)
 
 
 def by_tape(tool, problem, dt):

@@ -1,10 +1,11 @@
-"""An experiment: the options that each one takes, and where its pictures and numbers go.
+"""An experiment: the options that each one takes, where its pictures and numbers go, its rows.
 
 Numbers are printed as text: single ones in a list, rows that are alike in a table.
 """
 
 import dataclasses
 import functools
+import json
 import time
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -13,13 +14,47 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import tyro
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped.cli import Report
 from jaxbiped.plot import figure_style, save_figure
+from jaxbiped.plot.style import COLOURS, MARKERS
 
 MOST = 4
 """Numbers of a list that are printed; of a longer one it is said how many there are."""
+
+
+class RowStore:
+    """Rows by key, in the order in which they came: those that a file holds, and new ones.
+
+    The file has a line of JSON for each, so that a run that was cut off goes on.
+
+    Args:
+        path: the file; None keeps nothing.
+        writer: what rows depend on beside their keys: those of another writer do not count.
+    """
+
+    def __init__(self, path: Path | None, **writer: Any) -> None:
+        self._path, self._writer = path, writer
+        self.rows: dict[str, Any] = {}
+        for line in path.read_text().splitlines() if path and path.exists() else ():
+            try:
+                entry = json.loads(line)
+            except json.JSONDecodeError:
+                continue  # cut off while it was written
+            if entry.get("writer") == writer:
+                self.rows[entry["key"]] = entry["row"]
+
+    def row(self, key: str, make: Callable[..., Any], *given: Any) -> Any:
+        """The row of a key, made of what is given where there is none yet."""
+        if key not in self.rows:
+            self.rows[key] = make(*given)
+            if self._path is not None:
+                entry = {"key": key, "writer": self._writer, "row": self.rows[key]}
+                with self._path.open("a") as lines:
+                    lines.write(json.dumps(entry) + "\n")
+        return self.rows[key]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,6 +82,10 @@ class Options:
         """Where to write a file of this name."""
         self.out.mkdir(parents=True, exist_ok=True)
         return self.out / name
+
+    def store(self, name: str, **writer: Any) -> RowStore:
+        """Rows in a file of this name, those of the quick size apart."""
+        return RowStore(self.path(f"{name}{'_quick' * self.quick}.jsonl"), **writer)
 
     def save(self, figure: Figure, name: str) -> str:
         """Writes a picture of this name and lets go of the figure; returns where it is."""
@@ -82,6 +121,24 @@ def by(key: str, rows: Iterable[Mapping[str, Any]]) -> dict[Any, list[Any]]:
     for row in rows:
         found.setdefault(row[key], []).append(row)
     return found
+
+
+def draw_by(ax: Axes, key: str, rows: Iterable[Mapping[str, Any]], x: str, y: str) -> None:
+    """A line for each value of an entry among rows, named after it: another entry over a third."""
+    looks = zip(COLOURS, MARKERS, strict=True)
+    for (name, own), (colour, marker) in zip(by(key, rows).items(), looks, strict=False):
+        points = [row[x] for row in own], [row[y] for row in own]
+        ax.plot(*points, marker=marker, color=colour, label=name)
+
+
+def label(ax: Axes, x: str, y: str, title: str = "", *, log: str = "") -> None:
+    """Words of axes, a faint grid, and scales: "x", "y" or "xy" are logarithmic."""
+    ax.set(xlabel=x, ylabel=y, title=title)
+    ax.grid(alpha=0.3)
+    if "x" in log:
+        ax.set_xscale("log")
+    if "y" in log:
+        ax.set_yscale("log")
 
 
 def tables(numbers: Any, title: str = "") -> Iterator[str]:

@@ -1,7 +1,5 @@
 """A law of contact in the seed's walk: its cost, its gait, and whether it suits."""
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from _timing import seconds_of
 
@@ -20,7 +18,6 @@ COSTLY = 2.0
 """Attempted steps, as a multiple of those by the seed's laws, from which a law counts as costly."""
 GRIP = 1.001
 """Friction over load, as a multiple of the static coefficient, from which it is beyond it."""
-MOST_STEPS = 1 << 20
 CRITERIA = {
     "walks": f"it walks for {DURATION:g} s from the seed's start; else it does not suit",
     "pushes": "no normal force is ever below zero; else it does not suit",
@@ -45,39 +42,11 @@ MEASURES = {
 """Measures of a gait by their names here and in `jb.gait.Measures`."""
 
 
-def foot_loads(scene, state):
-    """For each foot its depth while it touches, its forces and its slip: pairs by name."""
-    both, forces = jb.dynamics.feet(scene, state), jb.dynamics.foot_forces(scene, state)
-    none = jnp.zeros_like(state.theta_1)
-    return {
-        "depth": [jnp.where(jb.dynamics.touches(foot), foot.penetration, 0.0) for foot in both],
-        "normal": [force.normal for force in forces],
-        "tangential": [none if each.tangential is None else each.tangential for each in forces],
-        "slip": [foot.slip_speed for foot in both],
-    }
-
-
-def extremes(scene, state):
-    """Loads and depths of both feet, for the `extremes` of a simulation."""
-    loads = foot_loads(scene, state)
-    normal = loads["normal"]
-    ratios = [
-        jnp.where(load > 0.0, jnp.abs(pull) / jnp.where(load > 0.0, load, 1.0), 0.0)
-        for pull, load in zip(loads["tangential"], normal, strict=True)
-    ]
-    return {
-        "depth": jnp.maximum(*loads["depth"]),
-        "least": jnp.minimum(*normal),
-        "most": jnp.maximum(*normal),
-        "total": normal[0] + normal[1],
-        "ratio": jnp.maximum(*ratios),
-    }
-
-
-def walk(scene, state, duration):
-    """A walk by lanes, ready to run: heel strikes and extremes. One program for every duration."""
-    how = dict(save=jb.HeelStrike(), extremes=extremes, max_solver_steps=MOST_STEPS)
-    return jb.Simulation.prepare(scene, state, duration=duration, engine="lanes", **how).compile()
+def walk_of(scene, duration, **how):
+    """A walk from the seed's start by lanes, and its dataset."""
+    options = dict(duration=duration, engine="lanes", max_solver_steps=1 << 17) | how
+    walk = jb.simulate(scene, jb.seed_state(), **options)
+    return walk, jb.measure.trajectory_dataset(scene, walk)
 
 
 def findings(scene, repeats):
@@ -88,61 +57,45 @@ def findings(scene, repeats):
     over the ends of the solver's steps of the walk from the seed's start: `least_total_N` of both
     feet together is above zero unless the walker leaves the ground.
     """
-    run = walk(scene, jb.seed_state(), DURATION)
-    first = run()
-    walks = first.outcome is jb.Ending.WALKING
-    walked = settled(scene) if walks else None
+    walk, rows = walk_of(scene, DURATION)
+    how = dict(duration=DURATION, save="end", engine="lanes")
+    run = jb.Simulation.prepare(scene, jb.seed_state(), **how).compile()
+    walked = settled(scene) if walk.outcome is jb.Ending.WALKING else None
     gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
     found = gait.outcome is jb.gait.Search.FOUND
     searched = {name: float(getattr(gait.measures, key)) for name, key in MEASURES.items()}
     both = found and walked
-    low, high = first.lowest, first.highest
+    load = rows.normal_force
+    pull = abs(rows.get("tangential_force", 0.0 * load))
     return {
-        "outcome": str(first.outcome),
-        "end_s": DURATION if walks else end_time(scene),
-        "attempted_steps": int(first.attempted),
-        "wall_ms": 1e3 * seconds_of({0: run}, repeats, warm=False)[0],
+        "outcome": str(walk.outcome),
+        "end_s": float(walk.t[-1]),
+        "attempted_steps": int(walk.attempted),
+        "wall_ms": 1e3 * seconds_of({0: run}, repeats)[0],
         "search": str(gait.outcome) + ("" if found else f", last walk: {gait.walk_outcome}"),
         "found_by": "search" if found else ("walk" if walked else None),
         "measures": searched if found else walked,
         "unit_multiplier_error": float(gait.unit_multiplier_error) if found else None,
         "walked_period_difference": walked["period_s"] / searched["period_s"] - 1 if both else None,
         "force_jumps_at_touchdown": scene.normal.jumps_at_touchdown,
-        "largest_penetration_m": float(high["depth"]),
-        "least_normal_N": float(low["least"]),
-        "most_normal_N": float(high["most"]),
-        "least_total_N": float(low["total"]),
-        "most_friction_over_load": float(high["ratio"]),
+        "largest_penetration_m": float(rows.penetration.where(rows.touches).max()),
+        "least_normal_N": float(load.min()),
+        "most_normal_N": float(load.max()),
+        "least_total_N": float(load.sum("foot").min()),
+        "most_friction_over_load": float((pull / load).where(load > 0.0).max()),
     }
 
 
 def settled(scene):
     """The gait that a long walk settles on, None where it does not; no spectral radius."""
-    long = walk(scene, jb.seed_state(), SETTLING)()
-    strikes = long.arrivals
-    count = int(strikes.total)
-    times, places = (np.asarray(row)[:count] for row in (strikes.t, strikes.state.hip_x))
-    periods = np.diff(times)
-    if long.outcome is not jb.Ending.WALKING or count < 4:
+    walk, _ = walk_of(scene, SETTLING)
+    steps = jb.footsteps(scene, walk)
+    last = steps.period_s[-3:]
+    if walk.outcome is not jb.Ending.WALKING or len(last) < 3 or np.ptp(last) > SETTLED * last[-1]:
         return None
-    if np.ptp(periods[-3:]) > SETTLED * periods[-1]:
-        return None
-    # Beginning where the foot strikes: so the extremes are those of the gait alone.
-    last = jax.tree_util.tree_map(lambda leaf: leaf[count - 1], strikes.state)
-    period, length = float(periods[-1]), float(places[-1] - places[-2])
-    return {
-        "period_s": period,
-        "step_length_m": length,
-        "speed_m_s": length / period,
-        "peak_normal_N": float(walk(scene, last, DURATION)().highest["most"]),
-        "spectral_radius": None,
-    }
-
-
-def end_time(scene):
-    """When a walk from the seed's start ends [s]."""
-    walk = jb.simulate(scene, jb.seed_state(), duration=DURATION, save="end", engine="lanes")
-    return float(walk.t[-1])
+    names = dict(period_s="period_s", step_length_m="length_m", speed_m_s="speed_m_s")
+    own = {name: float(getattr(steps, key)[-1]) for name, key in names.items()}
+    return own | {"peak_normal_N": float(steps.peak_normal_N[-1]), "spectral_radius": None}
 
 
 def deviations(found, seed):

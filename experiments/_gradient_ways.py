@@ -9,10 +9,17 @@ from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
+import diffrax
+import jax
+import jax.numpy as jnp
 import numpy as np
+import optimistix as optx
 from matplotlib.axes import Axes
 
 from jaxbiped.trade import work_of
+
+KVAERNO5 = diffrax.Kvaerno5(root_finder=diffrax.with_stepsize_controller_tols(optx.Chord)())
+TOLERANCES = (1e-4, 1e-6, 1e-8)
 
 NOT_INSTALLED, OTHER_LAW = "not installed", "its contact has another law"
 OVERFLOWED = "derivatives overflow"
@@ -83,6 +90,28 @@ def with_estimate(linearised: Callable[..., Answer], rtol: float) -> Run:
         return fine._replace(said=first + 2.0 * second)
 
     return run
+
+
+def differentiate(outputs: Callable[[jax.Array], jax.Array], count: int) -> Run:
+    """Numbers with their forward derivatives by so many changes of inputs, compiled once."""
+
+    def twice(changes: jax.Array) -> tuple[jax.Array, jax.Array]:
+        found = outputs(changes)
+        return found, found
+
+    program, zeros = jax.jit(jax.jacfwd(twice, has_aux=True)), jnp.zeros(count)
+    return lambda: Answer(*map(np.asarray, jax.block_until_ready(program(zeros))[::-1]))
+
+
+def diffrax_solution(
+    field: Callable[..., Any], solver: diffrax.AbstractSolver, rtol: float, duration: float,
+    start: Any, args: Any = None, **options: Any,
+) -> diffrax.Solution:  # fmt: skip
+    """The end of a motion through diffrax, differentiable forwards, as a user would write it."""
+    steps = diffrax.PIDController(rtol=rtol, atol=1e-2 * rtol)
+    how = dict(stepsize_controller=steps, adjoint=diffrax.ForwardMode(), max_steps=1 << 18)
+    term = diffrax.ODETerm(field)
+    return diffrax.diffeqsolve(term, solver, 0.0, duration, None, start, args, **how, **options)
 
 
 def row_of(

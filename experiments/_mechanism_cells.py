@@ -22,10 +22,11 @@ CLEARANCES = {jb.laws.StanceRotation: "stance-rotation", jb.laws.AlwaysTouching:
 
 
 class Trial:
-    """A mechanism, and what several capabilities need of it."""
+    """A mechanism, what several capabilities need of it, and where its pages and animations go."""
 
     def __init__(self, name: str, case: Case, folder: Path) -> None:
         self.name, self.case, self.scene, self.folder = name, case, case.scene, folder
+        folder.mkdir(exist_ok=True)
 
     @functools.cached_property
     def gait(self) -> jb.Gait:

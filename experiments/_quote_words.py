@@ -1,6 +1,6 @@
 """Numbers, rows and the matrix of capabilities as the pages write them, in Markdown."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 UNKNOWN = "…"
@@ -15,9 +15,25 @@ def small(number: float | None, digits: int = 1) -> str:
     return mantissa if int(exponent) == 0 else f"{mantissa}e{int(exponent)}"
 
 
-def row(*cells: str) -> str:
-    """A row of a table."""
-    return f"| {' | '.join(cells)} |"
+def row(*cells: str | int | float | None) -> str:
+    """A row of a table, numbers as the pages write them; a dash where there is none."""
+
+    def told(cell: str | int | float | None) -> str:
+        if cell is None:
+            return "–"
+        return small(cell) if isinstance(cell, float) else str(cell)
+
+    return f"| {' | '.join(map(told, cells))} |"
+
+
+def fixed(found: Mapping[str, Any], digits: int, *names: str) -> list[str]:
+    """Some of the numbers with so many digits behind the point."""
+    return [f"{found[name]:.{digits}f}" for name in names]
+
+
+def markdown(heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """A table."""
+    return "\n".join(row(*line) for line in (heads, ["---"] * len(heads), *lines))
 
 
 def percents(number: float) -> str:

@@ -1,9 +1,10 @@
 """What the pages quote of errors, gradients, basins and costs."""
 
+import itertools
 from collections.abc import Iterator
 from typing import Any
 
-from _quote_words import UNKNOWN, percents, row, small
+from _quote_words import UNKNOWN, fixed, percents, row, small
 
 RARE = 1e-3
 """Fractions below this are of labels that the pages do not count."""
@@ -35,82 +36,46 @@ def of_basin_simplest(numbers: dict[str, Any]) -> Iterator[str]:
     )
 
 
-def of_fraction_coverage(numbers: dict[str, Any]) -> Iterator[str]:
-    """How often intervals of fractions hold the truth, and how much less even starts scatter."""
-    yield f"In {numbers['draws']:,} draws of {numbers['starts']} starts"
-
-    def ends(method: str, measure: str, *names: str) -> tuple[float, float]:
-        labels = (each for name in names for each in numbers[name][method].values())
-        found = [each[measure] for each in labels if each["fraction"] > RARE]
-        return min(found), max(found)
-
-    for name in ("rigid", "compliant"):
-        low, high = ends("uniform", "inside_95", name)
-        yield f"{percents(low)} to {percents(high)} % for the {name} seed"
-    both = "rigid", "compliant"
-    low, high = ends("sobol", "scatter", *both)
-    yield f"only {low:.1f} to {high:.1f} times as much"
-    yield f"in {percents(ends('sobol', 'inside_95', *both)[0])} to 100.0 % of the draws"
-
-
 def of_gradient_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
-    """The unit multiplier's error against tolerance, stepping for the state and ours."""
+    """The unit multiplier's error against tolerance, and CPU time over the number of parameters."""
     points = numbers["points"]["exact laws"]
     for plain, both in zip(points["plain"], points["both"], strict=True):
-        yield row(
-            small(plain["rtol"], 0),
-            str(plain["steps"]),
-            small(plain["unit_multiplier"]),
-            str(both["steps"]),
-            small(both["unit_multiplier"]),
-        )
-
-
-def of_gradient_cost(numbers: dict[str, Any]) -> Iterator[str]:
-    """CPU time over the number of parameters."""
+        pairs = ((each["steps"], each["unit_multiplier"]) for each in (plain, both))
+        yield row(small(plain["rtol"], 0), *itertools.chain(*pairs))
     costs = ("return_ms", "return_with_columns_ms", "radius_by_adjoint_ms")
-    for each in numbers["rows"]:
-        times = (f"{each[name]:.1f}" for name in costs)
-        yield row(str(each["parameters"]), *times, f"{each['radius_by_differences_ms']:.0f}")
+    for each in numbers["costs"]["rows"]:
+        slow = fixed(each, 0, "radius_by_differences_ms")
+        yield row(each["parameters"], *fixed(each, 1, *costs), *slow)
 
 
 def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
-    """Errors of state and gradient of each way and setting, and what it says of them."""
+    """Errors of state and gradient of each way and setting, and what it says: ball, footstep."""
     answered = [each for each in numbers["rows"] if each["outcome"] == "answered"]
     for each in answered:
         yield row(each["problem"], each["way"], _setting(each), *_answer(each))
-    damped = {
-        (each["way"], each["value"]): each
-        for each in answered
-        if each["problem"] == "spring and damper"
-    }
-    ours, tsit5 = damped["jaxbiped", 1e-6], damped["diffrax Tsit5", 1e-6]
-    warp = damped["Warp", 1e-5]
+    damped = [each for each in answered if each["problem"] == "spring and damper"]
+    ours, tsit5, warp = (
+        next(each for each in damped if (each["way"], each["value"]) == way)
+        for way in (("jaxbiped", 1e-6), ("diffrax Tsit5", 1e-6), ("Warp", 1e-5))
+    )
     yield f"is {small(ours['gradient_error'])}, and its error bar is {small(ours['said'])}"
     others = small(tsit5["gradient_error"]), small(warp["gradient_error"])
     yield "{} with diffrax's Tsit5 and {} with Warp".format(*others)
-
-
-def of_footstep_truth(numbers: dict[str, Any]) -> Iterator[str]:
-    """Errors of a footstep and its gradient by each way and setting, and what it says of them."""
-    for each in numbers["rows"]:
-        answered = each.get("outcome", "answered") == "answered"
-        cells = _answer(each) if answered else (UNKNOWN, each["outcome"], UNKNOWN, UNKNOWN)
+    walked = numbers["footstep"]
+    for each in walked["rows"]:
+        known = each.get("outcome", "answered") == "answered"
+        cells = _answer(each) if known else (UNKNOWN, each["outcome"], UNKNOWN, UNKNOWN)
         yield row(each["way"], _setting(each), *cells)
-    yield f"changes by {small(numbers['problem']['coarser_collocation'])}"
-    yield f"differs from our finest solve by {small(numbers['problem']['our_finest'])}"
+    yield f"changes by {small(walked['problem']['coarser_collocation'])}"
+    yield f"differs from our finest solve by {small(walked['problem']['our_finest'])}"
 
 
 def of_reproducibility(numbers: dict[str, Any]) -> Iterator[str]:
     """How walks, labels and the gait differ by widths, batches, threads and engines."""
     yield f"of {numbers['walks']} walks"
     for each in numbers["rows"]:
-        labels, gait = each["labels"], each["gait"]
-        yield row(
-            each["name"], str(each["same_bits"]), small(each["median"]), small(each["largest"]),
-            str(each["endings"]), "–" if labels is None else str(labels),
-            "–" if gait is None else small(gait),
-        )  # fmt: skip
+        told = ("name", "same_bits", "median", "largest", "endings", "labels", "gait")
+        yield row(*(each[name] for name in told))
 
 
 def of_long_walks(numbers: dict[str, Any]) -> Iterator[str]:
@@ -126,8 +91,7 @@ def of_long_walks(numbers: dict[str, Any]) -> Iterator[str]:
 
 def of_accuracy_coverage(numbers: dict[str, Any]) -> Iterator[str]:
     """How many true errors lie within their bars."""
-    walks, gaits = numbers["walks"], numbers["gaits"]
-    rigid = numbers["rigid"]
+    walks, gaits, rigid = (numbers[name] for name in ("walks", "gaits", "rigid"))
     yield (
         f"{walks['met']} of {walks['run']} walks, {rigid['met']} of {rigid['run']} rigid ones and "
         f"{gaits['met']} of {gaits['run']} gaits"
@@ -136,31 +100,43 @@ def of_accuracy_coverage(numbers: dict[str, Any]) -> Iterator[str]:
         # Zeros have no relative error.
         ratio = "–" if name == "multipliers of zero" else f"{found['median_ratio']:.1f}"
         counts = ("numbers", "resolved", "covered", "scenes", "scenes_all_covered")
-        yield row(name, *(str(found[each]) for each in counts), ratio)
+        yield row(name, *(found[each] for each in counts), ratio)
 
 
 def of_label_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
-    """How many labels change with the tolerance, and what is known of those that do."""
+    """How many labels change with the tolerance, what is known of those, and of fractions."""
     named, starts = numbers["named"], numbers["starts"]
     changed = {each["way"]: each for each in named["rows"]}
     yield f"Of {starts:,} starts"
     for name in ("draft", "balanced", "tight"):
         each = changed[name]
-        yield row(
-            f"`{name}`", str(each["changed"]), str(each["walking_changed"]),
-            f"{each['attempted']:.0f}",
-        )  # fmt: skip
+        counts = each["changed"], each["walking_changed"], round(each["attempted"])
+        yield row(f"`{name}`", *counts)
     yield f"{named['between']['draft and tight']} labels differ between draft and tight"
     yield f"the two references differ in {named['references_differ']}"
     for model, found in numbers["by_number"].items():
         for each in found:
             yield row(
-                model, f"{each['wanted']:g}", str(each["relabelled"]), str(each["changed"]),
-                str(each["in_doubt"]), f"{each['wrong_before']} → {each['truly_wrong']}",
-                small(each["wrong_share"]), small(each["estimated_share"]),
-                f"{each['within_interval']} of {each['draws']}",
-                f"{each['met']} of {each['draws']}", f"{each['steps_ratio']:.1f}",
+                model, f"{each['wanted']:g}", each["relabelled"], each["changed"], each["in_doubt"],
+                f"{each['wrong_before']} → {each['truly_wrong']}", each["wrong_share"],
+                each["estimated_share"], f"{each['within_interval']} of {each['draws']}",
+                f"{each['met']} of {each['draws']}", *fixed(each, 1, "steps_ratio"),
             )  # fmt: skip
+    fractions = numbers["fractions"]
+    yield f"In {fractions['draws']:,} draws of {fractions['starts']} starts"
+
+    def ends(method: str, measure: str, *names: str) -> tuple[float, float]:
+        labels = (each for name in names for each in fractions[name][method].values())
+        found = [each[measure] for each in labels if each["fraction"] > RARE]
+        return min(found), max(found)
+
+    for name in ("rigid", "compliant"):
+        low, high = ends("uniform", "inside_95", name)
+        yield f"{percents(low)} to {percents(high)} % for the {name} seed"
+    both = "rigid", "compliant"
+    low, high = ends("sobol", "scatter", *both)
+    yield f"only {low:.1f} to {high:.1f} times as much"
+    yield f"in {percents(ends('sobol', 'inside_95', *both)[0])} to 100.0 % of the draws"
 
 
 def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
@@ -171,7 +147,7 @@ def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
         ("walk", "state"), ("walk", "step_time"), ("walk", "energy"), ("slopes", "slopes"),
         ("gait", "period"), ("gait", "multiplier"), ("gait", "gradient"),
     ):  # fmt: skip
-        yield row(f"{UNKNOWN}", small(floors[group][axis]), *_named(numbers, group, axis))
+        yield row(UNKNOWN, floors[group][axis], *_named(numbers, group, axis))
     for group, axis in (
         ("walk", "state"), ("batch", "state"), ("slopes", "slopes"), ("gait", "multiplier"),
         ("gait", "gradient"),
@@ -183,22 +159,17 @@ def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
                 yield row(way, *(_milliseconds(times[k]) for k in _COMPARED))
     for found in numbers["rows"]["basin"]:
         tolerance = f"{float(found['setting'].removeprefix('rtol=')):.0e}".replace("e-0", "e-")
-        wrong = found["errors"]
-        labels = small(wrong["labels"]) if "labels" in wrong else "–"
-        yield row(
-            found["way"], tolerance, labels, small(wrong["walking"]), _milliseconds(found["cpu_s"])
-        )
+        wrong = (found["errors"].get(name) for name in ("labels", "walking"))
+        yield row(found["way"], tolerance, *wrong, _milliseconds(found["cpu_s"]))
     for found in numbers["rows"].get("stepping", ()):
         if found["setting"] == "rtol=1e-06":
-            yield row(
-                found["way"], str(found["attempted"]),
-                *(small(found["errors"][axis]) for axis in ("period", "gradient")),
-            )  # fmt: skip
+            errors = (found["errors"][axis] for axis in ("period", "gradient"))
+            yield row(found["way"], found["attempted"], *errors)
     laws = {"the seed's laws": "walk"} | {k: k for k in ("smoothed laws", "v0 ten times wider")}
     for name, group in laws.items():
         ours = (each for each in numbers["rows"][group] if each["way"] == "rodas4p (lanes)")
         (found,) = (each for each in ours if each["setting"] == "rtol=1e-06")
-        yield row(name, str(found["attempted"]), small(found["errors"]["state"]))
+        yield row(name, found["attempted"], found["errors"]["state"])
 
 
 def of_extremes(numbers: dict[str, Any]) -> Iterator[str]:
@@ -206,7 +177,7 @@ def of_extremes(numbers: dict[str, Any]) -> Iterator[str]:
     verdicts = ("run", "accurate", "flagged", "refused", "silently_wrong", "unresolved")
     gaits = numbers["gaits"]
     for name, found in (("walks", numbers), ("gaits", gaits)):
-        yield row(name, *(str(found[each]) for each in verdicts))
+        yield row(name, *(found[each] for each in verdicts))
     yield f"{numbers['run']} of the {numbers['catalogue']} cases"
     yield f"{numbers['precise']} cases by a solve at 40 digits"
     errors = numbers["errors"]
@@ -215,8 +186,8 @@ def of_extremes(numbers: dict[str, Any]) -> Iterator[str]:
     for name, median in gaits["median_error"].items():
         yield f"{name} {small(median)} (at most {small(gaits['largest_error'][name])})"
     for swept in numbers["grazing"]:
-        counted = (str(swept[name]) for name in ("derivatives", *verdicts[1:3], "silently_wrong"))
-        yield row(swept["law"], swept["accuracy"], *counted, small(swept["largest_accurate"]))
+        counted = ("derivatives", *verdicts[1:3], "silently_wrong", "largest_accurate")
+        yield row(swept["law"], swept["accuracy"], *(swept[name] for name in counted))
 
 
 _COMPARED = (1, 2, 3, 4, 5)
@@ -227,39 +198,37 @@ def _setting(found: dict[str, Any]) -> str:
     return f"{found['setting']} = {small(found['value'], 0)}"
 
 
-def _answer(found: dict[str, Any]) -> tuple[str, ...]:
+def _answer(found: dict[str, Any]) -> tuple[Any, ...]:
     """Errors of state and gradient, CPU time [ms] where it was measured, and what is said."""
-    errors = small(found["state_error"]), small(found["gradient_error"])
     spent = (_milliseconds(found["cpu_s"]),) if "cpu_s" in found else ()
-    return *errors, *spent, "nothing" if found["said"] is None else small(found["said"])
+    said = "nothing" if found["said"] is None else found["said"]
+    return found["state_error"], found["gradient_error"], *spent, said
 
 
 def of_gpu_speed(numbers: dict[str, Any]) -> Iterator[str]:
     """Of docs/gpu.md; what lanes were not asked is a dash."""
     for each in numbers["walks"]:
         rates = (each.get(f"{engine}_steps_per_s") for engine in ("cuda", "lanes"))
-        yield row(f"{each['size']:,}", *("–" if rate is None else small(rate) for rate in rates))
+        yield row(f"{each['size']:,}", *rates)
     for each in numbers["labels"]:
         rates = (each.get(f"{engine}_starts_per_s") for engine in ("cuda", "lanes"))
-        told = ("–" if rate is None else f"{round(rate, -2):,.0f}" for rate in rates)
-        yield row(f"{each['size']:,}", *told, str(each.get("labels_that_differ", "–")))
+        told = (rate and f"{round(rate, -2):,.0f}" for rate in rates)
+        yield row(f"{each['size']:,}", *told, each.get("labels_that_differ"))
     yield f"{small(numbers['peak_flops'])} operations per second"
     yield f"take {100.0 * numbers['share_of_peak']:.0f} % of that"
 
 
-def _milliseconds(seconds: float | str | None) -> str:
-    if seconds is None:
-        return "–"
-    if isinstance(seconds, str):
-        return UNKNOWN
+def _milliseconds(seconds: float | str | None) -> str | None:
+    if isinstance(seconds, str | None):
+        return seconds
     return f"{1e3 * seconds:.{0 if seconds >= 1e-2 else 1}f}"
 
 
-def _named(numbers: dict[str, Any], group: str, axis: str) -> list[str]:
+def _named(numbers: dict[str, Any], group: str, axis: str) -> list[float]:
     """Errors by the named accuracies, or by three tolerances where there are none."""
     rows = numbers["rows"].get(f"named {group}")
     if rows is None:
         settings = ("rtol=1e-05", "rtol=1e-06", "rtol=1e-08")
         ours = [each for each in numbers["rows"][group] if each["way"] == "rodas4p (lanes)"]
         rows = [each for name in settings for each in ours if each["setting"] == name]
-    return [small(each["errors"][axis]) for each in rows]
+    return [each["errors"][axis] for each in rows]

@@ -3,17 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from _quote_words import UNKNOWN, row, small, table
-
-
-def of_bifurcation_elasticities(numbers: dict[str, Any]) -> Iterator[str]:
-    """How the critical slopes move with the contact's stiffness and the feet's radius."""
-    for name, found in numbers["cases"].items():
-        cells = [f"{found['slope_rad']:.6f}"]
-        for parameter in ("K", "c", "J", "d", "r"):
-            known = found["parameters"].get(parameter)
-            cells.append("–" if known is None else f"{known['elasticity']:.4f}")
-        yield row(name, *cells)
+from _quote_words import UNKNOWN, fixed, row, small, table
 
 
 def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
@@ -27,56 +17,44 @@ def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
     for name, setting in numbers["settings"].items():
         for found in setting["parameters"].values() if name != "precise" else ():
             share = f"{100 * found['inside_95']:.1f} %"
-            yield row(UNKNOWN, str(found["undetermined"]), str(found["one_sided"]), share)
-
-
-def of_kneed_ladder(numbers: dict[str, Any]) -> Iterator[str]:
-    """The kneed walker's gait on its way to the one on rigid feet."""
-    steps = numbers["paths"]["c with K^(3/2)"]
-    rows = [(f"{each['factor']:.0f}", each) for each in steps]
-    for words, found in [*rows, ("rigid", numbers["rigid"])]:
-        real, imaginary = found["pair"]
-        yield row(
-            words,
-            f"{found['period']:.5f}",
-            f"{found['step_length']:.5f}",
-            f"{real:.4f} ± {imaginary:.4f} i",
-            f"{found['third']:.4f}",
-        )
+            yield row(UNKNOWN, found["undetermined"], found["one_sided"], share)
 
 
 def of_mechanism_speed(numbers: dict[str, Any]) -> Iterator[str]:
     """A walker with five links beside numbalsoda and MuJoCo, and how a step's cost grows."""
     for each in numbers["rates"]["rows"]:
         how = each["rtol"] if "rtol" in each else each["step_s"]
-        rate = f"{each['simulated_s_per_cpu_s']:.0f}"
-        yield row(each["way"], small(how, 0), small(each["error_median"]), rate)
+        rate = round(each["simulated_s_per_cpu_s"])
+        yield row(each["way"], small(how, 0), each["error_median"], rate)
     for each in numbers["chains"]:
-        yield row(str(each["bodies"]), str(each["operations"]))
+        yield row(each["bodies"], each["operations"])
     yield f"n^{numbers['exponent']:.2f}"
 
 
 def of_ladder(numbers: dict[str, Any]) -> Iterator[str]:
-    """Measures and costs of the rungs, and the rates of the way to the rigid limit."""
+    """Measures and costs of the rungs, and the way to the rigid limit, also of one with knees."""
     for name, found in numbers["measures"].items():
         cost = numbers["costs"][name]
         timed = "batch_us" in cost
         single, batch = cost.get("single_us"), cost.get("batch_us")
-        yield row(
-            f"{name}{UNKNOWN}",
-            f"{found['period']:.5f}",
-            f"{found['step_length']:.5f}",
-            f"{found['spectral_radius']:.4f}",
+        told = (
             f"{single:.{0 if single > 100 else 1}f} µs" if timed else UNKNOWN,
             f"{batch:.{1 if batch > 10 else 2}f} µs" if timed else UNKNOWN,
-            small(cost["error"]) if timed else UNKNOWN,
+            cost["error"] if timed else UNKNOWN,
         )
+        gait = *fixed(found, 5, "period", "step_length"), *fixed(found, 4, "spectral_radius")
+        yield row(f"{name}{UNKNOWN}", *gait, *told)
     both, alone = (numbers["paths"][path]["rates"] for path in ("c with K", "c alone"))
     yield (
         f"the period differs from the rigid one by s^−{both['period']:.2f} and the step length by "
         f"s^−{both['step_length']:.2f}. If c alone grows, the period differs by "
         f"s^−{alone['period']:.1f}"
     )
+    kneed = numbers["kneed"]
+    steps = [(f"{each['factor']:.0f}", each) for each in kneed["paths"]["c with K^(3/2)"]]
+    for words, found in [*steps, ("rigid", kneed["rigid"])]:
+        pair = "{:.4f} ± {:.4f} i".format(*found["pair"])
+        yield row(words, *fixed(found, 5, "period", "step_length"), pair, *fixed(found, 4, "third"))
 
 
 def of_mechanism_matrix(numbers: dict[str, Any]) -> Iterator[str]:
@@ -113,39 +91,35 @@ def of_level_ground(numbers: dict[str, Any]) -> Iterator[str]:
         speeds = [f"{end['speed_m_s']:.3f}" for end in ends]
         yield row(name, *speeds, *[small(end["cost_of_transport"], 2) for end in ends])
     for each in numbers["designs"]:
-        costs = [f"{each[key]:.6f}" for key in ("seed_cost", "cost_of_transport")]
-        variables = [f"{each['variables'][name]:.4f}" for name in ("impulse", "d", "J")]
-        yield row(f"{each['speed_m_s']:.2f}", *costs, *variables)
+        costs = fixed(each, 6, "seed_cost", "cost_of_transport")
+        yield row(
+            *fixed(each, 2, "speed_m_s"), *costs, *fixed(each["variables"], 4, "impulse", "d", "J")
+        )
 
 
 def of_optimise_speed(numbers: dict[str, Any]) -> Iterator[str]:
     """Optimisers on one problem, designs at no loss of speed, and what descents took."""
     for name, each in numbers["fastest"].items():
-        best, seconds = f"{each['objective']:.4f}", f"{each['cpu_s']:.1f}"
-        yield row(name, best, each["outcome"], str(each["evaluations"]), seconds)
+        ended = each["outcome"], each["evaluations"]
+        yield row(name, *fixed(each, 4, "objective"), *ended, *fixed(each, 1, "cpu_s"))
     for name, each in numbers["designs"].items():
-        measures, told = each["measures"], each["certificate"]
-        sizes = (f"{measures['spectral_radius']:.4f}", f"{measures['speed']:.4f}")
-        basin, norm = f"{told['basin'][0]:.3f}", f"{told['sensitivity_norm']:.2f}"
-        yield row(name, *sizes, norm, basin)
+        sizes, told = fixed(each["measures"], 4, "spectral_radius", "speed"), each["certificate"]
+        yield row(name, *sizes, *fixed(told, 2, "sensitivity_norm"), f"{told['basin'][0]:.3f}")
     for name, each in numbers["descents"].items():
-        seconds = f"{each['warm_cpu_s']:.1f}"
-        yield row(name, str(each["iterations"]), str(each["evaluations"]), seconds)
+        yield row(name, each["iterations"], each["evaluations"], *fixed(each, 1, "warm_cpu_s"))
 
 
 def of_published_walkers(numbers: dict[str, Any]) -> Iterator[str]:
     """What was printed of published walkers, ours, and the difference; rounding is not told."""
     for each in numbers["rows"]:
-        off = each["difference"]
-        told = small(off) if off > 2e-12 else "below 2e-12"
-        yield row(each["walker"], each["quantity"], each["printed"], each["ours"], told)
+        off = each["difference"] if each["difference"] > 2e-12 else "below 2e-12"
+        yield row(*(each[name] for name in ("walker", "quantity", "printed", "ours")), off)
 
 
 def of_radius_map(numbers: dict[str, Any]) -> Iterator[str]:
     """What a map of gaits costs."""
     for each in numbers["rows"]:
-        seconds = (f"{each[key]:.1f}" for key in ("first_s", "then_s", "cpu_s"))
-        yield row(each["kind"], str(each["found"]), *seconds)
+        yield row(each["kind"], each["found"], *fixed(each, 1, "first_s", "then_s", "cpu_s"))
 
 
 def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
@@ -159,14 +133,18 @@ def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
 
 
 def of_slope_branch(numbers: dict[str, Any]) -> Iterator[str]:
-    """Where each model of the seed's walker loses its stability, by the branch and by bisection."""
+    """Where each model loses its stability, by the branch and by bisection, and how that moves."""
     for name, found in numbers["scenes"].items():
         for loss in found["losses"]:
             kind, multiplier = loss["kind"].replace("-", " "), loss["multiplier"][0]
             yield row(
                 name, kind, f"{loss['slope']:.9f}", f"{loss['bisection'][1]:.9f}",
-                small(abs(abs(multiplier) - 1.0)), small(loss["error"]),
+                abs(abs(multiplier) - 1.0), loss["error"],
             )  # fmt: skip
+    for name, found in numbers["cases"].items():
+        known = (found["parameters"].get(each) for each in ("K", "c", "J", "d", "r"))
+        cells = (each and f"{each['elasticity']:.4f}" for each in known)
+        yield row(name, *fixed(found, 6, "slope_rad"), *cells)
 
 
 def of_period_doubling(numbers: dict[str, Any]) -> Iterator[str]:
@@ -178,7 +156,7 @@ def of_period_doubling(numbers: dict[str, Any]) -> Iterator[str]:
     yield f"multipliers {first:.4f} and {second:.4f}"
     cascade = numbers["cascade"]
     for footsteps, slope in zip(cascade["footsteps"], cascade["slopes"], strict=True):
-        yield row(str(footsteps), f"{slope:.9f}")
+        yield row(footsteps, f"{slope:.9f}")
     yield ", ".join(f"{ratio:.3f}" for ratio in cascade["ratios"])
     chaos = numbers["chaos"]
     yield f"accumulate at {cascade['accumulation']:.5f} rad"

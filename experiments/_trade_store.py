@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from _row_store import RowStore
+from _experiment import RowStore
 
 from jaxbiped.trade import Row, Truth, failed_row, truth_of
 

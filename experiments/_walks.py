@@ -34,17 +34,17 @@ def scattered(state: Any, count: int, spread: float, moving: tuple[str, ...], *,
 
 
 def walk_from(start: Any, rtol: Any, *, scene: Any = None, duration: float = DURATION, **how: Any):
-    """The end of a walk from eight numbers; its absolute tolerance is the same for all of them.
+    """The end of a walk from its state's numbers; the absolute tolerance is the same for all.
 
     With `atol=None` it is that of `simulate`, in units of the walker.
     """
     scene = jb.seed_scene() if scene is None else scene
     given = dict(duration=duration, rtol=rtol, atol=1e-2 * rtol, save="end") | how
-    return jb.simulate(scene, jb.State(*start), **given)
+    return jb.simulate(scene, type(scene.state())(*start), **given)
 
 
 def walker(rtol: float, **how: Any) -> Callable[[np.ndarray], tuple[np.ndarray, Any, Any]]:
-    """A function of starts (n, 8): final states (n, 8), attempted and rejected steps (n,)."""
+    """A function of starts (n, k): final states (n, k), attempted and rejected steps (n,)."""
 
     def one(*start: Any) -> Any:
         end = walk_from(start, rtol, **how)

@@ -9,14 +9,11 @@ Scenes lie in accuracy_coverage.jsonl as they come: a run that was cut off goes 
 """
 
 import dataclasses
-import functools
 import warnings
 
 import jax
 import numpy as np
-from _experiment import Options, experiment
-from _pictures import label
-from _row_store import RowStore
+from _experiment import Options, experiment, label
 from tqdm import tqdm
 
 import jaxbiped as jb
@@ -44,14 +41,13 @@ class CoverageOptions(Options):
 
 @experiment
 def main(options: CoverageOptions):
-    store = options.path(f"accuracy_coverage{'_quick' if options.quick else ''}.jsonl")
-    rows = RowStore(store, seed=options.seed)
+    rows = options.store("accuracy_coverage", seed=options.seed)
     found = {}
     for place, (kind, one) in enumerate(KINDS.items()):
         found[kind] = []
         for index in tqdm(range(options.sized(SCENES, QUICK_SCENES)[kind]), unit=kind):
             random = np.random.default_rng((options.seed, place, index))
-            found[kind].append(rows.row(f"{kind} {index}", functools.partial(one, random)))
+            found[kind].append(rows.row(f"{kind} {index}", one, random))
     pairs = {}
     for each in (scene for scenes in found.values() for scene in scenes):
         for name, points in each["pairs"].items():
@@ -247,8 +243,7 @@ def _judged(error, bar, own):
 
 
 def _draw(options, pairs):
-    figure = new_figure(5.5, 5.0)
-    ax = figure.subplots()
+    ax = new_figure(5.5, 5.0).subplots()
     for name, points in pairs.items():
         error, bar, _ = np.concatenate(points).T
         shown = (error > 0.0) & (bar > 0.0)
@@ -258,7 +253,7 @@ def _draw(options, pairs):
     words = "error bar [SI units of the number]", "true error [SI units of the number]"
     label(ax, *words, log="xy")
     ax.legend()
-    return options.save(figure, "accuracy_coverage.png")
+    return options.save(ax.figure, "accuracy_coverage.png")
 
 
 KINDS = {

@@ -14,8 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _constraint_runs import FLOOR, METHODS, Integrator, relative_costs, truth_of
-from _experiment import Options, by, experiment
-from _pictures import COLOURS, MARKERS, label
+from _experiment import Options, by, draw_by, experiment, label
 
 import jaxbiped as jb
 from jaxbiped.plot.style import new_figure
@@ -112,28 +111,18 @@ def least_error(found):
 
 
 def draw_trade(options, runs):
+    """A panel for each integrator, by each method."""
     groups = by("integrator", runs)
     figure = new_figure(3.6 * max(len(groups), 2), 3.8)
     axes = figure.subplots(1, len(groups), sharey=True, squeeze=False)[0]
     for ax, (integrator, own) in zip(axes, groups.items(), strict=True):
-        for method, mine in by("method", own).items():
-            k = METHODS.index(method)
-            mine = [run for run in mine if run["state_error"] is not None]
-            points = [run["wall_s_run"] for run in mine], [run["state_error"] for run in mine]
-            look = dict(marker=MARKERS[k], color=COLOURS[k], linewidth=0.9, markersize=5)
-            ax.plot(*points, label=method, **look)
-        label(ax, "time of a run (s)", "", integrator, log="xy")
-    axes[0].set_ylabel("error of the state (SI)")
+        known = [run for run in own if run["state_error"] is not None]
+        draw_by(ax, "method", known, "wall_s_run", "state_error")
+        label(ax, "time of a run (s)", "error of the state (SI)", integrator, log="xy")
+        ax.label_outer()
     named = axes[0].get_legend_handles_labels()
     figure.legend(*named, loc="outside lower center", ncols=4, frameon=False)
     return options.save(figure, "trade.png")
-
-
-def edges_of(values):
-    """Edges half way between values, on a logarithmic axis."""
-    logs = np.log10(values)
-    half = 0.5 * (logs[1] - logs[0])
-    return 10.0 ** np.append(logs - half, logs[-1] + half)
 
 
 def draw_maps(options, maps):
@@ -143,8 +132,7 @@ def draw_maps(options, maps):
     for column, (name, found) in zip(axes.T, maps.items(), strict=True):
         for ax, (key, title) in zip(column, shown.items(), strict=True):
             values = np.log10(np.maximum(np.array(found[key], dtype=float), FLOOR))
-            edges = edges_of(found["column"]), edges_of(found["row"])
-            image = ax.pcolormesh(*edges, values, cmap="viridis")
+            image = ax.pcolormesh(found["column"], found["row"], values, shading="nearest")
             ax.set_facecolor("#BBBBBB")  # where a run failed
             label(ax, found["columns"], found["rows"], name, log="xy")
             figure.colorbar(image, ax=ax, label=f"log10, {title}")

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _experiment import Options, experiment
-from _quote_words import row
+from _quote_words import markdown
 from _scenes import rigid_seed, seed_with
 from tqdm import tqdm
 
@@ -250,16 +250,13 @@ def _tables(endings, laws):
             notes.append(value)
         return f"[{notes.index(value) + 1}]"
 
-    def table(heads, rows):
-        return "\n".join(row(*line) for line in (heads, ["---"] * len(heads), *rows))
-
     rows = [[each["model"], each["ends"], *map(cell, each["errors"].values())] for each in endings]
-    yield table(["model", "ends", *endings[0]["errors"]], rows)
+    yield markdown(["model", "ends", *endings[0]["errors"]], rows)
     rows = [
         [name, *(" / ".join(map(cell, each)) for each in found.values())]
         for name, found in laws.items()
     ]
-    yield table([" / ".join(ACCURACIES), *next(iter(laws.values()))], rows)
+    yield markdown([" / ".join(ACCURACIES), *next(iter(laws.values()))], rows)
     yield from (f"[{k}] {note}" for k, note in enumerate(notes, 1))
 
 

@@ -10,8 +10,7 @@ from _experiment import Options, by, experiment
 from extreme_cases.catalogue import RANGES, catalogue
 from extreme_cases.gaits import GaitJudge, gaits
 from extreme_cases.grazing import grazing
-from extreme_cases.store import by_group, counts, reasons, study
-from extreme_cases.verdict import VERDICTS, judge
+from extreme_cases.verdict import VERDICTS, by_group, counts, judge, reasons, study
 
 from jaxbiped.plot.style import new_figure
 

@@ -7,16 +7,23 @@ force_models_normal.png, force_models_friction.png, force_models_measures.png. I
 leg angle and contact force on several slopes: figure_9_leg_angle.png, figure_10_contact_force.png.
 """
 
+import itertools
+
 import numpy as np
 from _experiment import Options, experiment
-from _force_laws import CRITERIA, DURATION, MEASURES, SEED, deviations, findings, verdict
-from _force_samples import first_stance, motion
-from _force_slopes import descents
-from _pictures import COLOURS, MARKERS
+from _force_laws import CRITERIA, DURATION, MEASURES, SEED, deviations, findings, verdict, walk_of
 from _scenes import seed_with
 
 import jaxbiped as jb
-from jaxbiped.plot.style import GROUND_COLOUR, dress, new_figure
+from jaxbiped.plot.style import (
+    COLOURS,
+    GROUND_COLOUR,
+    LEG_COLOURS,
+    LEG_STYLES,
+    MARKERS,
+    dress,
+    new_figure,
+)
 
 LAWS = {"normal": tuple(jb.laws.NORMAL_LAWS), "friction": tuple(jb.laws.FRICTION_LAWS)}
 QUICK_LAWS = {
@@ -24,8 +31,13 @@ QUICK_LAWS = {
     "friction": ("bengisu-akay", "coulomb"),
 }
 REPEATS, QUICK_REPEATS = 15, 3
-DRAWN = 1.0
-"""Time from the seed's start in which one step is drawn [s]."""
+DRAWN, RTOL = 1.0, 1e-9
+"""Time from the seed's start in which one step is drawn [s], and tolerance of what is drawn."""
+SLOPES, QUICK_SLOPES = (0.010, 0.015, 0.020, 0.025, 0.030, 0.040), (0.020, 0.040)
+DESCENT = 4.0
+"""Time on each slope [s]."""
+TALLEST, LARGEST = 600.0, -160.0
+"""Where scales of normal and of tangential forces end [N]; a fall's last blow is larger."""
 DASHES = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))
 EARLIEST = 1e-5
 """Where logarithmic scales of time begin [s]."""
@@ -35,8 +47,6 @@ FAMILIES = {
     "Laws with bristles": ("dahl", "lugre"),
 }
 SINCE = "time after the foot touches, $t$ (s)"
-LARGEST = -160.0
-"""Where the scale of tangential forces ends [N]."""
 LEAST = 1e-7
 """Deviations below this are drawn there."""
 TITLES = {"normal": "Laws of the normal force", "friction": "Laws of friction"}
@@ -50,7 +60,7 @@ def main(options: Options):
     def model(**laws):
         """What is measured of a law, and its first step where it makes one."""
         scene = seed_with(**laws)
-        return findings(scene, repeats), first_stance(motion(scene, DRAWN))
+        return findings(scene, repeats), first_stance(scene)
 
     seed, mu_static = model(), float(jb.seed_scene().friction.mu_static)
     models = {
@@ -61,7 +71,8 @@ def main(options: Options):
         {kind: {name: each[k] for name, each in laws.items()} for kind, laws in models.items()}
         for k in range(2)
     )
-    slopes, figures = descents(options)
+    slopes = options.sized(SLOPES, QUICK_SLOPES)
+    descents = {slope: descent(jb.seed_scene(slope=slope)) for slope in slopes}
     return {
         "slope_rad": float(jb.seed_scene().ground.slope),
         "criteria": CRITERIA,
@@ -76,14 +87,87 @@ def main(options: Options):
             }
             for kind, laws in found.items()
         },
-        "slopes": slopes,
+        "slopes": [{"slope_rad": slope} | each for slope, (_, each) in descents.items()],
         "pictures": [
             normal_picture(options, stances["normal"]),
             friction_picture(options, stances["friction"]),
             measures_picture(options, found),
-            *figures,
+            *descent_pictures(options, {slope: rows for slope, (rows, _) in descents.items()}),
         ],
     }
+
+
+def first_stance(scene):
+    """One foot from the first heel strike to the second or to the end, by the time since.
+
+    None without a strike.
+    """
+    walk, rows = walk_of(scene, DRAWN, rtol=RTOL)
+    times, feet = jb.measure.heel_strikes(scene, walk)
+    if not len(times):
+        return None
+    rows = rows.isel(foot=feet[0] - 1).sel(time=slice(*times[:2], None))
+    return rows.assign_coords(time=rows.time - times[0])
+
+
+def descent(scene):
+    """A walk down a slope, and whether it grows as the paper says: a value for each heel strike.
+
+    Angles are the largest of the leg behind, forces the largest on a foot, both until the next
+    strike; kinetic energies are those at the strike.
+    """
+    walk, rows = walk_of(scene, DESCENT, rtol=RTOL)
+    times = jb.measure.heel_strikes(scene, walk).time_s
+    spans = itertools.pairwise([*times, float(walk.t[-1])])
+    parts = [rows.sel(time=slice(*span)) for span in spans]
+    grown = {
+        "angle": [-float(np.minimum(part.theta_1, part.theta_2).min()) for part in parts],
+        "force": [float(part.normal_force.max()) for part in parts],
+        "kinetic": np.interp(times, rows.time, rows.kinetic_energy).tolist(),
+    }
+    names = ("angles_behind_rad", "peaks_N", "kinetic_J")
+    return rows, {
+        "outcome": str(walk.outcome),
+        "end_s": float(walk.t[-1]),
+        "strike_times_s": times.tolist(),
+        **dict(zip(names, grown.values(), strict=True)),
+        **{f"{name}_grows_every_step": bool(np.all(np.diff(v) > 0.0)) for name, v in grown.items()},
+    }
+
+
+def descent_pictures(options, walks):
+    """The paper's figures 9 and 10."""
+    angles, forces = (new_figure(10.0, 0.9 + 2.0 * -(-len(walks) // 2)) for _ in range(2))
+    for figure, curves, words, title in (
+        (
+            angles,
+            lambda rows: (rows.theta_1, rows.theta_2),
+            r"leg angle, $\theta$ (rad)",
+            "Leg angles",
+        ),
+        (forces, lambda rows: rows.normal_force, "normal force, $F_N$ (N)", "Contact forces"),
+    ):
+        axes = figure.subplots(-(-len(walks) // 2), 2, sharex=True, sharey=True, squeeze=False)
+        for ax, (slope, rows) in zip(axes.flat, walks.items(), strict=True):
+            for k, row in enumerate(curves(rows)):
+                look = dict(color=LEG_COLOURS[k], linestyle=LEG_STYLES[k], linewidth=1.0)
+                ax.plot(rows.time, row, label=f"leg {k + 1}", **look)
+            end, fell = float(rows.time[-1]), rows.attrs["ending"] != "walking"
+            when = f" at {end:.2f} s" * fell
+            said = f"slope {slope:.3f} rad: {rows.attrs['ending']}{when}"
+            dress(ax, said, "time, $t$ (s)", words)
+            ax.label_outer()
+            if figure is forces and float(rows.normal_force.max()) > TALLEST:
+                blow = float(rows.normal_force.max("foot").idxmax())
+                look = dict(textcoords="offset points", fontsize=8)
+                ax.annotate("beyond the scale", (blow, 0.9 * TALLEST), (6, 0), **look)
+        ax.set_xlim(0.0, DESCENT)
+        named = ax.get_legend_handles_labels()
+        figure.legend(*named, loc="outside upper right", ncols=2, frameon=False, fontsize=9)
+        figure.suptitle(f"{title} on different slopes", x=0.01, ha="left", fontsize=11)
+    forces.axes[0].set_ylim(0.0, TALLEST)
+    yield options.save(angles, "figure_9_leg_angle.png")
+    yield options.save(forces, "figure_10_contact_force.png")
 
 
 def look(place, name, kind):
@@ -96,21 +180,20 @@ def look(place, name, kind):
 
 def normal_picture(options, stances):
     """Normal force from touchdown on, and penetration over the step."""
-    figure = new_figure(10.5, 4.6)
-    left, right = figure.subplots(1, 2)
+    left, right = new_figure(10.5, 4.6).subplots(1, 2)
     for place, (name, each) in enumerate(stances.items()):
         if each is None:
             continue
-        style, late = look(place, name, "normal"), each.t >= EARLIEST
-        left.plot(each.t[late], each.normal[late], **style)
-        right.plot(each.t, 1e3 * each.depth, **style)
+        style, late = look(place, name, "normal"), each.sel(time=slice(EARLIEST, None))
+        left.plot(late.time, late.normal_force, **style)
+        right.plot(each.time, 1e3 * each.penetration.where(each.touches, 0.0), **style)
     left.set_xscale("log")
     dress(left, "The first heel strike", SINCE, "normal force, $F_N$ (N)")
     dress(right, "The step that follows", SINCE, r"penetration, $\delta$ (mm)")
     left.set_xlim(left=EARLIEST)
     named = left.get_legend_handles_labels()
-    figure.legend(*named, loc="outside lower center", ncols=4, frameon=False)
-    return options.save(figure, "force_models_normal.png")
+    left.figure.legend(*named, loc="outside lower center", ncols=4, frameon=False)
+    return options.save(left.figure, "force_models_normal.png")
 
 
 def friction_picture(options, stances):
@@ -126,7 +209,7 @@ def friction_picture(options, stances):
         for place, name in enumerate([SEED["friction"], *names]):
             draw_friction(row, stances[name], look(place, name, "friction"))
         for name in names:
-            cut_off(row[0], name, stances[name].tangential.min())
+            cut_off(row[0], name, float(stances[name].tangential_force.min()))
         row[0].set_title(title, loc="left", fontsize="medium")
         row[2].legend(frameon=False, fontsize="small", loc="lower left")
     for ax in grid[-1]:
@@ -137,11 +220,11 @@ def friction_picture(options, stances):
 
 
 def draw_friction(row, each, style):
-    late = (each.t >= EARLIEST) & (each.normal > 0.0)
+    late = each.where(each.normal_force > 0.0).sel(time=slice(EARLIEST, None))
     strike, step, slip = row
-    strike.plot(each.t[late], each.tangential[late], **style)
-    step.plot(each.t, each.tangential, **style)
-    slip.plot(each.t[late], np.abs(each.slip[late]), **style)
+    strike.plot(late.time, late.tangential_force, **style)
+    step.plot(each.time, each.tangential_force, **style)
+    slip.plot(late.time, abs(late.slip_speed), **style)
     strike.set_xscale("log")
     step.set_ylim(-8.0, 8.0)
     slip.set(xscale="log", yscale="log", ylim=(1e-9, 1.0))

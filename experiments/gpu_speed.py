@@ -12,8 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _batches import OMEGA, THETA
-from _experiment import Options, experiment
-from _pictures import label
+from _experiment import Options, experiment, label
 from _timing import seconds_of
 from _walks import errors_of, perturbed, walker
 
@@ -125,15 +124,14 @@ def labels(sizes, footsteps, rounds):
 
 def draw(options, walked):
     """Steps a second against the size of the batch."""
-    figure = new_figure(6.0, 4.0)
-    ax = figure.subplots()
+    ax = new_figure(6.0, 4.0).subplots()
     for engine in ("cuda", "lanes", "xla"):
         points = [(row["size"], row.get(f"{engine}_steps_per_s")) for row in walked]
         if points := [point for point in points if point[1]]:
             ax.plot(*zip(*points, strict=True), "o-", label=engine)
     label(ax, "starts in the batch", "attempted steps a second", log="xy")
     ax.legend()
-    return options.save(figure, "gpu_speed.png")
+    return options.save(ax.figure, "gpu_speed.png")
 
 
 if __name__ == "__main__":

@@ -3,13 +3,23 @@
 Writes gradient_accuracy.png. The steps are chosen for the state alone ("plain"), or end just past
 every switch of the vector field ("landing"), or are chosen for the derivatives as well ("norm"), or
 both. Derivatives are always those of the solver's own steps. Laws: the seed's, and smoothed ones.
+
+Then what gradients cost over the number of parameters, the coefficients of a torque at the hip that
+is a spline over phase: CPU time of one return alone and with a column for each of them, from which
+the gradient of speed comes; and of the gradient of the spectral radius, by the adjoint of the
+second variation beside what central differences would take.
 """
 
+import dataclasses
+import time
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 from _experiment import Options, experiment
-from _scenes import SMOOTH, seed_with
+from _scenes import SMOOTH, rigid_seed, seed_with
+from _timing import seconds_of
+from tqdm import tqdm
 
 import jaxbiped as jb
 from jaxbiped.plot.style import new_figure
@@ -21,6 +31,10 @@ TANGENT_SHARE = 10.0
 """Tolerance of the columns, in units of the state's."""
 UNHEARD = 1e30
 """Tolerance of the columns where they have no say in the steps."""
+COUNTS, QUICK_COUNTS = (16, 32, 64), (4,)
+REPEATS = 15
+PRECISION = {"rtol": 3e-7, "tangent_rtol": 3e-6}
+"""That of a gait by the balanced accuracy."""
 STEPPINGS = {
     "plain": (False, False),
     "landing": (True, False),
@@ -103,11 +117,14 @@ def main(options: Options):
         }
         for law, scene in scenes.items()
     }
+    # A rigid walker compiles soonest.
+    costed, counts = options.sized((jb.seed_scene(), COUNTS), (rigid_seed(), QUICK_COUNTS))
     return {
         "tangent_share": TANGENT_SHARE,
         "reference_tolerance": reference,
         "reference": {law: reference_numbers(scenes[law], each) for law, each in exact.items()},
         "points": points,
+        "costs": {"rows": [costs(costed, n) for n in tqdm(counts, desc="costs")]},
         "picture": draw(options, points),
     }
 
@@ -186,6 +203,36 @@ def unit_error(scene, start, found):
     velocity = jnp.stack(jb.dynamics.vector_field(0.0, start, scene)[1:])
     square = found.monodromy[:, : len(velocity)]
     return float(jb.gait.stability_of(square, square, velocity, 1e-3).unit_error)
+
+
+def costs(scene, count):
+    """Of a scene whose hip has a torque of so many coefficients [ms]."""
+    spline = jb.actuation.HipSpline(tuple(1e-3 * np.ones(count)))
+    scene = dataclasses.replace(scene, actuation=(spline,))
+    names = tuple(f"torque_{k + 1}" for k in range(count))
+    how = dict(engine="lanes")
+    gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False, **how)
+    state = gait.measures.state
+
+    def one_return(parameters):
+        how_ = dict(parameters=parameters, **how, **PRECISION)
+        return lambda: jb.gait.linearise_return_map(scene, state, **how_).period_row
+
+    def found(radius):
+        how_ = dict(parameters=names, radius_sensitivities=radius, **how)
+        return lambda: jb.find_gait(scene, state, **how_).sensitivities
+
+    work = [one_return(()), one_return(names), found(True), found(False)]
+    alone, with_columns, radius, without = (
+        1e3 * seconds_of({0: run}, REPEATS, clock=time.process_time)[0] for run in work
+    )
+    return {
+        "parameters": count,
+        "return_ms": alone,
+        "return_with_columns_ms": with_columns,
+        "radius_by_adjoint_ms": radius - without,
+        "radius_by_differences_ms": 2.0 * count * alone,
+    }
 
 
 def draw(options, found):

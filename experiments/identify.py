@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from _experiment import Options, experiment
-from _row_store import RowStore
 from _scenes import rigid_seed
 from tqdm import tqdm
 
@@ -65,14 +64,13 @@ SETTINGS = {
 
 @experiment
 def main(options: Options):
-    store = options.path(f"identify{'_quick' if options.quick else ''}.jsonl")
-    rows, count = RowStore(store, seed=SEED), options.sized(SETS, QUICK_SETS)
+    rows, count = options.store("identify", seed=SEED), options.sized(SETS, QUICK_SETS)
     fitters = {name: fitter(name) for name in SETTINGS}
     fits = {name: [] for name in SETTINGS}
     for index in tqdm(range(count), unit="sets"):
         for name, fit in fitters.items():
-            fits[name].append(rows.row(f"{name} {index}", functools.partial(fit, index)))
-    xi = rows.row("precise with xi", functools.partial(fitter("precise", "xi"), 0))
+            fits[name].append(rows.row(f"{name} {index}", fit, index))
+    xi = rows.row("precise with xi", fitter("precise", "xi"), 0)
     precise, truth = fits["precise"], truth_of(SETTINGS["precise"])
     draw(options, precise, truth)
     return {

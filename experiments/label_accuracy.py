@@ -1,16 +1,21 @@
-"""Accuracy of labels: how many a tight solve changes, and how many of them are in doubt.
+"""Accuracy of labels and of their fractions: what a tight solve changes, what intervals hold.
 
-Writes label_accuracy.png. Starts are drawn over the slice of basin_seed.py and over a slice of the
+Writes label_accuracy.png: how many labels a tight solve changes, and how many of them are in doubt.
+Starts are drawn over the slice of basin_seed.py and over a slice of the
 rigid walker's. References are ours at a tolerance finer than any accuracy's: of the compliant
 walker by rodas5p, which gives no label, held against rodas4; of the rigid walker at 1e-13.
+
+Then how often intervals of fractions hold the fraction of all draws together: starts are drawn
+again and again, independently, for which the intervals are made, and by sequences that spread more
+evenly. These draws lie in label_accuracy.jsonl as they come: a run that was cut off goes on.
 """
 
+import collections
 import itertools
 
 import numpy as np
-from _batches import AXES, OMEGA, THETA, UNITS, WALKING, labelled
-from _experiment import Options, experiment
-from _pictures import label
+from _batches import AXES, OMEGA, THETA, UNITS, WALKING, labelled, starts_of
+from _experiment import Options, experiment, label
 from _scenes import rigid_seed
 from tqdm import tqdm
 
@@ -30,6 +35,11 @@ BOUNDS = {
     "compliant": {"omega_swing": OMEGA, "theta_swing": THETA},
     "rigid": {"omega_stance": (-2.5, 0.0), "theta_stance": (0.0, 0.5)},
 }
+METHODS = ("uniform", "sobol")
+SIZE = 300
+"""Starts of a draw whose fractions are looked at."""
+FRACTIONS, QUICK_FRACTIONS = 1000, 5
+"""Draws of them."""
 PENDING, OUT_OF_STEPS = int(jb.basins.Label.PENDING), int(jb.basins.Label.OUT_OF_STEPS)
 
 
@@ -39,10 +49,22 @@ def main(options: Options):
     named, picture = of_names(options, count)
     wishes = options.sized(WANTED, WANTED[:1])
     by_number = {name: of_numbers(name, wishes, count, draws) for name in SCENES}
-    return dict(starts=count, draws=draws, named=named, by_number=by_number, picture=picture)
+    rows, often = options.store("label_accuracy"), options.sized(FRACTIONS, QUICK_FRACTIONS)
+    fractions = {
+        name: {method: coverage(rows, name, method, often) for method in METHODS}
+        for name in ("rigid", "compliant")
+    }
+    return {
+        "starts": count,
+        "draws": draws,
+        "named": named,
+        "by_number": by_number,
+        "fractions": {"starts": SIZE, "draws": often} | fractions,
+        "picture": picture,
+    }
 
 
-def starts_of(name, count, seed):
+def drawn(name, count, seed):
     return jb.starts.sample(SCENES[name], BOUNDS[name], count, method="uniform", seed=seed)
 
 
@@ -60,7 +82,7 @@ def differ(codes, exact):
 
 def of_names(options, count):
     """How many labels change between the named accuracies and a finer solve, and where."""
-    starts = starts_of("compliant", count, 0)
+    starts = drawn("compliant", count, 0)
     exact = reference("compliant", starts, solver="rodas5p")
     again = reference("compliant", starts)
     ways = {name: {"accuracy": name} for name in NAMES}
@@ -95,7 +117,7 @@ def of_numbers(name, wishes, count, draws):
     """Of each accuracy asked for by a number: what it says of its labels, and what is true."""
     rows = {wanted: [] for wanted in wishes}
     for seed in tqdm(range(1, draws + 1), unit="draws"):
-        starts = starts_of(name, count, seed)
+        starts = drawn(name, count, seed)
         exact = reference(name, starts, solver="rodas5p")
         for wanted in wishes:
             found = labelled(name, starts, accuracy=wanted)
@@ -128,9 +150,35 @@ def together(wanted, rows, count):
     }
 
 
+def coverage(rows, name, method, draws):
+    """By label: its fraction in all draws, and in how many draws its interval holds that.
+
+    `scatter`: of the fractions, as a share of what independent starts have.
+    """
+
+    def counts(seed):
+        starts = starts_of(SCENES[name], SIZE, method=method, seed=seed)
+        found = jb.basins.fractions(labelled(name, starts, look=False)["label"].values)
+        return {name: fraction.count for name, fraction in found.items()}
+
+    bar = tqdm(range(draws), unit="draws", desc=f"{name} {method}")
+    counted = [rows.row(f"{name} {method} {k}", counts, k) for k in bar]
+    told = {}
+    for each, total in sum(map(collections.Counter, counted), collections.Counter()).items():
+        truth = total / (draws * SIZE)
+        own = np.array([one.get(each, 0) for one in counted])
+        low, high = jb.basins.wilson_interval(own, SIZE)
+        binomial = np.sqrt(truth * (1.0 - truth) / SIZE)
+        told[each] = {
+            "fraction": truth,
+            "inside_95": float(np.mean((low <= truth) & (truth <= high))),
+            "scatter": float(np.std(own / SIZE) / binomial),
+        }
+    return told
+
+
 def draw(options, places, codes, changed, rows, count):
-    figure = new_figure(11.0, 4.6)
-    left, right = figure.subplots(1, 2)
+    left, right = new_figure(11.0, 4.6).subplots(1, 2)
     theta, omega = places
     for code in np.unique(codes):
         own, unknown = codes == code, code == PENDING
@@ -149,7 +197,7 @@ def draw(options, places, codes, changed, rows, count):
     label(right, *words, log="xy")
     right.set(xlim=(min(TOLERANCES), max(TOLERANCES)), ylim=(0.5 / count, None))
     right.legend()
-    return options.save(figure, "label_accuracy.png")
+    return options.save(left.figure, "label_accuracy.png")
 
 
 if __name__ == "__main__":

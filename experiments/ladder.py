@@ -1,7 +1,8 @@
 """The ladder of fidelity: what each model of the walker costs, and what it changes.
 
-Writes ladder.png, cost per footstep against the gait's distance from the rung above, and
-rigid_limit.png, how the seed's gait approaches the rigid walker's as its contact stiffens.
+Writes ladder.png, cost per footstep against the gait's distance from the rung above; and how gaits
+approach those on rigid feet as contacts stiffen, rigid_limit.png of the seed's walker, and
+kneed_limit.png of McGeer's walker with knees.
 """
 
 import os
@@ -9,12 +10,12 @@ import os
 import jax
 import numpy as np
 from _experiment import Options, experiment
-from _pictures import COLOURS, MARKERS
+from _mechanisms import kneed
 from _timing import seconds_of
 from _walks import scattered
 
 import jaxbiped as jb
-from jaxbiped.plot.style import legend_below, new_figure
+from jaxbiped.plot.style import COLOURS, MARKERS, legend_below, new_figure
 
 BATCH, QUICK_BATCH = 4096, 128
 DURATION = 10.0
@@ -32,6 +33,7 @@ MEASURES = {
     "spectral_radius": "radius",
 }
 SHOWN = ("period", "step_length", "spectral_radius")
+PLAIN = dict(parameters=(), radius_sensitivities=False)
 WITNESSES = 64
 """Starts whose errors are measured."""
 PATHS = {
@@ -45,14 +47,26 @@ PATHS = {
 DOUBLINGS, QUICK_DOUBLINGS = 10, 4
 LAST = 4
 """Points that the rate is fitted to."""
+KNEED_PATHS = {"c with K": 1.0, "c with K^(3/2)": 1.5}
+"""By which power of the factor the damping c grows, of feet and stops; K grows as the factor."""
+KNEED_FACTORS, QUICK_KNEED_FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0), (1.0, 4.0, 16.0)
+KNEED_MEASURES = {
+    "period": "period",
+    "step_length": "step length",
+    "pair": "leading pair of multipliers",
+    "third": "third multiplier",
+}
 
 
 @experiment
 def main(options: Options):
     # One of each kind: the creeping rung compiles as long as the seed's, and is of its kind.
     names = [name for name in jb.ladder() if name != "creep" or not options.quick]
-    rungs = {name: (jb.ladder()[name], gait_of(jb.ladder()[name])) for name in names}
-    measures = {name: measures_of(gait) for name, (_, gait) in rungs.items()}
+    scenes = {name: jb.ladder()[name] for name in names}
+    # At heel strike, which every rung has.
+    gaits = {name: jb.find_gait(s, section=jb.HeelStrike(), **PLAIN) for name, s in scenes.items()}
+    rungs = {name: (scenes[name], gaits[name]) for name in names}
+    measures = {name: measures_of(gait) for name, gait in gaits.items()}
     apart = {
         name: {key: measures[name][key] / measures[above][key] - 1.0 for key in MEASURES}
         for name, above in zip(names, [*names[1:], names[-1]], strict=True)
@@ -60,13 +74,21 @@ def main(options: Options):
     batch = options.sized(BATCH, QUICK_BATCH)
     first, *others = options.sized(TOLERANCES, TOLERANCES[:1])
     costs = {name: cost_of(*rungs[name], batch, [first]) for name in names if name != "rigid"}
-    costs = {"rigid": rigid_cost(rungs, batch, costs["stribeck"])} | costs
     finer = [cost_of(*rungs["stribeck"], batch, [rtol]) for rtol in others]
-    pairs = [(costs["stribeck"], costs["rigid"])]
-    pairs += [(cost, rigid_cost(rungs, batch, cost)) for cost in finer]
+    # The rigid walker at no larger an error.
+    rigid = [
+        cost_of(*rungs["rigid"], batch, RIGID_TOLERANCES, error=cost["error"])
+        for cost in (costs["stribeck"], *finer)
+    ]
+    pairs = zip((costs["stribeck"], *finer), rigid, strict=True)
+    costs = {"rigid": rigid[0]} | costs
     doublings = options.sized(DOUBLINGS, QUICK_DOUBLINGS)
     chosen = options.sized([*PATHS], [*PATHS][:2])
-    paths = {path: approach(path, rungs["rigid"][1], doublings) for path in chosen}
+    paths = {path: approach(path, gaits["rigid"], doublings) for path in chosen}
+    walked = with_knees(
+        options.sized([*KNEED_PATHS], [*KNEED_PATHS][1:]),
+        options.sized(KNEED_FACTORS, QUICK_KNEED_FACTORS),
+    )
     return {
         "threads": os.cpu_count(),
         "measures": measures,
@@ -77,13 +99,13 @@ def main(options: Options):
             for a, b in pairs
         ],
         "paths": paths,
-        "pictures": [draw_rungs(options, apart, costs), draw_paths(options, paths)],
+        "kneed": walked,
+        "pictures": [
+            draw_rungs(options, apart, costs),
+            draw_paths(options, paths),
+            draw_kneed(options, walked["distances"]),
+        ],
     }
-
-
-def gait_of(scene):
-    """The gait at heel strike, which every rung has."""
-    return jb.find_gait(scene, section=jb.HeelStrike(), parameters=(), radius_sensitivities=False)
 
 
 def measures_of(gait):
@@ -93,11 +115,6 @@ def measures_of(gait):
         "multipliers": [[float(value.real), float(value.imag)] for value in leading],
         "unit_multiplier_error": float(gait.unit_multiplier_error),
     }
-
-
-def rigid_cost(rungs, batch, compliant):
-    """Cost of the rigid walker at no larger an error than another one has."""
-    return cost_of(*rungs["rigid"], batch, RIGID_TOLERANCES, error=compliant["error"])
 
 
 def cost_of(scene, gait, batch, tolerances, *, error=np.inf):
@@ -142,23 +159,27 @@ def error_of(found, exact):
     return float(np.median(np.max(gaps, axis=0)[walking]))
 
 
+def followed(scenes, guess=None):
+    """Gaits of scenes by factor, each searched from the last one's state; and why they end."""
+    found = {}
+    for factor, scene in scenes.items():
+        gait = jb.find_gait(scene, guess, **PLAIN)
+        if gait.outcome is not jb.gait.Search.FOUND:
+            return found, f"at factor {factor:.0f}: {gait.outcome}"
+        guess, found[factor] = gait.measures.state, gait
+    return found, None
+
+
 def approach(path, rigid, doublings):
-    """Gaits along a path, each searched from the last one's state, beside the rigid gait.
+    """Gaits along a path beside the rigid gait.
 
     By measure the relative differences, and the exponents p of |difference| ∝ s^(−p) over the last
     points; `ended` says why no stiffer gait was found.
     """
-    found, factors, guess, ended = [], [], None, None
-    for factor in (2.0**k for k in range(doublings + 1)):
-        stiffer, damped = PATHS[path](factor)
-        scene = jb.seed_scene(K=1e6 * stiffer, c=1e7 * damped)
-        gait = jb.find_gait(scene, guess, parameters=(), radius_sensitivities=False)
-        if gait.outcome is not jb.gait.Search.FOUND:
-            ended = f"at factor {factor:.0f}: {gait.outcome}"
-            break
-        guess = gait.measures.state
-        factors.append(factor)
-        found.append(gait.measures)
+    grown = {s: PATHS[path](s) for s in (2.0**k for k in range(doublings + 1))}
+    scenes = {s: jb.seed_scene(K=1e6 * K, c=1e7 * c) for s, (K, c) in grown.items()}
+    gaits, ended = followed(scenes)
+    factors, found = list(gaits), [gait.measures for gait in gaits.values()]
     gaps = {
         name: [float(getattr(m, name)) / float(getattr(rigid.measures, name)) - 1.0 for m in found]
         for name in SHOWN
@@ -177,9 +198,49 @@ def rate(factors, gaps):
     return float(-np.polyfit(np.log(factors[-LAST:]), np.log(np.abs(last)), 1)[0])
 
 
+def with_knees(paths, factors):
+    """Gaits of the kneed walker along paths, and how far they are from the one on rigid feet."""
+    soft = jb.models.mcgeer(knees=True)
+    values = {name: float(x) for name, x in jb.parameter_values(soft).items()}
+    start = soft.state(**jb.models.MODELS["mcgeer-kneed"].starts["gait"])
+    rigid = numbers_of(jb.find_gait(jb.RigidScene(kneed(), soft.ground), **PLAIN))
+
+    def stiffer(factor, power):
+        grown = {name: values[name] * factor for name in ("K", "stop.K")}
+        grown |= {name: values[name] * factor**power for name in ("c", "stop.c")}
+        return jb.with_parameters(soft, grown)
+
+    def away(row, name):
+        """Lengths and times are relative to the rigid gait's."""
+        scale = rigid[name] if name in SHOWN else 1.0
+        return float(np.linalg.norm(np.subtract(row[name], rigid[name])) / scale)
+
+    found = {path: {s: stiffer(s, KNEED_PATHS[path]) for s in factors} for path in paths}
+    found = {path: followed(scenes, start)[0] for path, scenes in found.items()}
+    rows = {
+        path: [{"factor": factor} | numbers_of(gait) for factor, gait in gaits.items()]
+        for path, gaits in found.items()
+    }
+    distances = {
+        path: [row | {name: away(row, name) for name in KNEED_MEASURES} for row in own]
+        for path, own in rows.items()
+    }
+    return {"rigid": rigid, "paths": rows, "distances": distances}
+
+
+def numbers_of(gait):
+    """Measures of a gait: of its leading pair of multipliers real and imaginary part."""
+    first, third = np.asarray(gait.multipliers)[[0, 2]]
+    return {
+        "period": float(gait.measures.period),
+        "step_length": float(gait.measures.step_length),
+        "pair": [float(first.real), abs(float(first.imag))],
+        "third": float(third.real),
+    }
+
+
 def draw_rungs(options, apart, costs):
-    figure = new_figure(8.0, 4.2)
-    left, right = figure.subplots(1, 2)
+    left, right = new_figure(8.0, 4.2).subplots(1, 2)
     names = list(costs)
     rows = np.arange(len(names))
     for k, (key, words) in enumerate({"single_us": "one walk", "batch_us": "in a batch"}.items()):
@@ -196,7 +257,7 @@ def draw_rungs(options, apart, costs):
         ax.set_yticks(rows, names)
         ax.grid(axis="x", color="#DDDDDD")
         legend_below(ax, columns=3, columnspacing=1.0, handletextpad=0.2)
-    return options.save(figure, "ladder.png")
+    return options.save(left.figure, "ladder.png")
 
 
 def draw_paths(options, paths):
@@ -218,6 +279,24 @@ def draw_paths(options, paths):
     figure.legend(*named, loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle("Filled: below the rigid gait's; hollow: above it", fontsize=9)
     return options.save(figure, "rigid_limit.png")
+
+
+def draw_kneed(options, distances):
+    figure = new_figure(4.6 * len(distances), 4.2)
+    axes = np.atleast_1d(figure.subplots(1, len(distances), sharey=True))
+    for ax, (path, rows) in zip(axes, distances.items(), strict=True):
+        factors = [row["factor"] for row in rows]
+        looks = zip(KNEED_MEASURES.items(), COLOURS, MARKERS, strict=False)
+        for (name, words), colour, marker in looks:
+            values = [row[name] for row in rows]
+            ax.plot(factors, values, marker, color=colour, linestyle="-", label=words)
+        ax.set_xscale("log", base=2)
+        ax.set(yscale="log", xlabel="factor of the stiffness, $s$")
+        ax.set_title(path.replace("with", "grows as"), loc="left")
+        ax.grid(color="#DDDDDD")
+        legend_below(ax, columns=2)
+    axes[0].set_ylabel("distance from the rigid gait")
+    return options.save(figure, "kneed_limit.png")
 
 
 if __name__ == "__main__":

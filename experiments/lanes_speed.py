@@ -15,8 +15,7 @@ import _casadi
 import jax
 import jax.numpy as jnp
 import numpy as np
-from _experiment import Options, experiment
-from _pictures import draw_by, label
+from _experiment import Options, draw_by, experiment, label
 from _scenes import seed_with
 from _timing import seconds_of, timed
 from _walks import DURATION, errors_of, exact_ends, perturbed, slopes_and_end, walk_from, walker
@@ -151,8 +150,7 @@ def derivatives(tolerances, rounds):
 
 
 def draw(options, rows, alone):
-    figure = new_figure(11, 4.5)
-    left, right = figure.subplots(1, 2)
+    left, right = new_figure(11, 4.5).subplots(1, 2)
     draw_by(left, "way", rows, "simulations", "simulations_per_s")
     words = "simulations in the batch", f"simulations of {DURATION:g} s a second"
     label(left, *words, "batches on two cores, errors of about 2e-5", log="xy")
@@ -161,7 +159,7 @@ def draw(options, rows, alone):
     label(right, *words, "one walk", log="xy")
     for axes in (left, right):
         axes.legend()
-    return options.save(figure, "lanes_speed.png")
+    return options.save(left.figure, "lanes_speed.png")
 
 
 if __name__ == "__main__":

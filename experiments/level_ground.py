@@ -9,11 +9,10 @@ import dataclasses
 
 import numpy as np
 from _experiment import Options, experiment
-from _pictures import COLOURS, MARKERS
 from _scenes import rigid_seed
 
 import jaxbiped as jb
-from jaxbiped.plot.style import dress, legend_below, new_figure
+from jaxbiped.plot.style import COLOURS, MARKERS, dress, legend_below, new_figure
 
 IMPULSES, QUICK_IMPULSES = 9, 3
 """Push-offs of the simplest walker."""
@@ -168,8 +167,7 @@ def passive_of(level):
 
 
 def draw(options, pairs, curves, designs):
-    figure = new_figure(9.6, 4.6)
-    left, right = figure.subplots(1, 2)
+    left, right = new_figure(9.6, 4.6).subplots(1, 2)
     draw_simplest(left, pairs)
     for (name, curve), colour, marker in zip(curves.items(), COLOURS, MARKERS, strict=False):
         known = [each for each in curve if each["found"]]
@@ -186,7 +184,7 @@ def draw(options, pairs, curves, designs):
     dress(right, "Seed's walker; hollow: unstable", "speed (m/s)", "cost of transport (–)")
     right.set_yscale("log")
     legend_below(right, columns=3)
-    return options.save(figure, "level_ground.png")
+    return options.save(left.figure, "level_ground.png")
 
 
 def draw_simplest(ax, pairs):

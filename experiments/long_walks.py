@@ -6,8 +6,7 @@ Writes long_walks.png: durations of the footsteps of the seed's walker beside it
 import resource
 
 import numpy as np
-from _experiment import Options, experiment
-from _pictures import label
+from _experiment import Options, experiment, label
 from tqdm import tqdm
 
 import jaxbiped as jb
@@ -63,13 +62,12 @@ def walked(count):
 
 
 def draw(options, period, durations):
-    figure = new_figure(7.0, 3.8)
-    ax = figure.subplots()
+    ax = new_figure(7.0, 3.8).subplots()
     off = np.abs(durations / period - 1.0)
     ax.plot(np.arange(1, len(off) + 1), np.maximum(off, 1e-16), ",", rasterized=True)
     label(ax, "footstep [1]", "duration's difference from the period [relative]", log="y")
     ax.set_ylim(1e-12, 10.0 * float(np.max(off)))
-    return options.save(figure, "long_walks.png")
+    return options.save(ax.figure, "long_walks.png")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from _experiment import Options, experiment
 from _mechanisms import SIDES, Case, cases
+from _quote_words import markdown
 from tqdm import tqdm
 
 import jaxbiped as jb
@@ -113,20 +114,16 @@ def main(options: Options):
     for name, case in tqdm(chosen.items(), desc="mechanisms"):
         found = {each: columns(case, how) for each, how in ends.items()}
         rows += [row(name, each, those) for each, those in found.items() if those is not None]
-    options.path("mechanism_derivatives.md").write_text("\n".join(_table(rows)) + "\n")
-    return {"rows": rows}
-
-
-def _table(rows):
-    """A table for a page."""
-    yield f"| mechanism | ends or saved | parameters | {' | '.join(ACCURACIES)} |"
-    yield "|---" * (3 + len(ACCURACIES)) + "|"
+    lines = []
     for each in rows:
         worst = ((each[a], each[f"{a}: of"]) for a in ACCURACIES)
         cells = [f"{error:.0e} ({of})" if np.isfinite(error) else "NaN" for error, of in worst]
         judged = min(each[f"{a}: judged"] for a in ACCURACIES)
         count = f"{judged} of {each['parameters']}"
-        yield f"| {' | '.join([each['mechanism'], each['ends'], count, *cells])} |"
+        lines.append([each["mechanism"], each["ends"], count, *cells])
+    text = markdown(("mechanism", "ends or saved", "parameters", *ACCURACIES), lines)
+    options.path("mechanism_derivatives.md").write_text(text + "\n")
+    return {"rows": rows}
 
 
 if __name__ == "__main__":

@@ -6,16 +6,13 @@ capabilities on two of the mechanisms.
 """
 
 import dataclasses
-import functools
 import math
 import time
-from pathlib import Path
 
 from _experiment import Options, experiment
 from _mechanism_cells import CAPABILITIES, Trial
 from _mechanisms import Case, cases
 from _quote_words import table
-from _row_store import RowStore
 
 import jaxbiped as jb
 from jaxbiped.plot.style import new_figure
@@ -42,14 +39,17 @@ def main(options: MatrixOptions):
         if name in (options.only or options.sized(tuple(cases()), QUICK_CASES))
     }
     wanted = options.capabilities or options.sized(tuple(CAPABILITIES), QUICK)
-    store = RowStore(None if options.quick else options.path("mechanism_matrix.jsonl"))
-    trials = {name: Trial(name, case, folder_of(name, options)) for name, case in chosen.items()}
+    store = options.store("mechanism_matrix")
+    trials = {
+        name: Trial(name, case, options.path(name.replace(" ", "_")))
+        for name, case in chosen.items()
+    }
     rows = [
         {
             "capability": each,
             "number": CAPABILITIES[each].meaning,
             "cells": {
-                name: store.row(f"{name}, {each}", functools.partial(cell, each, name, trial))
+                name: store.row(f"{name}, {each}", cell, each, name, trial)
                 for name, trial in trials.items()
             },
         }
@@ -58,13 +58,6 @@ def main(options: MatrixOptions):
     ]
     options.path("mechanism_matrix.md").write_text("\n".join(table(rows)) + "\n")
     return {"rows": rows, "picture": draw(options, chosen)}
-
-
-def folder_of(name: str, options: MatrixOptions) -> Path:
-    """Where a mechanism's pages and animations go."""
-    folder = options.path(name.replace(" ", "_"))
-    folder.mkdir(exist_ok=True)
-    return folder
 
 
 def cell(capability: str, mechanism: str, trial: Trial) -> float | int | str:

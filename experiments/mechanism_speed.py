@@ -16,14 +16,12 @@ import time
 
 import _mujoco
 import jax
-import jax.numpy as jnp
 import numpy as np
-from _experiment import Options, experiment
+from _experiment import Options, draw_by, experiment, label
 from _mechanisms import Case, cases, kneed
-from _pictures import draw_by, label
 from _scalar_field import address_of
 from _timing import seconds_of, timed
-from _walks import perturbed
+from _walks import perturbed, scattered, walker
 from reference.numbalsoda_solves import lsoda_batch
 
 import jaxbiped as jb
@@ -116,13 +114,8 @@ def lsoda_of(case: Case):
 
 def run_lanes(case: Case, rtol: float, starts: np.ndarray) -> np.ndarray:
     """Final states (n, 14) of walks from starts."""
-    how = dict(duration=DURATION, rtol=rtol, atol=1e-2 * rtol, save="end", engine="lanes")
-
-    def one(*values):
-        state = type(case.guess)(*values)
-        return jb.simulate(case.scene, state, max_solver_steps=10**6, **how).final
-
-    return np.stack(jax.vmap(one)(*jnp.asarray(starts.T)), axis=1)
+    how = dict(scene=case.scene, duration=DURATION, engine="lanes", max_solver_steps=10**6)
+    return walker(rtol, **how)(starts)[0]
 
 
 def on_a_spring(scene: jb.Scene) -> jb.Scene:
@@ -203,32 +196,23 @@ def rigid_walkers():
 
 def rigid_walks(scene, state, count):
     """A call that walks from starts about a gait; what is held keeps its rates alike."""
-    names, begin = state._fields, np.array([float(leaf) for leaf in state])
-    noise = SCATTER * np.random.default_rng(0).standard_normal((len(names), count))
-    starts = np.repeat(begin[:, None], count, axis=1)
-    for i, name in enumerate(names):
-        if name.startswith("omega"):
-            like = name.replace("shank_2", "thigh_2")
-            starts[i] *= 1.0 + noise[names.index(like)]
-
-    def one(*values):
-        how = dict(footsteps=FOOTSTEPS, save="end", engine="lanes")
-        return jb.simulate(scene, type(state)(*values), **how)
-
-    batch, columns = jax.vmap(one), tuple(map(jnp.asarray, starts))
-    return lambda: batch(*columns)
+    moved = scattered(state, count, SCATTER, ("omega",))._asdict()
+    for name in (name for name in moved if name == "omega_shank_2"):
+        moved[name] = getattr(state, name) * moved["omega_thigh_2"] / state.omega_thigh_2
+    how = dict(footsteps=FOOTSTEPS, save="end", engine="lanes")
+    batch = jax.vmap(lambda start: jb.simulate(scene, start, **how))
+    return lambda: batch(type(state)(**moved))
 
 
 def draw(options: Options, rows, chains):
-    figure = new_figure(10.0, 4.0)
-    left, right = figure.subplots(1, 2)
+    left, right = new_figure(10.0, 4.0).subplots(1, 2)
     draw_by(left, "way", rows, "error_median", "simulated_s_per_cpu_s")
     label(left, "median error of the final state (SI units)", "simulated seconds (s per CPU s)",
           "five links", log="xy")  # fmt: skip
     left.legend(frameon=False)
     right.plot(*np.array([[row["bodies"], row["operations"]] for row in chains]).T, "o-")
     label(right, "bodies of a chain", "operations of a step", "cost of a step", log="xy")
-    return options.save(figure, "mechanism_speed.png")
+    return options.save(left.figure, "mechanism_speed.png")
 
 
 if __name__ == "__main__":

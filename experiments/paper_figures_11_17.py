@@ -8,11 +8,10 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from _constraint_runs import FLOOR, METHODS, Integrator, relative_costs, truth_of
-from _experiment import Options, experiment
-from _pictures import COLOURS, label
+from _experiment import Options, experiment, label
 
 import jaxbiped as jb
-from jaxbiped.plot.style import new_figure
+from jaxbiped.plot.style import COLOURS, new_figure
 from jaxbiped.trade import work_of
 
 ODE = Integrator("dopri5", rtol=1e-3)
@@ -194,14 +193,22 @@ def judged(by_method, by_integrator, long):
 def draw(options, by_method, by_integrator, costs, long):
     """Every figure; returns their places."""
     others = {name: curve for name, curve in by_method.items() if name != "standard"}
+    costs = {name: row for name, row in costs.items() if name != "minimal"}
+    parts = {"one walk": "single", "in a batch": "batch"}
+    ratios = {words: {n: row[key] for n, row in costs.items()} for words, key in parts.items()}
+    of = {
+        method: {name: curve for (m, name), curve in by_integrator.items() if m == method}
+        for method in ("augmented", "standard")
+    }
+    seconds = {m: {name: curve.seconds for name, curve in own.items()} for m, own in of.items()}
     figures = {
         "fig11_violation": each_alone(by_method),
         "fig12_all_methods": all_together(by_method, "All methods"),
         "fig13_without_standard": all_together(others, "All but the standard method"),
-        "fig14_time_ratio": cost_bars(costs),
-        "fig15_augmented": of_integrators("augmented", by_integrator),
-        "fig16_standard": of_integrators("standard", by_integrator),
-        "fig17_times": time_bars(by_integrator),
+        "fig14_time_ratio": bars(ratios, "method", "time by Euler steps, standard = 1", level=1.0),
+        "fig15_augmented": all_together(of["augmented"], "Integrators, augmented method"),
+        "fig16_standard": all_together(of["standard"], "Integrators, standard method"),
+        "fig17_times": bars(seconds, "integrator", "time of a run (s)", log="y"),
     }
     if long:
         figures["hundred_footsteps"] = all_together(long, "A hundred footsteps by rodas4")
@@ -224,12 +231,11 @@ def each_alone(curves):
 
 
 def all_together(curves, title):
-    figure = new_figure(9.0, 3.8)
-    linear, logarithmic = figure.subplots(1, 2)
-    for method, curve in curves.items():
-        k = METHODS.index(method)
+    linear, logarithmic = new_figure(9.0, 3.8).subplots(1, 2)
+    for name, curve in curves.items():
+        k = METHODS.index(name) if name in METHODS else list(curves).index(name)
         style = dict(color=COLOURS[k], linestyle=STYLES[k], linewidth=1.1)
-        linear.plot(curve.t, curve.position, label=method, **style)
+        linear.plot(curve.t, curve.position, label=name, **style)
         # The largest violation in each part of the whole time, drawn in the middle of it.
         parts = [p for p in np.array_split(np.arange(len(curve.t)), PARTS) if len(p)]
         tops = [max(curve.position[p].max(), FLOOR) for p in parts]
@@ -238,61 +244,30 @@ def all_together(curves, title):
     linear.ticklabel_format(axis="y", style="sci", scilimits=(0, 0), useMathText=True)
     title_of_parts = f"largest in each of {PARTS} parts"
     label(logarithmic, "time (s)", "violation (m)", title_of_parts, log="y")
-    figure.suptitle(title, fontsize=10)
-    legend(figure, linear, "outside lower center", min(len(curves), 4))
-    return figure
+    linear.figure.suptitle(title, fontsize=10)
+    return with_legend(linear)
 
 
-def cost_bars(costs):
-    shown = {name: row for name, row in costs.items() if name != "minimal"}
-    heights = {
-        words: [row[key] for row in shown.values()]
-        for key, words in {"single": "one walk", "batch": "in a batch"}.items()
-    }
-    figure, ax = bars(list(shown), heights)
-    ax.axhline(1.0, color="#595959", linewidth=0.8)
-    label(ax, "method", "time by Euler steps, standard = 1")
-    legend(figure, ax, "outside upper center", 2)
-    return figure
-
-
-def of_integrators(method, curves):
-    figure = new_figure(6.4, 3.8)
-    ax = figure.subplots()
-    mine = {name: curve for (m, name), curve in curves.items() if m == method}
-    for (name, curve), colour, style in zip(mine.items(), COLOURS, STYLES, strict=False):
-        values = np.maximum(curve.position, FLOOR)
-        ax.plot(curve.t, values, color=colour, linestyle=style, label=name)
-    label(ax, "time (s)", "violation (m)", f"Integrators, {method} method", log="y")
-    legend(figure, ax, "outside lower center", 4)
-    return figure
-
-
-def time_bars(curves):
-    names = list(dict.fromkeys(name for _, name in curves))
-    heights = {m: [curves[m, name].seconds for name in names] for m in ("augmented", "standard")}
-    figure, ax = bars(names, heights)
-    for drawn in ax.containers:
+def bars(heights, x, y, *, level=None, log=""):
+    """A bar for each kind of height beside each other, by name."""
+    ax = new_figure(7.0, 3.6).subplots()
+    for k, (words, own) in enumerate(heights.items()):
+        places = np.arange(len(own)) + 0.4 * (k - 0.5)
+        drawn = ax.bar(places, list(own.values()), 0.38, color=COLOURS[k], label=words)
         ax.bar_label(drawn, fmt="%.2g", fontsize=8)
-    label(ax, "integrator", "time of a run (s)", "Time of the integrators", log="y")
+        ax.set_xticks(np.arange(len(own)), list(own))
+    if level is not None:
+        ax.axhline(level, color="#595959", linewidth=0.8)
+    label(ax, x, y, log=log)
     ax.margins(y=0.15)
-    legend(figure, ax, "outside upper right", 2)
-    return figure
+    return with_legend(ax)
 
 
-def bars(names, heights):
-    """Two bars for each name, beside each other."""
-    figure = new_figure(7.0, 3.6)
-    ax = figure.subplots()
-    for k, (words, values) in enumerate(heights.items()):
-        places = np.arange(len(names)) + 0.4 * (k - 0.5)
-        ax.bar(places, values, 0.38, color=COLOURS[k], label=words)
-    ax.set_xticks(np.arange(len(names)), names)
-    return figure, ax
-
-
-def legend(figure, ax, place, columns):
-    figure.legend(*ax.get_legend_handles_labels(), loc=place, ncols=columns, frameon=False)
+def with_legend(ax):
+    """The figure of axes, with their legend below."""
+    named = ax.get_legend_handles_labels()
+    ax.figure.legend(*named, loc="outside lower center", ncols=4, frameon=False)
+    return ax.figure
 
 
 if __name__ == "__main__":

@@ -1,8 +1,6 @@
 """The paper's figures 4 to 8: the seed's walk on its slope of 0.02 rad, and a moving picture."""
 
-import numpy as np
 from _experiment import Options, experiment
-from _force_laws import foot_loads
 
 import jaxbiped as jb
 from jaxbiped import plot
@@ -35,26 +33,25 @@ def main(options: Options):
 
 def measure(scene, walk):
     """The numbers that each figure shows, at the solver's own steps."""
-    state = walk.state
-    loads = foot_loads(scene, state)
+    rows = jb.measure.trajectory_dataset(scene, walk)
 
-    def ends(values):
-        return [float(np.min(values)), float(np.max(values))]
+    def ends(name):
+        return [float(rows[name].min()), float(rows[name].max())]
+
+    def largest(values):
+        return values.max("time").values.tolist()
 
     return {
-        "fig4_strobe": {"distance_along_slope_m": float(state.hip_x[-1] - state.hip_x[0])},
+        "fig4_strobe": {"distance_along_slope_m": float(rows.hip_x[-1] - rows.hip_x[0])},
         "fig5_phase_portrait": {
-            "angle_range_rad": ends(state.theta_1),
-            "rate_range_rad_s": ends(state.omega_1),
+            "angle_range_rad": ends("theta_1"),
+            "rate_range_rad_s": ends("omega_1"),
         },
-        "fig6_leg_angles": {
-            "angle_range_leg_1_rad": ends(state.theta_1),
-            "angle_range_leg_2_rad": ends(state.theta_2),
-        },
-        "fig7_penetrations": {"largest_m": [float(np.max(each)) for each in loads["depth"]]},
+        "fig6_leg_angles": {f"angle_range_leg_{k}_rad": ends(f"theta_{k}") for k in (1, 2)},
+        "fig7_penetrations": {"largest_m": largest(rows.penetration.where(rows.touches))},
         "fig8_contact_forces": {
-            "peak_normal_N": [float(np.max(each)) for each in loads["normal"]],
-            "peak_tangential_N": [float(np.max(np.abs(each))) for each in loads["tangential"]],
+            "peak_normal_N": largest(rows.normal_force),
+            "peak_tangential_N": largest(abs(rows.tangential_force)),
         },
     }
 

@@ -139,8 +139,7 @@ def chaos(slopes, _, cycles):
 
 
 def draw(options, branches, slopes, angles, _):
-    figure = new_figure(13.0, 5.6)
-    left, right = figure.subplots(1, 2)
+    left, right = new_figure(13.0, 5.6).subplots(1, 2)
     plot.branch(branches, "theta_2", ax=left)
     left.set_title("The simplest walker: stance angle after a strike", loc="left")
     look = dict(color="#999999", markersize=1.2, label="strikes of walks", zorder=0)
@@ -149,7 +148,7 @@ def draw(options, branches, slopes, angles, _):
     right.set_xlim(slopes[0], slopes[-1])
     right.set_ylim(np.nanmin(angles) - 0.01, np.nanmax(angles) + 0.01)
     right.set_title("The cascade, and where walks settle (grey)", loc="left")
-    return options.save(figure, "period_doubling.png")
+    return options.save(left.figure, "period_doubling.png")
 
 
 if __name__ == "__main__":

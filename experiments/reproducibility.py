@@ -15,8 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _batches import labelling_of, swept
-from _experiment import Options, experiment
-from _pictures import label
+from _experiment import Options, experiment, label
 from _walks import scattered
 from reference.compliant import numbers
 from reference.scipy_solves import scales
@@ -166,8 +165,7 @@ def compared(setting, own, other):
 
 def draw(options, rows, differences):
     """How many walks differ by more than what, of the settings that differ at all."""
-    figure = new_figure(6.4, 4.2)
-    ax = figure.subplots()
+    ax = new_figure(6.4, 4.2).subplots()
     for row, own in zip(rows, differences, strict=True):
         if np.any(own > 0.0):
             ax.plot(np.sort(own)[::-1], np.arange(1, len(own) + 1) / len(own), label=row["name"])
@@ -175,7 +173,7 @@ def draw(options, rows, differences):
     words = "difference of the final state [relative]", "share of walks that differ by more"
     label(ax, *words, f"{same} other settings: the same to the last bit", log="xy")
     ax.legend()
-    return options.save(figure, "reproducibility.png")
+    return options.save(ax.figure, "reproducibility.png")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ as missed where walks settle on a cycle of one footstep and the search does not 
 same period to 1e-6.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -97,10 +98,6 @@ def _rough(mu):
     return jb.seed_scene(mu_static=mu, mu_kinetic=0.8 * mu)
 
 
-def _compass(degrees):
-    return jb.models.goswami(float(np.deg2rad(degrees)))
-
-
 THIRD = 10**0.5
 FAMILIES = {
     "slope": _seeds("slope", "rad", [0.0097, *(np.arange(10, 98) * 1e-3)], log=False),
@@ -116,7 +113,9 @@ FAMILIES = {
     "simplest": Family(
         "slope", "rad", [*(np.arange(5, 190, 5) * 1e-4), 0.0187, 0.0189], jb.models.garcia
     ),
-    "compass": Family("slope", "degrees", np.arange(1, 11) * 0.5, _compass),
+    "compass": Family(
+        "slope", "degrees", np.arange(1, 11) * 0.5, lambda x: jb.models.goswami(math.radians(x))
+    ),
 }
 
 

@@ -12,8 +12,7 @@ import functools
 
 import _batches
 import numpy as np
-from _experiment import Options, experiment
-from _pictures import draw_by
+from _experiment import Options, draw_by, experiment
 from reference.labels import by_numbalsoda, by_scipy
 from reference.numbalsoda_solves import lsoda_address
 
@@ -125,8 +124,7 @@ def by_engine(model, size):
 
 
 def draw(options, numbers):
-    figure = new_figure(9.0, 3.8)
-    left, right = figure.subplots(1, 2)
+    left, right = new_figure(9.0, 3.8).subplots(1, 2)
     draw_by(left, "model", numbers["sizes"], "size", "us_each")
     left.set(xlabel="starts in the batch", ylabel="time for a start (µs)")
     left.set(xscale="log", yscale="log")
@@ -137,7 +135,7 @@ def draw(options, numbers):
     right.barh([row["way"] for row in peers], [row["starts_per_s"] for row in peers])
     right.set(xscale="log", xlabel="labelled starts that walk, a second")
     right.invert_yaxis()
-    return options.save(figure, "throughput.png")
+    return options.save(left.figure, "throughput.png")
 
 
 if __name__ == "__main__":

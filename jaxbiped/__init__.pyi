@@ -53,9 +53,9 @@ from jaxbiped.scene._walker import WithTorso as WithTorso
 from jaxbiped.scene._walker import Walker as Walker
 
 # States and the sections that they cross.
-from jaxbiped.dynamics._section import HeelStrike as HeelStrike
-from jaxbiped.dynamics._section import MidStance as MidStance
-from jaxbiped.dynamics._section import Section as Section
+from jaxbiped.dynamics._surfaces import HeelStrike as HeelStrike
+from jaxbiped.dynamics._surfaces import MidStance as MidStance
+from jaxbiped.dynamics._surfaces import Section as Section
 from jaxbiped.scene._state_types import State as State
 from jaxbiped.dynamics._state import seed_state as seed_state
 

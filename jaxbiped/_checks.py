@@ -6,6 +6,7 @@ NumPy before one: the command line refuses without them.
 """
 
 import contextlib
+import operator
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
@@ -69,12 +70,6 @@ def _numbers(name: str, value: object) -> "np.ndarray":
         raise ArgumentError(f"{name} = {value!r} is not a number.") from None
 
 
-def _first_offender(array: "np.ndarray", bad: "np.ndarray") -> str:
-    """The first offending value; where there are many, how many offend."""
-    first = f"{array[bad].flat[0]:g}"
-    return first if array.size == 1 else f"{first} (one of {int(bad.sum())} such entries)"
-
-
 _RULES: ContextVar["list[ArrayLike] | None"] = ContextVar("rules", default=None)
 
 
@@ -123,7 +118,9 @@ def _require(name: str, value: object, allowed: str, test: _Test) -> None:
         return  # the quick way for what is asked of every number at every door
     bad = ~(np.isfinite(array) & test(array))
     if bad.any():
-        shown = _first_offender(np.broadcast_to(array, bad.shape), bad)
+        shown = f"{np.broadcast_to(array, bad.shape)[bad].flat[0]:g}"
+        if bad.size > 1:
+            shown += f" (one of {int(bad.sum())} such entries)"
         raise ArgumentError(f"{name} = {shown} is not allowed: it must be {allowed}.")
 
 
@@ -156,12 +153,12 @@ def check_finite(name: str, value: object) -> None:
 
 def check_positive(name: str, value: object, unit: str = "") -> None:
     """Raises `ArgumentError` unless every entry of `value` is finite and above zero."""
-    _require(name, value, f"a finite number above 0{_in(unit)}", lambda x: x > 0)
+    _require(name, value, f"a finite number above 0 {unit}".rstrip(), lambda x: x > 0)
 
 
 def check_not_negative(name: str, value: object, unit: str = "") -> None:
     """Raises `ArgumentError` unless every entry of `value` is finite and at least zero."""
-    _require(name, value, f"a finite number of at least 0{_in(unit)}", lambda x: x >= 0)
+    _require(name, value, f"a finite number of at least 0 {unit}".rstrip(), lambda x: x >= 0)
 
 
 def check_count(name: str, value: "ArrayLike", least: int = 1) -> int:
@@ -253,12 +250,8 @@ def check_within(
 ) -> None:
     """Raises `ArgumentError` unless lower <= value <= upper (`open_below`: lower < value)."""
     allowed = f"{'above' if open_below else 'at least'} {lower:g} and at most {upper:g}"
-    _require(
-        name,
-        value,
-        allowed,
-        lambda x: (x > lower if open_below else x >= lower) & (x <= upper),
-    )
+    above = operator.gt if open_below else operator.ge
+    _require(name, value, allowed, lambda x: above(x, lower) & (x <= upper))
 
 
 def check_choice(name: str, value: object, allowed: Iterable[object]) -> None:
@@ -291,7 +284,3 @@ def check_type(name: str, value: object, *kinds: type) -> None:
         shown = repr(value)
         shown = shown if len(shown) < 80 else f"a {type(value).__name__}"
         raise ArgumentError(f"{name} = {shown} is not allowed: it must be {allowed}.")
-
-
-def _in(unit: str) -> str:
-    return f" {unit}" if unit else ""

@@ -42,7 +42,8 @@ class Quantity(NamedTuple):
     @property
     def unit_in_text(self) -> str:
         """The unit as tables print it, "N·s/m²"; "–" for a pure number."""
-        return _EXPONENT.sub(_in_text, self.unit).replace(" ", "·") or "–"
+        text = _EXPONENT.sub(lambda found: _SUPERSCRIPTS.get(found[1], found[0]), self.unit)
+        return text.replace(" ", "·") or "–"
 
     @property
     def unit_in_figure(self) -> str:
@@ -74,10 +75,6 @@ class Quantity(NamedTuple):
     def on_axis(self, unit: str | None = None) -> str:
         """Words, symbol and unit. Default: the quantity's own unit."""
         return f"{self.in_row()} ({self.unit_in_figure if unit is None else unit})"
-
-
-def _in_text(found: re.Match[str]) -> str:
-    return _SUPERSCRIPTS.get(found[1], found[0])
 
 
 def _in_figure(found: re.Match[str]) -> str:

@@ -1,22 +1,187 @@
-"""Tables: a result as a labelled dataset, whose rows are a data frame, CSV or LaTeX.
+"""Tables: a result as a labelled dataset, and rows of any dataset as a data frame, CSV or LaTeX.
 
 Variables carry words, SI unit and, by CF's `ancillary_variables`, the name of their error bars.
 """
 
 import abc
+import csv
+import io
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._files import check_writable_file
+from jaxbiped._latex import latex_table
 from jaxbiped._quantity import Quantity
-from jaxbiped._table_rows import to_csv, to_dataframe, to_latex
 
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+Along: TypeAlias = str | Sequence[str] | None
+"""A dimension whose places are rows, several, or none for one row."""
+
+
+class Column(NamedTuple):
+    """A column of n rows: its name, words and unit, values (n,), and error bars (n,) or None.
+
+    `error_name` is that of a column of the error bars alone.
+    """
+
+    name: str
+    words: str
+    unit: str
+    values: np.ndarray
+    errors: np.ndarray | None
+    error_name: str
+
+
+def columns_of(dataset: "xarray.Dataset", along: Along) -> list[Column]:
+    """Variables along some dimensions, coordinates first.
+
+    Those with one more dimension, whose places have no labels, have a column for each place.
+    """
+    dims = (along,) if isinstance(along, str) and along else tuple(along or ())
+    for each in dims:
+        check_choice("along", each, tuple(map(str, dataset.dims)))
+    are_bars = {each.attrs.get("ancillary_variables") for each in dataset.data_vars.values()}
+    found: list[Column] = []
+    for name in (*dataset.coords, *dataset.data_vars):
+        own = dataset[name]
+        more = [each for each in own.dims if each not in dims]
+        labelled = any(each in dataset.coords for each in more)
+        # Along several dimensions a coordinate has but one of them.
+        partial = name in dataset.coords and set(own.dims) < set(dims) and own.dims
+        whole = set(dims) <= set(own.dims) and len(more) <= 1 and not labelled
+        if name in are_bars or not (partial or whole):
+            continue
+        error = own.attrs.get("ancillary_variables")
+        values = _rows(dataset, str(name), dims, more)
+        errors = None if error is None else _rows(dataset, error, dims, more)
+        words = str(own.attrs.get("long_name", str(name).replace("_", " ")))
+        for k in range(values.shape[1]):
+            number, place = (f"_{k + 1}", f" {k + 1}") if more else ("", "")
+            told = f"{name}{number}", f"{words}{place}", str(own.attrs.get("units", ""))
+            bars = None if errors is None else errors[:, k]
+            found.append(Column(*told, values[:, k], bars, f"{error}{number}"))
+    return found
+
+
+def _rows(
+    dataset: "xarray.Dataset", name: str, dims: tuple[str, ...], more: Sequence[Any]
+) -> np.ndarray:
+    """Of a variable, shape (n, places of one more dimension); codes in words."""
+    own = dataset[name]
+    missing = {each: dataset.sizes[each] for each in dims if each not in own.dims}
+    shape = [math.prod(dataset.sizes[each] for each in group) for group in (dims, more)]
+    table = own.expand_dims(missing).transpose(*dims, *more).values.reshape(shape)
+    meanings = str(own.attrs.get("flag_meanings", "")).split()
+    if not meanings or "flag_values" not in own.attrs:
+        return np.asarray(table)
+    codes = np.atleast_1d(own.attrs["flag_values"]).tolist()
+    known = dict(zip(codes, (each.replace("_", " ") for each in meanings), strict=True))
+    return np.vectorize(lambda code: known.get(code, ""), otypes=[object])(table)
+
+
+def to_dataframe(dataset: "xarray.Dataset", along: Along) -> "pandas.DataFrame":
+    """Rows of a dataset as a data frame (see `Tabular.to_dataframe`).
+
+    Args:
+        dataset: one of jaxbiped's, as of a trajectory or a sweep, or any other with units.
+        along: the dimension whose places are the rows; several for all their combinations; "" for
+            a single row of what has no dimension.
+
+    Returns:
+        The data frame.
+
+    Raises:
+        ArgumentError: a dimension that the dataset does not have.
+    """
+    import pandas
+
+    flat = _flat(columns_of(dataset, along))
+    frame = pandas.DataFrame({name: values for name, (_, values) in flat.items()})
+    frame.attrs["units"] = {name: unit for name, (unit, values) in flat.items() if unit is not None}
+    return frame
+
+
+def _flat(columns: Sequence[Column]) -> dict[str, tuple[str | None, np.ndarray]]:
+    """Unit and values by name, error bars behind what they belong to; no unit for words."""
+    found: dict[str, tuple[str | None, np.ndarray]] = {}
+    for each in columns:
+        is_number = each.values.dtype.kind in "fiu"
+        found[each.name] = (each.unit if is_number else None, each.values)
+        if each.errors is not None:
+            found[each.error_name] = (each.unit, each.errors)
+    return found
+
+
+def to_csv(dataset: "xarray.Dataset", along: Along, path: str | Path | None = None) -> str:
+    """Rows of a dataset as comma-separated values (see `Tabular.to_csv`).
+
+    Args:
+        dataset, along: as for `to_dataframe`.
+        path: file to write; none if omitted.
+
+    Returns:
+        The text; cells of numbers that are not known are empty.
+
+    Raises:
+        ArgumentError: a file that cannot be written, or a dimension that the dataset does not have.
+    """
+    flat = _flat(columns_of(dataset, along))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(n if unit is None else f"{n} [{unit or 1}]" for n, (unit, _) in flat.items())
+    cells = (
+        ["" if isinstance(x, float) and math.isnan(x) else x for x in values.tolist()]
+        for _, values in flat.values()
+    )
+    writer.writerows(zip(*cells, strict=True))
+    return _written(text.getvalue(), path)
+
+
+def to_latex(
+    dataset: "xarray.Dataset",
+    along: Along,
+    path: str | Path | None = None,
+    *,
+    columns: Sequence[str] | Mapping[str, str] | None = None,
+) -> str:
+    """Rows of a dataset as a LaTeX `tabular` with siunitx's columns (see `Tabular.to_latex`).
+
+    Args:
+        dataset, along: as for `to_dataframe`.
+        path: file to write; none if omitted.
+        columns: names of the variables to show, in order, or their headings (LaTeX) by name; all
+            if omitted.
+
+    Returns:
+        The text.
+
+    Raises:
+        ArgumentError: a file that cannot be written, or a dimension or a column that the dataset
+            does not have.
+    """
+    known = {each.name: each for each in columns_of(dataset, along)}
+    if isinstance(columns, str):
+        raise ArgumentError(f"columns = {columns!r} is not allowed: give a list of names.")
+    for name in columns or ():
+        check_choice("columns", name, tuple(known))
+    chosen = known if columns is None else {name: known[name] for name in columns}
+    headings = columns if isinstance(columns, Mapping) else {}
+    return _written(latex_table(list(chosen.values()), headings, upright=not along), path)
+
+
+def _written(text: str, path: str | Path | None) -> str:
+    if path is not None:
+        check_writable_file("path", path).write_text(text, encoding="utf-8")
+    return text
 
 
 class Tabular(abc.ABC):
@@ -124,12 +289,11 @@ def variables_of(entries: Mapping[str, Entry]) -> dict[str, Any]:
             attributes["flag_meanings"] = " ".join(words)
         elif np.asarray(entry.values).dtype.kind in "bfiu":
             attributes["units"] = entry.quantity.unit
-        if entry.errors is not None:
-            bars = entry.errors if isinstance(entry.errors, str) else f"{name}_error"
-            attributes["ancillary_variables"] = bars
-        if entry.errors is not None and not isinstance(entry.errors, str):
-            own = {"long_name": f"error of {entry.quantity.words or name}"}
-            own["units"] = entry.quantity.unit
-            variables[bars] = (entry.dims, np.asarray(entry.errors, float), own)
+        if isinstance(entry.errors, str):
+            attributes["ancillary_variables"] = entry.errors
+        elif entry.errors is not None:
+            bars = attributes["ancillary_variables"] = f"{name}_error"
+            own = entry.quantity._replace(words=f"error of {entry.quantity.words or name}")
+            variables[bars] = (entry.dims, np.asarray(entry.errors, float), own.attributes)
         variables[name] = (entry.dims, np.asarray(entry.values), attributes)
     return variables

@@ -1,5 +1,7 @@
 """Mechanisms to walk with, and their starts."""
 
+import dataclasses
+
 import jaxbiped as jb
 from jaxbiped.scene._bodies import Body, Foot
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
@@ -16,6 +18,27 @@ PAIR = (("leg_1", "leg_2"),)
 TORSO = Body("torso", mass=0.3, inertia=0.0015, centre=-0.10)
 BISECTING = {"torso": 1, "leg_1": -0.5, "leg_2": -0.5}
 KNEE = jb.laws.HuntCrossley(K=30.0, hysteresis=0.3, n=1.0)
+
+
+def seed_walker(*bodies, joints=(), first=None):
+    """The seed's walker as data, with more on its hip; with a first leg of another mass unlike."""
+    masses = {"1": 1.0 if first is None else first, "2": 1.0}
+    legs = [Body(name, mass=m, inertia=0.0096, centre=0.10) for name, m in masses.items()]
+    return Mechanism(
+        bodies=(*legs, *bodies),
+        feet=tuple(Foot(name, centre=0.32, radius=0.08) for name in masses),
+        joints=joints,
+        mirror=(("1", "2"),) if first is None else (),
+    )
+
+
+SEED_WITH_TORSO = dataclasses.replace(
+    jb.seed_scene(),
+    walker=seed_walker(
+        Body("torso", mass=0.5, inertia=0.004, centre=-0.08),
+        joints=(Spring("torso", stiffness=8.0, damping=0.3),),
+    ),
+)
 
 
 def leg(i, m_thigh=0.2, turning=1.0):

@@ -81,7 +81,6 @@ def test_functions_go_before_the_packages_of_their_name():
     lines = ("import jaxbiped.sweep._store, jaxbiped.simulate._start", "import jaxbiped as jb")
     kinds = "[type(each).__name__ for each in (jb.sweep, jb.simulate, jb.gait)]"
     assert _python(*lines, f"print(json.dumps({kinds}))") == ["function", "function", "module"]
-    import jaxbiped.sweep._store  # noqa: F401
 
     assert jb.sweep.__module__ == "jaxbiped.sweep._sweep"
 

@@ -92,8 +92,7 @@ def test_the_reference_is_independent():
 
 TWO_LEGS = re.compile(r"walker\.(l|r|d|m|J|hip_mass|hip_to_foot)\b|\b(theta|omega|bristle)_[12]\b")
 KNOW_OF_TWO_LEGS = {
-    "cli/_basin_starts.py",  # the header of a table, as an example
-    "cli/_start_options.py",  # the seed's start
+    "cli/_start_options.py",  # the seed's start, and the header of a table as an example
     "cli/_walkers.py",  # starts of named walkers
     "dynamics/_state.py",  # the seed's start
     "gait/_search_starts.py",  # the seed's start

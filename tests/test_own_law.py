@@ -45,8 +45,3 @@ def test_on_an_axis():
     )  # fmt: skip
     assert axes.get_ylabel() == "grip per slip, $G$ (s/m)"
     assert axes.get_xlabel() == r"stance leg angle, $\theta_2$ (rad)"
-
-
-def test_in_a_refusal():
-    with pytest.raises(jb.ArgumentError, match="it must be a finite number of at least 0 s/m"):
-        Grip(-1.0)

@@ -3,11 +3,11 @@
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state import STATE_QUANTITIES
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.plot import _parameter_charts, _symbols
 from jaxbiped.solve._accuracy import units_of
-from jaxbiped.sweep._stored_fields import FIELDS
+from jaxbiped.sweep._store import FIELDS
 from jaxbiped.sweep.starts._coordinates import START_QUANTITIES, state_coordinates
 
 METRES, SECONDS, KILOGRAMS = 2.0, 3.0, 5.0

@@ -1,15 +1,26 @@
-"""Labels: what became of a start, and whether that is in doubt."""
+"""Labels: what became of a start, whether that is in doubt, and how many are likely wrong."""
 
 import enum
+import json
+import math
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, warn
 from jaxbiped._ending import Ending, NamedCode
+from jaxbiped._files import JsonObject
+
+if TYPE_CHECKING:
+    import xarray
 
 WALKING_NAME = "walking period-{cycle_footsteps}"
 """What a start that walks is called, by the footsteps in a cycle of its gait."""
+ERRORS = "label_errors"
+"""Attribute that holds, as JSON, the estimated errors of labels."""
+_QUANTILE = 1.96
+"""Of the normal distribution, for a two-sided 95 % interval."""
 
 
 class Label(NamedCode):
@@ -126,3 +137,136 @@ def check_known(labels: np.ndarray) -> None:
     unknown = sorted(set(np.unique(labels).tolist()) - set(map(int, Label)))
     if unknown:
         raise ArgumentError(f"labels holds {unknown[0]}: it must hold names or codes of Label.")
+
+
+class LabelErrors(NamedTuple):
+    """Estimated errors of labels that were asked for by a number.
+
+    Attributes:
+        starts: how many were labelled.
+        wanted: share of the labels that may be wrong.
+        relabelled: starts that were in doubt, and labelled anew at finer tolerances.
+        changed: how many of them got another label.
+        in_doubt: how many of them remain in doubt, and are flagged.
+        wrong: estimated share of wrong labels among those that are not flagged.
+        wrong_high: upper end of its interval, 95 %.
+        rtol: relative tolerance at which every start was labelled at last.
+        met: whether `wrong_high` is at most `wanted`.
+    """
+
+    starts: int
+    wanted: float
+    relabelled: int
+    changed: int
+    in_doubt: int
+    wrong: float
+    wrong_high: float
+    rtol: float
+    met: bool
+
+    @property
+    def fewest(self) -> int:
+        """Smallest number of starts that can confirm that accuracy, if no label is in doubt."""
+        return math.ceil(_upper_end(0.0, 0.0) / self.wanted)
+
+    def numbers(self) -> JsonObject:
+        """Ready for JSON."""
+        return self._asdict()
+
+    def sentence(self) -> str:
+        """The errors in one sentence."""
+        told = (
+            f"{self.relabelled} of {self.starts} labels were in doubt at a tolerance of "
+            f"{self.rtol:.1e} and labelled again; {self.changed} of them changed and "
+            f"{self.in_doubt} remain in doubt; of the others, a fraction of {self.wrong:.1e} "
+            f"(up to {self.wrong_high:.1e}) is estimated to be wrong"
+        )
+        if self.met:
+            return f"{told}, of {self.wanted:g} allowed"
+        if self.starts < self.fewest:
+            told += f"; fewer than {self.fewest} starts cannot confirm it"
+        return f"accuracy = {self.wanted:g} is not met: {told}."
+
+    def warn(self) -> None:
+        """Issues a `RuntimeWarning` where the accuracy is not met."""
+        if not self.met:
+            warn(self.sentence())
+
+
+def label_errors(found: "xarray.Dataset") -> LabelErrors:
+    """Estimated errors of a sweep's labels.
+
+    Args:
+        found: what `sweep` returned, or the store that it wrote.
+
+    Returns:
+        How many labels were in doubt, how many of them remain so, and how many of the others are
+        likely to be wrong.
+
+    Raises:
+        ArgumentError: the sweep's accuracy was not asked for by a number.
+    """
+    text = found.attrs.get(ERRORS)
+    if text is None:
+        raise ArgumentError(
+            "found has no error estimates of its labels: it must be a sweep of a labelling whose "
+            "accuracy is a number."
+        )
+    return LabelErrors(**json.loads(text))
+
+
+class Seen(NamedTuple):
+    """Counts of starts, from which errors are estimated.
+
+    Attributes:
+        starts: all of them.
+        relabelled, changed, in_doubt: see `LabelErrors`.
+        looser, other, both: settled starts whose label changed, by who had disagreed with it: the
+            looser tolerance, the other method, both.
+    """
+
+    starts: int = 0
+    relabelled: int = 0
+    changed: int = 0
+    in_doubt: int = 0
+    looser: int = 0
+    other: int = 0
+    both: int = 0
+
+    def __add__(self, more: object) -> "Seen":
+        assert isinstance(more, Seen)
+        return Seen(*[a + b for a, b in zip(self, more, strict=True)])
+
+
+def estimate_label_errors(seen: Seen, *, wanted: float, rtol: float) -> LabelErrors:
+    """What the witnesses did not see, from how often both saw what one of them saw.
+
+    Wrong labels are counted as animals are by capture and recapture: of two witnesses who overlook
+    independently of each other, the share of what one saw that the other saw as well is the other's
+    recall. Chapman, "Some properties of the hypergeometric distribution with applications to
+    zoological sample censuses", Univ. Calif. Publ. Stat. 1 (1951) 131; the variance is Seber's.
+    """
+    a, b, ab = seen.looser, seen.other, seen.both
+    # Chapman's (a + 1)(b + 1)/(ab + 1) − 1 in all, less those that were seen.
+    overlooked = (a - ab) * (b - ab) / (ab + 1.0)
+    variance = (a + 1.0) * (b + 1.0) * (a - ab) * (b - ab) / ((ab + 1.0) ** 2 * (ab + 2.0))
+    wrong_high = min(1.0, _upper_end(overlooked, variance) / seen.starts)
+    return LabelErrors(
+        seen.starts,
+        wanted,
+        *(seen.relabelled, seen.changed, seen.in_doubt),
+        wrong=overlooked / seen.starts,
+        wrong_high=wrong_high,
+        rtol=rtol,
+        met=wrong_high <= wanted,
+    )
+
+
+def _upper_end(overlooked: float, variance: float) -> float:
+    """Upper end of the interval of a count and of its estimate's variance.
+
+    One more than estimated: where none was seen, none is not certain. Counts are skewed as the
+    log-normal distribution is (Chao, Biometrics 43 (1987) 783).
+    """
+    more = overlooked + 1.0
+    return more * math.exp(_QUANTILE * math.sqrt(math.log1p((variance + more) / more**2)))

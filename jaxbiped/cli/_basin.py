@@ -12,9 +12,9 @@ from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
 from jaxbiped.caching import IMPORT_BEGAN
 from jaxbiped.cli import _options as options
-from jaxbiped.cli._basin_starts import StartsOptions
 from jaxbiped.cli._report import Report, columns
 from jaxbiped.cli._scene_options import SceneOptions, minimal
+from jaxbiped.cli._start_options import StartsOptions
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -1,4 +1,4 @@
-"""`jaxbiped walk`: simulate the seed's walker and print its footsteps."""
+"""`jaxbiped walk`: simulate a walker and print its footsteps."""
 
 import dataclasses
 import time
@@ -7,9 +7,11 @@ from typing import Annotated, Any, TypeAlias
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
+from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
 from jaxbiped.caching import IMPORT_BEGAN
 from jaxbiped.cli import _options as options
+from jaxbiped.cli._report import Report, columns
 from jaxbiped.cli._scene_options import SceneOptions
 from jaxbiped.cli._start_options import StartOptions
 
@@ -21,6 +23,39 @@ _Walked: TypeAlias = "tuple[jb.Trajectory[Any], dict[str, Any], dict[str, float]
 """A walk, its solver's settings, and times [s]."""
 _ROOM = 1 << 17
 """Steps that XLA finds room for at first; a walk that takes more is run again with more room."""
+_MOST_ROWS = 24
+_FIRST = {"step": "{0[step]}", "leg": "{0[leg]}"}
+_FOOTSTEP = {
+    "step": "{0[step]}",
+    "time s": "{0[time_s]:.4f}",
+    "period s": "{0[period_s]:.4f}",
+    "length m": "{0[length_m]:.4f}",
+    "speed m/s": "{0[speed_m_s]:.4f}",
+}
+_FORCES = {
+    "peak N": "{0[peak_normal_N]:.1f}",
+    "depth mm": "{0[depth_mm]:.3f}",
+    "double ms": "{0[double_ms]:.3f}",
+}
+_LINES: tuple[str, ...] = (
+    "{0[ending]} after {0[duration_s]:.4g} s and {0[footsteps]} footsteps on a slope of "
+    "{0[slope_rad]:g} rad",
+    "energy left open {0[energy_residual_J]:.1e} J of {0[gravity_work_J]:.4g} J of gravity's work",
+    "{0[solver][name]} ({0[solver][engine]}): {0[solver][accepted]} steps accepted, "
+    "{0[solver][rejected]} rejected; import {0[wall_s][import]:.1f} s, compile "
+    "{0[wall_s][compile]:.1f} s, run {0[wall_s][run]:.3f} s",
+)
+_RIGID_LINES = (
+    "{0[ending]} after {0[duration_s]:.4g} s and {0[footsteps]} whole footsteps on rigid feet on a "
+    "slope of {0[slope_rad]:g} rad",
+    "{0[solver][name]} ({0[solver][engine]}): {0[solver][attempted]} steps attempted; import "
+    "{0[wall_s][import]:.1f} s, compile {0[wall_s][compile]:.1f} s, run {0[wall_s][run]:.4f} s",
+)
+_CONSTRAINTS = (
+    "{0[method]}: the hip opens by at most {0[max_violation_m]:.1e} m and "
+    "{0[max_violation_rate]:.1e} m/s, and carries at most {0[max_hip_force_N]:.0f} N; the start "
+    "was corrected by {0[start_correction_m]:.1e} m and {0[start_correction_m_s]:.1e} m/s"
+)
 
 
 class SolveOptions(options.Options, of=("simulate",)):
@@ -99,7 +134,7 @@ class Walk(options.Command):
     output: options.OutputOptions
 
     def run(self) -> int:
-        from jaxbiped.cli._walk_report import report_walk
+        from jaxbiped.cli._walk_report import footstep_csv, walk_numbers, write_outputs
 
         imported = time.perf_counter()
         scene = self.scene.scene()
@@ -107,7 +142,15 @@ class Walk(options.Command):
         walked = self._roll if isinstance(scene, jb.RigidScene) else self._walk
         walk, settings, wall = walked(scene, state)
         wall["import"] = imported - IMPORT_BEGAN
-        return report_walk(self.output, scene, state, walk, settings, wall)
+        numbers = walk_numbers(scene, walk, settings, wall)
+        report = Report(self.output.json, self.output.csv)
+        _say(report, numbers, walk)
+        if self.output.out is not None:
+            with stage("drawing the figures and the animation"):
+                paths = write_outputs(scene, state, walk, self.output)
+            report.wrote(paths)
+        report.finish(numbers, lambda: footstep_csv(numbers["steps"]))
+        return 1 if walk.outcome is jb.Ending.SOLVER_FAILED else 0
 
     def _walk(self, scene: Any, state: Any) -> _Walked:
         solve = self.solve
@@ -194,3 +237,30 @@ def _simulate(request: "jb.Simulation", wanted: float | None) -> "tuple[jb.Traje
         if room == most or trajectory.outcome is not jb.Ending.OUT_OF_STEPS:
             return trajectory, seconds
         room = min(most, 4 * room)
+
+
+def _say(report: Report, numbers: JsonObject, walk: "jb.Trajectory[Any]") -> None:
+    """What people read of a walk before its files."""
+    from jaxbiped.cli._walk_report import cost_sentence
+    from jaxbiped.solve._error_estimate import error_sentence
+
+    layout, lines = _FIRST | _FOOTSTEP | _FORCES, _LINES
+    if "model" in numbers:
+        layout, lines = _FOOTSTEP, _RIGID_LINES
+    rows = []
+    for k, each in enumerate(numbers["steps"]):
+        row = each | {"step": k + 1}
+        if "peak_normal_N" in each:
+            row["depth_mm"] = 1e3 * each["max_penetration_m"]
+            row["double_ms"] = 1e3 * each["double_support_s"]
+        rows.append(row)
+    known = {"footsteps": len(rows)} | numbers
+    report.say(columns(layout, rows, most=_MOST_ROWS), *(line.format(known) for line in lines))
+    if "cost_of_transport" in numbers:
+        report.say(cost_sentence(numbers))
+    if walk.error is not None:
+        report.say(error_sentence(walk.error))
+    for sentence in numbers["warnings"]:
+        report.say(f"WARNING: {sentence}")
+    if "constraints" in numbers:
+        report.say(_CONSTRAINTS.format(numbers["constraints"]))

@@ -1,4 +1,7 @@
-"""Report of a walk: footsteps, costs and warnings, for people and for programs."""
+"""Numbers of a walk: footsteps, costs and warnings; and its files.
+
+Warned of is a walk that is no walk, and numbers that are not to be relied on.
+"""
 
 import dataclasses
 from collections.abc import Callable
@@ -13,66 +16,29 @@ from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
 from jaxbiped._types import rows_of
 from jaxbiped.cli._options import OutputOptions
-from jaxbiped.cli._report import Report, columns
-from jaxbiped.cli._walk_warnings import (
-    ending_name,
-    relative_residual,
-    rigid_warnings,
-    walk_warnings,
-)
 from jaxbiped.constraints._constraint_methods import name_of
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._footsteps import footstep_dataset
-from jaxbiped.measure._samples import from_start, places_of_standing
-from jaxbiped.solve._error_estimate import error_numbers, error_sentence
+from jaxbiped.measure._samples import evaluate_along, from_start, places_of_standing
+from jaxbiped.solve._accuracy import unresolved_slip
+from jaxbiped.solve._error_estimate import error_numbers
 
-_MOST_ROWS = 24
 _SHOWN = 60.0
 """The part of a long walk that is drawn and can be watched [s]."""
-_FIRST = {"step": "{0[step]}", "leg": "{0[leg]}"}
-_FOOTSTEP = {
-    "step": "{0[step]}",
-    "time s": "{0[time_s]:.4f}",
-    "period s": "{0[period_s]:.4f}",
-    "length m": "{0[length_m]:.4f}",
-    "speed m/s": "{0[speed_m_s]:.4f}",
-}
 _AT_LEAST = ("time_s", "period_s", "length_m", "speed_m_s")
 """What is known of footsteps on any feet."""
-_FORCES = {
-    "peak N": "{0[peak_normal_N]:.1f}",
-    "depth mm": "{0[depth_mm]:.3f}",
-    "double ms": "{0[double_ms]:.3f}",
-}
-_LINES: tuple[str, ...] = (
-    "{0[ending]} after {0[duration_s]:.4g} s and {0[footsteps]} footsteps on a slope of "
-    "{0[slope_rad]:g} rad",
-    "energy left open {0[energy_residual_J]:.1e} J of {0[gravity_work_J]:.4g} J of gravity's work",
-    "{0[solver][name]} ({0[solver][engine]}): {0[solver][accepted]} steps accepted, "
-    "{0[solver][rejected]} rejected; import {0[wall_s][import]:.1f} s, compile "
-    "{0[wall_s][compile]:.1f} s, run {0[wall_s][run]:.3f} s",
-)
-_RIGID_LINES = (
-    "{0[ending]} after {0[duration_s]:.4g} s and {0[footsteps]} whole footsteps on rigid feet on a "
-    "slope of {0[slope_rad]:g} rad",
-    "{0[solver][name]} ({0[solver][engine]}): {0[solver][attempted]} steps attempted; import "
-    "{0[wall_s][import]:.1f} s, compile {0[wall_s][compile]:.1f} s, run {0[wall_s][run]:.4f} s",
-)
-_CONSTRAINTS = (
-    "{0[method]}: the hip opens by at most {0[max_violation_m]:.1e} m and "
-    "{0[max_violation_rate]:.1e} m/s, and carries at most {0[max_hip_force_N]:.0f} N; the start "
-    "was corrected by {0[start_correction_m]:.1e} m and {0[start_correction_m_s]:.1e} m/s"
-)
+AIRBORNE = "airborne"
+"""How a simulation ended whose time ran out before any foot touched the ground."""
+_WORST_RESIDUAL = 1e-3
+"""Share of the energy turned over that may be left open, however loose the tolerance."""
+_FAR = 1e3
+"""How many times the relative tolerance it may be."""
 
 
-def report_walk(
-    output: OutputOptions,
-    scene: Any,
-    state: Any,
-    walk: "jb.Trajectory[Any]",
-    settings: JsonObject,
-    wall: dict[str, float],
-) -> int:
-    """Reports a walk from a start, of any kind; returns the exit code."""
+def walk_numbers(
+    scene: Any, walk: "jb.Trajectory[Any]", settings: JsonObject, wall: dict[str, float]
+) -> JsonObject:
+    """What is known of a walk of any kind in SI units, ready for JSON."""
     numbers: JsonObject = {
         "slope_rad": float(scene.ground.slope),
         "duration_s": float(np.asarray(walk.t)[-1]),
@@ -83,7 +49,13 @@ def report_walk(
         numbers["error"] = error_numbers(walk.error)
     rolls = isinstance(scene, jb.RigidScene)
     if rolls:
-        numbers |= _rigid_numbers(scene, walk)
+        assert walk.arrivals is not None
+        numbers |= {
+            "model": "rigid",
+            "ending": str(walk.outcome),
+            "footsteps": max(int(walk.arrivals.total) - 1, 0),
+            "steps": _rigid_footsteps(scene, walk.arrivals),
+        }
         numbers["solver"]["attempted"] = int(walk.attempted)
     else:
         numbers |= _compliant_numbers(scene, walk)
@@ -92,19 +64,7 @@ def report_walk(
         numbers |= walk_cost(scene, walk)
     warnings_of = rigid_warnings if rolls else walk_warnings
     numbers["warnings"] = warnings_of(scene, numbers, rtol=settings["rtol"])
-    report = Report(output.json, output.csv)
-    _say(report, numbers, walk)
-    if output.out is not None:
-        with stage("drawing the figures and the animation"):
-            if rolls:
-                shown = from_start(scene, _rigid_beginning(walk), state)
-                page = jb.plot.view(scene, shown).save(output.out / "walk.html")
-                paths = [*output.draw(_motion_figures(scene, shown)), page]
-            else:
-                paths = write_outputs(scene, walk, output)
-        report.wrote(paths)
-    report.finish(numbers, lambda: footstep_csv(numbers["steps"]))
-    return 1 if walk.outcome is jb.Ending.SOLVER_FAILED else 0
+    return numbers
 
 
 def _compliant_numbers(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
@@ -126,40 +86,6 @@ def _compliant_numbers(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
     if scene.redundant:
         numbers["constraints"] = _constraint_numbers(scene, walk)
     return numbers
-
-
-def _rigid_numbers(scene: "jb.RigidScene", walk: "jb.Trajectory[Any]") -> JsonObject:
-    assert walk.arrivals is not None
-    return {
-        "model": "rigid",
-        "ending": str(walk.outcome),
-        "footsteps": max(int(walk.arrivals.total) - 1, 0),
-        "steps": _rigid_footsteps(scene, walk.arrivals),
-    }
-
-
-def _say(report: Report, numbers: JsonObject, walk: "jb.Trajectory[Any]") -> None:
-    """What people read of a walk before its files."""
-    layout, lines = _FIRST | _FOOTSTEP | _FORCES, _LINES
-    if "model" in numbers:
-        layout, lines = _FOOTSTEP, _RIGID_LINES
-    rows = []
-    for k, each in enumerate(numbers["steps"]):
-        row = each | {"step": k + 1}
-        if "peak_normal_N" in each:
-            row["depth_mm"] = 1e3 * each["max_penetration_m"]
-            row["double_ms"] = 1e3 * each["double_support_s"]
-        rows.append(row)
-    known = {"footsteps": len(rows)} | numbers
-    report.say(columns(layout, rows, most=_MOST_ROWS), *(line.format(known) for line in lines))
-    if "cost_of_transport" in numbers:
-        report.say(cost_sentence(numbers))
-    if walk.error is not None:
-        report.say(error_sentence(walk.error))
-    for sentence in numbers["warnings"]:
-        report.say(f"WARNING: {sentence}")
-    if "constraints" in numbers:
-        report.say(_CONSTRAINTS.format(numbers["constraints"]))
 
 
 def footstep_rows(steps: Any) -> list[dict[str, float]]:
@@ -200,9 +126,15 @@ def _motion_figures(scene: Any, walk: "jb.Trajectory[Any]") -> dict[str, Callabl
     }
 
 
-def write_outputs(scene: Any, walk: "jb.Trajectory[Any]", output: OutputOptions) -> list[Path]:
-    """Writes the figures, the animations and the trajectory; returns their paths."""
+def write_outputs(
+    scene: Any, state: Any, walk: "jb.Trajectory[Any]", output: OutputOptions
+) -> list[Path]:
+    """Writes the figures, the animations and the trajectory of a walk; returns their paths."""
     assert output.out is not None
+    if isinstance(scene, jb.RigidScene):
+        shown = from_start(scene, _rigid_beginning(walk), state)
+        page = jb.plot.view(scene, shown).save(output.out / "walk.html")
+        return [*output.draw(_motion_figures(scene, shown)), page]
     # The numbers first: no picture that fails takes them away.
     data = output.out / "trajectory.nc"
     jb.measure.trajectory_dataset(scene, walk).to_netcdf(data)
@@ -264,3 +196,80 @@ def _constraint_numbers(scene: "jb.RedundantScene", walk: "jb.Trajectory[Any]") 
         "start_correction_m": float(correction.position),
         "start_correction_m_s": float(correction.velocity),
     }
+
+
+def ending_name(scene: Any, trajectory: "jb.Trajectory[Any]") -> str:
+    """How a walk ended, in words: its `Ending`, or that it never came to the ground."""
+    if trajectory.outcome is jb.Ending.WALKING:
+        touching = evaluate_along(scene, trajectory.state, contacts).touching
+        if not np.any(np.stack(touching)):
+            return AIRBORNE
+    return str(trajectory.outcome)
+
+
+def relative_residual(ledger: "jb.measure.EnergyLedger") -> float | None:
+    """The energy left open as a share of what gravity, losses and storage turned over.
+
+    None where that is no number: nothing happened, or the solve failed.
+    """
+    lost = ledger.damper_loss[0] + ledger.friction_loss[0]
+    works = (ledger.gravity_work[0], ledger.actuation_work[0])
+    turned_over = sum(map(abs, (*works, lost, ledger.stored_change[0])))
+    share = float(abs(ledger.residual[0]) / turned_over) if turned_over > 0.0 else float("nan")
+    return share if np.isfinite(share) else None
+
+
+def walk_warnings(scene: Any, numbers: JsonObject, *, rtol: float | None) -> list[str]:
+    """One sentence for each thing to know before relying on a walk's numbers."""
+    found = []
+    if numbers["ending"] == AIRBORNE:
+        found.append(
+            "no foot touched the ground in all that time: this is free flight, no walk; start "
+            "lower (--hip-z) or simulate longer"
+        )
+    steps = numbers["solver"]["accepted"] + numbers["solver"]["rejected"]
+    found += cut_short(numbers["ending"], steps)
+    if rtol is not None and (said := unresolved_slip(rtol, scene.minimal)):
+        found.append(said)
+    share = numbers["energy_residual_relative"]
+    bound = _WORST_RESIDUAL if rtol is None else min(_WORST_RESIDUAL, _FAR * rtol)
+    if share is not None and share > bound:
+        found.append(
+            f"the energy left open is {share:.2g} of what was turned over: these numbers are not "
+            f"accurate; take a smaller --{'dt' if rtol is None else 'rtol'}"
+        )
+    elif not np.isfinite(numbers["energy_residual_J"]):
+        found.append(
+            "the energy left open is not a number, because the walk's energy overflowed: take a "
+            f"smaller --{'dt' if rtol is None else 'rtol'}"
+        )
+    return [*found, *friction_warnings(scene)]
+
+
+def rigid_warnings(scene: Any, numbers: JsonObject, *, rtol: float | None) -> list[str]:
+    found, listed = cut_short(numbers["ending"], numbers["solver"]["attempted"]), numbers["steps"]
+    if numbers["footsteps"] > len(listed):
+        found.append(f"only the first {len(listed)} footsteps are listed")
+    return found
+
+
+def cut_short(ending: str, steps: int) -> list[str]:
+    """A sentence where the cap on the solver's steps ended a walk."""
+    if ending != str(jb.Ending.OUT_OF_STEPS):
+        return []
+    return [
+        f"the walk was cut short at {steps} of the solver's steps: --max-solver-steps allows "
+        "more, a larger --rtol takes fewer"
+    ]
+
+
+def friction_warnings(scene: Any) -> list[str]:
+    """A sentence where friction grows with slip instead of falling."""
+    law = scene.friction
+    static, kinetic = (getattr(law, name, None) for name in ("mu_static", "mu_kinetic"))
+    if static is None or kinetic is None or not float(kinetic) > float(static):
+        return []
+    return [
+        f"mu_kinetic = {float(kinetic):g} is above mu_static = {float(static):g}: friction grows "
+        "with slip, and has no Stribeck peak"
+    ]

@@ -13,7 +13,6 @@ from jaxbiped.constraints._constraint_method import (
     AbstractExactProjection,
     AbstractProjectingMethod,
     Constrained,
-    Row,
     applied_impulse,
     exact_multipliers,
     gram,
@@ -21,6 +20,7 @@ from jaxbiped.constraints._constraint_method import (
     projection,
     stabilised_residual,
 )
+from jaxbiped.constraints._linkage import Row
 from jaxbiped.linalg._small_matrices import SymmetricFactors, symmetric_factors
 
 

@@ -27,8 +27,8 @@ from jaxbiped.continuation._branch_point import (
 )
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, setup_of
 from jaxbiped.continuation._trace import BOUND, BranchStop, is_bound, leaves_range, reason_of
-from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint, StepControl, correct, follow
+from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.scene._parameter_access import parameter_quantities, parameter_values
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 

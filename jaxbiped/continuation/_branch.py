@@ -16,15 +16,14 @@ from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch_point import Axis, BranchPoint
 from jaxbiped.continuation._trace import BranchStop
-from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
+from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
 from jaxbiped.gait._branch_along import state_at
-from jaxbiped.gait._homotopy import BranchEnd
-from jaxbiped.gait._measures import QUANTITIES
+from jaxbiped.gait._gait import QUANTITIES
+from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 
 if TYPE_CHECKING:

@@ -10,14 +10,14 @@ from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point,
 from jaxbiped.continuation._cycle import Cycle, CycleProblem
 from jaxbiped.continuation._trace import Trace, limit_cause, trace
 from jaxbiped.gait._branch_along import state_at
-from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Change, Curve, CurvePoint, correct
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
+from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, precision_of, recurring_sizes
 

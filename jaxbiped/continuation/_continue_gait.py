@@ -22,9 +22,8 @@ from jaxbiped.continuation._trace import LIMITS, BranchStop, Trace
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint, correct
-from jaxbiped.gait._search_provenance import explain_search
+from jaxbiped.gait._search_provenance import BranchEnd, explain_search
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene

@@ -19,8 +19,7 @@ from jaxbiped.continuation._continuation_setup import (
     check_followed,
     continuation_setup,
 )
-from jaxbiped.dynamics._state import state_for
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves, state_for
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._search_starts import rolling_starts

@@ -14,8 +14,8 @@ from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, setup_of
 from jaxbiped.continuation._trace import BranchStop, Trace
-from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint, correct
+from jaxbiped.gait._search_provenance import BranchEnd
 
 _AMPLITUDES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 """Distances along the eigenvector, in the sizes of the curve, at which the branch is sought."""

@@ -17,8 +17,8 @@ from jaxbiped.continuation._bifurcations import (
 from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point
 from jaxbiped.continuation._cycle import NO_WALK
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, correct, follow
+from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._state_types import State, WalkerState
 from jaxbiped.simulate._simulate import simulate

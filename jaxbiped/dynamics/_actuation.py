@@ -1,16 +1,24 @@
-"""Actuation in the equations of motion: torques at joints, set points of feet, their powers."""
+"""Actuation in the equations of motion: motors, and the motion that their laws see; actuators."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
 
+from jaxbiped._checks import ArgumentError, is_number
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._footfalls import LegMotion
-from jaxbiped.dynamics._joint_loads import with_joint_loads
-from jaxbiped.dynamics._motor_motion import motor_torques
+from jaxbiped.dynamics._joint_loads import angle_value, with_joint_loads
 from jaxbiped.dynamics._tree import Loads, Motion
+from jaxbiped.scene._joint_parts import Motor
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._mechanism_pieces import named_sum
 from jaxbiped.scene._scene import CompliantScene, RigidScene
+from jaxbiped.scene._structure import Angle, Indices, Structure
 from jaxbiped.scene.actuation._abstract_actuator import (
     AbstractActuator,
     AbstractHipActuator,
@@ -18,6 +26,186 @@ from jaxbiped.scene.actuation._abstract_actuator import (
     LegTorques,
 )
 from jaxbiped.scene.actuation._actuators import FootPreload
+
+
+class MotorMotion(NamedTuple):
+    """A motion as a motor's law sees it; see `JointMotion`.
+
+    Attributes:
+        structure: of the mechanism.
+        motion: angles and rates of all bodies, exchanged where the law's sides are.
+        slope: angle of the vertical [rad].
+        own: the motor's angle.
+        stance: line of the leg that stands; None where no leg does.
+    """
+
+    structure: Structure
+    motion: Motion
+    slope: Scalar
+    own: Angle
+    stance: LegMotion | None
+
+    @property
+    def angle(self) -> Scalar:
+        """The motor's own angle [rad]."""
+        return angle_value(self.own, self.motion.angles, self.slope)
+
+    @property
+    def rate(self) -> Scalar:
+        """Its rate [rad/s]."""
+        return angle_value(self.own, self.motion.rates, None)
+
+    def of(self, angle: Any) -> tuple[Scalar, Scalar]:
+        """Value [rad] and rate [rad/s] of a body's angle by its name, or of weighted angles.
+
+        Raises:
+            ArgumentError: a name that is no body, "normal" or "vertical".
+        """
+        found = named_sum("motion.of", angle, self.structure.parents, self.structure.bodies)
+        value = angle_value(found, self.motion.angles, self.slope)
+        return value, angle_value(found, self.motion.rates, None)
+
+    @property
+    def phase(self) -> Scalar:
+        """Minus the angle of the leg that stands [rad]."""
+        return -self._stance().angle
+
+    @property
+    def phase_rate(self) -> Scalar:
+        """Its rate [rad/s]."""
+        return -self._stance().rate
+
+    @property
+    def time(self) -> NoReturn:
+        """Not known to laws."""
+        raise ArgumentError(
+            "motion.time is not known, because a motor's law may not depend on time: use "
+            "motion.phase, or an angle by motion.of."
+        )
+
+    def _stance(self) -> LegMotion:
+        if self.stance is None:
+            raise ArgumentError(
+                "motion.phase is not known for a motor by side, or of a mechanism without a "
+                "mirror: read an angle by motion.of instead."
+            )
+        return self.stance
+
+
+def exchange_of(structure: Structure) -> Indices:
+    """Number of the body whose role each body takes where the sides of the mirror are exchanged."""
+    twin = list(range(len(structure.bodies)))
+    for one, other in structure.pairs:
+        twin[one], twin[other] = other, one
+    return tuple(twin)
+
+
+def exchanged(structure: Structure, motion: Motion) -> Motion:
+    """The same motion with the names of both sides exchanged."""
+    twin = exchange_of(structure)
+    return motion._replace(
+        angles=tuple(motion.angles[j] for j in twin), rates=tuple(motion.rates[j] for j in twin)
+    )
+
+
+def swings_at_section(structure: Structure, leg: int) -> bool:
+    """Whether a leg is on the side of the mirror that swings where a cycle begins."""
+    return any(first in structure.bodies_of_leg(leg) for first, _ in structure.pairs)
+
+
+class MotorTorque(NamedTuple):
+    """Torque of a motor [N·m], and the angle on which it acts."""
+
+    angle: Angle
+    torque: Scalar
+
+
+def motor_torque(
+    mechanism: Mechanism,
+    number: int,
+    motion: Motion,
+    slope: Scalar,
+    leg: int | None = None,
+    line: LegMotion | None = None,
+) -> MotorTorque:
+    """The torque of a motor while a leg stands.
+
+    The law of a motor by role is written for the second of each pair standing. While the first one
+    stands, the law sees the motion with both sides exchanged, and its torque is exchanged back.
+
+    Args:
+        mechanism: whose motor it is.
+        number: of the motor among the joint parts.
+        motion: angles and rates of all bodies.
+        slope: angle of the vertical [rad].
+        leg: number of the leg that stands; None for none.
+        line: from the root point to its feet.
+    """
+    structure, motor = mechanism.structure, mechanism.joints[number]
+    assert isinstance(motor, Motor)
+    own = structure.joints[number]
+    if motor.by == "side" or leg is None or not swings_at_section(structure, leg):
+        return MotorTorque(own, _told(motor, MotorMotion(structure, motion, slope, own, line)))
+    seen = MotorMotion(structure, exchanged(structure, motion), slope, own, line)
+    return MotorTorque(own.mirrored(exchange_of(structure)), _told(motor, seen))
+
+
+def _told(motor: Motor, motion: MotorMotion) -> Scalar:
+    words = f"the law of Motor({motor.angle!r})"
+    try:
+        torque = motor.law(motion)
+    except (jax.errors.ConcretizationTypeError, jax.errors.TracerArrayConversionError) as error:
+        raise ArgumentError(
+            f"{words} takes the motion for plain numbers, which is not allowed: write it with "
+            "jax.numpy, and a choice with jax.numpy.where."
+        ) from error
+    is_one = not isinstance(torque, list | tuple) and is_number(torque)
+    if not is_one and not isinstance(torque, jax.Array):
+        raise ArgumentError(_not_one_torque(words, repr(torque)))
+    known = jtu.tree_leaves(eqx.filter((motion.motion, motion.slope, motor), eqx.is_array_like))
+    shape, most = np.shape(torque), np.broadcast_shapes(*map(np.shape, known))
+    if shape != most[len(most) - len(shape) :] or jnp.iscomplexobj(torque):
+        told = f"an array of the shape {shape} and the type {jnp.result_type(torque)}"
+        raise ArgumentError(_not_one_torque(words, told))
+    return jnp.asarray(torque) if motor.share is None else motor.share * torque
+
+
+def _not_one_torque(words: str, told: str) -> str:
+    return f"{words} returns {told}, which is not allowed: it must return one torque [N m]."
+
+
+def motor_torques(
+    mechanism: Mechanism,
+    motion: Motion,
+    slope: Scalar,
+    legs: Sequence[LegMotion],
+    shares: Sequence[Scalar | None],
+) -> list[tuple[int, Angle, Scalar]]:
+    """Torques of all motors, those by role once for each leg that may carry [N·m].
+
+    Args:
+        mechanism: whose motors they are.
+        motion: angles and rates of all bodies.
+        slope: angle of the vertical [rad].
+        legs: the line of each leg.
+        shares: of the load, on each leg; None for one that never touches.
+
+    Returns:
+        The motor's number among the joint parts, the angle on which it acts, and the torque.
+    """
+    structure, found = mechanism.structure, []
+    for number, motor in enumerate(mechanism.joints):
+        if not isinstance(motor, Motor):
+            continue
+        if motor.by == "side" or not structure.pairs:
+            found.append((number, *motor_torque(mechanism, number, motion, slope)))
+            continue
+        for leg, (line, share) in enumerate(zip(legs, shares, strict=True)):
+            if share is not None:
+                told = motor_torque(mechanism, number, motion, slope, leg, line)
+                found.append((number, told.angle, share * told.torque))
+    return found
+
 
 WalkerScene: TypeAlias = CompliantScene | RigidScene
 """A walker that may be driven."""
@@ -33,7 +221,7 @@ def actuators_of(scene: WalkerScene, kind: type[_Part]) -> tuple[_Part, ...]:
     return tuple(part for part in scene.actuation or () if isinstance(part, kind))
 
 
-def _at_hip(scene: WalkerScene) -> tuple[AbstractHipActuator, ...]:
+def hip_actuators(scene: WalkerScene) -> tuple[AbstractHipActuator, ...]:
     return actuators_of(scene, AbstractHipActuator)  # type: ignore[type-abstract]
 
 
@@ -58,7 +246,7 @@ def load_shares(scene: WalkerScene, normal: tuple[Scalar | None, ...]) -> tuple[
 
 def hip_torques(scene: WalkerScene, hip: HipMotion) -> LegTorques | None:
     """Torque of all actuators on each leg [N·m]; None where the scene has none at the hip."""
-    return _sums(part.torques(hip) for part in _at_hip(scene))
+    return _sums(part.torques(hip) for part in hip_actuators(scene))
 
 
 def preload(scene: WalkerScene, leg: LegMotion) -> tuple[Scalar, Scalar] | None:
@@ -97,48 +285,3 @@ def with_driven_joints(
         for body, torque in zip(pairs[0], hip_torques(scene, hip()) or (), strict=False):
             loads = loads.with_torques(((body, 1.0),), torque)
     return loads
-
-
-class ActuatorPowers(NamedTuple):
-    """Powers of a scene's actuators, leaves shaped as the state's.
-
-    Attributes:
-        total: power of all torques and set points on the walker, including springs and dampers [W].
-        motors: power of each motor [W]: one for each actuator at the hip that has a motor, then
-            one for each foot.
-    """
-
-    total: Scalar
-    motors: tuple[Scalar, ...]
-
-
-def actuator_powers(
-    scene: WalkerScene,
-    hip: HipMotion | None,
-    feet: Sequence[tuple[Scalar | None, LegMotion]] = (),
-) -> ActuatorPowers:
-    """Powers of the actuators of a walker that moves like this.
-
-    Args:
-        scene: what moves.
-        hip: what actuators at the hip know; None where the walker has no pair of legs.
-        feet: normal force on each foot [N] and how its leg moves; none of rigid feet.
-    """
-    total = jnp.zeros_like(feet[0][1].rate if hip is None else hip.angle[0])
-    motors: list[Scalar] = []
-    if hip is not None:
-        torques = hip_torques(scene, hip)
-        if torques is not None:
-            total = total + _power(torques, hip)
-        driven = (part.motor_torques(hip) for part in _at_hip(scene))
-        motors += [_power(each, hip) for each in driven if each is not None]
-    for force, leg in feet:
-        moved = preload(scene, leg)
-        if moved is not None and force is not None:
-            motors.append(force * moved[1])
-            total = total + motors[-1]
-    return ActuatorPowers(total, tuple(motors))
-
-
-def _power(torques: LegTorques, hip: HipMotion) -> Scalar:
-    return torques[0] * hip.rate[0] + torques[1] * hip.rate[1]

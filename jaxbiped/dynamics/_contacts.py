@@ -20,14 +20,14 @@ from jaxbiped.dynamics._footfalls import (
 )
 from jaxbiped.dynamics._joint_loads import Pressed, stop_limits
 from jaxbiped.dynamics._tree import Pose, point_motion
-from jaxbiped.scene._ground import drop_under
+from jaxbiped.scene._ground import SteppedGround
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene._state_types import SomeState
 from jaxbiped.scene._structure import Structure
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw, AbstractNormalLaw
-from jaxbiped.scene.laws.friction._coulomb import Frictionless
+from jaxbiped.scene.laws._coulomb import Frictionless
 
 _JUST_TOUCHING = 1e-6
 """Depth or height of a foot that counts as at the surface, in units of the leg's length."""
@@ -59,8 +59,8 @@ def feet_at(
     scene: CompliantScene, poses: tuple[Pose, ...], bristles: tuple[Scalar | None, ...]
 ) -> tuple[FootMotion, ...]:
     """The feet of bodies in these poses."""
-    mechanism = scene.mechanism
-    structure, given = mechanism.structure, mechanism.feet
+    ground: object = scene.ground
+    structure, given = scene.mechanism.structure, scene.mechanism.feet
     points = tuple(
         point_motion(structure, poses[body], body, foot.centre)
         for body, foot in zip(structure.feet, given, strict=True)
@@ -77,9 +77,8 @@ def feet_at(
         slip = point.vx
         if radius is not None:
             depth, slip = radius - point.z, point.vx + radius * poses[body].motion.rates[body]
-        drop = drop_under(scene.ground, leg)
-        if drop is not None:
-            depth = depth - drop
+        if isinstance(ground, SteppedGround) and leg == ground.leg:
+            depth = depth - ground.drop
         moved = preload(scene, legs[leg])
         if moved is not None:
             depth, depth_rate = depth + moved[0], depth_rate + moved[1]

@@ -1,12 +1,20 @@
-"""Energies of the walker and the powers that change them."""
+"""Energies of the walker and the powers that change them: gravity's, contacts', actuators'."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import kept_alone
-from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers, load_shares
+from jaxbiped.dynamics._actuation import (
+    WalkerScene,
+    hip_actuators,
+    hip_torques,
+    load_shares,
+    motor_torques,
+    preload,
+)
 from jaxbiped.dynamics._contacts import (
     feet,
     foot_force,
@@ -16,13 +24,16 @@ from jaxbiped.dynamics._contacts import (
     normal_forces,
 )
 from jaxbiped.dynamics._equivalent_states import motion_in, poses_of
-from jaxbiped.dynamics._footfalls import FootMotion, touches
-from jaxbiped.dynamics._joint_loads import JointEnergy, joint_energy
-from jaxbiped.dynamics._motor_motion import motor_powers
-from jaxbiped.dynamics._tree import PointMotion, point_motion
+from jaxbiped.dynamics._footfalls import LegMotion, touches
+from jaxbiped.dynamics._joint_loads import JointEnergy, angle_value, joint_energy
+from jaxbiped.dynamics._stance import Stance, of_stance
+from jaxbiped.dynamics._tree import Motion, PointMotion, point_motion
+from jaxbiped.linalg._sparse_lu import product
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._state_types import State
+from jaxbiped.scene.actuation._abstract_actuator import HipMotion, LegTorques
 
 
 class Energies(NamedTuple):
@@ -68,6 +79,19 @@ class Powers(NamedTuple):
     motors: tuple[Scalar, ...] | None = None
 
 
+class ActuatorPowers(NamedTuple):
+    """Powers of a scene's actuators, leaves shaped as the state's.
+
+    Attributes:
+        total: power of all torques and set points on the walker, including springs and dampers [W].
+        motors: power of each motor [W]: one for each actuator at the hip that has a motor, then
+            one for each foot.
+    """
+
+    total: Scalar
+    motors: tuple[Scalar, ...]
+
+
 @kept_alone
 def energies(scene: Scene, state: State) -> Energies:
     """Kinetic, gravitational and elastic energy; leaves shaped as the state's.
@@ -80,7 +104,10 @@ def energies(scene: Scene, state: State) -> Energies:
         The three energies [J], leaves shaped as the state's.
     """
     kinetic, moment = kinetic_and_moment(scene, state)
-    elastic = sum(_elastic_energy(scene, foot) for foot in feet(scene, state))
+    elastic = sum(
+        jnp.where(touches(foot), scene.normal.elastic_energy(foot.penetration), 0.0)
+        for foot in feet(scene, state)
+    )
     joints = _joint_energy(scene, state)
     if joints is not None:
         elastic = elastic + joints.stored
@@ -170,5 +197,62 @@ def _actuator_powers(scene: Scene, state: State) -> ActuatorPowers:
     return ActuatorPowers(sum(told, of_parts.total), of_parts.motors + tuple(told))
 
 
-def _elastic_energy(scene: Scene, foot: FootMotion) -> Scalar:
-    return jnp.where(touches(foot), scene.normal.elastic_energy(foot.penetration), 0.0)
+def kinetic_energy(scene: AbstractWalkerScene, state: Any) -> Scalar:
+    """Kinetic energy of a rigid walker in a state [J]."""
+
+    def energy(stance: Stance) -> Scalar:
+        motion = stance.pose.motion
+        rates = dict(enumerate((motion.vx, motion.vz, *motion.rates)))
+        momenta: Any = product(stance.mass_matrix(), rates)
+        others = (rates[i] * momenta[i] for i in range(1, len(rates)))
+        found: Scalar = 0.5 * sum(others, rates[0] * momenta[0])
+        return found
+
+    return of_stance(scene, state, energy)
+
+
+def actuator_powers(
+    scene: WalkerScene,
+    hip: HipMotion | None,
+    feet: Sequence[tuple[Scalar | None, LegMotion]] = (),
+) -> ActuatorPowers:
+    """Powers of the actuators of a walker that moves like this.
+
+    Args:
+        scene: what moves.
+        hip: what actuators at the hip know; None where the walker has no pair of legs.
+        feet: normal force on each foot [N] and how its leg moves; none of rigid feet.
+    """
+    total = jnp.zeros_like(feet[0][1].rate if hip is None else hip.angle[0])
+    motors: list[Scalar] = []
+    if hip is not None:
+        torques = hip_torques(scene, hip)
+        if torques is not None:
+            total = total + _power(torques, hip)
+        driven = (part.motor_torques(hip) for part in hip_actuators(scene))
+        motors += [_power(each, hip) for each in driven if each is not None]
+    for force, leg in feet:
+        moved = preload(scene, leg)
+        if moved is not None and force is not None:
+            motors.append(force * moved[1])
+            total = total + motors[-1]
+    return ActuatorPowers(total, tuple(motors))
+
+
+def _power(torques: LegTorques, hip: HipMotion) -> Scalar:
+    return torques[0] * hip.rate[0] + torques[1] * hip.rate[1]
+
+
+def motor_powers(
+    mechanism: Mechanism,
+    motion: Motion,
+    slope: Scalar,
+    legs: Sequence[LegMotion],
+    shares: Sequence[Scalar | None],
+) -> tuple[Scalar, ...]:
+    """Power of each motor on the walker [W]; see `motor_torques`."""
+    found: dict[int, Scalar] = {}
+    for number, angle, torque in motor_torques(mechanism, motion, slope, legs, shares):
+        power = torque * angle_value(angle, motion.rates, None)
+        found[number] = found[number] + power if number in found else power
+    return tuple(found.values())

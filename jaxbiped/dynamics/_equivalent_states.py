@@ -1,4 +1,4 @@
-"""Equivalent states: one motion in minimal and in redundant coordinates, and in a mirror's names.
+"""Equivalent states: one motion in the coordinates of other scenes, and in a mirror's names.
 
 In redundant coordinates each body has its own.
 """
@@ -14,9 +14,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._joint_loads import motion_of
-from jaxbiped.dynamics._stance import stance_on
-from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import OF_BODIES
+from jaxbiped.dynamics._stance import angles_and_rates, of_stance, stance_on
+from jaxbiped.dynamics._state import OF_BODIES, state_type
 from jaxbiped.dynamics._tree import Motion, Pose, point_motion, pose_of
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._linkages import loaded_bodies
@@ -46,12 +45,9 @@ class BodyMotion(NamedTuple):
     rate: Scalar
 
 
-def body_motions(structure: Structure, state: BodiesState) -> tuple[BodyMotion, ...]:
-    """Every body in a redundant state."""
-    return tuple(_body_motion(state, name) for name in structure.bodies)
-
-
 def _body_motion(state: BodiesState, body: str) -> BodyMotion:
+    """A body, by its name, in a redundant state."""
+
     def own(name: str) -> Scalar:
         return getattr(state, f"{name}_{body}")
 
@@ -94,7 +90,8 @@ def poses_of(scene: AbstractWalkerScene, state: CompliantState) -> tuple[Pose, .
     structure = mechanism.structure
     if not is_redundant(state):
         return (pose_of(mechanism, motion_in(scene, state)),) * len(structure.bodies)
-    bodies, origin = body_motions(structure, state), jnp.zeros_like(state[0])
+    bodies = [_body_motion(state, name) for name in structure.bodies]
+    origin = jnp.zeros_like(state[0])
     turned = tuple(each.angle for each in bodies), tuple(each.rate for each in bodies)
     pose = pose_of(mechanism, Motion(origin, origin, origin, origin, *turned))
     found = []
@@ -233,3 +230,36 @@ def _turned(structure: Structure, state: SomeState, times: int) -> dict[str, Any
         own = values[first], values[second]
         values |= {first: c * own[0] - s * own[1], second: s * own[0] + c * own[1]}
     return values
+
+
+@kept_alone
+def whole_state(scene: AbstractWalkerScene, state: Any) -> Any:
+    """The same motion in the compliant walker's coordinates, with the stance foot just touching.
+
+    Args:
+        scene: the walker, of any kind.
+        state: state of a rigid walker, leaves of any common shape, SI units.
+
+    Returns:
+        A state of the compliant walker (a `State` for `Walker`), leaves shaped as the state's.
+    """
+    z, vx, vz = of_stance(scene, state, lambda stance: stance.root[1:4])
+    structure = scene.mechanism.structure
+    angles, rates = angles_and_rates(structure, state)
+    kind = state_type_of((*structure.coordinates, *structure.rates))
+    return kind(state[0], z, *angles, vx, vz, *rates)
+
+
+def rigid_state(state: Any) -> Any:
+    """The part of a compliant walker's state that a rigid walker's state has.
+
+    Args:
+        state: state in which the second of each mirrored pair stands, leaves of any common shape,
+            SI units.
+
+    Returns:
+        Place of the root point, angles and rates, leaves shaped as the state's.
+    """
+    place, *names = state._fields
+    kept = [place, *(name for name in names if name.startswith(("theta_", "omega_")))]
+    return state_type_of(kept)(*(getattr(state, name) for name in kept))

@@ -98,25 +98,24 @@ def carrier_place(
     place = places[others[0]]
     if len(others) == 1:
         return place
-    deepest = _depth(structure, feet, others[0])
+    deepest = leg_depth(structure, feet, others[0], admitted=True)
     for i in others[1:]:
-        depth = _depth(structure, feet, i)
+        depth = leg_depth(structure, feet, i, admitted=True)
         place = jnp.where(depth > deepest, places[i], place)
         deepest = jnp.maximum(depth, deepest)
     return place
 
 
-def leg_depth(structure: Structure, feet: Sequence[FootMotion], leg: int) -> Scalar:
-    """How deep the deepest foot of a leg is [m]."""
-    return functools.reduce(jnp.maximum, [feet[k].penetration for k in structure.feet_of_leg[leg]])
-
-
-def _depth(structure: Structure, feet: Sequence[FootMotion], leg: int) -> Scalar:
-    """How deep the deepest foot of a leg that may touch is [m]."""
+def leg_depth(
+    structure: Structure, feet: Sequence[FootMotion], leg: int, *, admitted: bool = False
+) -> Scalar:
+    """How deep the deepest foot of a leg is [m]; of those that may touch, if only `admitted`."""
     depths = []
-    for k in structure.feet_of_leg[leg]:
-        depth, admitted = feet[k].penetration, feet[k].admitted
-        depths.append(depth if admitted is None else jnp.where(admitted, depth, -jnp.inf))
+    for foot in (feet[k] for k in structure.feet_of_leg[leg]):
+        depth = foot.penetration
+        if admitted and foot.admitted is not None:
+            depth = jnp.where(foot.admitted, depth, -jnp.inf)
+        depths.append(depth)
     return functools.reduce(jnp.maximum, depths)
 
 
@@ -156,31 +155,23 @@ def mean(values: Sequence[Scalar]) -> Scalar:
 
 
 def leg_motions(
-    structure: Structure,
-    poses: Sequence[Pose],
-    points: Sequence[PointMotion],
+    structure: Structure, poses: Sequence[Pose], points: Sequence[PointMotion]
 ) -> tuple[LegMotion, ...]:
     """The lines of all legs, from where their feet's centres are and how they move.
 
     Where all feet of a leg are on one body that hangs on the root point, its line is fixed in the
     body, so that its rate is the body's, exactly.
     """
-    return tuple(_line(structure, leg, poses, points) for leg in structure.feet_of_leg)
-
-
-def _line(
-    structure: Structure,
-    leg: tuple[int, ...],
-    poses: Sequence[Pose],
-    points: Sequence[PointMotion],
-) -> LegMotion:
-    bodies = {structure.feet[k] for k in leg}
-    first = structure.feet[leg[0]]
-    motion = poses[first].motion
-    x = mean([points[k].x for k in leg]) - motion.x
-    z = mean([points[k].z for k in leg]) - motion.z
-    if len(bodies) == 1 and structure.parents[first] < 0:
-        return LegMotion(x, z, motion.rates[first])
-    vx = mean([points[k].vx for k in leg]) - motion.vx
-    vz = mean([points[k].vz for k in leg]) - motion.vz
-    return LegMotion(x, z, (x * vz - z * vx) / (x * x + z * z))
+    found = []
+    for leg in structure.feet_of_leg:
+        bodies, first = {structure.feet[k] for k in leg}, structure.feet[leg[0]]
+        motion = poses[first].motion
+        x = mean([points[k].x for k in leg]) - motion.x
+        z = mean([points[k].z for k in leg]) - motion.z
+        if len(bodies) == 1 and structure.parents[first] < 0:
+            found.append(LegMotion(x, z, motion.rates[first]))
+            continue
+        vx = mean([points[k].vx for k in leg]) - motion.vx
+        vz = mean([points[k].vz for k in leg]) - motion.vz
+        found.append(LegMotion(x, z, (x * vz - z * vx) / (x * x + z * z)))
+    return tuple(found)

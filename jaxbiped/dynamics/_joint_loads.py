@@ -12,10 +12,10 @@ from jaxbiped.dynamics._tree import Loads, Motion
 from jaxbiped.dynamics._tree_inertia import Elimination, substitute
 from jaxbiped.linalg._small_matrices import inverse
 from jaxbiped.linalg._sparse_lu import plus
-from jaxbiped.scene._couplings import with_fixed
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._mechanism_pieces import with_fixed
 from jaxbiped.scene._structure import Angle, Structure, weighted
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 

@@ -28,9 +28,9 @@ from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, Pose, point_motion, pose_of
 from jaxbiped.dynamics._tree_inertia import (
     Composites,
-    centrifugal_loads,
     composites,
     eliminate,
+    inertial_loads,
 )
 from jaxbiped.linalg._sparse_lu import SparseMatrix, times
 from jaxbiped.scene._ground import gravity_on
@@ -56,7 +56,7 @@ def accelerations(scene: Scene, state: Any) -> Any:
     """
     at = _at(scene, state)
     structure, known, pose = at.mechanism.structure, at.known, at.pose
-    loads = _with_applied_loads(centrifugal_loads(structure, known, pose), scene, at)
+    loads = _with_applied_loads(inertial_loads(structure, known, pose), scene, at)
     factors = eliminate(structure, known, pose)
     moved = with_constraint_torques(structure, at.mechanism.joints, factors, loads)
     downhill, weight = gravity_on(scene.ground)

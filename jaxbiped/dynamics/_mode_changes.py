@@ -15,7 +15,7 @@ from jaxbiped.dynamics._holds import ROUNDING, gap_of
 from jaxbiped.dynamics._plastic_impact import Grip, Struck, plastic_impact
 from jaxbiped.dynamics._rolling import Turning, ground_force, turning_of
 from jaxbiped.dynamics._stance import Stance, of_stance, stance_on
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.scene._modes import THROUGH_STRIKE, Mode, Modes
 from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
 from jaxbiped.scene._scene import RigidScene
@@ -98,7 +98,6 @@ def grip_at_strike(scene: RigidScene, old: Stance) -> Grip:
     where their stops hold through heel strike, else while they are pressed on.
     """
     modes, mode = rigid_modes(old.mechanism), old.mode
-    assert mode is not None
     stood = old.leg
     loose = [
         each if limit.leg != stood or limit.holds == THROUGH_STRIKE else True
@@ -135,7 +134,6 @@ def _still(scene: RigidScene) -> Scalar:
 def mode_after_strike(scene: RigidScene, old: Stance, found: Struck) -> Mode:
     """The mode after a heel strike, sides exchanged: the leg that stood locks nothing any more."""
     modes, mode = rigid_modes(old.mechanism), old.mode
-    assert mode is not None
     stood = old.leg
     held = [found.held[i] for i in modes.twins]
     loose = dict(zip(modes.locks, mode.loose, strict=True))
@@ -179,7 +177,6 @@ def _changed(
     scene: RigidScene, state: Any, old: Stance, slack: Scalar | float, least: Scalar | float
 ) -> Any:
     mechanism, modes, mode = old.mechanism, rigid_modes(old.mechanism), old.mode
-    assert mode is not None
     if not old.may_hold:
         return state
     hits = _hits(scene, old, modes, mode, slack)
@@ -231,7 +228,6 @@ def settled(scene: RigidScene, state: Any, leg: int, least: Scalar | float = 0.0
     found, stance = _pressed(scene, state, leg, least), stance_on(scene, state, leg)
     if not stance.stands:
         return found
-    assert stance.mode is not None
     first, second = stance.stands
     loads = foot_loads(scene, *_turned(scene, found, leg))
     bearing = least * (scene.mechanism.total_mass * scene.ground.g)
@@ -255,7 +251,6 @@ def _pressed(scene: RigidScene, state: Any, leg: int, least: Scalar | float) -> 
     mode, holds, held = stance.mode, turning.holds, stance.held
     if holds is None:
         return state
-    assert mode is not None
     count = len(held) - len(modes.limits)
     if modes.limits:
         loose = [*[False] * count, *_loose(modes, mode)]

@@ -9,8 +9,7 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._holds import holds_of
 from jaxbiped.dynamics._implicit_field import fold, fold_matrix
 from jaxbiped.dynamics._joint_loads import of_all_bodies
-from jaxbiped.dynamics._stance import Stance
-from jaxbiped.dynamics._standing_tree import Sole, either, sole_of
+from jaxbiped.dynamics._stance import Sole, Stance, either, sole_of
 from jaxbiped.dynamics._tree import Loads
 from jaxbiped.linalg._sparse_lu import factorise, plus, product
 from jaxbiped.scene._modes import Modes

@@ -1,27 +1,25 @@
 """Equations of motion in redundant coordinates: each body by itself, held by constraints."""
 
-import functools
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
+from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.compiler import kept_alone
-from jaxbiped.constraints._linkage_constraints import (
-    constraints_of,
-    headings_of,
-    row_times,
-    torque_on,
-    turn_of,
+from jaxbiped.constraints._linkage import row_times, torque_on, turn_of
+from jaxbiped.dynamics._constrained_motion import (
+    LinkageMotion,
+    coordinates_of,
+    motion_under,
+    with_coordinates,
 )
-from jaxbiped.dynamics._contacts import bristles_of, feet_at, foot_force
+from jaxbiped.dynamics._contacts import bristles_of, feet, feet_at, foot_force
 from jaxbiped.dynamics._equivalent_states import BodiesState, poses_of
 from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
-from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
-from jaxbiped.dynamics._minimal_motion import bristle_rates, with_torques
+from jaxbiped.dynamics._joint_loads import of_all_bodies
+from jaxbiped.dynamics._minimal_motion import accelerations, bristle_rates, with_torques
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import (
     Arm,
@@ -37,7 +35,7 @@ from jaxbiped.linalg._sparse_lu import SparseMatrix, times
 from jaxbiped.scene._bodies import Point
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._linkages import loaded_bodies
-from jaxbiped.scene._scene import RedundantScene
+from jaxbiped.scene._scene import CompliantScene, RedundantScene
 from jaxbiped.scene._state_types import state_type_of
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
@@ -57,24 +55,6 @@ class HipForce(NamedTuple):
     z: Scalar
 
 
-class Violation(NamedTuple):
-    """Violation of the constraints by a redundant state, leaves shaped as the state's.
-
-    Attributes:
-        position: largest distance between the positions of a hinge on its two bodies [m].
-        rate: largest relative speed of these positions [m/s].
-        normalisation: largest | cos² + sin² − 1 | of a body's Euler parameters; 0 without them.
-        angle: largest violation of a coupling [rad]; 0 without couplings.
-        angle_rate: largest rate of such a violation [rad/s].
-    """
-
-    position: RealScalarLike
-    rate: RealScalarLike
-    normalisation: RealScalarLike
-    angle: RealScalarLike = 0.0
-    angle_rate: RealScalarLike = 0.0
-
-
 class RedundantMotion(NamedTuple):
     """Motion of a redundant walker at a state, leaves shaped as the state's.
 
@@ -88,17 +68,6 @@ class RedundantMotion(NamedTuple):
     accelerations: list[Scalar]
     hip_force: HipForce
     minimal: Any
-
-
-def coordinates_of(scene: RedundantScene, state: BodiesState) -> tuple[list[Scalar], list[Scalar]]:
-    """Coordinates and rates of a redundant state as the linkage has them."""
-    count = len(scene.mechanism.structure.bodies) * scene.linkage.coordinates
-    return list(state[:count]), list(state[count : 2 * count])
-
-
-def with_coordinates(state: PyTree, q: list[Scalar], v: list[Scalar]) -> BodiesState:
-    """The state with other coordinates and rates; bristles stay."""
-    return type(state)(*q, *v, *state[len(q) + len(v) :])
 
 
 @kept_alone
@@ -165,45 +134,12 @@ def _(scene: RedundantScene) -> VectorField:
     return BodiesField()
 
 
-@kept_alone
-def violation(scene: RedundantScene, state: BodiesState) -> Violation:
-    """Violations of hinges and couplings, and their rates of change.
-
-    Args:
-        scene: the walker and its constraint method.
-        state: redundant, leaves of any common shape, SI units.
-
-    Returns:
-        Distance [m], relative speed [m/s], normalisation [–], angle [rad] and its rate [rad/s],
-        leaves shaped as the state's.
-    """
-    linkage = scene.linkage
-    at = constraints_of(linkage, *coordinates_of(scene, state))
-    points = 2 * len(linkage.joints)
-    angles = points + len(linkage.angles)
-
-    def most(values: Sequence[Scalar]) -> Scalar:
-        return functools.reduce(jnp.maximum, map(jnp.abs, values), jnp.zeros_like(state[0]))
-
-    def apart(values: Sequence[Scalar]) -> Scalar:
-        return most([jnp.hypot(*values[i : i + 2]) for i in range(0, points, 2)])
-
-    return Violation(
-        position=apart(at.violation),
-        rate=apart(at.rate),
-        normalisation=most(at.violation[angles:]),
-        angle=most(at.violation[points:angles]),
-        angle_rate=most(at.rate[points:angles]),
-    )
-
-
 def _linkage_motion(scene: RedundantScene, state: BodiesState) -> LinkageMotion:
     q, v = coordinates_of(scene, state)
     poses, linkage = poses_of(scene, state), scene.linkage
     circular = list(zip(poses[0].sines, poses[0].cosines, strict=True))
-    headings = headings_of(linkage, q, v, circular)
     applied = _applied_forces(scene, state, poses)
-    return motion_under(linkage, scene.method, q, v, applied, headings)
+    return motion_under(linkage, scene.method, q, v, applied, circular)
 
 
 def _applied_forces(
@@ -256,3 +192,40 @@ def _minimal_accelerations(
     root = (mean(values) for values in zip(*roots, strict=True))
     kind = state_type_of(structure.accelerations)
     return kind(*root, *(turning[j] for j in structure.free)), roots[0]
+
+
+@kept_alone
+def hip_force(scene: CompliantScene, state: PyTree) -> HipForce:
+    """The reaction of the root point's hinge on the first body, in either formulation.
+
+    In minimal coordinates, it does no work and does not occur in the equations. It is the remainder
+    of Newton's law for the first body with everything that hangs on it: m (a − g) minus the
+    ground's force.
+
+    Args:
+        scene: the walker, in minimal or redundant coordinates.
+        state: of the scene's kind, leaves of any common shape, SI units.
+
+    Returns:
+        The force [N], leaves shaped as the state's.
+    """
+    if isinstance(scene, RedundantScene):
+        return redundant_motion(scene, state).hip_force
+    mechanism, pose = scene.mechanism, poses_of(scene, state)[0]
+    structure, second = mechanism.structure, accelerations(scene, state)
+    turning = of_all_bodies(structure, second[2:], second[0])
+    downhill, weight = gravity_on(scene.ground)
+    force_x = force_z = jnp.zeros_like(state[0])
+    for j, body in enumerate(mechanism.bodies):
+        if structure.chains[j][0] == 0:
+            centre = point_motion(structure, pose, j, body.centre)
+            ax, az = point_acceleration(centre, pose.motion.rates, turning)
+            force_x = force_x + body.mass * (ax + second[0] - downhill)
+            force_z = force_z + body.mass * (az + second[1] + weight)
+    for j, foot in zip(structure.feet, feet(scene, state), strict=True):
+        if structure.chains[j][0] == 0:
+            reaction = foot_force(scene, foot)
+            force_z = force_z - reaction.normal
+            if reaction.tangential is not None:
+                force_x = force_x - reaction.tangential
+    return HipForce(force_x, force_z)

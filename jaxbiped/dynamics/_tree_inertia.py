@@ -179,7 +179,10 @@ def _of_symmetric(matrix: tuple[Scalar, Entry, Scalar], x: Entry, z: Entry) -> t
 
 
 def inertial_loads(
-    structure: Structure, known: Composites, pose: Pose, accelerations: Sequence[Entry] | None
+    structure: Structure,
+    known: Composites,
+    pose: Pose,
+    accelerations: Sequence[Entry] | None = None,
 ) -> Loads:
     """Generalised forces of the motion itself, in the frame that falls freely (d'Alembert's).
 
@@ -230,11 +233,6 @@ def inertial_loads(
     for k in structure.children[-1]:
         x, z = plus(x, forces[k][0]), plus(z, forces[k][1])
     return Loads(x, z, tuple(torques))
-
-
-def centrifugal_loads(structure: Structure, known: Composites, pose: Pose) -> Loads:
-    """Generalised forces of the motion itself without accelerations, in the falling frame."""
-    return inertial_loads(structure, known, pose, None)
 
 
 def mass_entries(structure: Structure, known: Composites, pose: Pose) -> SparseMatrix:

@@ -2,8 +2,7 @@
 
 from jaxbiped.gait._find_gaits import Gaits as Gaits
 from jaxbiped.gait._fixed_point_search import Search as Search
-from jaxbiped.gait._homotopy import BranchEnd as BranchEnd
-from jaxbiped.gait._measures import Measures as Measures
+from jaxbiped.gait._gait import Measures as Measures
 from jaxbiped.gait._orbit_derivatives import Slopes as Slopes
 from jaxbiped.gait._orbit_derivatives import slopes_of as slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn as LinearisedReturn
@@ -13,6 +12,7 @@ from jaxbiped.gait._return_map_spec import AbstractGradient as AbstractGradient
 from jaxbiped.gait._return_map_spec import Forward as Forward
 from jaxbiped.gait._return_map_spec import Implicit as Implicit
 from jaxbiped.gait._return_map_spec import Reverse as Reverse
+from jaxbiped.gait._search_provenance import BranchEnd as BranchEnd
 from jaxbiped.gait._search_provenance import FoundBy as FoundBy
 from jaxbiped.gait._search_provenance import Origin as Origin
 from jaxbiped.gait._search_provenance import OtherGait as OtherGait

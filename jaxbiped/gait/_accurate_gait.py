@@ -13,8 +13,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._measures import Measures
+from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._return_map_spec import orbit_solver
 from jaxbiped.gait._search_provenance import unknown_derivatives
 from jaxbiped.scene._abstract_scene import AbstractScene

@@ -2,9 +2,11 @@
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, Literal, cast
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any, Literal
 
 import diffrax
+import equinox as eqx
 import jax
 import jax.tree_util as jtu
 import numpy as np
@@ -12,39 +14,35 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice, check_count, check_unbatched
 from jaxbiped._jax_versions import without_switches
-from jaxbiped._progress import Stage, stage
-from jaxbiped._types import in_64_bits, is_traced
-from jaxbiped.caching._caches import bounded_cache
-from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._consistent_state import consistent_state
-from jaxbiped.dynamics._equivalent_states import BodiesState, minimal_state
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped._progress import stage
+from jaxbiped._types import is_traced
+from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
+from jaxbiped.compiler import deferred_checks, host_jit
+from jaxbiped.dynamics._equivalent_states import BodiesState
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
-    Search,
     search,
     search_by_lanes,
     walks_only,
 )
-from jaxbiped.gait._gait import Gait, summarise_gait
-from jaxbiped.gait._guess_free_search import is_whole, origin_of, search_in_stages, spectral_radius
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._gait_summary import summarise_gait, without_held
+from jaxbiped.gait._guess_free_search import is_stable, search_on
+from jaxbiped.gait._homotopy import search_along
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes
-from jaxbiped.gait._search_along import search_along
-from jaxbiped.gait._search_compilation import compile_once
-from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_unknown
-from jaxbiped.gait._search_starts import default_guess, state_of_guess
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.gait._search_provenance import FoundBy, single_stage_origin, warn_of_unknown
+from jaxbiped.gait._search_starts import start_of_search
+from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._rigid_feet import held_count
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
 from jaxbiped.solve._error_estimate import check_wanted
-from jaxbiped.variational._hybrid_system import section_of, with_leg_names_of
+from jaxbiped.variational._hybrid_system import section_of
 
 if TYPE_CHECKING:
     import optax
@@ -159,7 +157,7 @@ def find_gait(
     arrivals = arrivals_of(scene, footsteps)
     check_unbatched("scene", scene)
     section = section_of(scene, section)
-    start = _check_start(scene, section, guess)
+    start = start_of_search(scene, section, guess)
     check_unbatched("guess", start, "one state")
     most = (40 if method == "newton" else 400) if max_evaluations is None else max_evaluations
     check_count("max_evaluations", most)
@@ -197,73 +195,19 @@ def find_gait(
             found = walks_only(search(problem))
         return summarise_gait(asked, found, names, radius, origin)
     with stage("searching for a gait", unit="searches", show=progress) as now:
-        compile_once(_search, problem, asked, names, radius, origin)
+        once = _compilation_of(_kind_of((problem, names, radius)))
+        once(lambda: _compile(problem, asked, names, radius, origin))
         found, told = _search(problem), origin
         now.update()
         found = found if staged else walks_only(found)
-        if staged and not (_is_stable(found) and is_whole(found, problem)):
-            found, told = _search_on(problem, found, engine, now)
+        if staged and not is_stable(found, problem):
+            found, told = search_on(_search_within, problem, found, engine, now)
         now.update(0, "measuring it")
         gait = summarise_gait(asked, found, names, radius, origin)
     if told is not origin:  # its scene may be of another structure, as of motors with a share
         gait = dataclasses.replace(gait, origin=jtu.tree_map(np.asarray, told))
     warn_of_unknown(gait)
-    return _without_held(scene, gait)
-
-
-def _is_stable(found: Found) -> bool:
-    usable = int(found.ending) == int(Search.FOUND) and bool(found.sound)
-    return usable and spectral_radius(found) < 1.0
-
-
-def _search_on(
-    problem: FixedPointProblem, first: Found, engine: str, now: Stage
-) -> tuple[Found, Origin]:
-    """The stages of a search beyond the first."""
-    scene, start, method = problem.args, problem.guess, problem.method
-    assert method is not None
-    scout = return_map_spec(
-        scene.minimal,
-        start,
-        solver=None,
-        engine="auto" if scene.redundant else engine,
-        max_solver_steps=ACCURACIES["balanced"].max_solver_steps,
-    )
-
-    def search_from(other: FixedPointProblem, patience: int) -> Found:
-        most = np.asarray(min(patience, method.max_evaluations))
-        return _search(other._replace(method=dataclasses.replace(method, patience=most)))
-
-    staged = search_in_stages(search_from, problem, scout, first, now)
-    found = walks_only(first) if staged.best is None else staged.best.found
-    return found, origin_of(staged, problem)
-
-
-def _check_start(
-    scene: AbstractWalkerScene, section: AbstractSection, guess: PyTree
-) -> WalkerState:
-    start = default_guess(scene) if guess is None else guess
-    if scene.redundant and not isinstance(guess, Gait):  # whose state is minimal
-        start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
-    start = in_64_bits(state_of_guess(scene.minimal, start))
-    return with_leg_names_of(section, scene.minimal, start)
-
-
-def _without_held(scene: AbstractWalkerScene, gait: Gait) -> Gait:
-    """A gait without the multipliers, all zero, of what is held where its cycle begins.
-
-    Those of a state's mode and of the angles and rates that a stop or a flat foot holds.
-    """
-    mode = float(getattr(gait.measures.state, "mode", np.nan))
-    if not np.isfinite(mode):
-        return gait
-    own = slice(np.shape(gait.multipliers)[-1] - 1 - 2 * held_count(scene.mechanism, mode))
-    return dataclasses.replace(
-        gait,
-        multipliers=gait.multipliers[own],
-        multiplier_errors=gait.multiplier_errors[own],
-        directions=gait.directions[:, own],
-    )
+    return without_held(scene, gait)
 
 
 @bounded_cache(1)  # the same object each time, so that nothing is compiled again
@@ -278,4 +222,53 @@ def _search(problem: FixedPointProblem) -> Found:
     # Without weak types, which would make the next program another one than was compiled.
     return jtu.tree_map(
         lambda leaf: jax.lax.convert_element_type(leaf, leaf.dtype), search(problem)
+    )
+
+
+def _search_within(problem: FixedPointProblem, patience: int) -> Found:
+    """A search in at most so many evaluations."""
+    method = problem.method
+    assert method is not None
+    most = np.asarray(min(patience, method.max_evaluations))
+    return _search(problem._replace(method=dataclasses.replace(method, patience=most)))
+
+
+@bounded_cache(PROGRAMS)
+def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
+    return Once()
+
+
+def _compile(problem: FixedPointProblem, asked: FixedPointProblem, *more: Any) -> None:
+    """Compiles a search and what summarises it, and what lanes run for both, at the same time."""
+    told = stage("compiling the search (first time for this kind of scene)")
+    with told, ThreadPoolExecutor() as meanwhile:
+        with deferred_checks() as programs:
+            # What takes lanes longest begins first.
+            begun = _search.begin(problem)
+            ready = [meanwhile.submit(begun.finish)]
+            no_result = _empty_arrays(begun.result)
+            ready.append(meanwhile.submit(summarise_gait.begin(asked, no_result, *more).finish))
+        try:
+            for program in programs:
+                program.check()
+        except BaseException:
+            _search.clear()  # it would be found compiled, and fail where XLA runs it
+            raise
+        for each in ready:
+            each.result()
+
+
+def _kind_of(tree: PyTree) -> tuple[object, ...]:
+    """What decides whether one compiled program can serve for another."""
+    arrays, rest = eqx.partition(tree, eqx.is_array)
+    shapes = tuple((leaf.shape, leaf.dtype) for leaf in jtu.tree_leaves(arrays))
+    leaves, structure = jtu.tree_flatten(rest)
+    return jtu.tree_structure(arrays), shapes, tuple(leaves), structure
+
+
+def _empty_arrays(shape: PyTree) -> PyTree:
+    return jtu.tree_map(
+        # Made by NumPy: JAX would compile a program for every shape.
+        lambda leaf: np.full(leaf.shape, np.nan if leaf.dtype.kind == "f" else 0, leaf.dtype),
+        shape,
     )

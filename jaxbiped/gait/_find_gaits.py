@@ -11,12 +11,12 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import RigidState, State, WalkerState
 
 _SAME = 1e-4

@@ -1,46 +1,63 @@
-"""Periodic gait: its state, measures, stability and sensitivities, found or not."""
+"""Periodic gait: its state, measures, stability and sensitivities, found or not, and its table."""
 
-from typing import TYPE_CHECKING
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
-import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._checks import check_unbatched
 from jaxbiped._ending import Ending
 from jaxbiped._quantity import Quantity
 from jaxbiped._summary import notebook_html, summary
-from jaxbiped._tables import Tabular, variables_of
+from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped._types import Scalar, by_numpy
-from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_names, state_quantity
 from jaxbiped.gait._fixed_point_search import (
-    FixedPointProblem,
-    Found,
     Search,
-    minimal_cycle,
-    search_by_lanes,
 )
-from jaxbiped.gait._gait_table import gait_coordinates, gait_entries
-from jaxbiped.gait._measures import (
-    Measures,
-    elasticities_of,
-    measure_errors,
-    measure_slopes,
-    nodes_of,
-    speed_backwards,
-    step_lengths,
-)
-from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
-from jaxbiped.gait._search_provenance import FoundBy, Origin, OtherGait
+from jaxbiped.gait._search_provenance import BranchEnd, FoundBy, Origin, OtherGait
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.scene._parameter_access import parameter_quantities
 from jaxbiped.solve._error_estimate import ErrorEstimate
 
 if TYPE_CHECKING:
     import xarray
+
+QUANTITIES = {
+    "period": Quantity("period", "$T$", "s"),
+    "step_length": Quantity("step length", "$L$", "m"),
+    "speed": Quantity("speed", "$v$", "m/s"),
+    "peak_normal": Quantity("peak normal force", "$F$", "N"),
+    "spectral_radius": Quantity("spectral radius", "$\\rho$"),
+}
+"""What is measured of a gait by the fields of its `Measures`, the state left out."""
+
+
+class Measures(NamedTuple):
+    """Measures of a gait, or their derivatives; all leaves have one shape.
+
+    The peak force of a rigid walker is that of single support; its impacts have impulses instead.
+
+    Attributes:
+        period: duration of the cycle [s].
+        step_length: advance along the slope in a cycle [m].
+        speed: mean speed along the slope [m/s].
+        peak_normal: largest normal force on a foot [N]; None if the gradient mode does not provide
+            it.
+        spectral_radius: largest absolute value of a Floquet multiplier, without the trivial one;
+            None if the gradient mode does not provide it.
+        state: the state on the section, a `State` or a `RigidState`, hip_x zero.
+    """
+
+    period: Scalar
+    step_length: Scalar
+    speed: Scalar
+    peak_normal: PyTree
+    spectral_radius: PyTree
+    state: PyTree
 
 
 class Gait(eqx.Module, Tabular):
@@ -185,78 +202,68 @@ class Gait(eqx.Module, Tabular):
         return xarray.Dataset(entries, gait_coordinates(self), attributes)
 
 
-@host_jit(search_by_lanes)
-def summarise_gait(
-    problem: FixedPointProblem, found: Found, names: tuple[str, ...], radius: bool, origin: Origin
-) -> Gait:
-    """The gait that a search found, with its stability and its derivatives.
+def gait_entries(gait: Gait) -> dict[str, Entry]:
+    """Variables of a dataset of a gait; NaN where none was found.
 
-    Args:
-        problem: what was searched; its active parameters are those that are asked for.
-        found: what the search came to.
-        names: of the active parameters.
-        radius: whether the spectral radius is differentiated.
-        origin: how the search came to it.
+    Measures and the state on the section with their errors, multipliers along `multiplier`,
+    sensitivities and elasticities along `parameter`. Arrays of several gaits keep their first axis,
+    which the entries' dimensions leave out.
     """
-    path = nodes_of(found.last, problem.guess)  # of the search, whose steps are counted
-    found = with_parameter_columns(problem, found)
-    orbit = orbit_of(problem, found, radius=radius)
-    stability = orbit.stability
-    last, m = found.last, found.recurring.shape[0]
-    structure = problem.args.mechanism.structure
-    lost = found.ending == int(Search.NO_RETURN)
+    found = np.asarray(gait.ending) == int(Search.FOUND)
+    entries: dict[str, Entry] = {}
 
-    def known(tree: PyTree) -> PyTree:
-        """NaN where no cycle was ever completed."""
-        return jtu.tree_map(lambda leaf: jnp.where(lost, jnp.nan, leaf), tree)
+    def known(value: npt.ArrayLike) -> np.ndarray:
+        number = np.asarray(value, dtype=np.float64)
+        own = found.reshape(found.shape + (1,) * (number.ndim - found.ndim))
+        return np.where(own, number, np.nan)
 
-    measures = Measures(
-        period=last.period,
-        step_length=last.advance[0],
-        speed=last.advance[0] / last.period,
-        peak_normal=last.peak,
-        spectral_radius=stability.spectral_radius,
-        state=orbit.state,
-    )
-    measures = known(measures)._replace(state=orbit.state)
-    slopes = measure_slopes(orbit, measures, orbit.slopes, orbit.radius_slopes)
-    backwards = speed_backwards(measures)
-    slope_errors = measure_slopes(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
-    errors = measure_errors(measures, orbit)
-    rows = jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])
-    told = dict(
-        measure_errors=errors,
-        multipliers=stability.multipliers,
-        multiplier_errors=stability.errors,
-        directions=stability.directions,
-        monodromy=last.monodromy[:, :m],
-        step_lengths=step_lengths(problem, last, path[1]),
-        return_jacobian=rows[:, :m],
-        unit_multiplier_error=stability.unit_error,
-        sensitivities=jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes),
-        sensitivity_errors=jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors),
-        elasticities=elasticities_of(problem, measures, slopes),
-    )
-    off = jnp.stack(recurring_leaves(errors.state))
-    is_found = found.ending == int(Search.FOUND)
-    return Gait(
-        **known(told),
-        ending=found.ending,
-        walk_ending=found.code,
-        measures=measures,
-        residual=found.residual,
-        bifurcation=jnp.where(is_found, stability.bifurcation, int(Bifurcation.NONE)),
-        evaluations=found.evaluations,
-        history=found.history,
-        solver_steps=last.attempted,
-        grazes=last.grazes,
-        cycle_footsteps=problem.args.arrival_footsteps
-        * minimal_cycle(last, off, problem.precision.rtol),
-        sound=found.sound,
-        origin=jtu.tree_map(jnp.asarray, origin),
-        orbit=path,
-        parameters=names,
-        engine=problem.spec.engine,
-        cycle="stride" if len(structure.namings) == 1 else "step",
-        quantities=tuple(map(parameter_quantities(problem.args).__getitem__, names)),
-    )
+    def add(name: str, value: Any, quantity: Quantity, error: Any = None, *own: str) -> None:
+        entries[name] = Entry(own, known(value), quantity, None if error is None else known(error))
+
+    codes: dict[str, tuple[Any, type[IntEnum]]] = {
+        "ending": (gait.ending, Search),
+        "found_by": (gait.origin.found_by, FoundBy),
+        "branch_end": (gait.origin.branch_end, BranchEnd),
+    }
+    for name, (code, kind) in codes.items():
+        flags = {int(each): str(each) for each in kind}
+        words = Quantity(name.replace("_", " "))
+        entries[name] = Entry((), np.asarray(code, dtype=np.int8), words, flags=flags)
+    for name, quantity in QUANTITIES.items():
+        add(name, getattr(gait.measures, name), quantity, getattr(gait.measure_errors, name))
+    for name in recurring_names(gait.measures.state):
+        quantity = state_quantity(name) or Quantity(name)
+        value, error = (getattr(each.state, name) for each in (gait.measures, gait.measure_errors))
+        add(f"state_{name}", value, quantity, error)
+    parts = {"real": np.real(gait.multipliers), "imaginary": np.imag(gait.multipliers)}
+    for name, part in parts.items():
+        words = Quantity(f"multiplier, {name}")
+        add(f"multiplier_{name[:4]}", part, words, gait.multiplier_errors, "multiplier")
+    words = Quantity("error of the unit multiplier")
+    add("unit_multiplier_error", gait.unit_multiplier_error, words)
+    add("residual", gait.residual, Quantity("residual", "", "SI"))
+    add("grazes", gait.grazes, Quantity("switches that are grazed"))
+    for name, quantity in QUANTITIES.items():
+        slope, slope_error, elasticity = (
+            np.asarray(getattr(each, name))
+            for each in (gait.sensitivities, gait.sensitivity_errors, gait.elasticities)
+        )
+        per = Quantity(
+            f"sensitivity of the {quantity.words}",
+            unit=f"{quantity.unit or 1} per unit of the parameter",
+        )
+        add(f"sensitivity_{name}", slope, per, slope_error, "parameter")
+        with np.errstate(divide="ignore", invalid="ignore"):
+            bar = np.where(slope == 0.0, 0.0, slope_error * np.abs(elasticity / slope))
+        words = Quantity(f"elasticity of the {quantity.words}")
+        add(f"elasticity_{name}", elasticity, words, bar, "parameter")
+    return entries
+
+
+def gait_coordinates(gait: Gait) -> dict[str, Any]:
+    """Coordinates of these: names of the parameters, and their SI units where they are known."""
+    found: dict[str, Any] = {"parameter": np.array(gait.parameters, object)}
+    if gait.quantities:
+        units = np.array([each.unit for each in gait.quantities], object)
+        found["parameter_unit"] = ("parameter", units)
+    return found

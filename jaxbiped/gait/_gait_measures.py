@@ -8,11 +8,10 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state_quantities import cyclic_names, recurring_names
+from jaxbiped.dynamics._state import cyclic_names, recurring_names
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._measures import Measures
+from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.gait._return_map_spec import AbstractGradient, Implicit
 from jaxbiped.linalg._small_matrices import solution

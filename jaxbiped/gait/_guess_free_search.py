@@ -7,13 +7,20 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._progress import Stage, stage
-from jaxbiped.gait._branch_along import Searching, branch_along, state_at
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, cycle_of
-from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, homotopy_to
+from jaxbiped.gait._branch_along import FollowedBranch, Searching, branch_along, state_at
+from jaxbiped.gait._fixed_point_search import (
+    FixedPointProblem,
+    Found,
+    Search,
+    cycle_of,
+    walks_only,
+)
+from jaxbiped.gait._homotopy import Homotopy, homotopy_to
 from jaxbiped.gait._relaxation import relaxed
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, return_map_spec
 from jaxbiped.gait._search_provenance import (
     MOST_OTHERS,
+    BranchEnd,
     FoundBy,
     Origin,
     OtherGait,
@@ -21,11 +28,10 @@ from jaxbiped.gait._search_provenance import (
     single_stage_origin,
 )
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
-from jaxbiped.gait._settled_walks import SHORTEST, Walks
-from jaxbiped.gait._walk_waves import is_far_from_seed, state_rows, walks_of
+from jaxbiped.gait._walk_waves import SHORTEST, Walks, is_far_from_seed, state_rows, walks_of
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Walker
-from jaxbiped.solve._accuracy import recurring_sizes
+from jaxbiped.solve._accuracy import ACCURACIES, recurring_sizes
 
 _PUSHES = (-0.05, -0.01, 0.01, 0.05)
 """Sizes (scaled) of the pushes off an unstable gait from which walks begin as well, and off a
@@ -105,7 +111,8 @@ def search_in_stages(
 
     def add(found: Found, by: FoundBy) -> None:
         # What a walk itself settles on is one, however deep, but not where it stands and chatters.
-        sound = bool(found.sound) or (by is FoundBy.WALKING and _steps_ahead(found, modelled))
+        steps = float(np.sum(found.last.advance)) > SHORTEST * float(modelled.mechanism.height)
+        sound = bool(found.sound) or (by is FoundBy.WALKING and steps)
         known = any(_same(found, old) for old in seen)
         if int(found.ending) == int(Search.FOUND) and sound and not known:
             seen.append(Seen(found, by, spectral_radius(found), is_whole(found, problem)))
@@ -201,6 +208,29 @@ def origin_of(staged: Staged, problem: FixedPointProblem) -> Origin:
     )
 
 
+def search_on(
+    search: Searching, problem: FixedPointProblem, first: Found, engine: str, now: Stage
+) -> tuple[Found, Origin]:
+    """The stages of a search beyond the first, which came to `first`: a gait, and its origin."""
+    scene = problem.args
+    scout = return_map_spec(
+        scene.minimal,
+        problem.guess,
+        solver=None,
+        engine="auto" if scene.redundant else engine,
+        max_solver_steps=ACCURACIES["balanced"].max_solver_steps,
+    )
+    staged = search_in_stages(search, problem, scout, first, now)
+    found = walks_only(first) if staged.best is None else staged.best.found
+    return found, origin_of(staged, problem)
+
+
+def is_stable(found: Found, problem: FixedPointProblem) -> bool:
+    """Whether a search came to a stable gait with all the footsteps that were asked for."""
+    usable = int(found.ending) == int(Search.FOUND) and bool(found.sound)
+    return usable and spectral_radius(found) < 1.0 and is_whole(found, problem)
+
+
 def is_whole(found: Found, problem: FixedPointProblem) -> bool:
     """Whether a fixed point's cycle has all the footsteps that were asked for."""
     steps = problem.spec.steps
@@ -214,10 +244,6 @@ def spectral_radius(found: Found) -> float:
     if not np.all(np.isfinite(jacobian)):
         return float("inf")
     return float(np.max(np.abs(np.linalg.eigvals(jacobian))))
-
-
-def _steps_ahead(found: Found, scene: Scene | RigidScene) -> bool:
-    return float(np.sum(found.last.advance)) > SHORTEST * float(scene.mechanism.height)
 
 
 def _same(a: Found, b: Seen) -> bool:

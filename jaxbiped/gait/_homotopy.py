@@ -1,39 +1,36 @@
 """Homotopy: the line in the parameters from the seed's scene to another of the same laws.
 
 A search that fails from its start follows the seed's gait along this line to scenes far from it.
+Here is the traced search, which `jit` and `vmap` have in the place of `branch_along`: the fitted
+start is tried first; where no stable gait comes of it, the first scene's gait is followed along the
+line, each search beginning where those before point to.
 """
 
-from collections.abc import Callable
-from itertools import islice
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-import numpy as np
+from jaxtyping import PyTree
 
-from jaxbiped._ending import NamedCode
-from jaxbiped._types import Scalar
-from jaxbiped.gait._pseudo_arclength import (
-    Change,
-    Curve,
-    CurvePoint,
-    StepControl,
-    correct,
-    follow,
-    locate,
-)
+from jaxbiped._types import Scalar, select
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, search, walks_only
+from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._relaxation import like_model, relaxed, seed_like
+from jaxbiped.gait._search_provenance import BranchEnd, FoundBy, Origin
+from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.linalg._small_matrices import eigenpairs
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._walker import Walker
 
-_CONTROL = StepControl(first=0.08, largest=0.35, smallest=2e-4)
-_CONVERGED = 2e-5
-"""Size of a correction that ends the corrector."""
-_MOST_STEPS = 150
-_AT_END = 1e-9
-_BEYOND_FOLD, _BACK = 24, 0.25
-"""Steps, and distance in s, for which a branch is followed back behind its first fold."""
+_FIRST_STEP, _LARGEST_STEP, _LEAST_STEP = 0.05, 0.3, 1e-3
+"""Steps along the line: the first, at most, and at which it is given up."""
+_FLOOR, _JUMP, _ASIDE = 0.1, 0.2, 0.5
+"""Size below which components count as of one size; how far, relative to it, the first step may
+lead, and others aside from where they pointed, in units of their length: else it is another gait's
+branch that they came to."""
+_MOST_SEARCHES = 80
 
 
 class Homotopy(NamedTuple):
@@ -86,127 +83,136 @@ def line_from_model(scene: AbstractWalkerScene) -> Homotopy | None:
     return None if both is None else Homotopy(*both)
 
 
-class BranchEnd(NamedCode):
-    """How a branch of gaits ended. `str(end)` is its name in words.
-
-    - not followed: there was no need to.
-    - reached: it reached the requested scene.
-    - fold: it turned back at a fold.
-    - walk ends: beyond this point, the walk of the gait ends (see its `Ending`).
-    - breaks off: the return map is not smooth there, for example because a foot begins to scuff.
-    - no beginning: there is no known gait at which to begin.
-    - unfinished: the maximum number of steps was reached.
-    - no walk: beyond this point, the orbit is not a walk (see `Search`).
-    - closed: it returned to its beginning.
-    - branches off: it begins at another branch.
-    - jumped: a step led back to gaits that were already followed.
-    - interrupted: by Ctrl-C.
-    """
-
-    NOT_FOLLOWED = 0
-    REACHED = 1
-    FOLD = 2
-    WALK_ENDS = 3
-    BREAKS_OFF = 4
-    NO_BEGINNING = 5
-    UNFINISHED = 6
-    NO_WALK = 7
-    CLOSED = 8
-    BRANCHES_OFF = 9
-    JUMPED = 10
-    INTERRUPTED = 11
-
-
-class FollowedBranch(NamedTuple):
-    """A branch of fixed points.
+class _Way(NamedTuple):
+    """How far along the line a search is.
 
     Attributes:
-        points: shape (n, m).
-        s: the parameter's values, shape (n,).
-        end: how it ended.
-        code: of the `Ending` of a walk that did not return, where the branch ended by it.
+        s: of the next search; negative for the search from the fitted start, at the end of the
+            line.
+        step: from the last gait that was found on the line.
+        latest_point, before: points of the last gait found on the line and of the one before it,
+            with their places `at`, shape (2,).
+        ahead: the point that the next search begins from.
+        best: the gait to be returned, `radius` its spectral radius, infinite where there is none.
+        origin: what will be told.
+        searches: how many there were.
+        over: whether there is nothing left to do.
     """
 
-    points: np.ndarray
-    s: np.ndarray
-    end: BranchEnd
-    code: int = 0
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether it ended where the return map has a kink, or beyond its last walk."""
-        return self.end in (BranchEnd.WALK_ENDS, BranchEnd.BREAKS_OFF)
-
-    @property
-    def farthest(self) -> int:
-        """The point nearest to the scene that was asked for, before the branch turned back: behind
-        its first fold, orbits need not be walks."""
-        turned = np.flatnonzero(np.diff(self.s) < 0.0)
-        return int(turned[0] if turned.size else np.argmax(self.s))
+    s: Scalar
+    step: Scalar
+    latest_point: Scalar
+    before: Scalar
+    at: Scalar
+    ahead: Scalar
+    best: Found
+    radius: Scalar
+    origin: Origin
+    searches: Scalar
+    over: Scalar
 
 
-def follow_branch(
-    change: Callable[[np.ndarray, float], Change],
-    start: np.ndarray,
-    s: float = 0.0,
-    *,
-    scales: np.ndarray,
-    smallest: float = _CONTROL.smallest,
-) -> FollowedBranch:
-    """Follows the branch of zeros of `change` from one at s until s = 1.
+def search_along(problem: FixedPointProblem, origin: Origin) -> tuple[Found, Origin]:
+    """The traced search: from the guess, and along the line from the seed's scene where need be."""
+    line, system = homotopy_to(problem.args), problem.spec.system
+    # Origins have scenes of the problem's own kind.
+    own: PyTree = jtu.tree_structure(problem.args)
+    if line is None or jtu.tree_structure(line.last) != own:
+        return walks_only(search(problem)), origin
+    fitted = recurring_components(system, problem.guess)
+    first = recurring_components(system, default_guess(line.first.minimal))
 
-    Args:
-        change: of a point, shape (m,), and s.
-        start: the zero at s.
-        s: where the branch begins.
-        scales: sizes of the components, shape (m,), in which arclength is measured; s in its own.
-        smallest: arclength of a step below which the branch is given up.
-    """
-    curve = Curve(change, np.append(scales, 1.0), _CONVERGED)
-    here = np.append(start, s) / curve.sizes
-    first = correct(curve, here)
-    if first.found is None:
-        return FollowedBranch(start[None], np.full(1, s), BranchEnd.NO_BEGINNING, first.code)
-    control = _CONTROL._replace(smallest=smallest)
-    path, end, code = [first.found], BranchEnd.UNFINISHED, 0
-    for attempt in islice(follow(curve, first.found, control, high=1.0), _MOST_STEPS):
-        if attempt.found is None:
-            code = attempt.code
-            end = BranchEnd.WALK_ENDS if code else BranchEnd.BREAKS_OFF
-            break
-        here, there = path[-1], attempt.found
-        if here.place[-1] < 1.0 < there.place[-1]:  # a step about a bend
-            there = _at_end(curve, here, there) or there
-        path += [*_fold(curve, here, there), there]
-        if abs(there.place[-1] - 1.0) < _AT_END:
-            end = BranchEnd.REACHED
-        if end is BranchEnd.REACHED or _is_far_behind_a_fold(path):
-            break
-    if end is not BranchEnd.REACHED and any(point.tangent[-1] < 0.0 for point in path):
-        end, code = BranchEnd.FOLD, 0
-    points = np.stack([point.place for point in path]) * curve.sizes
-    return FollowedBranch(points[:, :-1], points[:, -1], end, code)
+    def run(way: _Way) -> Found:
+        there = line.at(jnp.where(way.s < 0.0, 1.0, way.s))
+        return search(problem._replace(args=there, guess=problem.state(way.ahead)), ~way.over)
+
+    shape = jax.eval_shape(lambda: search(problem, jnp.asarray(True)))
+    no_return = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
+    begin = _Way(
+        s=jnp.asarray(-1.0),
+        step=jnp.asarray(_FIRST_STEP),
+        latest_point=fitted,
+        before=fitted,
+        at=jnp.zeros(2),
+        ahead=fitted,
+        best=no_return,
+        radius=jnp.asarray(jnp.inf),
+        origin=jax.tree.map(jnp.asarray, origin),
+        searches=jnp.asarray(0),
+        over=jnp.asarray(False),
+    )
+    end = jax.lax.while_loop(
+        lambda way: ~way.over,
+        lambda way: select(way.over, way, _after(way, run(way), line, first)),
+        begin,
+    )
+    return walks_only(end.best), end.origin
 
 
-def _at_end(curve: Curve, here: CurvePoint, there: CurvePoint) -> CurvePoint | None:
-    """The point at s = 1 between two points on either side of it."""
-    share = (1.0 - here.place[-1]) / (there.place[-1] - here.place[-1])
-    guess = here.place + share * (there.place - here.place)
-    return correct(curve, guess, here.tangent, holds_s=True).found
+def _after(way: _Way, latest: Found, line: Homotopy, first: Scalar) -> _Way:
+    """One search further; `first` is where that of the seed's gait begins."""
+    from_start, from_seed = way.s < 0.0, way.s == 0.0
+    found = latest.ending == int(Search.FOUND)
+    found &= from_start | from_seed | _is_ahead(way, latest.recurring)
+    radius = jnp.where(found & latest.sound, _radius(latest), jnp.inf)
+    at_end = from_start | (way.s == 1.0)
+    # What the fitted start gave is kept where nothing better comes, found or not.
+    better = from_start | (at_end & (radius < way.radius))
+    on_line = found & ~from_start
+    at = jnp.where(on_line, jnp.stack([jnp.where(from_seed, 0.0, way.at[1]), way.s]), way.at)
+    # The first gait on the line has none before it.
+    before = jnp.where(
+        on_line, jnp.where(from_seed, latest.recurring, way.latest_point), way.before
+    )
+    latest_point = jnp.where(on_line, latest.recurring, way.latest_point)
+    grown = jnp.minimum(jnp.where(from_seed, way.step, 1.5 * way.step), _LARGEST_STEP)
+    step = jnp.where(from_start, way.step, jnp.where(found, grown, 0.4 * way.step))
+    lost = ~found & ~from_start
+    given_up = lost & (from_seed | (step < _LEAST_STEP)) | (way.searches >= _MOST_SEARCHES)
+    over = (from_start & found & (radius < 1.0)) | (found & (way.s == 1.0)) | given_up
+    end = jnp.where(from_seed, int(BranchEnd.NO_BEGINNING), int(BranchEnd.BREAKS_OFF))
+    end = jnp.where(lost & (latest.code != 0), int(BranchEnd.WALK_ENDS), end)
+    end = jnp.where(found, int(BranchEnd.UNFINISHED), end)
+    end = jnp.where(found & (way.s == 1.0), int(BranchEnd.REACHED), end)
+    followed = over & ~from_start
+    s = jnp.where(from_start, 0.0, jnp.minimum(at[1] + step, 1.0))
+    share = (s - at[1]) / jnp.where(at[1] > at[0], at[1] - at[0], 1.0)
+    ahead = jnp.where(from_start, first, latest_point + share * (latest_point - before))
+    origin = way.origin._replace(
+        found_by=jnp.where(better & ~from_start, int(FoundBy.CONTINUATION), way.origin.found_by),
+        branch_end=jnp.where(followed, end, way.origin.branch_end),
+        branch_walk_ending=jnp.where(followed & lost, latest.code, way.origin.branch_walk_ending),
+        nearest=select(followed & ~from_seed, line.at(at[1]).minimal, way.origin.nearest),
+        searches=way.searches + 1,
+    )
+    return _Way(
+        s=s,
+        step=step,
+        latest_point=latest_point,
+        before=before,
+        at=at,
+        ahead=ahead,
+        best=select(better, latest, way.best),
+        radius=jnp.where(better, radius, way.radius),
+        origin=origin,
+        searches=way.searches + 1,
+        over=over,
+    )
 
 
-def _fold(curve: Curve, here: CurvePoint, there: CurvePoint) -> list[CurvePoint]:
-    """The fold between two points; none where there is none, or it is not found."""
-    if here.tangent[-1] * there.tangent[-1] >= 0.0:
-        return []
-    found = locate(curve, here, there, lambda point: float(point.tangent[-1]))
-    return [] if found is None else [found]
+def _is_ahead(way: _Way, point: Scalar) -> Scalar:
+    """Whether a point lies where those before it on the line point to."""
+
+    def distance(a: Scalar, b: Scalar) -> Scalar:
+        return jnp.max(jnp.abs(a - b) / (_FLOOR + jnp.abs(way.latest_point)))
+
+    aside, length = distance(point, way.ahead), distance(point, way.latest_point)
+    return jnp.where(way.at[1] > way.at[0], aside < _ASIDE * length + 0.01, length < _JUMP)
 
 
-def _is_far_behind_a_fold(path: list[CurvePoint]) -> bool:
-    """Whether a branch that turned back was followed back for long enough."""
-    behind = [k for k, point in enumerate(path) if point.tangent[-1] < 0.0]
-    if not behind:
-        return False
-    back = max(point.place[-1] for point in path) - path[-1].place[-1]
-    return len(path) - behind[0] > _BEYOND_FOLD or back > _BACK
+def _radius(found: Found) -> Scalar:
+    """Largest absolute value of a Floquet multiplier: on the section the trivial one is zero."""
+    jacobian = found.last.jacobian[:, : found.recurring.shape[0]]
+    finite = jnp.all(jnp.isfinite(jacobian))
+    values, _ = eigenpairs(jnp.where(finite, jacobian, 0.0))
+    return jnp.where(finite, jnp.max(jnp.abs(values)), jnp.inf)

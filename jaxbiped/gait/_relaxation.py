@@ -58,7 +58,9 @@ def like_model(scene: Scene) -> tuple[Scene, Scene] | None:
     They have the scene's size and weight, and the model's slope and laws of contact in proportion.
     Springs and latches hardly do anything.
     """
-    mechanism, model = scene.mechanism, _model_of(scene.mechanism)
+    mechanism, models = scene.mechanism, (seed_scene(), kneed_scene())
+    kind = _kind_of_legs(mechanism)
+    model = next((each for each in models if _kind_of_legs(each.mechanism) == kind), None)
     if model is None:
         return None
     size, own = _sizes(scene, model), model.mechanism
@@ -100,12 +102,6 @@ def _sizes(scene: Scene, model: Scene) -> _Sizes:
     length = mine.height / theirs.height
     time = (length * model.ground.g / scene.ground.g) ** 0.5
     return _Sizes(mine.total_mass / theirs.total_mass, length, time)
-
-
-def _model_of(mechanism: Mechanism) -> Any:
-    """The scene of the model with the same kind of legs; None where there is none."""
-    kind, models = _kind_of_legs(mechanism), (seed_scene(), kneed_scene())
-    return next((each for each in models if _kind_of_legs(each.mechanism) == kind), None)
 
 
 def _kind_of_legs(mechanism: Mechanism) -> tuple[object, ...]:

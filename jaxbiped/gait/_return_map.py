@@ -11,8 +11,8 @@ from jaxbiped._checks import ArgumentError, check_choice, check_count, check_pos
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Scalar, Time, as_float, in_64_bits, select
 from jaxbiped.dynamics._equivalent_states import minimal_state, redundant_state
-from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import check_leaves, without_whole_turns
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._poincare_map import LinearisedReturn, linearised_return, seed_directions
 from jaxbiped.gait._return_derivatives import forward, reverse
 from jaxbiped.gait._return_map_spec import (
@@ -24,9 +24,9 @@ from jaxbiped.gait._return_map_spec import (
     check_holds_none,
     return_map_spec,
 )
+from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, Precision, precision_of
 from jaxbiped.variational._hybrid_system import AbstractSystem, section_of, with_leg_names_of

@@ -5,20 +5,18 @@ import dataclasses
 import diffrax
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._types import Scalar, Time, by_numpy
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import RedundantScene, is_rigid
 from jaxbiped.scene._state_types import is_redundant
-from jaxbiped.solve._engine_names import engine_for
+from jaxbiped.solve._engine_names import engine_for, lane_obstacle
 from jaxbiped.solve._solvers import solver_named, with_projection
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._hybrid_system import (
     AbstractSystem,
     RedundantWalking,
@@ -160,7 +158,7 @@ def return_map_spec(
     """
     section = section_of(args, section)
     method = orbit_solver(solver, rigid=is_rigid(args))
-    obstacle = _hindrance(method, section, (args, state))
+    obstacle = lane_obstacle(method, section, (args, state))
     own, within = system_of(args) if system is None else system, None
     if system is None and isinstance(args, RedundantScene):
         obstacle = "redundant coordinates are diffrax's"
@@ -261,18 +259,6 @@ def check_holds_none(
 def holds_arrays(tree: PyTree) -> bool:
     """Whether there are arrays, known or traced, among the leaves."""
     return any(isinstance(leaf, jax.Array | np.ndarray) for leaf in jtu.tree_leaves(tree))
-
-
-def _hindrance(
-    solver: diffrax.AbstractSolver[PyTree], section: AbstractSection, leaves: PyTree
-) -> str | None:
-    if not isinstance(solver, AbstractRosenbrock):
-        return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
-    if jtu.tree_leaves(section):
-        return f"the section {type(section).__name__} holds numbers of its own"
-    if any(jnp.result_type(leaf) != jnp.float64 for leaf in jtu.tree_leaves(leaves)):
-        return "it computes in 64 bits"
-    return None
 
 
 class _Arrival(eqx.Module):

@@ -11,7 +11,6 @@ from jaxbiped._checks import warn
 from jaxbiped._ending import Ending, NamedCode
 from jaxbiped._types import Scalar
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search
-from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._ground import AlwaysTouching
 from jaxbiped.scene._parameter_access import parameter_values
@@ -51,6 +50,37 @@ class FoundBy(NamedCode):
     WALKING = 2
     CONTINUATION = 3
     SCATTERED_STARTS = 4
+
+
+class BranchEnd(NamedCode):
+    """How a branch of gaits ended. `str(end)` is its name in words.
+
+    - not followed: there was no need to.
+    - reached: it reached the requested scene.
+    - fold: it turned back at a fold.
+    - walk ends: beyond this point, the walk of the gait ends (see its `Ending`).
+    - breaks off: the return map is not smooth there, for example because a foot begins to scuff.
+    - no beginning: there is no known gait at which to begin.
+    - unfinished: the maximum number of steps was reached.
+    - no walk: beyond this point, the orbit is not a walk (see `Search`).
+    - closed: it returned to its beginning.
+    - branches off: it begins at another branch.
+    - jumped: a step led back to gaits that were already followed.
+    - interrupted: by Ctrl-C.
+    """
+
+    NOT_FOLLOWED = 0
+    REACHED = 1
+    FOLD = 2
+    WALK_ENDS = 3
+    BREAKS_OFF = 4
+    NO_BEGINNING = 5
+    UNFINISHED = 6
+    NO_WALK = 7
+    CLOSED = 8
+    BRANCHES_OFF = 9
+    JUMPED = 10
+    INTERRUPTED = 11
 
 
 class OtherGait(NamedTuple):

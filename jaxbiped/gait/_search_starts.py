@@ -1,32 +1,36 @@
 """Starts of a search: the fitted guess, and scattered ones."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jaxtyping import PyTree
 
 from jaxbiped._checks import check_positive
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Scalar, as_float, in_64_bits
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._constrained_motion import consistent_state
 from jaxbiped.dynamics._contacts import legs_in
+from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._joint_loads import motion_of
 from jaxbiped.dynamics._state import seed_state, state_for, state_type
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.dynamics._tree import pose_of
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene, check_scene
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode
 from jaxbiped.scene._placement import root_on_feet
 from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene._rigid_feet import rigid_modes
-from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State, WalkerState
 from jaxbiped.scene._structure import Angle
+from jaxbiped.variational._hybrid_system import with_leg_names_of
 
 _BEND = 1.5
 """Largest bend of a joint with a stop in a scattered swing leg, in units of the spread [rad]."""
@@ -54,6 +58,17 @@ def state_of_guess(
     """
     near = guess.measures.state if isinstance(guess, Gait) else guess
     return None if near is None else state_for(scene, near, "guess")
+
+
+def start_of_search(
+    scene: AbstractWalkerScene, section: AbstractSection, guess: PyTree
+) -> WalkerState:
+    """The checked state from which a walker is searched, the default where there is no guess."""
+    start = default_guess(scene) if guess is None else guess
+    if scene.redundant and not isinstance(guess, Gait):  # whose state is minimal
+        start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
+    start = in_64_bits(state_of_guess(scene.minimal, start))
+    return with_leg_names_of(section, scene.minimal, start)
 
 
 class Lines(NamedTuple):

@@ -17,8 +17,8 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, as_float, rows_of
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._equivalent_states import exchange_legs
-from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import field_of
+from jaxbiped.dynamics._surfaces import MidStance
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait

@@ -10,12 +10,12 @@ from jaxbiped._checks import check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, variables_of
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._constrained_motion import violation
 from jaxbiped.dynamics._contacts import feet, foot_forces
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._equivalent_states import BodiesState, minimal_state
 from jaxbiped.dynamics._footfalls import touches
-from jaxbiped.dynamics._redundant_motion import violation
-from jaxbiped.dynamics._state_quantities import state_quantity
+from jaxbiped.dynamics._state import state_quantity
 from jaxbiped.scene._parameter_access import parameter_quantities, parameter_values
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.solve._trajectory import Trajectory, check_scene_of

@@ -8,13 +8,18 @@ import numpy as np
 
 from jaxbiped._checks import check_increasing, check_type
 from jaxbiped._types import Scalar, rows_of
-from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
-from jaxbiped.dynamics._energy import Energies, energies, kinetic_and_moment, powers
-from jaxbiped.dynamics._equivalent_states import motion_in
+from jaxbiped.dynamics._energy import (
+    ActuatorPowers,
+    Energies,
+    actuator_powers,
+    energies,
+    kinetic_and_moment,
+    powers,
+)
+from jaxbiped.dynamics._equivalent_states import motion_in, whole_state
 from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._joint_loads import joint_energy
 from jaxbiped.dynamics._rolling import rolling_field, rolling_hip_motion
-from jaxbiped.dynamics._state import whole_state
 from jaxbiped.measure._samples import (
     NODES,
     ModeChanges,

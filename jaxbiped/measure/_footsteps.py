@@ -17,7 +17,7 @@ from jaxbiped.dynamics._footfalls import landings, standing_leg
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._samples import (
     Samples,
-    at_steps,
+    evaluate_along,
     evaluate_at,
     moments_of_change,
     sample,
@@ -128,7 +128,7 @@ def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
     check_type("scene", scene, Scene, RedundantScene)
     check_scene_of(trajectory, scene)
     trajectory.require_dense()
-    found_feet = at_steps(scene, trajectory, contacts).feet
+    found_feet = evaluate_along(scene, trajectory.state, contacts).feet
     before, after = (rows_of(found_feet, part) for part in (slice(-1), slice(1, None)))
     structure = scene.mechanism.structure
     lands = np.stack(landings(structure, before, after))
@@ -185,12 +185,13 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     loads = sample(scene, trajectory, contacts, time)
     distance, gravity, motors = driving_works(scene, trajectory, time)
     weight = float(scene.mechanism.total_mass) * float(scene.ground.g)
+    normal = np.max([np.asarray(force.normal) for force in loads.values.forces], axis=0)
     return Footsteps(
         time_s=time[1:],
         period_s=period,
         length_m=length,
         speed_m_s=length / period,
-        peak_normal_N=_largest(_normal(loads.values), loads, time),
+        peak_normal_N=_largest(normal, loads, time),
         max_penetration_m=_largest(_depth(loads.values), loads, time),
         double_support_s=_double_support(scene, trajectory, time, loads),
         cost_of_transport=(motors + gravity) / (weight * distance),
@@ -238,11 +239,6 @@ def _of_legs(structure: Structure, of_feet: Sequence[Numbers]) -> list[np.ndarra
     return [
         np.asarray(np.any([of_feet[k] for k in feet], axis=0)) for feet in structure.feet_of_leg
     ]
-
-
-def _normal(now: Contacts) -> np.ndarray:
-    """The largest normal force on a foot [N]."""
-    return np.max([np.asarray(force.normal) for force in now.forces], axis=0)
 
 
 def _depth(now: Contacts) -> np.ndarray:

@@ -97,13 +97,6 @@ def evaluate_at(
     return jtu.tree_map(lambda leaf: leaf.reshape(times.shape), values)
 
 
-def at_steps(
-    scene: Scene, trajectory: Trajectory, function: Callable[[Scene, State], PyTree]
-) -> PyTree:
-    """`function(scene, state)` at the ends of the solver's steps, as NumPy arrays."""
-    return evaluate_along(scene, trajectory.state, function)
-
-
 def evaluate_along(
     scene: SomeScene, state: SomeState, function: Callable[[SomeScene, SomeState], PyTree]
 ) -> PyTree:

@@ -16,8 +16,8 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, Time, select
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._equivalent_states import exchange_legs
-from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._strike_surfaces import clearance, clearance_rate, distance_ahead
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.optimise._augmented_system import (
     AbstractAugmentedSystem,
     MotionSection,
@@ -83,12 +83,9 @@ class DisturbedCycle(AbstractAugmentedSystem):
         return found
 
 
-def push_cycle(walker: AbstractSystem) -> DisturbedCycle:
-    return DisturbedCycle(walker, ("clock", PUSH), PUSH)
-
-
-def drop_cycle(walker: AbstractSystem) -> DisturbedCycle:
-    return DisturbedCycle(walker, ("clock", "fallen", DROP), DROP)
+def disturbed_cycle(walker: AbstractSystem, disturbance: str) -> DisturbedCycle:
+    more = (PUSH,) if disturbance == PUSH else ("fallen", DROP)
+    return DisturbedCycle(walker, ("clock", *more), disturbance)
 
 
 class SteppedSection(AbstractSection):

@@ -14,16 +14,13 @@ from equinox import AbstractVar
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, by_numpy
-from jaxbiped.dynamics._actuation import actuator_powers
 from jaxbiped.dynamics._contacts import feet
-from jaxbiped.dynamics._energy import is_driven, powers
+from jaxbiped.dynamics._energy import actuator_powers, is_driven, kinetic_energy, powers
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
-from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._stance import kinetic_energy
 from jaxbiped.dynamics._strike_surfaces import clearance
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._surfaces import AbstractSection, Switch
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.variational._hybrid_system import AbstractSystem, Rolling, Walking

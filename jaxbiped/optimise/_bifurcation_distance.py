@@ -12,16 +12,16 @@ import numpy as np
 
 from jaxbiped._checks import check_choice
 from jaxbiped._types import as_float
-from jaxbiped.continuation._bifurcation_sensitivities import fold_forcing
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent, advance, locate_near
 from jaxbiped.continuation._branch_point import axis_of, start_of
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
-from jaxbiped.continuation._nearest_bifurcation import range_of
+from jaxbiped.continuation._continue_gait import traces_from
+from jaxbiped.continuation._critical_values import STEPS, fold_forcing, range_of
 from jaxbiped.continuation._trace import LIMITS, Trace
 from jaxbiped.gait._fixed_point_search import looser
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint
+from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.optimise._cycle_functionals import Functional
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import MODULI
@@ -31,7 +31,6 @@ from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 KINDS = (BranchEvent.FOLD, BranchEvent.PERIOD_DOUBLING)
 """Bifurcations whose distance is told."""
-_LARGEST_STEP, _MOST_POINTS = 0.02, 200
 _ENDS = (*LIMITS, BranchEnd.REACHED, BranchEnd.CLOSED)
 """Ends of a branch that was followed as far as it goes, or to the end of the range."""
 
@@ -148,21 +147,13 @@ def bifurcation_distance(
     )
 
 
-def _both_ways(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> list[Trace]:
+def _both_ways(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> tuple[Trace, ...]:
     """The branch down and up to its first bifurcation of a kind; empty where the gait is lost."""
     own = start_of(setup.scene, setup.axis)
     begin = setup.at_value(setup.recurring(gait.measures.state), own).found
     if begin is None:
-        return []
-    return [
-        setup.trace(
-            begin._replace(tangent=way * begin.tangent),
-            largest_step=_LARGEST_STEP,
-            max_points=_MOST_POINTS,
-            until=kind,
-        )
-        for way in (-1.0, 1.0)
-    ]
+        return ()
+    return traces_from(setup, begin, until=(kind,), **STEPS)
 
 
 def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> Functional | None:

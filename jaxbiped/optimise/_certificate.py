@@ -10,16 +10,17 @@ import numpy as np
 from jaxbiped._checks import check_choice, check_not_negative, check_positive, check_type
 from jaxbiped._progress import Stage, stage
 from jaxbiped._types import as_float
-from jaxbiped.basins._fractions import Fraction, wilson_interval
+from jaxbiped.basins._label_statistics import Fraction, wilson_interval
 from jaxbiped.basins._labels import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock
-from jaxbiped.continuation._nearest_bifurcation import (
+from jaxbiped.continuation._critical_values import (
     NearestBifurcation,
     nearest_bifurcation,
     range_of,
 )
-from jaxbiped.dynamics._section import HeelStrike
-from jaxbiped.dynamics._state_quantities import recurring_leaves, unit_of
+from jaxbiped.dynamics._holds import independent_names
+from jaxbiped.dynamics._state import recurring_leaves, unit_of
+from jaxbiped.dynamics._surfaces import HeelStrike
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -36,7 +37,6 @@ from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure
 from jaxbiped.sweep.starts._samples import sample
-from jaxbiped.variational._hybrid_system import independent_names
 
 _SETTLED = 1e-4
 """Relative difference between a walk's last footstep and the gait's that counts as none."""

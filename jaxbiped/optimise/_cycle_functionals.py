@@ -12,7 +12,7 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._energy import is_driven
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._fixed_point_search import looser
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import (

@@ -12,8 +12,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_within
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import state_of_recurring
+from jaxbiped.dynamics._state import state_of_recurring, state_type
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait

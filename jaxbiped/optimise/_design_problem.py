@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_provenance import explain_search
 from jaxbiped.optimise._cycle_functionals import Functional, weighted_sum
@@ -198,9 +198,6 @@ class DesignProblem:
             return None
         found = np.stack(recurring_leaves(gait.measures.state))
         return None if np.any(np.abs(found - guess) > farthest) else self._keep(u, scene, gait)
-
-    def gait_of(self, design: Design) -> Gait:
-        return self.settings.find_near(self.scene_at(design.u), design.known.state)
 
     def scene_at(self, u: np.ndarray) -> Scene | RigidScene:
         """The scene of a design; raises `ArgumentError` where parameters do not go together."""

@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._fixed_point_search import with_looser
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn
@@ -18,11 +18,12 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.linalg._small_matrices import singular_pairs
 from jaxbiped.optimise._augmented_cycles import (
+    DROP,
+    PUSH,
     LowestSwing,
     LowestSwingSection,
     SteppedSection,
-    drop_cycle,
-    push_cycle,
+    disturbed_cycle,
 )
 from jaxbiped.optimise._augmented_system import AbstractAugmentedSystem, MotionSection
 from jaxbiped.optimise._cycle_functionals import (
@@ -109,7 +110,7 @@ def jacobian_functionals(
     told = []
     for (by_step, has_clearance), group in groups.items():
         on, count = section_of(scene, None), arrivals
-        disturbed = (drop_cycle if by_step else push_cycle)(system_of(scene))
+        disturbed = disturbed_cycle(system_of(scene), DROP if by_step else PUSH)
         system: AbstractAugmentedSystem = disturbed
         section: AbstractSection = SteppedSection(on) if by_step else MotionSection(on)
         if has_clearance:

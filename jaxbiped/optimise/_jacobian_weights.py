@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._state_quantities import dimensions_of
+from jaxbiped.dynamics._state import dimensions_of
 from jaxbiped.linalg._small_matrices import Eigensystem, eigenpairs, eigensystem
 
 MODULI = ("spectral_radius", "modulus_2", "modulus_3")

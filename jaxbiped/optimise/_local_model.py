@@ -11,17 +11,17 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # its submodules are imported where they are first used
 
-from jaxbiped.optimise._design_problem import Design, DesignProblem
-from jaxbiped.optimise._multiplier_cluster import (
+from jaxbiped.optimise._design_functions import (
     CONDITIONS,
     CONJUGATE,
+    AnyRow,
     ClusterRow,
     cluster_of,
     conditions,
     radius_of,
 )
+from jaxbiped.optimise._design_problem import Design, DesignProblem
 from jaxbiped.optimise._optimality import smooth_weights
-from jaxbiped.optimise._optimisers import AnyRow
 
 _SCALES = (1.0, 0.1, 0.01, 0.001)
 """Of the trust region, at which a subproblem is tried where multipliers may meet."""

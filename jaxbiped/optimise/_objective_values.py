@@ -23,7 +23,7 @@ from jaxbiped._types import JsonObject, Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.dynamics._energy import is_driven
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import (

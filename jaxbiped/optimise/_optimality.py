@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # its submodules are imported where they are first used
 
+from jaxbiped.optimise._design_functions import AnyRow, cluster_rows, rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem
 from jaxbiped.optimise._objective_values import Evaluation
-from jaxbiped.optimise._optimisers import AnyRow, cluster_rows, rows_of
 
 OPTIMAL = 1e-3
 """Residual of the conditions of optimality from which a design counts as an optimum."""

@@ -1,4 +1,4 @@
-"""Optimisers: how a design problem is handed to SciPy and to optax, and what comes back.
+"""Optimisers: a trust region for designs with corners, SciPy's, and optax's.
 
 All of them see variables in [0, 1] and functions of the order of one. Where a design has no gait,
 the objective is raised well above the latest one's, so that line searches and trust regions turn
@@ -6,7 +6,7 @@ back towards it.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -14,22 +14,34 @@ import numpy as np
 import scipy  # its submodules are imported where they are first used
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.optimise._design_problem import DesignProblem, scale_of
-from jaxbiped.optimise._multiplier_cluster import CONDITIONS, ClusterRow, cluster_of
-from jaxbiped.optimise._objective_values import Evaluation
+from jaxbiped.optimise._design_functions import RAISED, Functions, rows_of
+from jaxbiped.optimise._design_problem import Design, DesignProblem
+from jaxbiped.optimise._local_model import Local, Model, local_of
+from jaxbiped.optimise._optimality import OPTIMAL, lagrangian_change, optimality_of
 
 if TYPE_CHECKING:
     import optax
 
-_ACTIVE = 1e-4
-"""Largest part of its bound by which an active requirement is missed or kept too well."""
 OPTIMISERS = ("trust-region", "slsqp", "trust-constr", "optax")
-_RAISED = 10.0
-"""By how much the scaled objective is raised where there is no gait."""
 _RATE = 0.05
 """Learning rate of Adam, in logits of u."""
 _EDGE = 1e-3
 """Distance from a bound, in u, at which optax begins at least: logits are infinite there."""
+_FIRST, _LARGEST, _SMALLEST = 0.1, 0.5, 1e-7
+"""Half-widths of the trust region in u: at first, at most, and at which it is given up."""
+_PENALTY, _MOST = 10.0, 1e5
+"""Weight of missed requirements, at first and at most."""
+_GAIN, _BETTER = 1e-9, 1e-7
+"""Expected gain, relative to the objective's size, below which there is nothing more to gain; and
+gain of a scattered design that counts."""
+_STEEPEST = 1e6
+"""Norm of the curvature beyond which it is forgotten."""
+_CUTS = 6
+"""Linearisations at rejected trials that are kept, beside those of scattered designs."""
+_CORRECTIONS = 2
+"""Second-order corrections of a step that did not come where the cluster was expected."""
+_DISTANCES = (1e-2, 1e-3, 1e-4)
+"""At which others are scattered about a design that seems best, in u."""
 
 
 class RunEnding(NamedTuple):
@@ -39,101 +51,154 @@ class RunEnding(NamedTuple):
     message: str
 
 
-class Row(NamedTuple):
-    """A requirement as a function that must be at least zero, or zero where `equality`.
+Callback = Callable[[np.ndarray], None]
+
+
+def run_trust_region(
+    functions: Functions, u: np.ndarray, iterations: int, report: Callback
+) -> RunEnding:
+    """Sequential quadratic programming in a trust region, with an exact penalty and cuts.
+
+    A trial that is no better leaves its linearisation behind, as in bundle methods, and the next
+    subproblem sees both sides of a corner. Fletcher, Practical Methods of Optimization (1987),
+    section 14.4 (Sl1QP). Where a design seems best and its derivatives do not balance, others are
+    scattered about it at several distances, and their linearisations are cuts, too (gradient
+    sampling: Burke, Lewis and Overton, SIAM J. Optim. 15, 2005).
+    """
+    problem = functions.problem
+    search = _Search(problem, u, iterations, report)
+    while search.descend():
+        if optimality_of(problem, search.design).residual <= OPTIMAL:
+            return RunEnding(True, search.message)
+        if not any(search.leaves(distance) for distance in _DISTANCES) and search.left > 0:
+            return RunEnding(True, f"{search.message} None of those scattered about it is better.")
+    return RunEnding(False, "Iteration limit reached.")
+
+
+class _Search:
+    """A descent under way.
 
     Attributes:
-        name: of the measure; `bound` that it is held to, `sign` 1 from below and −1 from above.
+        design, here: the best design, and its linearisations; `cuts` those of others near it.
+        curvature, reach, penalty: of the model, of the trust region, of missed requirements.
+        left: designs that may still be tried.
     """
 
-    name: str
-    bound: float
-    sign: float
-    equality: bool
-
-    def value(self, known: Evaluation) -> float:
-        """How much there is to spare, in units of the bound."""
-        return self.sign * (known.values[self.name] - self.bound) / scale_of(self.bound)
-
-    def slopes(self, known: Evaluation) -> np.ndarray:
-        return self.sign * known.slopes[self.name] / scale_of(self.bound)
-
-    def slope_errors(self, known: Evaluation) -> np.ndarray:
-        return known.slope_errors[self.name] / scale_of(self.bound)
-
-    def by_bound(self, known: Evaluation) -> float:
-        return -self.sign / scale_of(self.bound)
-
-    def is_active(self, known: Evaluation) -> bool:
-        return self.equality or self.value(known) <= _ACTIVE
-
-
-AnyRow: TypeAlias = Row | ClusterRow
-
-
-def rows_of(problem: DesignProblem) -> tuple[AnyRow, ...]:
-    """The requirements one by one.
-
-    An upper bound of the spectral radius is the conditions on the cluster of leading multipliers,
-    and one on the next modulus: all of them are smooth where multipliers meet.
-    """
-    rows: list[AnyRow] = []
-    for each in problem.requirements:
-        if each.low is not None and each.low == each.high:
-            rows.append(Row(each.name, each.low, 1.0, True))
-            continue
-        if each.low is not None:
-            rows.append(Row(each.name, each.low, 1.0, False))
-        if each.high is not None:
-            if each.name == "spectral_radius" and problem.has_cluster:
-                rows += cluster_rows(problem, each.high)
-            else:
-                rows.append(Row(each.name, each.high, -1.0, False))
-    return tuple(rows)
-
-
-def cluster_rows(problem: DesignProblem, bound: float) -> list[AnyRow]:
-    """An upper bound of the spectral radius."""
-    errors = tuple(cluster_of(problem.asked[0].known).errors.tolist())
-    every: list[AnyRow] = [
-        ClusterRow("spectral_radius", bound, -1.0, False, place, errors)
-        for place in range(CONDITIONS)
-    ]
-    return [*every, Row("next_modulus", bound, -1.0, False)]
-
-
-class Functions:
-    """The scaled objective and the requirements of a problem, with their gradients."""
-
-    def __init__(self, problem: DesignProblem) -> None:
-        self.problem, self.rows = problem, rows_of(problem)
+    def __init__(
+        self, problem: DesignProblem, u: np.ndarray, iterations: int, report: Callback
+    ) -> None:
         assert problem.latest is not None
-        self.scale = scale_of(problem.objective(problem.latest.known).value)
+        known = problem.latest.known
+        self.problem, self.report, self.left = problem, report, iterations
+        self.rows = rows_of(problem)
+        self.scale = max(abs(problem.objective(known).value), 1e-300)
+        self.design = Design(np.array(u), known)
+        self.here = local_of(problem, self.rows, self.scale, self.design)
+        self.cuts: list[Local] = []
+        self.curvature, self.reach, self.penalty = np.eye(len(u)), _FIRST, _PENALTY
+        self.random, self.message = np.random.default_rng(0), ""
 
-    def objective(self, u: np.ndarray) -> tuple[float, np.ndarray]:
-        known, raised = self._evaluation(u)
-        found = self.problem.objective(known)
-        gradient = self.problem.gradient(u, found.slopes)
-        return found.value / self.scale + raised, gradient / self.scale
+    def descend(self) -> bool:
+        """Steps until no better design is expected; False where no more may be tried."""
+        while self.left > 0:
+            step, expected = self.step()
+            if expected <= _GAIN:
+                self.message = "No better design is expected nearby."
+                if not self.cuts:
+                    return True
+                # What was seen farther away may not hold here.
+                nearest = min(float(np.max(np.abs(each.u - self.here.u))) for each in self.cuts)
+                self.cuts, self.reach = [], 0.25 * min(self.reach, nearest)
+            else:
+                self.attempt(step, expected)
+                self.message = "The trust region became small."
+            if self.reach < _SMALLEST:
+                return True
+        return False
 
-    def spare(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
-        known, _ = self._evaluation(u)
-        return np.asarray([row.value(known) for row in rows])
+    def leaves(self, distance: float) -> bool:
+        """Whether a better design is found at that distance: scattered, or by what these show."""
+        k, before, self.cuts, self.reach = len(self.here.u), self.here, [], distance
+        for _ in range(min(2 * k + 2, self.left)):
+            aside = self.random.standard_normal(k)
+            self.look(self.here.u + distance * aside / np.max(np.abs(aside)))
+        for _ in range(_CUTS):
+            if self.here is not before or self.left <= 0:
+                break
+            step, expected = self.step()
+            if expected <= _BETTER:
+                break
+            self.look(self.here.u + step)
+        return self.here is not before
 
-    def spare_gradients(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
-        known, _ = self._evaluation(u)
-        return np.stack([self.problem.gradient(u, row.slopes(known)) for row in rows])
+    def step(self, here: Local | None = None) -> tuple[np.ndarray, float]:
+        """The model's best step, and what it is expected to gain; `here` as corrected."""
+        model = Model(here or self.here, self.cuts, self.curvature)
+        step, left = model.step(self.reach, self.penalty)
+        while left > 1e-6 and self.penalty < _MOST:
+            other = model.step(self.reach, 10.0 * self.penalty)
+            if other[1] > 0.9 * left:
+                break
+            (step, left), self.penalty = other, 10.0 * self.penalty
+        return step, self.here.merit(self.penalty) - model.merit(step, self.penalty)
 
-    def _evaluation(self, u: np.ndarray) -> tuple[Evaluation, float]:
-        u = np.clip(np.asarray(u, dtype=float), 0.0, 1.0)
+    def attempt(self, step: np.ndarray, expected: float) -> None:
+        """Tries a step; the trust region and the model learn from it."""
+        size, before = float(np.max(np.abs(step))), self.here
+        there = self.look(before.u + step, 1e-3 * expected)
+        for _ in range(_CORRECTIONS):
+            if there is None or there is self.here or not before.has_radius:
+                break
+            # Multipliers that meet part by the root of what a linearisation is off.
+            cuts, self.cuts = self.cuts, self.cuts[:-1]
+            again, hoped = self.step(before.exact_at(there))
+            if hoped > 1e-3 * expected:
+                there = self.look(before.u + again, 1e-3 * expected)
+            self.cuts = self.cuts if self.here is not before else cuts
+        if there is None:
+            self.reach = 0.25 * size
+            return
+        share = (before.merit(self.penalty) - there.merit(self.penalty)) / expected
+        self.cuts = self.cuts[-_CUTS:]
+        if share > 0.7 and size > 0.9 * self.reach:
+            self.reach = min(2.0 * self.reach, _LARGEST)
+        if share < 0.3:
+            self.reach = 0.5 * size
+
+    def look(self, u: np.ndarray, least: float = _BETTER) -> Local | None:
+        """A design's linearisations, None where it has no gait; a better design is gone on from.
+
+        One that is not better by more than `least` is a cut.
+        """
+        u, self.left = np.clip(u, 0.0, 1.0), self.left - 1
         known = self.problem.at(u)
-        if known is not None:
-            return known, 0.0
-        assert self.problem.latest is not None
-        return self.problem.latest.known, _RAISED
+        self.report(u if known is not None else self.here.u)
+        if known is None:
+            return None
+        design = Design(u, known)
+        there = local_of(self.problem, self.rows, self.scale, design)
+        if self.here.merit(self.penalty) - there.merit(self.penalty) > least:
+            change = lagrangian_change(self.problem, self.design, design, self.scale)
+            self.curvature = _damped_update(self.curvature, u - self.here.u, change)
+            self.design, self.here, self.cuts = design, there, []
+        else:
+            self.cuts = [*self.cuts, there]
+        return there
 
 
-Callback = Callable[[np.ndarray], None]
+def _damped_update(curvature: np.ndarray, step: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Powell's damped BFGS update of the Lagrangian's curvature by a change of its gradient."""
+    image = curvature @ step
+    own = float(step @ image)
+    if own <= 1e-16:
+        return curvature
+    if step @ change < 0.2 * own:
+        mixed = 0.8 * own / (own - float(step @ change))
+        change = mixed * change + (1.0 - mixed) * image
+    updated = curvature - np.outer(image, image) / own
+    updated += np.outer(change, change) / float(step @ change)
+    # Across a corner derivatives jump, which tells of no curvature.
+    return updated if np.linalg.norm(updated) < _STEEPEST else np.eye(len(step))
 
 
 def run_slsqp(functions: Functions, u: np.ndarray, iterations: int, report: Callback) -> RunEnding:
@@ -223,7 +288,7 @@ def run_optax(
         report(now)
         if value < best:
             best, at_best = value, logits
-        if value > best + 0.5 * _RAISED:
+        if value > best + 0.5 * RAISED:
             logits = 0.5 * (logits + at_best)  # no gait there: half way back
             continue
         with jax.numpy_dtype_promotion("standard"):  # optax's own

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jaxbiped._progress import Stage
-from jaxbiped.continuation._nearest_bifurcation import allows, range_of
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.continuation._critical_values import allows, range_of
+from jaxbiped.dynamics._state import recurring_leaves
+from jaxbiped.optimise._design_functions import Functions
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
 from jaxbiped.optimise._optimality import OPTIMAL, optimality_of
 from jaxbiped.optimise._optimisers import (
     Callback,
-    Functions,
     RunEnding,
     run_optax,
     run_slsqp,
     run_trust_constr,
+    run_trust_region,
 )
 from jaxbiped.optimise._optimum import Iteration, Optimum, Outcome
-from jaxbiped.optimise._trust_region import run_trust_region
 
 if TYPE_CHECKING:
     import optax
@@ -138,12 +138,12 @@ def _message(problem: DesignProblem, best: Design, ended: RunEnding) -> str:
 def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     """The best of the designs that runs came to."""
     best = runs.best
-    found = problem.objective(best.known)
+    found, scene = problem.objective(best.known), problem.scene_at(best.u)
     return Optimum(
         outcome=runs.outcome(),
         message=_message(problem, best, runs.ended),
-        scene=problem.scene_at(best.u),
-        gait=problem.gait_of(best),
+        scene=scene,
+        gait=problem.settings.find_near(scene, best.known.state),
         variables=problem.variables.by_name(best.u),
         objective=problem.sense * found.value,
         error=found.error,

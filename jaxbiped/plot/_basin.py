@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._quantity import Quantity
-from jaxbiped.basins._fractions import fractions as fractions_of
+from jaxbiped.basins._label_statistics import fractions as fractions_of
 from jaxbiped.basins._labels import Label, check_known, label_names
 from jaxbiped.basins._refined_boundary import RefinedBoundary
 from jaxbiped.plot import style

@@ -134,7 +134,9 @@ def optimisation(optimum: Optimum) -> Figure:
     figure = style.new_figure(3.8 * max(columns, 1.6), 0.8 + 1.35 * lines, rows=True)
     panels = list(figure.subplots(lines, columns, squeeze=False, sharex=True).flat)
     kept = np.array([each.excess <= _KEPT for each in history])
-    best = _best(optimum)
+    # The iterate that the optimum is, or the last one.
+    same = [k for k, each in enumerate(history) if each.variables == optimum.variables]
+    best = same[-1] if same else len(history) - 1
     for ax, (quantity, values, value, error, bound) in zip(panels, rows, strict=False):
         _draw_row(ax, np.array(values), kept, best, (value, error), bound)
         ax.set_ylabel(f"{quantity.symbol or quantity.words} ({quantity.unit_in_figure})")
@@ -176,12 +178,6 @@ def _rows(optimum: Optimum) -> list[_Row]:
         own = [each.variables[name] for each in history]
         rows.append((quantities[name], own, value, 0.0, held.get(name)))
     return rows
-
-
-def _best(optimum: Optimum) -> int:
-    """Number of the iterate that the optimum is, or of the last one."""
-    same = [k for k, each in enumerate(optimum.history) if each.variables == optimum.variables]
-    return same[-1] if same else len(optimum.history) - 1
 
 
 def _draw_row(

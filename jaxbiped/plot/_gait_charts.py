@@ -1,4 +1,4 @@
-"""Elasticities of a gait as tornados, and the error bars of charts of gaits."""
+"""Charts of a gait: its Floquet multipliers in the complex plane, its elasticities as tornados."""
 
 import math
 from typing import Any
@@ -7,13 +7,32 @@ import jax.tree_util as jtu
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type
+from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._measures import QUANTITIES
+from jaxbiped.gait._gait import QUANTITIES, Gait
+from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import row_label
+
+_NEAR_ZERO = 0.03
+"""Multipliers closer to zero than this are named together."""
+_VISIBLE = 0.005
+"""Errors below this hide behind a dot."""
+_VERDICTS = {True: "stable", False: "not stable", None: "undecided within the errors"}
+_LINEAR = 1e-4
+"""Elasticities up to this are drawn to a linear scale, beyond to a logarithmic one."""
+_READING = """One per cent more of a parameter
+changes the measure by as many
+per cent as its elasticity.
+
+Blue: the measure grows;
+vermilion: it shrinks.
+
+The scale is logarithmic beyond
+±0.0001, and the same in all panels."""
 
 
 def check_drawable(gait: Gait) -> None:
@@ -25,9 +44,6 @@ def check_drawable(gait: Gait) -> None:
         raise ArgumentError(f"the search ended {str(gait.outcome)!r}: there is no gait to draw.")
 
 
-_ERRORS = {"multipliers": "multiplier_errors", "sensitivities": "sensitivity_errors"}
-
-
 def error_bars(gait: Gait, of: str) -> Any:
     """Estimated errors of a gait's `multipliers` or `sensitivities`.
 
@@ -35,7 +51,7 @@ def error_bars(gait: Gait, of: str) -> Any:
     """
     if gait.error is not None and of in gait.error.bars:
         return gait.error.bars[of]
-    return getattr(gait, _ERRORS[of])
+    return gait.multiplier_errors if of == "multipliers" else gait.sensitivity_errors
 
 
 def elasticity_errors(gait: Gait, name: str) -> np.ndarray:
@@ -62,21 +78,6 @@ def elasticity_errors(gait: Gait, name: str) -> np.ndarray:
     return np.where(np.isfinite(own) & np.isfinite(found), found, np.nan)
 
 
-_LINEAR = 1e-4
-"""Elasticities up to this are drawn to a linear scale, beyond to a logarithmic one."""
-
-
-_READING = """One per cent more of a parameter
-changes the measure by as many
-per cent as its elasticity.
-
-Blue: the measure grows;
-vermilion: it shrinks.
-
-The scale is logarithmic beyond
-±0.0001, and the same in all panels."""
-
-
 def elasticities(
     gait: Gait, measure: str | tuple[str, ...] | None = None, *, ax: Axes | None = None
 ) -> Figure:
@@ -99,8 +100,11 @@ def elasticities(
             one pair of axes, or the gait has no parameters.
     """
     check_drawable(gait)
-    asked = _known(gait) if measure is None else measure
-    names = (asked,) if isinstance(asked, str) else tuple(asked)
+    if measure is None:
+        # Those that are known and not zero; all of them if none has one.
+        own = {name: np.nan_to_num(getattr(gait.elasticities, name)) for name in QUANTITIES}
+        measure = tuple(name for name in own if own[name].any()) or tuple(QUANTITIES)
+    names = (measure,) if isinstance(measure, str) else tuple(measure)
     if not names:
         raise ArgumentError("measure = () is not allowed: it must name a measure at least.")
     for name in names:
@@ -110,7 +114,14 @@ def elasticities(
     if ax is not None and len(names) > 1:
         raise ArgumentError("ax is one pair of axes: it shows the elasticities of one measure.")
     rows, short = _row_labels(gait)
-    panels = [ax] if ax is not None else _new_panels(len(names), len(rows), short)
+    if ax is not None:
+        panels = [ax]
+    else:
+        columns = style.panels_abreast(min(len(names), 3), width=1.9 if short else 3.2)
+        lines = -(-len(names) // columns)
+        width, height = max(3.9 * columns, 4.6), (1.3 + 0.2 * len(rows)) * lines
+        figure = style.new_figure(width, height, rows=True)
+        panels = list(figure.subplots(lines, columns, squeeze=False).flat)
     found = [np.asarray(getattr(gait.elasticities, name)) for name in names]
     errors = [elasticity_errors(gait, name) for name in names]
     ends = np.abs(np.nan_to_num(found, posinf=0.0, neginf=0.0)) + np.nan_to_num(errors)
@@ -121,15 +132,9 @@ def elasticities(
     for each in spare:
         each.set_axis_off()
     if spare and style.has_titles():
-        look: dict[str, Any] = {"fontsize": "small", "color": style.GROUND_COLOUR}
-        spare[0].text(-0.4, 0.95, _READING, va="top", transform=spare[0].transAxes, **look)
+        look: dict[str, Any] = {"fontsize": "small", "color": style.GROUND_COLOUR, "va": "top"}
+        spare[0].text(-0.4, 0.95, _READING, transform=spare[0].transAxes, **look)
     return style.figure_of(panels[0])
-
-
-def _known(gait: Gait) -> list[str]:
-    """Measures with an elasticity that is known and not zero; all of them if none has one."""
-    values = {name: np.nan_to_num(getattr(gait.elasticities, name)) for name in QUANTITIES}
-    return [name for name, own in values.items() if own.any()] or list(QUANTITIES)
 
 
 def _row_labels(gait: Gait) -> tuple[list[str], bool]:
@@ -142,22 +147,7 @@ def _row_labels(gait: Gait) -> tuple[list[str], bool]:
     return [row_label(each) for each in gait.quantities or gait.parameters], False
 
 
-def _new_panels(count: int, parameters: int, short: bool) -> list[Axes]:
-    """Axes of a new figure, of three panels or as many as have room side by side."""
-    columns = style.panels_abreast(min(count, 3), width=1.9 if short else 3.2)
-    rows = -(-count // columns)
-    width, height = max(3.9 * columns, 4.6), (1.3 + 0.2 * parameters) * rows
-    figure = style.new_figure(width, height, rows=True)
-    return list(figure.subplots(rows, columns, squeeze=False).flat)
-
-
-def _panel(
-    ax: Axes,
-    title: str,
-    names: list[str],
-    values: np.ndarray,
-    errors: np.ndarray,
-) -> None:
+def _panel(ax: Axes, title: str, names: list[str], values: np.ndarray, errors: np.ndarray) -> None:
     """One measure: bars from the largest down, unknown ones last, and their numbers beside.
 
     Thin lines are their errors.
@@ -197,3 +187,112 @@ def _scale(ax: Axes, largest: float, narrow: bool) -> None:
     for power in powers:
         marks |= {-power: f"−{power:g}", power: f"{power:g}"}
     ax.set_xticks(list(marks), list(marks.values()), fontsize="small")
+
+
+def multipliers(gait: Gait | BranchPoint, *, ax: Axes | None = None) -> Figure:
+    """Draws the Floquet multipliers with their error bars, without the trivial one.
+
+    The circle is the unit circle, within which a gait is stable. A disc around a multiplier is its
+    estimated error, if that is larger than the dot. Multipliers near zero lie on top of each other
+    and share a label.
+
+    Args:
+        gait: a gait that was found, or a point of a branch.
+        ax: axes to draw into. Default: a new figure.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
+
+    Raises:
+        ValueError: no gait was found, or this is a batch.
+    """
+    check_type("gait", gait, Gait, BranchPoint)
+    if isinstance(gait, BranchPoint):
+        errors, stable = np.asarray(gait.multiplier_errors), gait.stable
+        critical = Bifurcation(gait.bifurcation)
+    else:
+        check_drawable(gait)
+        errors = np.asarray(error_bars(gait, "multipliers"))
+        stable, critical = bool(gait.stable), gait.critical
+    values = np.asarray(gait.multipliers)
+    ax = style.axes_or_new(ax, 5.6, 5.6)
+    look: dict[str, Any] = {"edgecolor": style.GROUND_COLOUR, "zorder": 0, "label": "unit circle"}
+    ax.add_patch(Circle((0.0, 0.0), 1.0, facecolor="#F6F6F6", **look))
+    for value, error in zip(values, errors, strict=True):
+        if _VISIBLE < error < np.inf:
+            place = (value.real, value.imag)
+            ax.add_patch(Circle(place, error, facecolor=style.LEG_COLOURS[1], alpha=0.25))
+    bars = np.where(np.isfinite(errors), errors, np.nan)
+    look = {"color": style.LEG_COLOURS[0], "elinewidth": 0.9, "capsize": 2.0}
+    ax.errorbar(values.real, values.imag, bars, bars, fmt="none", **look)
+    look = {"color": style.LEG_COLOURS[0], "markersize": 5}
+    ax.plot(values.real, values.imag, "o", label="multipliers", **look)
+    _frame(ax, max(1.0, float(np.max(np.abs(values) + np.nan_to_num(bars)))))
+    _name(ax, values)
+    largest = float(np.max(errors))
+    said = f"largest error {largest:.1e}" + ("" if largest > _VISIBLE else ": within the dots")
+    said = said if np.isfinite(largest) else "not all errors are known"
+    look = {"fontsize": "small", "color": style.GROUND_COLOUR}
+    ax.text(0.02, 0.02, said, transform=ax.transAxes, **look)
+    verdict = _VERDICTS[stable]
+    if critical is not Bifurcation.NONE:
+        verdict += f", at a bifurcation ({critical})"
+    radius = float(np.max(np.abs(values)))
+    style.set_title(ax, f"Floquet multipliers: spectral radius {radius:.4f}\n{verdict}")
+    return style.figure_of(ax)
+
+
+def _frame(ax: Axes, reach: float) -> None:
+    """Equal scales, both axes through zero, room for the names."""
+    ax.axhline(0.0, color=style.SHADE_COLOUR, linewidth=0.8, zorder=0.5)
+    ax.axvline(0.0, color=style.SHADE_COLOUR, linewidth=0.8, zorder=0.5)
+    ax.set_aspect("equal")
+    ax.set_xlim(-1.15 * reach, 1.15 * reach)
+    ax.set_ylim(-1.15 * reach, 1.15 * reach)
+    ax.set_xlabel(r"real part, Re $\lambda$ (–)")
+    ax.set_ylabel(r"imaginary part, Im $\lambda$ (–)")
+    ax.spines[["top", "right"]].set_visible(False)
+
+
+def _name(ax: Axes, values: np.ndarray) -> None:
+    """Writes each multiplier beside its dot; of a complex pair once, those near zero together.
+
+    A name stands in that corner of its dot from which the other dots and names, and the circle,
+    are farthest.
+    """
+    small = np.abs(values) < _NEAR_ZERO
+    names = [
+        (f"{value.real:.3f} ± {value.imag:.3f} i" if value.imag else f"{value.real:.3f}", value)
+        for value in values[~small & (values.imag >= 0.0)]
+    ]
+    if small.any():
+        largest = float(np.max(np.abs(values[small])))
+        names.append((f"{int(small.sum())} near 0\n" + rf"($|\lambda| \leq$ {largest:.1e})", 0j))
+    circle = np.exp(2j * np.pi * np.linspace(0.0, 1.0, 200))
+    taken = [*values[~small], *([0j] if small.any() else []), *circle]
+    edge = ax.get_xlim()[1]
+    inches = ax.get_window_extent().width / style.figure_of(ax).dpi
+    scale = 2.0 * edge / inches
+    for text, value in names:
+        wide, high = (scale * each for each in style.text_size(text))
+        # Down the middle of each text that might be written.
+        corners = {
+            (right, up): value
+            + right * np.linspace(0.4 * high, wide, 9)
+            + 1j * up * (0.5 * high + 0.05 * scale)
+            for right in (1, -1)
+            for up in (1, -1)
+        }
+        others = np.array([each for each in taken if each != value])[:, None]
+        right, up = max(corners, key=lambda each: _room(corners[each], others, edge))
+        taken += list(corners[right, up])
+        side, level = "left" if right > 0 else "right", "bottom" if up > 0 else "top"
+        place = (value.real, value.imag)
+        words = text.replace("-", "−")
+        style.label_point(ax, words, place, (6 * right, 4 * up), ha=side, va=level)
+
+
+def _room(text: np.ndarray, others: np.ndarray, edge: float) -> float:
+    """Smallest distance of a text from others; below zero by how far it leaves the axes."""
+    outside = edge - float(np.max(np.abs(text.real)))
+    return min(outside, 0.0) or float(np.min(np.abs(text - others)))

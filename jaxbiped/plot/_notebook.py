@@ -16,16 +16,15 @@ from jaxbiped._checks import check_type
 from jaxbiped._types import is_traced
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._measures import QUANTITIES
+from jaxbiped.gait._gait import QUANTITIES, Gait
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.plot import style
-from jaxbiped.plot._multiplier_chart import multipliers
+from jaxbiped.plot._gait_charts import multipliers
+from jaxbiped.plot._motion_curves import gait_orbit
+from jaxbiped.plot._motion_pictures import corners_of, draw_bodies
 from jaxbiped.plot._parameter_charts import branch
-from jaxbiped.plot._phase_portrait import gait_orbit
 from jaxbiped.plot._samples import AnyScene
 from jaxbiped.plot._skeleton import skeleton_of
-from jaxbiped.plot._strobe import corners_of, draw_bodies
 from jaxbiped.plot._symbols import HEIGHT, HORIZONTAL
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import parameter_quantities, parameter_values

@@ -12,12 +12,12 @@ from matplotlib.lines import Line2D
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive, check_type
 from jaxbiped._quantity import Quantity
-from jaxbiped.basins._fractions import Fraction, wilson_interval
+from jaxbiped.basins._label_statistics import Fraction, wilson_interval
 from jaxbiped.continuation._bifurcation_curve import BifurcationCurve
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import BranchPoint
-from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
+from jaxbiped.dynamics._state import recurring_names, state_quantity
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import NORMAL_FORCE, axis_label
 from jaxbiped.scene._parameter_access import parameter_quantities

@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import as_array, in_parts, rows_of
-from jaxbiped.dynamics._state import state_type, whole_state
+from jaxbiped.dynamics._equivalent_states import whole_state
+from jaxbiped.dynamics._state import state_type
 from jaxbiped.measure._footsteps import HeelStrikes, heel_strikes
 from jaxbiped.measure._samples import evaluate_along, states_after
 from jaxbiped.plot._skeleton import body_motion

@@ -5,12 +5,12 @@ Symbols are the paper's; those of laws that it does not have are the ones of the
 
 from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._quantity import Quantity
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES, state_quantity
+from jaxbiped.dynamics._state import STATE_QUANTITIES, state_quantity
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
-from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
-from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
+from jaxbiped.scene.laws._ristow_schafer import RistowSchafer
+from jaxbiped.scene.laws._stribeck import BengisuAkay
 from jaxbiped.sweep.starts._coordinates import START_QUANTITIES
 
 TIME = Quantity("time", r"$t$", "s")

@@ -67,14 +67,6 @@ def warn_if_steep(ground: Ground, friction: object) -> None:
         )
 
 
-def drop_under(ground: object, leg: int) -> Scalar | None:
-    """How much lower the ground under a leg's feet lies than the slope [m]; None for even.
-
-    Legs count from 0.
-    """
-    return ground.drop if isinstance(ground, SteppedGround) and leg == ground.leg else None
-
-
 class AbstractClearance(eqx.Module):
     """A rule that decides from a leg and its rotation whether its feet may touch."""
 

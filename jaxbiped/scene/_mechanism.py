@@ -14,35 +14,32 @@ from jaxbiped._jax_versions import current_trace
 from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
 from jaxbiped._types import Parameter, Scalar, by_numpy, is_traced
 from jaxbiped.caching._caches import OfObjects
-from jaxbiped.scene._bodies import Body, Foot, check_name
-from jaxbiped.scene._couplings import fixed_angles
+from jaxbiped.scene._bodies import Body, Foot
 from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Motor, Stop
-from jaxbiped.scene._mechanism_names import check_parameter_names, mechanism_parameter_names
 from jaxbiped.scene._mechanism_pieces import (
     angle_of_part,
+    check_parameter_names,
     check_pieces,
     check_state_names,
-    check_zero_pose,
+    fixed_angles,
     foot_names_of,
+    mechanism_parameter_names,
     named_angle,
     number_of,
     parents_of,
 )
-from jaxbiped.scene._mirror import (
+from jaxbiped.scene._placement import check_zero_pose
+from jaxbiped.scene._structure import Indices, Structure
+from jaxbiped.scene._symmetry import (
     body_twins,
+    check_nothing_turns_along,
     check_same_both_ways,
     foot_twins,
     joint_twins,
     symmetric_part,
-    whole_part,
-)
-from jaxbiped.scene._structure import Indices, Structure
-from jaxbiped.scene._turn import (
-    check_nothing_turns_along,
-    check_turn,
     turn_of,
     turned_foot,
-    turning_body,
+    with_turning_body,
 )
 
 
@@ -93,7 +90,6 @@ class Mechanism(eqx.Module):
         mirror: Sequence[tuple[str, str]] = (),
         turn: Mapping[str, int] | None = None,
     ) -> None:
-        check_name("root", root)
         check_pieces(root, bodies, feet, joints)
         names = [each.name for each in bodies]
         parents = parents_of(bodies, names)
@@ -112,8 +108,7 @@ class Mechanism(eqx.Module):
             joints = [symmetric_part(p) if m else p for p, m in zip(joints, mirrored, strict=True)]
         turns, shared = turn_of(turn, names, at_feet), [*twins]
         if turns is not None:
-            check_turn(turns, bodies, feet, legs)
-            bodies = [turning_body(b) if j == turns.body else b for j, b in enumerate(bodies)]
+            bodies = with_turning_body(turns, bodies, feet, legs)
             shared[1] = turns.firsts
         pieces: list[Body | Foot | AbstractJointPart] = []
         groups = zip((bodies, feet, joints), shared, strict=True)
@@ -181,10 +176,12 @@ class Mechanism(eqx.Module):
         """All joint parts; mirror images have the same leaves."""
         s, found = self.structure, []
         for k, (own, name) in enumerate(zip(s.joint_pieces, s.joint_names, strict=True)):
-            part = with_fields(self.pieces[own], name=name)
+            part: Any = with_fields(self.pieces[own], name=name)
             if own in s.joint_pieces[:k]:
                 part = with_fields(part, angle=named_angle(s.joints[k], s.bodies))
-            found.append(whole_part(part) if s.changes_sign(k) else part)
+            if s.changes_sign(k) and isinstance(part, Stop) and part.upper is not None:
+                part = with_fields(part, lower=-part.upper)  # the mirror's
+            found.append(part)
         return tuple(found)
 
     def arguments(self) -> dict[str, Any]:

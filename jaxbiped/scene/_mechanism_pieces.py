@@ -1,8 +1,10 @@
-"""Pieces of a mechanism, checked and numbered: what hangs on what, and which angle a part is on.
+"""Pieces of a mechanism, checked, numbered and named, and its couplings solved.
 
-With all angles 0 they must stand above the ground, and every motion must have inertia.
+What hangs on what, which angle a part is on, and what its parameters are called: "thigh.mass",
+"shank.foot.radius".
 """
 
+import functools
 import string
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -12,21 +14,17 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._types import is_traced
-from jaxbiped.scene._bodies import RESERVED, Body, Foot
+from jaxbiped.scene._bodies import RESERVED, Body, Foot, check_name
 from jaxbiped.scene._joint_parts import AbstractJointPart
-from jaxbiped.scene._structure import Angle, Indices, Structure
+from jaxbiped.scene._structure import Angle, Fixed, Indices, Structure, pair_name, weighted
 
 if TYPE_CHECKING:
     from jaxbiped.scene._mechanism import Mechanism
 
 
-_SINGULAR = 1e-12
-"""Least eigenvalue of a mass matrix scaled to a diagonal of ones that still is an inertia."""
-
-
 def check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
     """Raises `ArgumentError` for pieces of the wrong kind, no foot, or a name that stands twice."""
+    check_name("root", root)
     for argument, kind, group in (
         ("bodies", Body, bodies), ("feet", Foot, feet), ("joints", AbstractJointPart, joints)
     ):  # fmt: skip
@@ -133,106 +131,154 @@ def named_angle(angle: Angle, names: Sequence[str]) -> tuple[tuple[str, float], 
     return (*weights, *([("normal", -total)] if abs(total) > 1e-12 else []))
 
 
-def check_zero_pose(mechanism: "Mechanism") -> None:
-    """Raises `ArgumentError` where the root point is not above the ground with all angles 0.
-
-    Nor may the mass matrix be known to be singular there.
-
-    Hanging straight down, what has no inertia of its own has none at all: a mass at its hinge, a
-    massless thigh over a shank that is a mass point, legs without inertia under a massless root.
-    """
-    if is_traced(mechanism):
-        return
-    _check_shapes(mechanism)
-    height = np.min(np.asarray(mechanism.height))
-    if height <= 0.0:
-        raise ArgumentError(
-            f"feet are not allowed where all angles are 0: the root point is at {height:g} m, not "
-            "above the ground; put one foot's sole below it."
-        )
-    structure = mechanism.structure
-    matrix = _mass_matrix(mechanism)
-    diagonal = np.sqrt(np.diagonal(matrix, axis1=-2, axis2=-1))
-    for j, body in enumerate(structure.free):
-        if np.any(diagonal[..., 2 + j] == 0.0):
-            _refuse(mechanism, body)
-    if np.any(diagonal[..., :2] == 0.0):
-        raise ArgumentError(
-            "bodies and root_mass are all without mass, which is not allowed: give one some mass."
-        )
-    scaled = matrix / diagonal[..., :, None] / diagonal[..., None, :]
-    values, vectors = np.linalg.eigh(scaled)
-    if np.any(values[..., 0] < _SINGULAR):
-        worst = np.reshape(vectors[..., 2:, 0], (-1, len(structure.free)))
-        sizes = np.max(np.abs(worst), axis=0)
-        # Of those that turn as much as the first one does, whatever the rounding.
-        most = int(np.argmax(sizes > (1.0 - 1e-6) * np.max(sizes)))
-        _refuse(mechanism, structure.free[most])
-
-
-def _check_shapes(mechanism: "Mechanism") -> None:
-    """Raises `ArgumentError` where two numbers are arrays that do not broadcast to one shape."""
-    known: dict[tuple[int, ...], str] = {}
-    leaves = jtu.tree_leaves(mechanism)
-    for name, leaf in zip(mechanism.parameter_names(), leaves, strict=True):
-        for shape, other in known.items():
-            try:
-                np.broadcast_shapes(shape, np.shape(leaf))
-            except ValueError:
-                raise ArgumentError(
-                    f"{other} and {name} have the shapes {shape} and {np.shape(leaf)}, which are "
-                    "not allowed together: give arrays of one shape."
-                ) from None
-        known.setdefault(np.shape(leaf), name)
-
-
-def _refuse(mechanism: "Mechanism", body: int) -> None:
-    structure = mechanism.structure
-    name = structure.bodies[body]
-    mend = "give it some inertia, or put its mass away from its hinge"
-    if body in structure.feet and not np.any(mechanism.bodies[body].mass):
-        mend = "give it an inertia of 1e-4 kg m^2, or put the foot on the leg"
-    raise ArgumentError(
-        f"Body({name!r}) can turn without any inertia where all angles are 0, which is not "
-        f"allowed: {mend}."
+def mechanism_parameter_names(mechanism: "Mechanism") -> tuple[str, ...]:
+    """Names of a mechanism's leaves, in their order."""
+    prefixes = _prefixes(mechanism)
+    return tuple(
+        f"{mechanism.structure.root}.mass"
+        if path[0].name == "root_mass"
+        else f"{prefixes[path[1].idx]}.{_leaf_name(path[2:])}"
+        for path, _ in jtu.tree_flatten_with_path(mechanism)[0]
     )
 
 
-def _mass_matrix(mechanism: "Mechanism") -> np.ndarray:
-    """Of the root point's place and the free angles, all angles 0; shape (..., n, n)."""
-    structure, bodies = mechanism.structure, mechanism.bodies
-    n = len(bodies)
-    total: Any = 0.0
-    for body, chain in zip(bodies, structure.chains, strict=True):
-        moves: Any = np.eye(2, 2 + n)
-        for link, after in zip(chain, (*chain[1:], None), strict=True):
-            point = body.centre if after is None else bodies[after].at
-            if point is None:
-                continue
-            # At angle 0 a point (along, ahead) moves by (along, ahead) for each radian.
-            moves = _added(moves, 0, 2 + link, point.along)
-            if point.ahead is not None:
-                moves = _added(moves, 1, 2 + link, point.ahead)
-        mass = np.asarray(body.mass)[..., None, None]
-        total = total + mass * (np.swapaxes(moves, -1, -2) @ moves)
-        total = _added(total, 2 + chain[-1], 2 + chain[-1], body.inertia)
-    if mechanism.root_mass is not None:
-        for i in range(2):
-            total = _added(total, i, i, mechanism.root_mass)
-    free = np.zeros((2 + n, 2 + len(structure.free)))
-    free[0, 0] = free[1, 1] = 1.0
-    for k, j in enumerate(structure.free):
-        free[2 + j, 2 + k] = 1.0
+def _prefixes(mechanism: "Mechanism") -> dict[int, str]:
+    """What names of each piece's parameters begin with."""
+    s, found = mechanism.structure, {}
+    names = [
+        name
+        if s.body_twins is None or s.body_twins[j] == j
+        else pair_name(*(s.bodies[i] for i in sorted((j, s.body_twins[j]))))
+        for j, name in enumerate(s.bodies)
+    ]
+    tokens = [name for j, name in enumerate(names) if s.body_twins and s.body_twins[j] != j]
+    for j, twin in enumerate(s.body_twins or ()):
+        if twin != j and tokens.count(names[j]) > 2:  # several pairs share them
+            names[j] = "+".join(s.bodies[i] for i in sorted((j, twin)))
+    for k, name in zip(s.body_pieces, names, strict=True):
+        found[k] = name
+    for k, j in zip(s.foot_pieces, s.feet, strict=True):
+        own = [name for i, name in zip(s.foot_pieces, s.foot_names, strict=True) if i == k]
+        found[k] = f"{names[j]}.{functools.reduce(pair_name, own)}"
+    for k, angle, part in zip(s.joint_pieces, s.joints, mechanism.joints, strict=True):
+        found.setdefault(k, f"{names[angle.weights[0][0]]}.{part.name or part.kind}")
+    return found
+
+
+def _leaf_name(path: tuple[Any, ...]) -> str:
+    """The name of a leaf of a piece: "centre" and "centre_ahead" of a point, "K" of a law."""
+    texts = path_texts(path)
+    if len(texts) > 1 and texts[1] in ("along", "ahead"):
+        return texts[0] if texts[1] == "along" else f"{texts[0]}_ahead"
+    return ".".join(texts[1:] if len(texts) > 1 and texts[0] == "law" else texts)
+
+
+def path_texts(path: tuple[Any, ...]) -> list[str]:
+    """Names along a path; an entry of several is numbered from 1."""
+    texts: list[str] = []
+    for key in path:
+        if isinstance(key, jtu.SequenceKey) and texts:
+            texts[-1] += f"_{key.idx + 1}"
+        else:
+            texts.append(str(getattr(key, "name", key)))
+    return texts
+
+
+def check_parameter_names(mechanism: "Mechanism") -> None:
+    """Raises `ArgumentError` where two pieces would have parameters of the same names."""
+    structure, prefixes = mechanism.structure, _prefixes(mechanism)
+    for k, name in zip(structure.body_pieces, structure.bodies, strict=True):
+        if prefixes[k] != name and prefixes[k] in structure.bodies:
+            raise ArgumentError(
+                f"a body is called {prefixes[k]!r}, which is not allowed: in names of parameters "
+                f"{prefixes[k]!r} stands for the pair."
+            )
+    for k, part in zip(structure.joint_pieces, mechanism.joints, strict=True):
+        if list(prefixes.values()).count(prefixes[k]) > 1:
+            raise ArgumentError(
+                f"two {part.kind}s at one body, {prefixes[k]!r}, are not allowed "
+                "without a name each: give name=."
+            )
+    names = mechanism_parameter_names(mechanism)
+    for name in names:
+        if names.count(name) > 1:
+            raise ArgumentError(
+                f"two parameters would be called {name!r}, which is not allowed: give bodies, feet "
+                "or joints other names."
+            )
+
+
+_SINGULAR = 1e-9
+"""Couplings whose weights are so nearly dependent repeat or contradict each other."""
+
+
+def with_fixed(
+    structure: Structure, values: Sequence[Any], vertical: Any = None, joints: Sequence[Any] = ()
+) -> list[Any]:
+    """Values of all bodies' angles, those that couplings fix set from the others.
+
+    Args:
+        structure: of the mechanism.
+        values: of all bodies; what stands for fixed ones is not read.
+        vertical: angle of the vertical [rad]; None for rates and accelerations.
+        joints: the joint parts, whose rest angles count; none for rates and accelerations.
+    """
+    found = list(values)
     for each in structure.fixed:
-        for j, weight in each.angle.weights:
-            free[2 + each.body, 2 + structure.free.index(j)] = weight
-    return np.asarray(free.T @ total @ free)
+        own = each.angle.of(values, vertical)
+        own = 0.0 * values[0] if own is None else own
+        for k, weight in each.rests if joints else ():
+            rest = joints[k].rest
+            own = own if rest is None else own + weighted(rest, weight)
+        found[each.body] = own
+    return found
 
 
-def _added(matrix: Any, row: int, column: int, value: Any) -> Any:
-    """A matrix, or a batch of them, with a value added to one entry of each."""
-    value = np.asarray(value, dtype=float)
-    shape = np.broadcast_shapes(np.shape(matrix)[:-2], value.shape)
-    matrix = np.array(np.broadcast_to(matrix, (*shape, *np.shape(matrix)[-2:])))
-    matrix[..., row, column] += value
-    return matrix
+def fixed_angles(couplings: Sequence[tuple[int, Angle]], names: Sequence[str]) -> tuple[Fixed, ...]:
+    """The angle of the first body that each coupling names, as a sum of those that stay free.
+
+    Args:
+        couplings: number of each one among the joint parts, and its angle.
+        names: of the bodies.
+
+    Raises:
+        ArgumentError: an angle that two couplings fix, or couplings that repeat or contradict each
+            other.
+    """
+    if not couplings:
+        return ()
+    first = [angle.weights[0][0] for _, angle in couplings]
+    for body in first:
+        if first.count(body) > 1:
+            raise ArgumentError(
+                f"two couplings name {names[body]!r} first, whose angle each would fix: name "
+                "another body first in one of them."
+            )
+    weights = np.zeros((len(couplings), len(names)))
+    for row, (_, angle) in enumerate(couplings):
+        for body, weight in angle.weights:
+            weights[row, body] = weight
+    own = weights[:, first]
+    if np.linalg.cond(own) * _SINGULAR > 1.0:
+        raise ArgumentError(
+            f"couplings of {', '.join(repr(names[body]) for body in first)} repeat or contradict "
+            "each other: leave one out."
+        )
+    by_rest = np.linalg.inv(own)
+    by_others = -by_rest @ weights
+    by_slope = -by_rest @ np.array([angle.vertical for _, angle in couplings])
+    return tuple(
+        Fixed(
+            body,
+            Angle(
+                tuple(
+                    (j, float(by_others[row, j]))
+                    for j in range(len(names))
+                    if j not in first and by_others[row, j]
+                ),
+                float(by_slope[row]),
+            ),
+            tuple((k, float(by_rest[row, i])) for i, (k, _) in enumerate(couplings)),
+        )
+        for row, body in enumerate(first)
+    )

@@ -17,7 +17,7 @@ from jaxbiped._types import JsonObject, Parameter, Scalar
 from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._bodies import Point
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._mechanism_names import path_texts
+from jaxbiped.scene._mechanism_pieces import path_texts
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 SomeScene = TypeVar("SomeScene", bound=eqx.Module)
@@ -131,8 +131,8 @@ def select_parameters(
             f"parameters = {parameters!r} is not allowed: give a tuple of names, such as "
             f"({parameters!r},)."
         )
-    leaves = _leaves_by_name(scene)
-    names, by_leaf = tuple(_by_rank(leaves) if parameters is None else parameters), list(leaves)
+    names = parameter_names(scene) if parameters is None else tuple(parameters)
+    by_leaf = list(_leaves_by_name(scene))
     for name in names:
         check_choice("parameters", name, by_leaf)
     return names, tuple(by_leaf.index(name) for name in names)
@@ -219,10 +219,7 @@ def _rebuilt(part: Any, fields: dict[str, Any]) -> Any:
 
 def _parameters(scene: PyTree) -> dict[str, tuple[_Path, Scalar]]:
     """Paths and leaves of a scene's parameters by name, those first that are first asked for."""
-    return _by_rank(_leaves_by_name(scene))
-
-
-def _by_rank(leaves: dict[str, tuple[_Path, Scalar]]) -> dict[str, tuple[_Path, Scalar]]:
+    leaves = _leaves_by_name(scene)
     return {name: leaves[name] for name in _FIRST if name in leaves} | leaves
 
 

@@ -12,10 +12,9 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._types import Parameter, Scalar, as_float, by_numpy, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.scene._couplings import angles_and_rates_named
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode, Modes, limits_named, modes_of
-from jaxbiped.scene._placement import feet_named, foot_motion
+from jaxbiped.scene._placement import angles_and_rates_named, feet_named, foot_motion
 from jaxbiped.scene._structure import Indices, Structure
 
 
@@ -40,20 +39,20 @@ def leg_after_strike(structure: Structure, leg: int) -> int:
     return leg if len(standing_legs(structure)) == 1 else next_leg(structure, leg)
 
 
-def _check_feet(structure: Structure) -> None:
-    """Raises `ArgumentError` for feet of which it is not known how they stand."""
-    if structure.turn is not None:
-        return
+def check_rolls(mechanism: Mechanism) -> None:
+    """Raises `ArgumentError` for a mechanism whose walk on rigid feet is not known yet."""
+    structure = mechanism.structure
     soles = [
         len(feet) <= 2 and len({structure.feet[k] for k in feet}) == 1
         for feet in structure.feet_of_leg
     ]
-    if len(soles) != 2 or not all(soles):
+    if structure.turn is None and (len(soles) != 2 or not all(soles)):
         raise ArgumentError(
             f"walker has the feet {', '.join(structure.feet_told)}, which is not allowed on rigid "
             "feet yet: there must be two legs, each with one or two feet on one body; use a Scene "
             "for others, whose feet are compliant."
         )
+    rigid_modes(mechanism)
 
 
 def rigid_modes(mechanism: Mechanism) -> Modes:
@@ -68,12 +67,6 @@ def held_count(mechanism: Mechanism, mode: float) -> int:
     modes = rigid_modes(mechanism)
     found = modes.decoded(np, np.float64(mode))
     return sum(map(bool, (*found.held, *modes.flat(found).values())))
-
-
-def check_rolls(mechanism: Mechanism) -> None:
-    """Raises `ArgumentError` for a mechanism whose walk on rigid feet is not known yet."""
-    _check_feet(mechanism.structure)
-    rigid_modes(mechanism)
 
 
 def check_stands(structure: Structure, standing: str | Sequence[str] | None) -> Indices:

@@ -198,8 +198,7 @@ class RigidScene(AbstractMinimalScene):
         modes, names = rigid_modes(mechanism), self.state_names
         if not modes.any:
             limits_named(modes, held or ())
-            placed = placement(mechanism, slope, values, standing, names)
-            return state_type_of(names)(**placed)
+            return state_type_of(names)(**placement(mechanism, slope, values, standing, names))
         placed = placement(mechanism, slope, values, standing, names[:-1])
         mode = starting_mode(mechanism, modes, slope, placed, feet, held)
         return state_type_of(names)(**placed, mode=mode)

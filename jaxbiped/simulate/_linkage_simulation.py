@@ -19,12 +19,16 @@ from jaxbiped._checks import (
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, as_float, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
-from jaxbiped.constraints._linkage_constraints import Constraints, constraints_of
-from jaxbiped.constraints._projection import check_independent, correct_step, nearest_consistent
-from jaxbiped.dynamics._linkage_motion import LinkageState, linkage_field
+from jaxbiped.constraints._constraint_method import (
+    AbstractProjectingMethod,
+    check_independent,
+    correct_step,
+    nearest_consistent,
+)
+from jaxbiped.constraints._linkage import Constraints, constraints_of
+from jaxbiped.dynamics._constrained_motion import LinkageState, linkage_field
+from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._linkages import LinkageScene
-from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.simulate._start import Options, check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
 from jaxbiped.solve._solvers import (

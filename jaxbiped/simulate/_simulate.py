@@ -9,8 +9,8 @@ from jaxtyping import Array, PyTree
 from jaxbiped._checks import check_type, warn
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Parameter
-from jaxbiped.dynamics._linkage_motion import LinkageState
-from jaxbiped.dynamics._section import AbstractSection, HeelStrike
+from jaxbiped.dynamics._constrained_motion import LinkageState
+from jaxbiped.dynamics._surfaces import AbstractSection, HeelStrike
 from jaxbiped.scene._linkages import LinkageScene
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState

@@ -24,12 +24,19 @@ from jaxbiped._checks import (
 )
 from jaxbiped._types import Numbers, Scalar, as_array, as_float, is_traced
 from jaxbiped.compiler import BY_NAME, Request
-from jaxbiped.dynamics._consistent_state import Consistent
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._constrained_motion import Consistent
+from jaxbiped.dynamics._surfaces import AbstractSection
+from jaxbiped.scene._abstract_scene import check_scene, where_allowed
 from jaxbiped.scene._scene import RedundantScene, Scene
-from jaxbiped.scene._scene_checks import check_scene, where_allowed
+from jaxbiped.simulate._backends import (
+    by_lanes,
+    by_xla,
+    choose_engine,
+    lane_request,
+    prepare_lanes,
+    trim,
+)
 from jaxbiped.simulate._derivatives import with_derivatives
-from jaxbiped.simulate._lane_backend import by_lanes, choose_engine, lane_request, prepare_lanes
 from jaxbiped.simulate._slopes import Slopes, slopes_of
 from jaxbiped.simulate._start import (
     Options,
@@ -39,7 +46,6 @@ from jaxbiped.simulate._start import (
     check_times,
     start_for,
 )
-from jaxbiped.simulate._xla_backend import by_xla, trim
 from jaxbiped.solve._accuracy import (
     Units,
     check_precision,
@@ -53,16 +59,14 @@ from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._solvers import check_adjoint, solver_named
 from jaxbiped.solve._trajectory import Trajectory, scene_key
 from jaxbiped.solve.controllers._event_steps import PATIENCE
-from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas4P, Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 _FIRST = 1e-2
 """First tolerance as a share of the relative error wanted: errors of walks are about 0.5 to 6
 tolerances (the seed's walk of two seconds, 1e-5 to 1e-9), and bars some fifteen times that."""
-
 _FINEST_FIRST = 1e-10
 """Finest tolerance to begin with."""
-
 _AS_FINE = 2.0
 """Weight of a witness whose own error is about the walk's: their difference may be either's.
 
@@ -122,8 +126,7 @@ class Simulation(eqx.Module):
         """Checks what is asked, and forms it."""
         given, dt, footsteps, times = state, asked.dt, asked.footsteps, asked.times
         check_limits(asked.duration, footsteps, asked.max_solver_steps)
-        allowed_time = PATIENCE * footsteps if footsteps is not None else 0.0
-        time = allowed_time if asked.duration is None else asked.duration
+        time = PATIENCE * (footsteps or 0) if asked.duration is None else asked.duration
         for name, value in (("rtol", asked.rtol), ("atol", asked.atol)):
             check_unbatched(name, value)
         with traced_rules() as rules:
@@ -134,9 +137,7 @@ class Simulation(eqx.Module):
             relative, absolute = tolerances(asked.accuracy, asked.rtol, asked.atol, scene)
             method = solver_named(asked.solver)
             check_steps(method, dt, most_steps=asked.max_solver_steps, duration=time)
-        if (
-            scene.redundant
-        ):  # outside: what it compiles makes parts of its own, of which none is given
+        if scene.redundant:  # outside: what it compiles makes parts of its own, none of them given
             state, correction = start_for(scene, state)
         # Of a lane that is not allowed nothing is known from the start.
         state, time = where_allowed(rules, state), where_allowed(rules, time, 1.0)
@@ -168,8 +169,7 @@ class Simulation(eqx.Module):
         units = units if asked.atol is None else si_units(units)
         scene = scene if dtype == jnp.float64 else jtu.tree_map(cast, scene)
         longest = cast(time)
-        leaves = (scene, state, longest)
-        chosen = choose_engine(asked, method, leaves, redundant=scene.redundant)
+        chosen = choose_engine(asked, method, (scene, state, longest), redundant=scene.redundant)
         return Simulation(
             scene=scene,
             state=state,
@@ -267,8 +267,7 @@ def _slopes(
     run: Simulation, found: Trajectory, places: tuple[int, ...], active: tuple[int, ...]
 ) -> Slopes:
     # The columns take the walk's own method of steps, where that is one for them.
-    solver = run.solver if isinstance(run.solver, AbstractRosenbrock) else solver_named("rodas4p")
-    assert isinstance(solver, AbstractRosenbrock)
+    solver = run.solver if isinstance(run.solver, AbstractRosenbrock) else Rodas4P()
     assert isinstance(run.scene, Scene)
     return slopes_of(
         run.scene,
@@ -288,8 +287,7 @@ class CompiledSimulation:
     """A compiled request; call it to run."""
 
     def __init__(self, program: Callable[[Simulation], Trajectory], request: Simulation) -> None:
-        self._program = program
-        self._request = request
+        self._program, self._request = program, request
 
     def __call__(self) -> Trajectory:
         """Runs the solve and waits for it."""

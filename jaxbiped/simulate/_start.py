@@ -21,13 +21,12 @@ from jaxbiped._checks import (
 from jaxbiped._jax_versions import untraced
 from jaxbiped._types import Scalar, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.constraints._projection import check_independent
-from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
+from jaxbiped.constraints._constraint_method import check_independent
+from jaxbiped.dynamics._constrained_motion import Consistent, consistent_state, coordinates_of
 from jaxbiped.dynamics._contacts import feet, limits_of
 from jaxbiped.dynamics._footfalls import touches
-from jaxbiped.dynamics._redundant_motion import coordinates_of
-from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import state_for
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
 from jaxbiped.solve._failure_events import WATCHES
 

@@ -18,7 +18,7 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Numbers, Scalar, select
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import Program
-from jaxbiped.dynamics._consistent_state import project
+from jaxbiped.dynamics._constrained_motion import project
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.solve._accuracy import Units
 from jaxbiped.solve._failure_events import ending_code, ending_events

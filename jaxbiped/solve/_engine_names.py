@@ -1,9 +1,15 @@
 """Engines by name, and which of them "auto" stands for."""
 
+import diffrax
 import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.compiler import BY_NAME, CUDA
+from jaxbiped.dynamics._surfaces import AbstractSection
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 ENGINES = ("auto", "xla", "lanes", "cuda")
 """Names of the engines.
@@ -54,6 +60,19 @@ def engine_for(
         return engine
     able = obstacle is None and jax.default_backend() == "cpu"
     return "lanes" if able and not prefers_xla else "xla"
+
+
+def lane_obstacle(
+    solver: diffrax.AbstractSolver[PyTree], section: AbstractSection | None, leaves: PyTree
+) -> str | None:
+    """Why lanes cannot solve by a solver, to a section, from these numbers; None where they can."""
+    if not isinstance(solver, AbstractRosenbrock):
+        return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
+    if section is not None and jtu.tree_leaves(section):
+        return f"the section {type(section).__name__} holds numbers of its own"
+    if any(jnp.result_type(leaf) != jnp.float64 for leaf in jtu.tree_leaves(leaves)):
+        return "it computes in 64 bits"
+    return None
 
 
 def _check_device(obstacle: str | None, *, by_device: bool) -> None:

@@ -12,7 +12,7 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._equivalent_states import exchange_legs, images
 from jaxbiped.dynamics._footfalls import standing_leg
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._step_polynomials import StepCubic

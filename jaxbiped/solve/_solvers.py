@@ -16,7 +16,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import BoolScalarLike, Numbers, RealScalarLike, Time
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
-from jaxbiped.dynamics._consistent_state import project
+from jaxbiped.dynamics._constrained_motion import project
 from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas3P, Rodas4, Rodas4P, Rodas5P

@@ -1,10 +1,14 @@
-"""Gaits on a grid of parameters as a dataset, in memory or in a Zarr store."""
+"""Grid of gaits over parameters: its dataset, in memory or in a Zarr store; and its geometry.
+
+Its points are searched on lattices, from coarse to fine: what is known of gaits there tells where
+those of other points may lie.
+"""
 
 import contextlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -13,21 +17,34 @@ from jaxbiped._files import strict_json
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import variables_of
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._state_quantities import recurring_names
+from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._gait_table import gait_coordinates, gait_entries
+from jaxbiped.gait._gait import Gait, gait_coordinates, gait_entries
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.sweep._store_files import SETTINGS, continue_store, open_store, writing
 
 if TYPE_CHECKING:
     import xarray
 
+Place: TypeAlias = tuple[int, ...]
+"""Indices of a point."""
+
+LARGE = 64
+"""Points from which on a grid is large."""
 _DONE = "done"
 _PAUSE = 2.0
 """Seconds between two writes of a store, at least."""
 _SHARE = 20.0
 """How much longer than a write takes."""
+_STENCILS: tuple[dict[int, float], ...] = (
+    {-3: -1 / 16, -1: 9 / 16, 1: 9 / 16, 3: -1 / 16},
+    {-1: 0.5, 1: 0.5},
+    {-1: 1.5, -3: -0.5},
+    {1: 1.5, 3: -0.5},
+    {-1: 1.0},
+    {1: 1.0},
+)
+"""Weights of points so many steps away for the point between them, the best first."""
 
 
 class GaitGrid:
@@ -37,11 +54,11 @@ class GaitGrid:
         self._dataset, self._state, self._path = dataset, state, path
         self._written, self._pause = time.monotonic(), _PAUSE
 
-    def is_done(self, place: tuple[int, ...]) -> bool:
+    def is_done(self, place: Place) -> bool:
         """Whether it is known what a point has, a gait or none."""
         return bool(self._dataset[_DONE].data[place])
 
-    def is_stable(self, place: tuple[int, ...]) -> bool:
+    def is_stable(self, place: Place) -> bool:
         return bool(self._dataset["spectral_radius"].data[place] < 1.0)
 
     def states(self) -> np.ndarray:
@@ -49,7 +66,7 @@ class GaitGrid:
         names = recurring_names(self._state)
         return np.stack([self._dataset[f"state_{name}"].data for name in names], axis=-1)
 
-    def write(self, places: Sequence[tuple[int, ...]], gaits: Gait) -> None:
+    def write(self, places: Sequence[Place], gaits: Gait) -> None:
         """Keeps gaits, whose arrays have a first axis; every few seconds in the store, too."""
         at = tuple(np.transpose(places))
         for name, (_, values, _) in variables_of(gait_entries(gaits)).items():
@@ -155,9 +172,7 @@ def _load(path: Path, empty: "xarray.Dataset") -> "xarray.Dataset":
         whole = all(each.nchunks_initialized == each.nchunks for each in arrays)
         whole = whole or not bool(stored[_DONE].any())
     if not whole:
-        warn(
-            f"store = {str(path)!r} was damaged: its gaits are searched again.",
-        )
+        warn(f"store = {str(path)!r} was damaged: its gaits are searched again.")
         return empty
     missing = sorted(set(map(str, empty.data_vars)) - set(map(str, stored.data_vars)))
     if missing:
@@ -183,3 +198,80 @@ def _empty(
         name: (name, column, quantities[name].attributes) for name, column in values.items()
     }
     return xarray.Dataset(variables, coordinates | gait_coordinates(gait))
+
+
+class Wave(NamedTuple):
+    """Points none of which needs another.
+
+    Attributes:
+        places: the points.
+        stride: steps along an axis between neighbours on the wave's lattice.
+        fills: whether the points lie between those of the lattice that is twice as coarse; else
+            beyond those of the waves before.
+    """
+
+    places: list[Place]
+    stride: int
+    fills: bool
+
+
+def neighbours(place: Place, shape: Sequence[int], stride: int = 1) -> Iterator[Place]:
+    """The points next to one, one axis after the other."""
+    for axis, size in enumerate(shape):
+        for step in (-stride, stride):
+            moved = place[axis] + step
+            if 0 <= moved < size:
+                yield (*place[:axis], moved, *place[axis + 1 :])
+
+
+def extrapolated(states: np.ndarray, wave: Wave) -> np.ndarray:
+    """Where the points of a wave beyond the known ones may lie: on from the nearest two, or one.
+
+    `states` has shape (*grid, m), NaN where nothing is known; the result (n, m).
+    """
+    shape = states.shape[:-1]
+    found = np.full((len(wave.places), states.shape[-1]), np.nan)
+    for k, place in enumerate(wave.places):
+        best = None
+        for near in neighbours(place, shape, wave.stride):
+            if np.isnan(states[near][0]):
+                continue
+            beyond = tuple(2 * a - b for a, b in zip(near, place, strict=True))
+            inside = all(0 <= i < size for i, size in zip(beyond, shape, strict=True))
+            if inside and not np.isnan(states[beyond][0]):
+                best = 2.0 * states[near] - states[beyond]
+                break
+            best = states[near] if best is None else best
+        if best is not None:
+            found[k] = best
+    return found
+
+
+def interpolated(states: np.ndarray, first: Place, wave: Wave) -> np.ndarray:
+    """Where the points of a wave between the known ones may lie, as `extrapolated`.
+
+    By cubic polynomials along one axis after the other, by lower ones where points are missing.
+    """
+    coarse = np.full_like(states, np.nan)
+    known = tuple(slice(i % (2 * wave.stride), None, 2 * wave.stride) for i in first)
+    coarse[known] = states[known]
+    for axis, begin in enumerate(first):
+        rows = np.moveaxis(coarse, axis, 0)[begin % wave.stride :: wave.stride]
+        odd = (begin // wave.stride + 1) % 2
+        rows[odd::2] = _between(rows, odd)
+    return coarse[tuple(np.transpose(wave.places))]
+
+
+def _between(rows: np.ndarray, odd: int) -> np.ndarray:
+    """Values in every second row, from `odd` on, by the rows between them."""
+    margin = np.full((3, *rows.shape[1:]), np.nan)
+    padded = np.concatenate([margin, rows, margin])
+    count = len(rows[odd::2])
+    best = np.full((count, *rows.shape[1:]), np.nan)
+    for stencil in _STENCILS:
+        value = sum(
+            weight * padded[3 + odd + step : 3 + odd + step + 2 * count - 1 : 2]
+            for step, weight in stencil.items()
+        )
+        best = np.where(np.isnan(best), value, best)
+    return best

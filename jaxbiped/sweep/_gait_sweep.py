@@ -17,10 +17,11 @@ from jaxbiped._identity import provenance
 from jaxbiped._progress import stage
 from jaxbiped._types import as_float, rows_of
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import (
     parameter_quantities,
     parameter_values,
@@ -28,10 +29,8 @@ from jaxbiped.scene._parameter_access import (
     with_parameters,
 )
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
-from jaxbiped.sweep._gait_grid import open_gait_grid
+from jaxbiped.sweep._gait_grid import LARGE, Place, open_gait_grid
 from jaxbiped.sweep._gait_waves import GaitWaves
-from jaxbiped.sweep._grid_waves import LARGE, Place
 from jaxbiped.sweep._store_files import store_path, what_is_kept
 from jaxbiped.sweep.starts._coordinates import parameter_axes
 
@@ -94,7 +93,12 @@ def gait_sweep(
         ResourceError: the disk is full. The contents of the store are kept.
     """
     scene = check_scene(scene, Scene, RigidScene, RedundantScene)
-    values = _check_values(scene, over)
+    if not isinstance(over, Mapping) or not over:
+        raise ArgumentError(
+            f"over = {over!r} is not allowed: map one parameter's name or more to its values, "
+            'such as {"K": [1e6, 2e6]}.'
+        )
+    values = parameter_axes(scene, over, "over")
     path = store_path(store)
     options: dict[str, Any] = dict(
         parameters=parameters,
@@ -177,13 +181,13 @@ def find_each(
     while first < count:
         size = _MANY if count - first > 3 * _FEW else _FEW
         part = slice(first, min(first + size, count))
-        missing = size - (part.stop - first)
+        kept = part.stop - first
+        missing = size - kept
         # A search from nowhere ends at once: it fills the batch.
         rows = np.pad(starts[part], ((0, missing), (0, 0)), constant_values=np.nan)
         columns = {k: np.pad(v[part], (0, missing), mode="edge") for k, v in values.items()}
         begin = state(np.zeros(size), *np.ascontiguousarray(rows.T))
         gaits = _find_each(scene, columns, begin, dict(options))
-        kept = part.stop - first
         yield part, rows_of(gaits, slice(kept))
         first = part.stop
 
@@ -199,17 +203,6 @@ def _find_each(
         return dataclasses.replace(gait, orbit=None)  # type: ignore[arg-type]
 
     return jax.vmap(one)(values, starts)
-
-
-def _check_values(
-    scene: AnyScene, over: Mapping[str, Sequence[float] | np.ndarray]
-) -> dict[str, np.ndarray]:
-    if not isinstance(over, Mapping) or not over:
-        raise ArgumentError(
-            f"over = {over!r} is not allowed: map one parameter's name or more to its values, "
-            'such as {"K": [1e6, 2e6]}.'
-        )
-    return parameter_axes(scene, over, "over")
 
 
 def _nearest(scene: AnyScene, values: dict[str, np.ndarray]) -> Place:

@@ -6,6 +6,7 @@ neighbours point to; where that leads to no stable gait, at neighbours. Only the
 searched without a guess, which takes longest: in a region without gaits not each of them.
 """
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeAlias
 
@@ -13,20 +14,21 @@ import numpy as np
 
 from jaxbiped._progress import Stage
 from jaxbiped._types import rows_of
-from jaxbiped.dynamics._state_quantities import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.sweep._gait_grid import GaitGrid
-from jaxbiped.sweep._grid_waves import (
+from jaxbiped.sweep._gait_grid import (
     LARGE,
+    GaitGrid,
     Place,
     Wave,
     extrapolated,
     interpolated,
     neighbours,
-    waves,
 )
 
+_COARSEST = 12
+"""Points of the coarse lattice along the longest axis, about."""
 _TRIES = 2
 """Neighbours from which a point with an unstable gait is searched again."""
 _REACH = 2
@@ -36,6 +38,40 @@ strides: those are not searched so."""
 Find: TypeAlias = Callable[[Sequence[Place], np.ndarray], Iterator[tuple[slice, Gait]]]
 """Which of the points, and the gaits, with a first axis, to which Newton's method leads from the
 states without `ROOT_x` that are given, shape (n, m)."""
+
+
+def waves(shape: Sequence[int], first: Place) -> list[Wave]:
+    """All points of a grid in the order in which they are searched; `first` is the first wave."""
+    stride = 1
+    if np.prod(shape) >= LARGE:
+        while 2 * stride * _COARSEST <= max(shape):
+            stride *= 2
+    found = [Wave(each, stride, False) for each in rings(shape, first, stride)]
+    while stride > 1:
+        stride //= 2
+        coarser = set(_lattice(shape, first, 2 * stride))
+        places = [place for place in _lattice(shape, first, stride) if place not in coarser]
+        found.append(Wave(places, stride, True))
+    return found
+
+
+def rings(shape: Sequence[int], first: Place, stride: int = 1) -> Iterator[list[Place]]:
+    """The lattice's points by how many strides they are away."""
+    seen, ring = {first}, [first]
+    while ring:
+        yield ring
+        following = []
+        for place in ring:
+            for near in neighbours(place, shape, stride):
+                if near not in seen:
+                    seen.add(near)
+                    following.append(near)
+        ring = following
+
+
+def _lattice(shape: Sequence[int], first: Place, stride: int) -> Iterator[Place]:
+    axes = [range(i % stride, size, stride) for i, size in zip(first, shape, strict=True)]
+    return itertools.product(*axes)
 
 
 class GaitWaves:

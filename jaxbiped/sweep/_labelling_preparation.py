@@ -14,8 +14,8 @@ from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.basins._labels import Doubt, Label
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
+from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
 from jaxbiped.solve._engine_names import engine_for
@@ -258,9 +258,7 @@ def label_at(
         labelled = labelling(batch.states, parameters=batch.parameters)
         remain = np.sum(labelled.doubt == int(Doubt.REMAINS)) if labelled.doubt is not None else 0
         if remain:
-            warn(
-                f"{remain} of {len(points)} labels remain in doubt at the finest tolerance.",
-            )
+            warn(f"{remain} of {len(points)} labels remain in doubt at the finest tolerance.")
         found = labelled.label.astype(int)
         return (found != int(Label.WALKING)).astype(int) if failing else found
 

@@ -13,8 +13,15 @@ from jaxbiped._checks import ArgumentError, check_count, check_type
 from jaxbiped._files import JsonObject
 from jaxbiped._identity import provenance
 from jaxbiped._progress import stage
-from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_label_errors
-from jaxbiped.basins._labels import Doubt, Label, Witness
+from jaxbiped.basins._labels import (
+    ERRORS,
+    Doubt,
+    Label,
+    LabelErrors,
+    Seen,
+    Witness,
+    estimate_label_errors,
+)
 from jaxbiped.sweep._gait_family import Guesses
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import (
@@ -23,7 +30,7 @@ from jaxbiped.sweep._labelling_preparation import (
     with_gaits_met,
     with_guesses,
 )
-from jaxbiped.sweep._store import ALL_GAITS, Store
+from jaxbiped.sweep._store import ALL_GAITS, DOUBT_FIELDS, Layout, Store, fields_of
 from jaxbiped.sweep._store_files import (
     GAITS,
     check_continued,
@@ -32,7 +39,6 @@ from jaxbiped.sweep._store_files import (
     what_is_kept,
     writing,
 )
-from jaxbiped.sweep._stored_fields import DOUBT_FIELDS, Layout, fields_of
 from jaxbiped.sweep._workers import compute_chunks
 from jaxbiped.sweep.starts._coordinates import coordinate_quantities, state_coordinates
 from jaxbiped.sweep.starts._starts import AbstractStarts
@@ -124,10 +130,7 @@ def sweep(
     with stage("seeking the gaits that starts converge to", show=progress, kept=kept):
         known = with_gaits_met(labelling, starts) if look_for_gaits else labelling
     settings = known.settings() | own
-    if path is None:
-        results = Store.in_memory(layout, settings, writer)
-    else:
-        results = Store.open(path, layout, settings, writer, any_version=any_version)
+    results = Store.of(path, layout, settings, writer, any_version=any_version)
     missing = results.behind()
     sizes = layout.sizes
     fresh = int(sizes[missing].sum())
@@ -249,23 +252,16 @@ def tightened(
             left = results.behind(ALL_GAITS + more)
             for chunk, fields in compute_chunks(finer, layout, left, executor, workers):
                 results.write(chunk, fields, mark=ALL_GAITS + more)
-        errors = estimate_label_errors(
-            tally_results(layout, results), wanted=wanted, rtol=tolerances[-1]
-        )
+        seen = Seen()
+        for chunk in range(layout.chunks):
+            seen += tally_disagreements(**results.read(chunk, tuple(DOUBT_FIELDS)))
+        errors = estimate_label_errors(seen, wanted=wanted, rtol=tolerances[-1])
         finest = tolerances[-1] <= 1.001 * FINEST_FIRST[compliant]
         too_few = errors.wrong <= wanted and errors.starts < errors.fewest
         if errors.met or too_few or finest or len(tolerances) >= _ROUNDS:
             return errors
         tolerances.append(max(tolerances[-1] / _FINER, FINEST_FIRST[compliant]))
         results.note({_TOLERANCES: json.dumps(tolerances)})
-
-
-def tally_results(layout: Layout, results: Store) -> Seen:
-    total = Seen()
-    for chunk in range(layout.chunks):
-        fields = results.read(chunk, tuple(DOUBT_FIELDS))
-        total += tally_disagreements(fields["doubt"], fields["disagreed"], fields["changed"])
-    return total
 
 
 def tally_disagreements(doubt: np.ndarray, disagreed: np.ndarray, changed: np.ndarray) -> Seen:

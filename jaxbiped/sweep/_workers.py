@@ -25,7 +25,7 @@ from jaxbiped._checks import ArgumentError, ResourceError, check_count, check_po
 from jaxbiped._files import THREADS_VARIABLE
 from jaxbiped.compiler import default_threads
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._stored_fields import Layout, fields_of
+from jaxbiped.sweep._store import Layout, fields_of
 from jaxbiped.sweep.starts._starts import AbstractStarts, GivenStarts
 
 _RETRIES = 3

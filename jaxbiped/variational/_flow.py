@@ -13,7 +13,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree, PyTreeDef
 
 from jaxbiped._types import Scalar, VectorField
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._switch_locator import MARGIN
 from jaxbiped.variational._tangents import Seeded, with_active

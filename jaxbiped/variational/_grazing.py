@@ -16,7 +16,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._contacts import Gap, gaps
 from jaxbiped.dynamics._footfalls import any_of
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._fusion_barrier import fusion_barrier

@@ -14,7 +14,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import (

@@ -18,11 +18,7 @@ from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar, Time
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._solvers import Projected
-from jaxbiped.solve.controllers._wrapped_control import (
-    AbstractMemorylessControl,
-    Adapted,
-    Attempt,
-)
+from jaxbiped.solve.controllers._wrapped_control import AbstractMemorylessControl, Adapted, Attempt
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
     AbstractMemorylessSolver,
     AbstractRosenbrock,

@@ -14,7 +14,7 @@ from jaxtyping import PyTree
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.linalg._sparse_lu import SparseMatrix
 from jaxbiped.solve._accuracy import Precision, Units
 

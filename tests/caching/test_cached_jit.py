@@ -12,7 +12,7 @@ import jaxbiped as jb
 from jaxbiped.caching import _compiled_store
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._disk_cache import CACHE_VARIABLE, disk_use
-from jaxbiped.simulate._xla_backend import by_xla
+from jaxbiped.simulate._backends import by_xla
 from jaxbiped.solve.controllers._wrapped_control import just_before_end
 
 

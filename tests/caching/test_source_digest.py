@@ -19,7 +19,7 @@ from jaxbiped.caching._source_digest import SourceDigests
 PACKAGE = Path(jb.__file__).parent
 LATER = time.time_ns() + 10**15
 
-COULOMB = "scene/laws/friction/_coulomb.py"
+COULOMB = "scene/laws/_coulomb.py"
 WORDS = {
     "comment in a figure": ("plot/style.py", "import re\n", "import re  # of any kind\n"),
     "line above functions": ("gait/_find_gait.py", "import jax\n", "import jax\n\n# A word.\n"),

@@ -12,7 +12,7 @@ from matplotlib.colors import to_hex
 
 import jaxbiped as jb
 from jaxbiped import plot
-from jaxbiped.cli._basin_starts import StartsOptions
+from jaxbiped.cli._start_options import StartsOptions
 from jaxbiped.plot.style import label_colour
 from tests.cli.commands import numbers_of, outputs_of, run
 from tests.drawn import assert_is_drawn

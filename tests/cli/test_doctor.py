@@ -1,7 +1,8 @@
-"""The command doctor, against installations with one thing wrong."""
+"""The commands doctor and cache, against installations with one thing wrong and the folder."""
 
 import pytest
 
+from jaxbiped.caching._disk_cache import CACHE_VARIABLE, read_entry, write_entry
 from jaxbiped.cli import _doctor
 from jaxbiped.cli._doctor import Truth, complaints, self_test
 from tests.cli.commands import numbers_of, run
@@ -39,3 +40,29 @@ def test_versions_known_to_be_bad_are_named():
     (said,) = complaints({"jax": "0.10.2"})
     assert "jax 0.10.2 must not be used" in said
     assert "39103" in said
+
+
+def _told(capsys, *arguments):
+    assert run("cache", *arguments) == 0
+    return capsys.readouterr().out
+
+
+def test_the_cache_is_counted_and_cleared(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+    write_entry("lanes", "a", bytes(1000))
+    write_entry("xla", "b", bytes(2000))
+    told = numbers_of(capsys, "cache")
+    assert told["folder"] == str(tmp_path / "cache")
+    assert told["kept"]["xla"] == {"entries": 1, "size": 2032}
+    assert told["removed"] is None
+    assert str(tmp_path / "cache") in _told(capsys)
+    told = numbers_of(capsys, "cache", "--clear")
+    assert told["removed"] == {"entries": 2, "size": 3064}
+    assert read_entry("lanes", "a") is None
+    assert "removed: 0 entries" in _told(capsys, "--clear")
+
+
+def test_a_cache_where_nothing_is_kept_says_so(monkeypatch, capsys):
+    monkeypatch.setenv(CACHE_VARIABLE, "")
+    assert "nothing is kept" in _told(capsys)
+    assert numbers_of(capsys, "cache")["folder"] is None

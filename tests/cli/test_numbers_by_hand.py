@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._basin_starts import read_starts
 from jaxbiped.cli._gait import _assumption_line
-from jaxbiped.cli._walk_warnings import walk_warnings
+from jaxbiped.cli._start_options import read_starts
+from jaxbiped.cli._walk_report import walk_warnings
 
 SCENE = jb.seed_scene()
 

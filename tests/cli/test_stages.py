@@ -23,7 +23,7 @@ class _ReachedError(Exception):
         (WALK, "_walk", "Simulation.prepare", "start"),
         (WALK, "_walk", "Simulation.compile", "compiling"),
         (WALK, "_walk_report", "footsteps", "footsteps"),
-        (f"{WALK} --out OUT", "_walk_report", "cli._walk_report.write_outputs", "figures"),
+        (f"{WALK} --out OUT", "_walk", "cli._walk_report.write_outputs", "figures"),
         (f"{WALK} --formulation redundant", "_walk", "Simulation.prepare", "start"),
         (f"{WALK} --model rigid", "_walk", "rigid_walk", "compiling"),
         ("basin", "_basin", "labelling", "gaits"),

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._basin_starts import StartsOptions, read_starts
 from jaxbiped.cli._scene_options import ActuationOptions, SceneOptions
-from jaxbiped.cli._start_options import StartOptions
+from jaxbiped.cli._start_options import StartOptions, StartsOptions, read_starts
 from jaxbiped.cli._walkers import WALKERS
 from jaxbiped.models import MODELS
 from tests.cli.commands import numbers_of, outputs_of, refused

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of
-from jaxbiped.constraints._projection import correct_step
+from jaxbiped.constraints._constraint_method import correct_step
+from jaxbiped.constraints._linkage import constraints_of, masses_of
 from tests.linkages import (
     four_bar,
     four_bar_state,

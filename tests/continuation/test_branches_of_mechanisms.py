@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 from _mechanisms import cases
-from reference.mechanism_gait import checked_cycle
+from reference.mechanism_flow import checked_cycle
 
 import jaxbiped as jb
 from jaxbiped.continuation import BranchEvent
 from jaxbiped.continuation._branch_point import axis_of
 from jaxbiped.continuation._continuation_setup import continuation_setup
 from tests.mechanism_numbers import tree_of
-from tests.mechanisms import scene_of
-from tests.optimise.test_optima_of_mechanisms import TORSO
+from tests.mechanisms import SEED_WITH_TORSO, scene_of
 
 STIFFNESS = "torso.spring.stiffness"
 
@@ -27,17 +26,17 @@ def test_a_cycle_is_as_many_arrivals(name, footsteps):
     assert (setup.arrivals, setup.footsteps) == (1, footsteps // 3)
 
 
-@pytest.mark.nightly
+@pytest.mark.slow
 def test_a_branch_along_a_spring_has_the_gaits_own_slope():
-    gait = jb.find_gait(TORSO, parameters=(STIFFNESS,), radius_sensitivities=False)
+    gait = jb.find_gait(SEED_WITH_TORSO, parameters=(STIFFNESS,), radius_sensitivities=False)
     branch = jb.continue_gait(
-        TORSO, STIFFNESS, bounds=(7.0, 9.0), guess=gait, max_points=3, largest_step=0.2
+        SEED_WITH_TORSO, STIFFNESS, bounds=(7.0, 9.0), guess=gait, max_points=3, largest_step=0.2
     )
     values = np.array([point.value for point in branch.points])
     periods = np.array([point.period for point in branch.points])
     slope = np.polynomial.Polynomial.fit(values - 8.0, periods, 4).deriv()(0.0)
     assert slope == pytest.approx(float(gait.sensitivities.period[0]), rel=1e-5)
-    again = jb.continuation.open_branch(branch.to_dataset(), TORSO)
+    again = jb.continuation.open_branch(branch.to_dataset(), SEED_WITH_TORSO)
     assert again.state_type is type(gait.measures.state)
     for name in again.state_type._fields:
         assert float(getattr(again.state(0), name)) == float(getattr(branch.state(0), name))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.continuation import _nearest_bifurcation as nearest
+from jaxbiped.continuation import _critical_values as nearest
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.optimise import _bifurcation_distance as distances
 from jaxbiped.optimise._bifurcation_distance import Sought
@@ -72,6 +72,24 @@ def test_where_one_was_not_located_the_nearer_end_counts(monkeypatch):
     follows(monkeypatch, [event(0.01)], [later])
     scene = jb.with_parameters(SCENE, {"slope": 0.02})
     assert nearest.nearest_bifurcation(scene, GAIT).kind is BranchEvent.NOT_LOCATED
+
+
+def test_a_range_ends_where_the_walker_allows_no_more():
+    """A foot's radius at the leg's length, a leg at the radius, an exponent at one, a wall."""
+    seed, own = jb.seed_scene(), jb.parameter_values(SCENE)
+    d, r, leg = (float(own[name]) for name in "drl")
+    assert nearest.range_of(SCENE, "d") == (d / 8.0, 8.0 * d)
+    assert nearest.range_of(SCENE, "r") == (r / 8.0, pytest.approx(leg, rel=1e-9))
+    assert nearest.range_of(SCENE, "l") == (pytest.approx(r, rel=1e-9), 8.0 * leg)
+    assert nearest.farthest_allowed(seed, "n", 0.2) == pytest.approx(1.0, rel=1e-9)
+    steep = nearest.range_of(jb.seed_scene(slope=0.3), "slope")[1]
+    assert steep == pytest.approx(np.pi / 2, rel=1e-8)
+    for name in ("r", "l", "n"):
+        for end in nearest.range_of(seed, name):
+            jb.with_parameters(seed, {name: end})
+    assert nearest.range_of(jb.with_parameters(SCENE, {"slope": 0.0}), "slope") == (-0.1, 0.1)
+    with pytest.raises(jb.ArgumentError, match="no factor fits"):
+        nearest.range_of(SCENE, "hip_mass")
 
 
 @pytest.mark.parametrize("value", [OWN + 0.01, OWN - 0.004])

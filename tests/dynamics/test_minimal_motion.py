@@ -31,12 +31,6 @@ def test_vector_field_equals_the_independent_one(y, hip, slope):
     np.testing.assert_allclose(np.array(got), expected, rtol=1e-9, atol=1e-11 * scale)
 
 
-def test_field_works_on_a_time_series():
-    states = jax.tree_util.tree_map(lambda leaf: jnp.full(3, leaf), jb.seed_state())
-    rates = jb.dynamics.vector_field(0.0, states, jb.seed_scene())
-    assert all(leaf.shape == (3,) for leaf in rates)
-
-
 def test_free_flight():
     """The centre of mass flies a parabola; momenta of the fall and spin are kept."""
     scene = jb.seed_scene(slope=0.2, hip_mass=0.3)

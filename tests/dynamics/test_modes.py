@@ -1,5 +1,7 @@
 """Stops and flat feet on rigid feet, against maximal coordinates with what is held as loads."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -189,21 +191,9 @@ def test_a_flat_foot_is_pressed_at_both_ends(data):
 
 
 def hsu_chen(holds="through heel strike"):
-    """Hsu Chen's walker: thighs and shanks of point masses, and a latch at each knee."""
-    bodies = []
-    for i in (1, 2):
-        bodies += [
-            Body(f"thigh_{i}", mass=0.5, inertia=0.0, centre=0.325),
-            Body(f"shank_{i}", mass=0.05, inertia=0.0, centre=0.125, parent=f"thigh_{i}", at=0.5),
-        ]
-    walker = Mechanism(
-        root_mass=0.5,
-        bodies=bodies,
-        feet=[Foot(f"shank_{i}", centre=0.5) for i in (1, 2)],
-        joints=[Stop(f"shank_{i}", upper=0.0, holds=holds) for i in (1, 2)],
-        mirror=[("thigh_1", "thigh_2"), ("shank_1", "shank_2")],
-    )
-    return jb.RigidScene(walker, jb.Ground(slope=0.0504, g=9.81))
+    """Hsu Chen's walker, with other latches at its knees."""
+    scene = jb.models.hsu_chen()
+    return dataclasses.replace(scene, walker=dataclasses.replace(scene.walker, holds=holds))
 
 
 ANGLES = dict(theta_thigh_1=-0.2, theta_shank_1=-0.2, theta_thigh_2=0.2, theta_shank_2=0.2)

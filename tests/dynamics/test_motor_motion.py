@@ -9,14 +9,9 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._trigonometry import angle_of_vector
+from jaxbiped.dynamics._actuation import MotorMotion, exchanged, motor_torque, motor_torques
 from jaxbiped.dynamics._contacts import legs_in
-from jaxbiped.dynamics._motor_motion import (
-    MotorMotion,
-    exchanged,
-    motor_powers,
-    motor_torque,
-    motor_torques,
-)
+from jaxbiped.dynamics._energy import motor_powers
 from jaxbiped.dynamics._tree import Motion, pose_of
 from tests.scene.test_mechanism import BISECTING, LEGS, TORSO, kneed, two_legs
 

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
+from jaxbiped.dynamics._energy import kinetic_energy
 from jaxbiped.dynamics._joint_loads import motion_of
-from jaxbiped.dynamics._stance import kinetic_energy
 from jaxbiped.dynamics._tree import Motion
 from jaxbiped.scene._bodies import Body, Foot, Point
 from jaxbiped.scene._joint_parts import Coupling, Latch, Motor, Spring

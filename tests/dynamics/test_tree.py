@@ -13,7 +13,7 @@ from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._implicit_field import force_balance, free_mass_entries
 from jaxbiped.dynamics._joint_loads import motion_of, with_constraint_torques, with_joint_loads
 from jaxbiped.dynamics._tree import Loads, point_motion, pose_of
-from jaxbiped.dynamics._tree_inertia import centrifugal_loads, composites, eliminate
+from jaxbiped.dynamics._tree_inertia import composites, eliminate, inertial_loads
 from jaxbiped.scene._bodies import Body, Foot, Point
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
@@ -35,7 +35,7 @@ def tree_accelerations(mechanism, motion, slope, g, force):
     structure = mechanism.structure
     pose, known = pose_of(mechanism, motion), composites(mechanism)
     loads = with_joint_loads(
-        centrifugal_loads(structure, known, pose), mechanism, motion, slope, stops=True
+        inertial_loads(structure, known, pose), mechanism, motion, slope, stops=True
     )
     last = len(structure.bodies) - 1
     loads = loads.with_force(point_motion(structure, pose, last, PLACE), *force)

@@ -29,6 +29,13 @@ def test_few_labels_change_and_those_in_doubt_are_told(tmp_path):
         assert row["truly_wrong"] <= row["wanted"] * numbers["starts"]
         assert row["within_interval"] == row["draws"] == 1
         assert 1.0 < row["steps_ratio"] < 3.5
+    # Fractions lie in their intervals, and scatter less if starts are even.
+    for name in ("rigid", "compliant"):
+        uniform, sobol = (numbers["fractions"][name][method] for method in ("uniform", "sobol"))
+        for found in (uniform, sobol):
+            assert sum(each["fraction"] for each in found.values()) == pytest.approx(1.0)
+            assert all(each["inside_95"] >= 0.6 for each in found.values())
+        assert sobol["walking"]["scatter"] < uniform["walking"]["scatter"]
 
 
 def test_no_extreme_is_silently_wrong(tmp_path):

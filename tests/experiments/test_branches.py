@@ -7,14 +7,6 @@ from tests.experiments.quick import drawn_run
 pytestmark = pytest.mark.nightly
 
 
-def test_elasticities_of_a_critical_slope_are_those_of_differences(tmp_path):
-    numbers, _ = drawn_run("bifurcation_elasticities", tmp_path, unitless={"parameter"})
-    found = numbers["cases"]["doubling, rigid"]
-    assert found["slope_rad"] == pytest.approx(0.100401149, abs=1e-8)
-    row = found["parameters"]["r"]
-    assert row["elasticity"] == pytest.approx(row["by_differences"], rel=1e-5)
-
-
 def test_the_cascade_and_the_walks_beside_it(tmp_path):
     numbers, _ = drawn_run("period_doubling", tmp_path)
     assert 0.1 < numbers["rigid_seed"]["slope"] < 0.102
@@ -45,7 +37,11 @@ def test_published_walkers_are_beside_what_was_printed(tmp_path):
 
 
 def test_stability_is_lost_where_bisection_says(tmp_path):
-    numbers, _ = drawn_run("slope_branch", tmp_path)
+    numbers, figures = drawn_run("slope_branch", tmp_path, unitless={"parameter"})
+    assert set(figures) == {
+        "slope_branch.png", "bifurcation_elasticities.png", "k_c_xi_branches.png",
+        "k_c_xi_curves.png",
+    }  # fmt: skip
     compliant, rigid = numbers["scenes"]["stribeck"], numbers["scenes"]["rigid"]
     assert [row["kind"] for row in compliant["losses"]] == ["fold", "period-doubling"]
     assert [row["kind"] for row in rigid["losses"]] == ["period-doubling"]
@@ -54,11 +50,11 @@ def test_stability_is_lost_where_bisection_says(tmp_path):
         # Multipliers change by at most 50 for each rad; the bracket is of 5e-8 rad.
         assert row["off"] < 1e-7 + row["error"] / 25.0
     assert numbers["hundred_gaits"]["gaits"] >= 100
-
-
-def test_branches_and_curves(tmp_path):
-    numbers, figures = drawn_run("k_c_xi_branches", tmp_path)
-    assert set(figures) == {"k_c_xi_branches.png", "k_c_xi_curves.png"}
+    # Elasticities of a critical slope are those of differences.
+    found = numbers["cases"]["doubling, rigid"]
+    assert found["slope_rad"] == pytest.approx(0.100401149, abs=1e-8)
+    row = found["parameters"]["r"]
+    assert row["elasticity"] == pytest.approx(row["by_differences"], rel=1e-5)
     assert all(numbers["branches"]["K"]["stable"])
     for curve in numbers["curves"]["K"]:
         assert max(curve["off"]) < 1e-6

@@ -42,19 +42,10 @@ def test_laws_are_measured_and_judged(tmp_path):
     assert steep["angle_grows_every_step"]
 
 
-def test_a_kneed_walker_s_gait_tends_to_the_one_on_rigid_feet(tmp_path):
-    axis = {"factor of the stiffness, $s$", "distance from the rigid gait"}
-    numbers, figures = drawn_run("kneed_ladder", tmp_path, unitless=axis)
-    rows = numbers["distances"]["c with K^(3/2)"]
-    drawn = points_of(figures["kneed_limit.png"].axes[-1], "period")[0]
-    np.testing.assert_array_equal(drawn, [[row["factor"], row["period"]] for row in rows])
-    for name in ("period", "step_length", "pair", "third"):
-        away = np.array([row[name] for row in rows])
-        assert (away[1:] < 0.5 * away[:-1]).all(), name
-
-
 def test_rungs_and_the_way_to_the_rigid_limit(tmp_path):
-    numbers, figures = drawn_run("ladder", tmp_path, unitless={"factor of the path, $s$"})
+    axes = {"factor of the path, $s$", "factor of the stiffness, $s$"}
+    bare = {*axes, "distance from the rigid gait"}
+    numbers, figures = drawn_run("ladder", tmp_path, unitless=bare)
     measures = numbers["measures"]
     costs = points_of(figures["ladder.png"].axes[0], "in a batch")[0][:, 0]
     assert costs.tolist() == [cost["batch_us"] for cost in numbers["costs"].values()]
@@ -71,6 +62,13 @@ def test_rungs_and_the_way_to_the_rigid_limit(tmp_path):
     assert stiff["period"][-1] > 0.0 > stiff["period"][0]
     assert damped["step_length"] == sorted(damped["step_length"])
     assert damped["step_length"][-1] < 0.0
+    # So does the gait of a walker with knees, as its feet and stops stiffen.
+    rows = numbers["kneed"]["distances"]["c with K^(3/2)"]
+    drawn = points_of(figures["kneed_limit.png"].axes[-1], "period")[0]
+    np.testing.assert_array_equal(drawn, [[row["factor"], row["period"]] for row in rows])
+    for name in ("period", "step_length", "pair", "third"):
+        away = np.array([row[name] for row in rows])
+        assert (away[1:] < 0.5 * away[:-1]).all(), name
 
 
 def test_costs_on_level_ground(tmp_path):
@@ -111,11 +109,18 @@ def test_footsteps_stay_on_the_gait_and_repeat(tmp_path):
 
 
 def test_every_gait_of_the_map_is_found(tmp_path):
-    numbers, _ = drawn_run("radius_map", tmp_path, unitless={"spectral radius ρ"})
+    bare = {f"elasticity of\n{each}" for each in ("period", "step length", "speed", "peak normal")}
+    numbers, _ = drawn_run("radius_map", tmp_path, unitless={"spectral radius ρ", *bare})
     (row,) = numbers["rows"]
     assert row["found"] == row["stable"] == row["gaits"] == 64
     # At the seed's own K and c it is 0.457: the map spans values to both sides.
     assert numbers["least_radius"] < 0.457 < numbers["largest_radius"] < 1.0
+    for name, seeds in (("K", 0.139), ("c", 0.479)):
+        swept = numbers["along"][name]
+        assert not any(swept["ending"])
+        assert swept["period"][1] == pytest.approx(0.440835, abs=1e-6)
+        assert swept["elasticity_peak_normal"][1] == pytest.approx(seeds, abs=1e-3)
+        assert max(swept["elasticity_period_error"]) < 1e-4
 
 
 def test_no_gait_that_walks_settle_on_is_missed(tmp_path):
@@ -129,15 +134,3 @@ def test_no_gait_that_walks_settle_on_is_missed(tmp_path):
     assert [row["verdict"] for row in numbers["slope"]] == ["agrees"] * 3
     for row in numbers["slope"]:
         assert abs(row["period"] - row["walked"]) < 1e-6
-
-
-def test_every_gait_is_found_with_its_elasticities(tmp_path):
-    measures = ("period", "step length", "speed", "peak force")
-    bare = {f"elasticity of\n{measure}" for measure in measures}
-    numbers, _ = drawn_run("sensitivity_K_c_xi", tmp_path, unitless=bare)
-    assert numbers["without_a_gait"] == []
-    for row in numbers["points"].values():
-        seed = row[len(row) // 2]
-        assert seed["measures"]["period"] == pytest.approx(0.440835, abs=1e-6)
-        assert seed["elasticities"]["peak_normal"][:2] == pytest.approx([0.139, 0.479], abs=1e-3)
-        assert all(max(point["errors"]["period"]) < 1e-4 for point in row)

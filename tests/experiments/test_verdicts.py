@@ -8,8 +8,7 @@ import pytest
 from extreme_cases import verdict as verdicts
 from extreme_cases.case import Case, check_numbers
 from extreme_cases.catalogue import catalogue
-from extreme_cases.store import by_group, counts, reasons, study
-from extreme_cases.verdict import VERDICTS, judge
+from extreme_cases.verdict import VERDICTS, by_group, counts, judge, reasons, study
 from reference.scipy_solves import Checked
 
 import jaxbiped as jb

@@ -10,7 +10,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from tests.systems import Plain, orbit_near
 

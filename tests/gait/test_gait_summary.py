@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait import _gait
+from jaxbiped.gait import _gait_summary
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._orbit_derivatives import Orbit, Slopes
 from jaxbiped.gait._poincare_map import LinearisedReturn
@@ -56,16 +56,16 @@ def summary():
         return jax.tree.map(jnp.asarray, orbit)
 
     patch = pytest.MonkeyPatch()
-    patch.setattr(_gait, "nodes_of", lambda *_: (jnp.zeros((1, 1)), start))
+    patch.setattr(_gait_summary, "nodes_of", lambda *_: (jnp.zeros((1, 1)), start))
     problem = FixedPointProblem(spec, scene, active, start, Precision(0.0, 0.0))
     origin = single_stage_origin(problem, FoundBy.GUESS)
 
     @jax.jit
     def summarised(ending):
         orbit = both(ending)
-        patch.setattr(_gait, "orbit_of", lambda *_, **__: orbit)
-        patch.setattr(_gait, "with_parameter_columns", lambda *given: given[-1])
-        return _gait.summarise_gait.__wrapped__(problem, orbit.found, NAMES, True, origin)
+        patch.setattr(_gait_summary, "orbit_of", lambda *_, **__: orbit)
+        patch.setattr(_gait_summary, "with_parameter_columns", lambda *given: given[-1])
+        return _gait_summary.summarise_gait.__wrapped__(problem, orbit.found, NAMES, True, origin)
 
     yield summarised
     patch.undo()

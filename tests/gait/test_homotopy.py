@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait._homotopy import BranchEnd, follow_branch, homotopy_to
+from jaxbiped.gait._branch_along import follow_branch
+from jaxbiped.gait._homotopy import homotopy_to
 from jaxbiped.gait._pseudo_arclength import Change
+from jaxbiped.gait._search_provenance import BranchEnd
 
 SCENES = {
     "seed": jb.seed_scene(slope=0.05, K=1e8, hip_mass=2.0),

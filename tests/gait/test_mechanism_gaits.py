@@ -11,40 +11,18 @@ import pytest
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._state_quantities import recurring_names
-from tests.mechanisms import FEET, LEGS, PAIR, leg
+from jaxbiped.dynamics._state import recurring_names
+from tests.mechanisms import SEED_WITH_TORSO, leg, seed_walker
 
-STANCE = jb.laws.StanceRotation()
 LAWS = dict(
     normal=jb.laws.RistowSchafer(K=1e6, c=1e7),
     friction=jb.laws.BengisuAkay(0.5, 0.4, 1e-4, 1000.0),
 )
-STEP = jb.Scene(
-    walker=jb.Mechanism(bodies=LEGS, feet=FEET, mirror=PAIR),
-    ground=jb.Ground(slope=0.03),
-    clearance=STANCE,
-    **LAWS,
-)
 PLAIN = dict(parameters=(), radius_sensitivities=False)
 
 
-def _seed_with(*bodies, joints=(), first=None):
-    legs = [jb.Body(n, mass=1.0, inertia=0.0096, centre=0.10) for n in "12"]
-    if first is not None:
-        legs[0] = jb.Body("1", mass=first, inertia=0.0096, centre=0.10)
-    walker = jb.Mechanism(
-        bodies=(*legs, *bodies),
-        feet=[jb.Foot(n, centre=0.32, radius=0.08) for n in "12"],
-        joints=joints,
-        mirror=() if first is not None else (("1", "2"),),
-    )
-    return dataclasses.replace(jb.seed_scene(), walker=walker)
-
-
-TORSO = _seed_with(
-    jb.Body("torso", mass=0.5, inertia=0.004, centre=-0.08),
-    joints=(jb.Spring("torso", stiffness=8.0, damping=0.3),),
-)
+def _seed_with(first=None):
+    return dataclasses.replace(jb.seed_scene(), walker=seed_walker(first=first))
 
 
 def test_the_seed_is_a_mechanism():
@@ -63,21 +41,21 @@ def test_a_gait_with_a_torso_against_differences():
     """Multipliers by the return map's differences, and slopes by other gaits' periods."""
     names = ("torso.spring.stiffness", "torso.mass", "torso.centre", "slope")
     how = dict(accuracy="tight", parameters=names, radius_sensitivities=False)
-    gait = jb.find_gait(TORSO, **how)
+    gait = jb.find_gait(SEED_WITH_TORSO, **how)
     assert gait.stable
     assert float(gait.unit_multiplier_error) < 1e-5
-    jacobian = _by_differences(TORSO, gait.measures.state)
+    jacobian = _by_differences(SEED_WITH_TORSO, gait.measures.state)
     np.testing.assert_allclose(jacobian, gait.return_jacobian[:-2], atol=2e-5)
     values = np.linalg.eigvals(jacobian)
     leading = values[np.argsort(-np.abs(values))][:3]
     np.testing.assert_allclose(np.abs(leading), np.abs(gait.multipliers[:3]), atol=1e-6)
     for k, name in enumerate(names):
-        value = float(jb.parameter_values(TORSO)[name])
+        value = float(jb.parameter_values(SEED_WITH_TORSO)[name])
         step = 1e-4 * abs(value)
         periods = [
             float(
                 jb.find_gait(
-                    jb.with_parameters(TORSO, {name: value + moved}),
+                    jb.with_parameters(SEED_WITH_TORSO, {name: value + moved}),
                     gait.measures.state,
                     **how,
                 ).measures.period
@@ -138,7 +116,10 @@ def test_footsteps_of_a_mirrored_walker_have_lengths_of_their_own():
 
 @pytest.mark.slow
 def test_measures_of_a_mechanism_are_differentiable():
-    scene, gait = TORSO, jb.find_gait(TORSO, parameters=("torso.mass",), radius_sensitivities=False)
+    scene, gait = (
+        SEED_WITH_TORSO,
+        jb.find_gait(SEED_WITH_TORSO, parameters=("torso.mass",), radius_sensitivities=False),
+    )
 
     def period(mass):
         place = next(k for k, each in enumerate(scene.walker.pieces) if each.name == "torso")
@@ -150,25 +131,13 @@ def test_measures_of_a_mechanism_are_differentiable():
 
 
 def test_a_section_may_be_where_a_body_is_upright():
-    plain = jb.find_gait(TORSO, **PLAIN)
+    plain = jb.find_gait(SEED_WITH_TORSO, **PLAIN)
     section = jb.MidStance(body="torso")
     with pytest.raises(ArgumentError, match=r"section.body = 'trunk' is not known"):
-        jb.find_gait(TORSO, section=jb.MidStance(body="trunk"))
-    other = jb.find_gait(TORSO, plain.measures.state, section=section, **PLAIN)
+        jb.find_gait(SEED_WITH_TORSO, section=jb.MidStance(body="trunk"))
+    other = jb.find_gait(SEED_WITH_TORSO, plain.measures.state, section=section, **PLAIN)
     assert float(other.measures.period) == pytest.approx(float(plain.measures.period), rel=1e-6)
     assert float(other.measures.state.theta_torso) == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.nightly
-def test_one_leg_heavier_as_a_program():
-    step = jb.find_gait(STEP, **PLAIN)
-    with pytest.warns(UserWarning, match="stride"):
-        uneven = jb.with_parameters(STEP, {"leg_1.mass": 1.02})
-    gait = jb.find_gait(uneven, **PLAIN)
-    assert gait.cycle == "stride"
-    assert len(set(gait.step_lengths.tolist())) == 2
-    assert float(gait.measures.period / step.measures.period) == pytest.approx(2.0, abs=0.02)
-    assert float(sum(gait.step_lengths)) == pytest.approx(float(gait.measures.step_length))
 
 
 class KneedOfMyOwn(eqx.Module):
@@ -212,18 +181,6 @@ def test_a_kneed_walker_of_a_users_own_is_found_without_a_guess():
 
 
 @pytest.mark.slow
-def test_gaits_of_a_mechanism_along_a_parameter():
-    gait = jb.find_gait(TORSO, **PLAIN)
-    bounds = (8.0, 9.0)
-    branch = jb.continue_gait(TORSO, "torso.spring.stiffness", bounds=bounds, guess=gait)
-    assert branch.points[0].value == pytest.approx(8.0)
-    assert branch.points[-1].value == pytest.approx(9.0)
-    stiffer = jb.with_parameters(TORSO, {"torso.spring.stiffness": 9.0})
-    end = jb.find_gait(stiffer, gait.measures.state, **PLAIN)
-    assert branch.points[-1].period == pytest.approx(float(end.measures.period), rel=1e-6)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("depth", [-5e-17, 0.0, 1e-12])
 def test_a_foot_that_is_put_on_the_ground_is_a_guess(depth):
     """By rounding it is above the ground or below, at rest: no step may wait for it to touch."""
@@ -236,11 +193,7 @@ def test_a_foot_that_is_put_on_the_ground_is_a_guess(depth):
 def rimless_wheel():
     """The published wheel on compliant feet, whose ground is stiff for gravity of 1."""
     rigid = jb.models.rimless_wheel()
-    laws = dict(
-        normal=jb.laws.RistowSchafer(K=1e6, c=1e7),
-        friction=jb.laws.BengisuAkay(0.5, 0.4, 1e-4, 1000.0),
-    )
-    return rigid, jb.Scene(walker=rigid.walker, ground=rigid.ground, **laws)
+    return rigid, jb.Scene(walker=rigid.walker, ground=rigid.ground, **LAWS)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 from _mechanisms import cases
-from reference.mechanism_gait import checked_cycle
+from reference.mechanism_flow import checked_cycle
 from reference.mechanism_pieces import Field, pieces_at
 
 import jaxbiped as jb

@@ -13,9 +13,9 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait import _orbit_derivatives
 from jaxbiped.gait._accurate_gait import judge_gait
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, is_sound, walks_only
-from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gait_measures import _by_correction
-from jaxbiped.gait._measures import Measures, elasticities_of, measure_errors, measure_slopes
+from jaxbiped.gait._gait_summary import elasticities_of, measure_errors, measure_slopes
 from jaxbiped.gait._newton import Method, Stage, initial_progress, newton_iteration
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn

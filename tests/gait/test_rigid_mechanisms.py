@@ -8,7 +8,7 @@ import jaxbiped as jb
 from jaxbiped.scene._bodies import Body, Foot
 from jaxbiped.scene._joint_parts import Coupling, Spring
 from jaxbiped.scene._mechanism import Mechanism
-from tests.mechanisms import BISECTING, FEET, LEGS, PAIR, TORSO
+from tests.mechanisms import BISECTING, FEET, LEGS, PAIR, TORSO, seed_walker
 from tests.rigid_walkers import rigid_seed
 
 GROUND = jb.Ground(slope=0.03)
@@ -50,12 +50,7 @@ def test_multipliers_are_those_of_the_walk(joint):
 
 
 def test_the_seed_written_as_data_walks_as_the_seed():
-    walker = Mechanism(
-        bodies=tuple(Body(n, mass=1.0, inertia=0.0096, centre=0.10) for n in "12"),
-        feet=tuple(Foot(n, centre=0.32, radius=0.08) for n in "12"),
-        mirror=(("1", "2"),),
-    )
-    scenes = [jb.RigidScene(walker, jb.Ground(slope=0.02)), rigid_seed(0.02)]
+    scenes = [jb.RigidScene(seed_walker(), jb.Ground(slope=0.02)), rigid_seed(0.02)]
     state = scenes[0].state(theta_1=-0.24, theta_2=0.24, omega_1=-1.09, omega_2=-1.64)
     assert type(state) is jb.dynamics.RigidState
     ends = [
@@ -81,11 +76,7 @@ def test_a_walker_with_shanks_strikes_where_its_foot_comes_down():
         before = walk.final
         foot = jb.dynamics.rigid_checks(scene, jb.dynamics.exchange_legs(scene, before)).clearance
         np.testing.assert_allclose(np.array(foot), 0.0, atol=1e-9)
-    leg = dict(mass=1.0, inertia=0.0096, centre=0.10)
-    compass = Mechanism(
-        bodies=tuple(Body(f"leg_{i}", **leg) for i in (1, 2)), feet=FEET, mirror=PAIR
-    )
-    scene = jb.RigidScene(compass, GROUND)
+    scene = jb.RigidScene(Mechanism(bodies=LEGS, feet=FEET, mirror=PAIR), GROUND)
     start = scene.state(**START)
     straight = jb.rigid_walk(scene, start, footsteps=1, accuracy="tight", engine="lanes")
     off = np.abs(np.array(times) - float(straight.t[-1]))

@@ -7,13 +7,12 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._progress import Stage
-from jaxbiped.gait import _guess_free_search, _settled_walks, _walk_waves
+from jaxbiped.gait import _guess_free_search, _walk_waves
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._guess_free_search import origin_of, search_in_stages, spectral_radius
-from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.gait._search_provenance import FoundBy
-from jaxbiped.gait._settled_walks import walks_from
+from jaxbiped.gait._search_provenance import BranchEnd, FoundBy
+from jaxbiped.gait._walk_waves import walks_from
 from jaxbiped.solve._accuracy import Precision, recurring_sizes
 
 SCENE = jb.ladder()["rigid"]
@@ -136,7 +135,7 @@ def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
     places = np.where(np.arange(6)[:, None] < 5, 0.2, 1e-8) * last
     states = jb.dynamics.RigidState(places, angle, zero, zero, zero)
     counts = np.array([40, 40, 40, 39, 40, 40])
-    monkeypatch.setattr(_settled_walks, "_rigid_arrivals", lambda *_: (counts, states, counts))
+    monkeypatch.setattr(_walk_waves, "_arrivals", lambda *_: (counts, states, counts))
     assert walks_from(SCENE, START).attempted == 239
     chosen = walks_from(SCENE, START).settled()
     # The third is where the first one is; the fourth fell.

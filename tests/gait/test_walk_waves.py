@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._state_quantities import recurring_names
+from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait import _walk_waves
 from jaxbiped.gait._homotopy import homotopy_to, line_from_model
-from jaxbiped.gait._settled_walks import Walks
-from jaxbiped.gait._walk_waves import walks_of
+from jaxbiped.gait._walk_waves import Walks, walks_of
 from jaxbiped.scene._parameter_access import parameter_values
 from tests.mechanisms import FEET, LEGS, PAIR, TORSO, scene_of
 

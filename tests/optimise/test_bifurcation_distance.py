@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.continuation._critical_values import STEPS
 from jaxbiped.optimise import Sought
 from jaxbiped.optimise._objective_values import evaluate
 
@@ -71,7 +72,7 @@ def test_a_walker_without_a_fold_is_told_from_one_that_is_lost(monkeypatch):
     assert np.isnan(found.value)
     assert np.all(np.isnan(found.slopes))
     assert jb.optimise.bifurcation_distance(scene, gait, "period-doubling").outcome is Sought.MET
-    monkeypatch.setattr("jaxbiped.optimise._bifurcation_distance._MOST_POINTS", 2)
+    monkeypatch.setitem(STEPS, "max_points", 2)
     lost = jb.optimise.bifurcation_distance(scene, gait)
     assert lost.outcome is Sought.UNKNOWN
     assert np.isnan(lost.distance)

@@ -10,8 +10,8 @@ from reference.rigid import rigid_walker
 
 import jaxbiped as jb
 from jaxbiped._progress import Stage
-from jaxbiped.continuation._nearest_bifurcation import farthest_allowed, range_of
-from jaxbiped.dynamics._actuation import actuator_powers, hip_torques
+from jaxbiped.dynamics._actuation import hip_torques
+from jaxbiped.dynamics._energy import actuator_powers
 from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
 from jaxbiped.optimise import _certificate, _design_gaits
@@ -29,8 +29,8 @@ from jaxbiped.optimise._jacobian_weights import entry_weights, leading_multiplie
 from jaxbiped.optimise._local_model import Local
 from jaxbiped.optimise._objective_values import Evaluation, _cost_of_transport, _root_of_squares
 from jaxbiped.optimise._optimality import optimality_of
+from jaxbiped.optimise._optimisers import _damped_update
 from jaxbiped.optimise._optimum import Outcome
-from jaxbiped.optimise._trust_region import _damped_update
 from tests.optimise.drawn_designs import (
     BOTH,
     NAMES,
@@ -389,18 +389,6 @@ def test_curvature_is_learnt_from_two_gradients():
     assert np.linalg.eigvalsh(learnt).min() > 0.0
     damped = _damped_update(np.eye(2), step, -hessian @ step)
     assert step @ damped @ step == pytest.approx(0.2 * step @ step)
-
-
-def test_a_range_ends_where_the_walker_allows_no_more():
-    """A foot's radius at the leg's length, a leg at the radius, an exponent at one."""
-    own = jb.parameter_values(SCENE)
-    r, leg = float(own["r"]), float(own["l"])
-    assert range_of(SCENE, "r") == (r / 8.0, pytest.approx(leg, rel=1e-9))
-    assert range_of(SCENE, "l") == (pytest.approx(r, rel=1e-9), 8.0 * leg)
-    assert farthest_allowed(jb.seed_scene(), "n", 0.2) == pytest.approx(1.0, rel=1e-9)
-    assert range_of(jb.with_parameters(SCENE, {"slope": 0.0}), "slope") == (-0.1, 0.1)
-    with pytest.raises(jb.ArgumentError, match="no factor fits"):
-        range_of(SCENE, "hip_mass")
 
 
 def test_a_part_of_a_certificate_fails_by_itself():

@@ -17,11 +17,11 @@ from jaxbiped.optimise._cycle_functionals import cycle_spec
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.solve._accuracy import precision_of
 from jaxbiped.variational._hybrid_system import section_of
-from tests.optimise.test_optima_of_mechanisms import TORSO
+from tests.mechanisms import SEED_WITH_TORSO
 
 pytestmark = pytest.mark.slow
 FOOTSTEPS = 24
-SCENES = {"rigid": jb.ladder()["rigid"], "compliant": jb.seed_scene(), "torso": TORSO}
+SCENES = {"rigid": jb.ladder()["rigid"], "compliant": jb.seed_scene(), "torso": SEED_WITH_TORSO}
 NEAR = {"rigid": 1e-5, "compliant": 1e-4, "torso": 1e-4}
 SIZES = {("rigid", "drop"): 2e-5}
 """Of a disturbance, where it is not 1e-4."""

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import lsq_linear
 
 import jaxbiped as jb
+from jaxbiped.optimise._design_functions import conditions, radius_of
 from jaxbiped.optimise._design_variables import variables_of
-from jaxbiped.optimise._multiplier_cluster import conditions, radius_of
 from jaxbiped.optimise._optimality import optimality_of
 from jaxbiped.optimise._optimum import Outcome
 from tests.optimise.drawn_designs import SCENE, difference, drawn, solved

@@ -9,30 +9,10 @@ import jaxbiped as jb
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.optimise._objective_values import _weight, evaluate
 from jaxbiped.optimise._objectives import check_objective
-from tests.mechanisms import scene_of
+from tests.mechanisms import SEED_WITH_TORSO, scene_of, seed_walker
 
 STANCE = jb.laws.StanceRotation()
-SEED = jb.Mechanism(
-    bodies=tuple(jb.Body(name, mass=1.0, inertia=0.0096, centre=0.10) for name in "12"),
-    feet=tuple(jb.Foot(name, centre=0.32, radius=0.08) for name in "12"),
-    mirror=(("1", "2"),),
-)
-TORSO = dataclasses.replace(
-    jb.seed_scene(),
-    walker=jb.Mechanism(
-        bodies=(*SEED.bodies, jb.Body("torso", mass=0.5, inertia=0.004, centre=-0.08)),
-        feet=SEED.feet,
-        joints=(jb.Spring("torso", stiffness=8.0, damping=0.3),),
-        mirror=(("1", "2"),),
-    ),
-)
-UNLIKE = dataclasses.replace(
-    jb.seed_scene(),
-    walker=jb.Mechanism(
-        bodies=(jb.Body("1", mass=1.02, inertia=0.0096, centre=0.10), SEED.bodies[1]),
-        feet=SEED.feet,
-    ),
-)
+UNLIKE = dataclasses.replace(jb.seed_scene(), walker=seed_walker(first=1.02))
 """Its cycle is a stride, near two of the seed's steps."""
 KNEED = dataclasses.replace(
     jb.seed_scene(slope=0.0456),
@@ -90,7 +70,7 @@ def test_motors_are_bounded_as_actuators_are():
 def test_objectives_of_the_seed_as_a_mechanism_are_the_seeds():
     seed, names = jb.seed_scene(slope=0.02), ("cost_of_transport", "spectral_radius")
     told = []
-    for scene in (seed, dataclasses.replace(seed, walker=SEED, clearance=STANCE)):
+    for scene in (seed, dataclasses.replace(seed, walker=seed_walker(), clearance=STANCE)):
         gait = jb.find_gait(scene, radius_sensitivities=False)
         told.append((jb.parameter_names(scene), evaluate(scene, gait, names, "balanced")))
     (own, seeds), (others, found) = told
@@ -108,7 +88,7 @@ def test_objectives_of_the_seed_as_a_mechanism_are_the_seeds():
 @pytest.mark.parametrize(
     ("scene", "guess"),
     [
-        pytest.param(TORSO, None, id="torso"),
+        pytest.param(SEED_WITH_TORSO, None, id="torso"),
         pytest.param(UNLIKE, None, id="unlike"),
         pytest.param(KNEED, BENT, id="kneed"),
     ],
@@ -128,9 +108,9 @@ def test_what_is_lost_is_the_slopes_sine(scene, guess):
 
 @pytest.mark.slow
 def test_a_faster_torso():
-    gait = jb.find_gait(TORSO, radius_sensitivities=False)
+    gait = jb.find_gait(SEED_WITH_TORSO, radius_sensitivities=False)
     vary = {"torso.spring.stiffness": (6.0, 12.0), "torso.mass": (0.4, 0.6)}
-    best = jb.optimise_gait(TORSO, vary=vary, maximise="speed", guess=gait)
+    best = jb.optimise_gait(SEED_WITH_TORSO, vary=vary, maximise="speed", guess=gait)
     assert best.outcome is jb.optimise.Outcome.CONVERGED
     again = jb.find_gait(best.scene, gait.measures.state, radius_sensitivities=False)
     assert best.objective == pytest.approx(float(again.measures.speed), rel=1e-6)

@@ -47,7 +47,7 @@ def test_motions_that_end_early_are_drawn(draw, endings):
         assert_is_drawn(figure)
         assert labels_of(figure) == LABELS[draw]
         if draw is plot.gait_strobe:
-            continue  # its poses are those of test_strobe.py
+            continue  # its poses are those of test_motion_pictures.py
         first, end = points_of(figure.axes[0])[0], walk.final
         if draw is plot.phase_portrait:
             expected = (float(end.theta_1), float(end.omega_1))

@@ -10,7 +10,7 @@ from PIL import Image
 import jaxbiped as jb
 from jaxbiped import plot
 from jaxbiped.plot import style
-from jaxbiped.plot._contact_forces import sampled_forces
+from jaxbiped.plot._contact_charts import sampled_forces
 from tests.drawn import assert_is_drawn
 
 WIDTHS = {1: 3.4, 2: 7.0}

@@ -93,6 +93,7 @@ def test_a_range_and_axes_may_be_given():
     [
         (lambda: plot.normal_law(jb.laws.Viscous(k=1.0)), "law = "),
         (lambda: plot.friction_law(jb.laws.Hertz(K=1.0)), "law = "),
+        (plot.friction_law, "laws is empty"),
         (lambda: plot.normal_law(jb.laws.Hertz(K=1.0), depth=0.0), "depth = 0"),
         (lambda: plot.normal_law(jb.laws.Hertz(K=1.0), mass=-1.0), "mass = -1"),
         (lambda: plot.normal_law(jb.laws.Hertz(K=1.0), approach_speed=0.0), "approach_speed = 0"),
@@ -144,8 +145,3 @@ def test_laws_of_friction_side_by_side():
     curves = [line for line in ax.lines if line.get_label() in names]
     assert len({str(line._dash_pattern) for line in curves}) == 3
     assert len({line.get_color() for line in curves}) == 3
-
-
-def test_no_law_is_refused():
-    with pytest.raises(jb.ArgumentError, match="laws is empty"):
-        plot.friction_law()

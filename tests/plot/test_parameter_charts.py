@@ -82,6 +82,7 @@ def test_a_longer_cycle_is_drawn_by_its_footsteps():
     (ax,) = figure.axes
     assert points_of(ax)[3][:, 1].tolist() == [0.1, 0.2]
     assert {"1 footstep", "2 footsteps"} <= set(legend_of(ax))
+    assert len({line.get_linewidth() for line in ax.lines if len(line.get_xdata()) > 1}) == 2
     marks = [line.get_xdata()[0] for line in ax.lines if line.get_marker() == "D"]
     assert marks == [0.05, 0.06]
 
@@ -137,9 +138,3 @@ def test_the_radius_has_its_errors_and_the_line_of_one():
     # An error that is not known, where the gait grazes, has no band.
     grazing = branch(_branch([branch_point(0.02, 0.3, error=np.inf), *points]), "spectral_radius")
     assert np.isfinite(grazing.axes[0].get_ylim()).all()
-
-
-def test_cycles_of_more_footsteps_have_thinner_lines():
-    found = [_branch(POINTS, footsteps=count) for count in (1, 2)]
-    (ax,) = branch(found).axes
-    assert len({line.get_linewidth() for line in ax.lines if len(line.get_xdata()) > 1}) == 2

@@ -1,27 +1,14 @@
 """Samples of a walk for figures, against the walk between its steps and far finer samplings."""
 
-import dataclasses
-
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.measure._samples import evaluate_along, evaluate_at
-from jaxbiped.plot._contact_forces import sampled_forces
-from jaxbiped.plot._samples import sample, state_at
-
-
-def test_samples_hold_every_step_of_the_solver(seed_walk):
-    _, walk = seed_walk
-    t, state = sample(walk)
-    assert np.all(np.diff(t) > 0.0)
-    steps = np.asarray(walk.t)
-    assert np.isin(steps[1:-1], t).all()
-    found = np.searchsorted(t, steps[1:-1])
-    np.testing.assert_array_equal(state.omega_1[found], np.asarray(walk.state.omega_1)[1:-1])
+from jaxbiped.measure._samples import evaluate_at
+from jaxbiped.plot._contact_charts import sampled_forces
+from jaxbiped.plot._samples import sample
 
 
 def test_samples_between_two_times(seed_walk):
@@ -31,16 +18,6 @@ def test_samples_between_two_times(seed_walk):
     np.testing.assert_allclose(state.theta_2, np.asarray(walk.at(t).theta_2), rtol=1e-12)
     t, _ = sample(walk, start=-1.0, stop=9.0)
     assert (t[0], t[-1]) == (0.0, 2.0)
-
-
-def test_contacts_are_feet_and_forces(seed_walk):
-    scene, walk = seed_walk
-    state = state_at(walk, np.linspace(0.0, 2.0, 11))
-    found = evaluate_along(scene, state, contacts)
-    forces = jb.dynamics.foot_forces(scene, jb.State(*(jnp.asarray(leaf) for leaf in state)))
-    np.testing.assert_allclose(found.forces[0].normal, np.asarray(forces[0].normal))
-    np.testing.assert_allclose(found.forces[1].tangential, np.asarray(forces[1].tangential))
-    assert found.touching[0].shape == (11,)
 
 
 @pytest.fixture(scope="module")
@@ -89,5 +66,3 @@ def test_between_two_times_and_without_friction(walk):
     assert (t[0], t[-1]) == (0.3, 0.5)
     assert set(found) == {"normal_1", "normal_2"}
     assert found["normal_1"].shape == t.shape
-    with pytest.raises(ValueError, match='save="steps"'):
-        sampled_forces(scene, dataclasses.replace(trajectory, dense=None))

@@ -61,27 +61,12 @@ def test_mirror_images_share_their_parameters():
     assert float(by_name["hip.mass"]) == 1.0
 
 
-def test_pieces_make_the_mechanism_again():
-    walker = kneed()
-    parts = dict(bodies=walker.bodies, feet=walker.feet, joints=walker.joints)
-    for mirror in ((), walker.arguments()["mirror"]):
-        again = Mechanism(root_mass=walker.root_mass, **parts, mirror=mirror)
-        assert again.structure.joints == walker.structure.joints
-        assert again.structure.feet == walker.structure.feet
-
-
 def test_a_number_left_out_is_no_parameter():
     assert "leg.foot.radius" in two_legs().parameter_names()
     bare = two_legs(feet=tuple(Foot(f"leg_{i}", centre=0.4) for i in (1, 2)))
     assert "leg.foot.radius" not in bare.parameter_names()
     written = two_legs(feet=tuple(Foot(f"leg_{i}", centre=0.4, radius=0.0) for i in (1, 2)))
     assert "leg.foot.radius" in written.parameter_names()
-
-
-def test_states_have_the_names_of_free_bodies():
-    walker = two_legs(Coupling(BISECTING), bodies=(*LEGS, TORSO))
-    assert walker.structure.coordinates == ("hip_x", "hip_z", "theta_leg_1", "theta_leg_2")
-    assert walker.structure.rates == ("hip_vx", "hip_vz", "omega_leg_1", "omega_leg_2")
 
 
 def test_height_is_that_of_the_lowest_foot():
@@ -134,12 +119,9 @@ REFUSED = {
     "no limit": lambda: Stop("leg_1", law=None),
     "it must be below": lambda: Stop("leg_1", upper=0.0, lower=0.1),
     "holds = 'always' is not known": lambda: Stop("leg_1", upper=0.0, holds="always"),
-    "function of the motion alone": lambda: Motor("leg_1", lambda angle, rate: 0.0),
-    "width = 0": lambda: Latch("leg_1", at=0.0, width=0.0, torque=1.0),
     "has no parent": lambda: Body("a", mass=1, inertia=1, centre=0, at=0.1),
     "letters, digits and underscores": lambda: Body("a b", mass=1, inertia=1, centre=0),
     "takes a reaction": lambda: Body("vertical", mass=1, inertia=1, centre=0),
-    "mass = -1": lambda: Body("a", mass=-1, inertia=1, centre=0),
     "(along, ahead)": lambda: Foot("a", centre=(1, 2, 3)),
     "whose mass differ": lambda: two_legs(
         bodies=(LEGS[0], Body("leg_2", mass=2, inertia=0.0096, centre=0.1))
@@ -302,14 +284,6 @@ def test_numbers_of_pieces_are_finite_and_in_their_range(made, words, numbers, n
         said = str(told.value)
         assert said.startswith(("along" if name == "centre" else name) + " = ")
         assert ". " not in said
-
-
-def test_under_tracing_a_mechanism_is_made_without_looking_at_numbers():
-    def mass(m):
-        legs = tuple(Body(f"leg_{i}", mass=m, inertia=0.0096, centre=0.10) for i in (1, 2))
-        return two_legs(bodies=legs).total_mass
-
-    assert float(jax.jit(jax.grad(mass))(1.0)) == 2.0
 
 
 def test_pairs_that_share_their_tokens_are_told_apart():

@@ -1,7 +1,6 @@
 """Names of parameters against the rules of mechanisms, and values set by name against leaves."""
 
 import warnings
-from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -10,58 +9,34 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.scene._abstract_scene import AbstractMinimalScene
 from jaxbiped.scene._parameter_access import scene_identity, select_parameters
+from tests.mechanisms import leg
 from tests.scene.test_mechanism import BISECTING, LAW, LEGS, TORSO, kneed, two_legs
 
 SEED = jb.seed_scene()
 
 
 class OwnKneed(eqx.Module):
-    """McGeer's knees, as a user would write them: thighs and shanks by numbers of his own."""
+    """McGeer's knees, as a user would write them: by numbers of his own."""
 
     m_thigh: float = jb.laws.parameter("thigh mass", "$m_t$", "kg", positive=True)
-    m_shank: float = jb.laws.parameter("shank mass", "$m_s$", "kg", positive=True)
     g: float = jb.laws.parameter("a length that a ground's name has", "$g$", "m")
     epsilon: float = jb.laws.parameter("knee angle at the stop", "", "rad")
     stop: jb.laws.AbstractNormalLaw
 
     def mechanism(self):
-        bodies = tuple(
-            body
-            for i in (1, 2)
-            for body in (
-                jb.Body(f"thigh_{i}", mass=self.m_thigh, inertia=5.8e-4, centre=0.08),
-                jb.Body(
-                    f"shank_{i}", mass=self.m_shank, inertia=6.9e-4, centre=(0.096, -0.004),
-                    parent=f"thigh_{i}", at=0.184,
-                ),
-            )
-        )  # fmt: skip
-        return jb.Mechanism(
-            root_mass=1.352,
-            bodies=bodies,
+        return kneed(
+            bodies=(*leg(1, self.m_thigh), *leg(2, self.m_thigh)),
             feet=tuple(jb.Foot(f"shank_{i}", centre=self.g, radius=0.08) for i in (1, 2)),
             joints=tuple(jb.Stop(f"shank_{i}", upper=self.epsilon, law=self.stop) for i in (1, 2)),
-            mirror=(("thigh_1", "thigh_2"), ("shank_1", "shank_2")),
         )
 
 
-OWN = OwnKneed(0.2, 0.124, 0.136, 0.2, LAW)
-
-
-class WalkerScene(AbstractMinimalScene):
-    """A compliant scene of a walker of any kind."""
-
-    compliant: ClassVar[bool] = True
-    walker: Any
-    ground: jb.Ground
-    normal: jb.laws.AbstractNormalLaw
-    friction: jb.laws.AbstractFrictionLaw
+OWN = OwnKneed(0.2, 0.136, 0.2, LAW)
 
 
 def scene_of(walker):
-    return WalkerScene(walker, SEED.ground, SEED.normal, SEED.friction)
+    return jb.Scene(walker, SEED.ground, SEED.normal, SEED.friction)
 
 
 @pytest.mark.parametrize("walker", [OWN, kneed()])
@@ -82,7 +57,7 @@ def test_own_walkers_are_named_by_their_fields():
     assert float(values["stop.K"]) == 300.0
     assert float(values["walker.g"]) == 0.136
     assert select_parameters(OWN, None)[0] == (
-        "m_thigh", "m_shank", "g", "epsilon", "stop.K", "stop.c", "stop.n"
+        "m_thigh", "g", "epsilon", "stop.K", "stop.c", "stop.n"
     )  # fmt: skip
 
 

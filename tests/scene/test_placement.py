@@ -9,26 +9,10 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.scene._placement import placement
+from tests.mechanisms import WALKERS
 from tests.scene.test_mechanism import BISECTING, FEET, LEGS, TORSO, kneed, two_legs
 
 SEED = jb.seed_scene().walker
-
-
-def foot_body(i):
-    return jb.Body(
-        f"foot_{i}", mass=0.1, inertia=1e-4, centre=(0.01, 0.02), parent=f"leg_{i}", at=0.36
-    )
-
-
-FLAT = jb.Mechanism(
-    bodies=(*LEGS, foot_body(1), foot_body(2)),
-    feet=tuple(
-        jb.Foot(f"foot_{i}", centre=(0.04, ahead), name=name)
-        for i in (1, 2)
-        for name, ahead in (("heel", -0.04), ("toe", 0.10))
-    ),
-    mirror=(("leg_1", "leg_2"), ("foot_1", "foot_2")),
-)
 
 
 def test_a_walker_just_touches_with_its_lowest_foot():
@@ -65,13 +49,13 @@ def test_a_knee_and_a_point_ahead_by_hand():
 
 @pytest.mark.parametrize("pitch", [-0.1, 0.1])
 def test_of_a_flat_foot_the_lower_end_stands(pitch):
-    end = {"foot_2.heel": -0.04, "foot_2.toe": 0.10}
+    end = {"foot_2.heel": -0.04, "foot_2.toe": 0.08}
     name = "foot_2.heel" if pitch > 0.0 else "foot_2.toe"
     values = {"theta_foot_2": pitch, "omega_foot_2": 2.0}
-    found = placement(FLAT, 0.0, values, standing="foot_2")
-    height = 0.36 + 0.04 * math.cos(pitch) - end[name] * math.sin(pitch)
+    found = placement(WALKERS["flat"], 0.0, values, standing="foot_2")
+    height = 0.36 + 0.03 * math.cos(pitch) - end[name] * math.sin(pitch) + 0.01
     assert float(found["hip_z"]) == pytest.approx(height, rel=1e-15)
-    by_name = placement(FLAT, 0.0, values, standing=name)
+    by_name = placement(WALKERS["flat"], 0.0, values, standing=name)
     assert [float(a) for a in found.values()] == [float(a) for a in by_name.values()]
 
 

@@ -64,16 +64,6 @@ def test_frictionless_forces_have_no_tangential_part():
     assert jb.dynamics.foot_forces(scene, jb.seed_state())[0].tangential is None
 
 
-@pytest.mark.parametrize("rule", [jb.laws.StanceRotation(), jb.laws.AlwaysTouching()])
-def test_clearance_rules(rule):
-    forward, backward = rule.admits(1, jnp.asarray(1.0)), rule.admits(1, jnp.asarray(-1.0))
-    if isinstance(rule, jb.laws.AlwaysTouching):
-        assert forward is None
-    else:
-        assert not bool(forward)
-        assert bool(backward)
-
-
 SEED = jb.seed_scene()
 BRISTLES = jb.ladder()["bristles"]
 RIGID = jb.RigidScene(SEED.walker, SEED.ground)

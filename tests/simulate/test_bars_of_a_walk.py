@@ -7,7 +7,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped._ending import Ending
 from jaxbiped.simulate._accurate_walk import Witness, judge_walk
-from jaxbiped.simulate._lane_backend import lane_request
+from jaxbiped.simulate._backends import lane_request
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._trajectory import Trajectory
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
-from jaxbiped.simulate import _lane_backend
-from jaxbiped.simulate._lane_backend import recorded_steps
+from jaxbiped.simulate import _backends
+from jaxbiped.simulate._backends import recorded_steps
 from tests.compliant_walkers import frictionless_walker
 from tests.unknown_to_lanes import ErrorFunction
 
@@ -126,9 +126,9 @@ def test_every_step_ends_where_the_end_alone_does():
 
 
 def test_without_a_step_there_is_the_start():
-    walk = recorded_steps(START, np.zeros((0, 25)), jb.solvers.Rodas4())
-    assert walk.state.hip_z == walk.dense.evaluate(0.0).hip_z == START.hip_z
-    assert np.isnan(walk.dense.evaluate(0.1).hip_z)
+    _, state, dense = recorded_steps(START, np.zeros((0, 25)), jb.solvers.Rodas4())
+    assert state.hip_z == dense.evaluate(0.0).hip_z == START.hip_z
+    assert np.isnan(dense.evaluate(0.1).hip_z)
 
 
 def test_bristles_are_saved_step_by_step():
@@ -200,7 +200,7 @@ def test_memory_is_asked_for_by_the_steps_taken(monkeypatch):
     """A cap that no memory could hold; and steps that do not fit into the first room."""
     few = jb.simulate(SEED, START, duration=0.1)
     capped = jb.simulate(SEED, START, duration=0.1, max_solver_steps=1 << 50)
-    monkeypatch.setattr(_lane_backend, "_ROOM", 16)
+    monkeypatch.setattr(_backends, "_ROOM", 16)
     again = jb.simulate(SEED, START, duration=0.1)
     assert int(few.accepted) > 16
     for walk in (capped, again):

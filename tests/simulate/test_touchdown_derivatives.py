@@ -8,21 +8,20 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from tests.mechanisms import seed_walker
 
 pytestmark = pytest.mark.slow
 
 
 def _heavier_on_one_side(friction):
     """The seed's walker with a heavier leg, on Kelvin and Voigt's ground, and a start."""
-    bodies = [jb.Body(n, mass=m, inertia=0.0096, centre=0.1) for n, m in (("1", 1.02), ("2", 1.0))]
-    feet = tuple(jb.Foot(body.name, centre=0.32, radius=0.08) for body in bodies)
     seed = jb.seed_scene(slope=0.02)
     slips = {name: getattr(seed.friction, name) for name in ("mu_static", "mu_kinetic", "v0", "xi")}
     own = dict(K=seed.normal.K, c=seed.normal.c, n=seed.normal.n)
     of_mass = dict(mass=seed.walker.total_mass, g=seed.ground.g)
     scene = dataclasses.replace(
         seed,
-        walker=jb.Mechanism(bodies=tuple(bodies), feet=feet),
+        walker=seed_walker(first=1.02),
         normal=jb.laws.normal_law_like("kelvin-voigt", **own, **of_mass),
         friction=jb.laws.friction_law_like(friction, **slips),
     )

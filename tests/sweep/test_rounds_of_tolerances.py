@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins._label_errors import Seen
-from jaxbiped.basins._labels import Doubt, Witness
+from jaxbiped.basins._labels import Doubt, Seen, Witness
 from jaxbiped.sweep import _sweep
-from jaxbiped.sweep._store import Store
-from jaxbiped.sweep._stored_fields import Layout
+from jaxbiped.sweep._store import Layout, Store
 from jaxbiped.sweep._sweep import tally_disagreements, tightened
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless
@@ -41,7 +39,7 @@ def test_tolerances_are_tightened_until_the_errors_are_what_was_asked_for(
     labelling = jb.labels.Labelling(SCENE, labelling.family, effort)
     starts = jb.starts.grid(SCENE, {"theta_stance": np.linspace(0.1, 0.3, 1000)})
     layout = Layout.of(starts, 500, doubts=True)
-    results, solved = Store.in_memory(layout, {}, {}), []
+    results, solved = Store.of(None, layout, {}, {}), []
 
     def labels(labelling, layout, chunks, executor, workers):
         solved.append(labelling.effort.rtol)

@@ -1,8 +1,9 @@
-"""Stores, against what was labelled: opened by anybody, continued, never mixed."""
+"""Stores, against what was labelled and cut: opened by anybody, continued, never mixed."""
 
 import errno
 import importlib
 import json
+import math
 import os
 import warnings
 from pathlib import Path
@@ -11,12 +12,13 @@ import numpy as np
 import pytest
 import xarray as xr
 import zarr
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped._identity import provenance
 from jaxbiped.sweep import _store, _store_files
-from jaxbiped.sweep._store import Store
-from jaxbiped.sweep._stored_fields import FIELDS, Layout
+from jaxbiped.sweep._store import FIELDS, Layout, Store
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results, simplest_grid, stacked
 
@@ -39,10 +41,7 @@ def swept(path=None, starts=None, *, labelling=LABELLING, chunk=4, look=False, *
 @pytest.mark.parametrize("on_disk", [False, True])
 def test_what_is_written_is_read_and_in_the_dataset(on_disk, tmp_path):
     layout, writer = Layout.of(simplest_grid(SCENE), 16), provenance(SCENE)
-    if on_disk:
-        store = Store.open(tmp_path / "store", layout, {}, writer)
-    else:
-        store = Store.in_memory(layout, {}, writer)
+    store = Store.of(tmp_path / "store" if on_disk else None, layout, {}, writer)
     label = np.arange(16, dtype=np.int8) % 7
     assert list(store.behind()) == list(range(layout.chunks))
     store.write(1, {"label": label})
@@ -324,3 +323,41 @@ def test_memory_is_bounded_by_the_chunk(tmp_path, by_formula, monkeypatch):
     assert by_formula == [512] * 3
     written = sum(each.stat().st_size for each in path.rglob("*") if each.is_file())
     assert written < 3_000_000
+
+
+NAMES = ("theta_stance", "theta_swing", "omega_stance", "omega_swing")
+
+
+def _grid(shape):
+    axes = {name: np.linspace(0.0, 1.0, size) for name, size in zip(NAMES, shape, strict=False)}
+    return jb.starts.grid(jb.seed_scene(), axes)
+
+
+@given(st.lists(st.integers(1, 6), min_size=1, max_size=4), st.integers(1, 300))
+@settings(max_examples=60, deadline=None)
+def test_chunks_cover_every_start_once(shape, chunk):
+    starts = _grid(shape)
+    layout = Layout.of(starts, chunk)
+    numbers = np.arange(starts.size).reshape(shape)
+    seen = []
+    sizes = layout.sizes
+    assert len(sizes) == layout.chunks
+    for i in range(layout.chunks):
+        first, last = layout.numbers(i)
+        assert sizes[i] == last - first <= chunk
+        assert math.prod(layout.shape_of(i)) == last - first
+        part = numbers[layout.region(i)]
+        np.testing.assert_array_equal(part.ravel(), np.arange(first, last))
+        # A chunk of the store's arrays is written by one chunk of the sweep alone.
+        whole = zip(layout.region(i), layout.chunk_shape, strict=True)
+        assert all(place.start % size == 0 for place, size in whole)
+        seen += range(first, last)
+    assert seen == list(range(starts.size))
+
+
+def test_a_chunk_of_a_large_grid_is_small():
+    starts = _grid((1000, 1000, 1000, 10))
+    layout = Layout.of(starts, 16384)
+    assert layout.chunk_shape == (1, 1, 1000, 10)
+    first, last = layout.numbers(layout.chunks - 1)
+    assert (last, last - first) == (10**10, 10**4)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins._label_errors import estimate_label_errors
+from jaxbiped.basins._labels import estimate_label_errors
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, killed_at, same_results, simplest_grid
 

@@ -16,7 +16,7 @@ import zarr
 import jaxbiped as jb
 from jaxbiped._files import THREADS_VARIABLE
 from jaxbiped.compiler import default_threads
-from jaxbiped.sweep._stored_fields import Layout
+from jaxbiped.sweep._store import Layout
 from jaxbiped.sweep._workers import _AHEAD, compute_chunks
 from tests.compiler.fake_driver import install
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker

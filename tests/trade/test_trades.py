@@ -9,7 +9,7 @@ from reference.walks import reference_states, walk
 
 import jaxbiped as jb
 from jaxbiped.trade import GaitTrade, WalkTrade, Way
-from tests.optimise.test_optima_of_mechanisms import TORSO
+from tests.mechanisms import SEED_WITH_TORSO
 
 DURATION = 2.0
 LEGS = 0.40
@@ -97,8 +97,8 @@ def test_no_gait_no_truth():
 
 @pytest.mark.nightly
 def test_a_mechanisms_gait_is_traded_from_a_guess():
-    start = jb.find_gait(TORSO, parameters=(), radius_sensitivities=False).measures.state
-    trade = GaitTrade(TORSO, 1, start)
+    start = jb.find_gait(SEED_WITH_TORSO, parameters=(), radius_sensitivities=False).measures.state
+    trade = GaitTrade(SEED_WITH_TORSO, 1, start)
     truth = trade.truth()
     assert truth.floor["period"] < 1e-10
     row = trade.row(Way("rodas4", "lanes", "balanced", 2e-8), truth)

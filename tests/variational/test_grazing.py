@@ -7,7 +7,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._switches import Switch, switches
+from jaxbiped.dynamics._surfaces import Switch, switches
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._orbit_derivatives import orbit_of, slopes_of
 from jaxbiped.gait._return_map_spec import ReturnMapSpec

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 import jaxbiped as jb
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._step_size import step_control
 from jaxbiped.variational._collocated_step import RADAU, KnownStep

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.variational._saltation import at_fixed_time, behind_reset, meet, meeting_at
 from jaxbiped.variational._tangents import Seeded, Watch
 

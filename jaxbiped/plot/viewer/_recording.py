@@ -14,13 +14,13 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject, Scalar
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._energy import energies, kinetic_and_moment
+from jaxbiped.dynamics._equivalent_states import whole_state
 from jaxbiped.dynamics._mode_changes import foot_loads
 from jaxbiped.dynamics._rolling import ground_force, turning_of
 from jaxbiped.dynamics._stance import Stance, of_stance
-from jaxbiped.dynamics._state import whole_state
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._samples import evaluate_along, places_of_standing
-from jaxbiped.plot._contact_forces import forces_in
+from jaxbiped.plot._contact_charts import forces_in
 from jaxbiped.plot._samples import RigidMotion, end_time, rigid_motion, state_at
 from jaxbiped.plot._skeleton import Skeleton, body_motion, motion_names, names_by_foot, skeleton_of
 from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots

@@ -8,8 +8,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped._quantity import Quantity
-from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import recurring_names, state_quantity
+from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, with_parameters
 from jaxbiped.scene._placement import placement
@@ -127,12 +126,6 @@ def state_at(scene: AbstractWalkerScene, base: PyTree, columns: Mapping[str, np.
     """The states (n,) with these coordinates, all else from the base's leaves (n,)."""
     leaves = state_coordinates(scene)
     return base._replace(**{leaves[name]: columns[name] for name in columns if name in leaves})
-
-
-def turns_bodies(scene: AbstractWalkerScene, names: Iterable[str]) -> bool:
-    """Whether an angle or a rate is among the names, as the state has it."""
-    structure = scene.mechanism.structure
-    return not {*structure.coordinates[2:], *structure.rates[2:]}.isdisjoint(names)
 
 
 def _held_along(

@@ -26,7 +26,6 @@ from jaxbiped.sweep.starts._coordinates import (
     parameters_among,
     place_states,
     state_at,
-    turns_bodies,
 )
 
 Completion: TypeAlias = Callable[[Any, PyTree], PyTree]
@@ -120,7 +119,11 @@ def rest_of(
                 "state."
             )
         base = type(base)(*map(float, base))
-    return Rest(turns_bodies(scene, names) if place is None else bool(place), follow, base)
+    if place is None:
+        structure = scene.mechanism.structure
+        turning = {*structure.coordinates[2:], *structure.rates[2:]}
+        place = not turning.isdisjoint(names)
+    return Rest(bool(place), follow, base)
 
 
 class Grid(AbstractStarts):

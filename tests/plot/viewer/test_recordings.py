@@ -110,18 +110,6 @@ def test_a_rigid_walk_keeps_its_legs():
         recorded(scene, jb.rigid_walk(scene, start, footsteps=3))
 
 
-def test_the_page_stands_upright(seed_walk):
-    """Gravity down the page: what `onPage` does is what `upright` does."""
-    scene, walk = seed_walk
-    found = recorded(scene, walk)
-    x, z, *_ = played(found, np.array([1.0]))
-    sine, cosine = np.sin(found.slope), np.cos(found.slope)
-    hip = poses(scene, DrawnMotion(scene, walk).at(np.array([1.0]))).root[0]
-    assert hip == pytest.approx(
-        [cosine * x[0] + sine * z[0], cosine * z[0] - sine * x[0]], abs=1e-5
-    )
-
-
 def test_what_cannot_be_viewed_is_told(seed_walk):
     scene, walk = seed_walk
     with pytest.raises(jb.ArgumentError, match="start is allowed only with a rigid walk"):

@@ -112,13 +112,6 @@ def test_the_gait_on_bristles_is_the_seeds_but_for_their_give():
     assert bool(jnp.all(jnp.isfinite(gait.sensitivities.period)))
 
 
-def test_bad_arguments():
-    with pytest.raises(jb.ArgumentError, match="sigma_0 = 0"):
-        jb.laws.Dahl(mu=0.4, sigma_0=0.0)
-    with pytest.raises(jb.ArgumentError, match="v_s = -1"):
-        jb.laws.LuGre(mu_static=0.5, mu_kinetic=0.4, v_s=-1.0, sigma_0=1e4, sigma_1=1.0)
-
-
 def test_a_state_without_bristles_is_refused_where_nothing_adds_them():
     for use in (
         jb.dynamics.foot_forces,

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from tests.scene.laws.refusals import assert_refused
 
 NORMAL = dict(K=1e6, c=1e7, n=1.5, mass=2.0)
 FRICTION = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
@@ -95,27 +94,6 @@ def test_they_are_differentiable_in_the_seeds_parameters():
 
     difference = (force(1e6 + 1.0) - force(1e6 - 1.0)) / 2.0
     np.testing.assert_allclose(jax.jit(jax.grad(force))(1e6), difference, rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("like", "name", "changed", "words"),
-    [
-        (jb.laws.normal_law_like, "rubber", {}, ("name", "rubber", "hunt-crossley")),
-        (jb.laws.friction_law_like, "ice", {}, ("name", "ice", "brown-mcphee")),
-        (jb.laws.normal_law_like, "tsuji", {"mass": -1.0}, ("mass", "-1")),
-        (jb.laws.normal_law_like, "tsuji", {"mass": "m"}, ("mass", "number")),
-        (jb.laws.normal_law_like, "tsuji", {"g": 0.0}, ("g", "0", "above 0")),
-        (jb.laws.normal_law_like, "hertz", {"K": -1.0}, ("K", "-1")),
-        (jb.laws.friction_law_like, "viscous", {"v0": 0.0}, ("v0", "0")),
-        (jb.laws.friction_law_like, "stribeck", {"xi": 0.0}, ("xi", "0")),
-        (jb.laws.friction_law_like, "lugre", {"xi": 0.0}, ("xi", "0")),
-        (jb.laws.friction_law_like, "dahl", {"mu_kinetic": 0.0}, ("mu", "0")),
-        (jb.laws.friction_law_like, "coulomb", {"mu_static": -1.0}, ("mu_static",)),
-    ],
-)
-def test_bad_arguments_are_named(like, name, changed, words):
-    usual = NORMAL if like is jb.laws.normal_law_like else FRICTION
-    assert_refused(lambda: like(name, **usual | changed), *words)
 
 
 def _walk(normal, friction):

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from tests.scene.laws.derivatives import Force
 from tests.scene.laws.formulas import friction_shares
-from tests.scene.laws.refusals import assert_refused
 
 
 def numbers(low, high):
@@ -182,31 +181,3 @@ def test_brown_and_mcphee_without_a_viscous_part_leave_it_out():
     program = lambda law: str(jax.make_jaxpr(law.force)(1.0, 1.0))
     assert program(LAWS["brown-mcphee"]).count("= tanh ") == 1
     assert program(LAWS["brown-mcphee, viscous"]).count("= tanh ") == 2
-
-
-@pytest.mark.parametrize(
-    ("law", "numbers", "words"),
-    [
-        ("Viscous", dict(k=-1.0), ("k", "-1", "s/m")),
-        ("Threlfall", dict(mu=-0.1, v0=1.0), ("mu", "-0.1")),
-        ("Threlfall", dict(mu=0.1, v0=0.0), ("v0", "0", "m/s")),
-        ("Ambrosio", dict(mu=-0.1, v0=1.0, v1=2.0), ("mu", "-0.1")),
-        ("Ambrosio", dict(mu=0.1, v0=0.0, v1=2.0), ("v0", "0", "above 0")),
-        ("Ambrosio", dict(mu=0.1, v0=2.0, v1=1.5), ("v1 − v0", "-0.5", "above 0")),
-        ("Ambrosio", dict(mu=0.1, v0=2.0, v1="fast"), ("v1", "fast", "number")),
-        ("Stribeck", STRIBECK | dict(p=0.0, k_v=0.0, v_d=1.0), ("p", "0")),
-        ("Stribeck", STRIBECK | dict(p=1.0, k_v=-0.5, v_d=1.0), ("k_v", "-0.5")),
-        ("Stribeck", STRIBECK | dict(p=1.0, k_v=0.0, v_d=-1.0), ("v_d", "-1")),
-        ("Andersson", STRIBECK | dict(v_s=0.0, p=1.0, k=1.0), ("v_s", "0")),
-        ("Andersson", STRIBECK | dict(p=1.0, k=float("nan")), ("k", "nan")),
-        ("Andersson", STRIBECK | dict(mu_static=-1, p=1.0, k=1.0), ("mu_static", "-1")),
-        ("BrownMcPhee", dict(mu_static=0.3), ("mu_static", "0.3", "mu_dynamic = 0.4")),
-        ("BrownMcPhee", dict(mu_dynamic=-1.0), ("mu_dynamic", "-1")),
-        ("BrownMcPhee", dict(v_t=0.0), ("v_t", "0")),
-        ("BrownMcPhee", dict(mu_v=1.0), ("N_t", "None", "mu_v")),
-        ("BrownMcPhee", dict(mu_v=1.0, N_t=0.0), ("N_t", "0", "above 0")),
-    ],
-)
-def test_bad_arguments_are_named(law, numbers, words):
-    usual = dict(mu_static=0.4, mu_dynamic=0.4, v_t=1.0) if law == "BrownMcPhee" else {}
-    assert_refused(lambda: getattr(jb.laws, law)(**usual | numbers), *words)

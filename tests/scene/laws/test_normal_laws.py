@@ -1,7 +1,5 @@
 """Laws of the normal force, against formulas written a second time, differences, constructors."""
 
-import operator
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -13,7 +11,6 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from tests.scene.laws.derivatives import Force
 from tests.scene.laws.formulas import normal_forces
-from tests.scene.laws.refusals import assert_refused
 
 
 def numbers(low, high):
@@ -206,38 +203,3 @@ def test_hertz_stiffness_of_known_pairs():
     np.testing.assert_allclose(steel, 2 / 3 * 210e9 * np.sqrt(0.08) / 0.91, rtol=1e-12)
     rigid = jb.laws.hertz_stiffness(radius=0.08, **STEEL, ground_modulus=1e30, ground_poisson=0.0)
     np.testing.assert_allclose(rigid, 2 * steel, rtol=1e-12)
-
-
-WEIGHT = dict(mass=1.0, penetration=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("make", "numbers", "words"),
-    [
-        ("KelvinVoigt", dict(K=0.0, D=1.0), ("K", "0", "N/m")),
-        ("KelvinVoigt", dict(K=1.0, D=-1.0), ("D", "-1")),
-        ("KuwabaraKono", dict(K=-2.0, gamma=1.0), ("K", "-2")),
-        ("KuwabaraKono", dict(K=1.0, gamma=-3.0), ("gamma", "-3")),
-        ("Tsuji", dict(K=float("inf"), gamma=1.0), ("K", "inf")),
-        ("Tsuji", dict(K=1.0, gamma="much"), ("gamma", "much", "number")),
-        ("HuntCrossley", dict(K=1.0, hysteresis=-1.0), ("hysteresis", "-1", "s/m")),
-        ("HuntCrossley", dict(K=1.0, hysteresis=1.0, n=0.9), ("n", "0.9", "at least")),
-        ("Hertz.from_weight", WEIGHT | dict(mass=0.0), ("mass", "0", "kg")),
-        ("Hertz.from_weight", WEIGHT | dict(penetration=-1.0), ("penetration", "-1")),
-        ("Hertz.from_weight", WEIGHT | dict(n=0.5), ("n", "0.5")),
-        ("Tsuji.from_weight", WEIGHT | dict(damping_ratio=-0.1), ("damping_ratio", "-0.1")),
-        ("Tsuji.from_weight", WEIGHT | dict(damping_ratio=0.1, g=0.0), ("g", "0", "m/s^2")),
-        (
-            "hertz_stiffness",
-            STEEL | dict(radius=0.1, ground_modulus=1e9, ground_poisson=0.6),
-            ("ground_poisson", "0.6", "above -1", "at most 0.5"),
-        ),
-        (
-            "hertz_stiffness",
-            STEEL | dict(radius=0.0, ground_modulus=1e9, ground_poisson=0.3),
-            ("radius", "0", "above 0"),
-        ),
-    ],
-)
-def test_bad_arguments_are_named(make, numbers, words):
-    assert_refused(lambda: operator.attrgetter(make)(jb.laws)(**numbers), *words)

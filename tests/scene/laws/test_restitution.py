@@ -7,7 +7,6 @@ from scipy.optimize import brentq
 
 import jaxbiped as jb
 from tests.scene.laws.drop import restitutions
-from tests.scene.laws.refusals import assert_refused
 
 WANTED = np.array([0.1, 0.3, 0.5, 0.7, 0.9])
 REALISED = {
@@ -77,18 +76,3 @@ def test_zero_is_refused_where_it_is_divided_by(formula):
             factor(0.0)
     else:
         assert np.isfinite(factor(0.0))
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"formula": "newton"}, ("formula", "newton", "flores")),
-        ({"approach_speed": 0.0}, ("approach_speed", "0", "above 0")),
-        ({"K": -1.0}, ("K", "-1")),
-        ({"e": "soft"}, ("e", "soft", "number")),
-        ({"n": 0.5}, ("n", "0.5")),
-    ],
-)
-def test_bad_arguments_are_named(change, words):
-    usual = {"K": 1e6, "e": 0.5, "approach_speed": 0.1}
-    assert_refused(lambda: jb.laws.HuntCrossley.from_restitution(**usual | change), *words)

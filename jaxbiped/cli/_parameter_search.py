@@ -1,0 +1,299 @@
+"""Searches for parameters: `jaxbiped optimise` for the best gait, `fit` for the measured ones."""
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional
+
+import jaxbiped as jb
+from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._files import JsonObject, read_json, read_text
+from jaxbiped.cli import _options as options
+from jaxbiped.cli._gait import gait_figures
+from jaxbiped.cli._report import Report, columns, records
+from jaxbiped.cli._scene_options import SceneOptions, minimal
+
+_USUAL_RANGE = (0.5, 2.0)
+"""Factors of a parameter's own value between which it varies unless bounds are given."""
+_STABLE = {True: "stable", False: "NOT STABLE", None: "undecided within the error"}
+_REDUNDANT = (
+    "formulation = redundant is not allowed here: how the hip is held makes no difference to a "
+    "gait; choose minimal."
+)
+_ESTIMATE = {
+    "parameter": "{0[0]}",
+    "unit": "{0[1].unit}",
+    "estimate": "{0[2]:.6g}",
+    "standard error": "{0[3]:.6g}",
+    "95 % from": "{0[4][0]:.6g}",
+    "to": "{0[4][1]:.6g}",
+}
+_REDUNDANT_FIT = 'formulation = "redundant" is not allowed here: it must be "minimal".'
+_IS_MEASURED = options.Check(
+    lambda name, path: (read_text if path.suffix.lower() == ".csv" else read_json)(name, path)
+)
+
+
+class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
+    """Find the parameters within bounds whose periodic gait is best, and certify it."""
+
+    vary: str
+    """Parameters to vary: d,r,J (from half to double their values), or with bounds d=0.05:0.2,r."""
+    scene: Annotated[SceneOptions, minimal(_REDUNDANT)]
+    maximise: str | None = None
+    """Measure of the gait to maximise, such as speed."""
+    minimise: str | None = None
+    """Measure of the gait to minimise, such as spectral_radius."""
+    subject_to: tuple[str, ...] = ()
+    """Requirements, such as "spectral_radius<0.4" "step_length>0.2"."""
+    optimiser: Annotated[str, options.one_of("optimise.OPTIMISERS")]
+    """Optimiser: trust-region, slsqp, trust-constr; or, without requirements, optax."""
+    iterations: options.Count
+    """Maximum number of iterations of a run."""
+    restarts: options.NotNegative
+    """Number of further runs, from the best of scattered designs."""
+    seed: int
+    """Random seed for scattering these designs."""
+    accuracy: options.GaitAccuracy
+    engine: options.Engine
+    basin: options.NotNegative = 1024
+    """Number of starts around the gait that the certificate labels; 0 for none."""
+    footsteps: options.NotNegative
+    """Number of footsteps that the certificate walks from a pushed start; 0 for none."""
+    bifurcations: str = "slope"
+    """Parameters along which the certificate seeks the nearest bifurcation: slope,d; or none."""
+    fatal_push: bool
+    other_engine: bool
+    store: Path | None
+    output: options.OutputOptions
+
+    def run(self) -> int:
+        from jaxbiped.continuation._critical_values import range_of
+
+        scene = self.scene.scene()
+        assert not isinstance(scene, jb.RedundantScene)
+        self.output.make_folder()
+        names = map(str.strip, self.bifurcations.split(","))
+        along = [name for name in names if name not in ("", "none")]
+        for name in along:
+            check_choice("bifurcations", name, jb.parameter_names(scene))
+            range_of(scene, name)
+        vary = {"vary": _bounds(scene, self.vary), "subject_to": self.subject_to or None}
+        how = self.arguments("optimise_gait") | vary
+        del how["footsteps"]  # of the certificate's walk
+        found = jb.optimise_gait(scene, **how)
+        certificate = jb.optimise.certify(
+            found,
+            starts=self.basin,
+            footsteps=self.footsteps,
+            fatal_push=self.fatal_push,
+            bifurcations_along=along,
+            other_engine=self.other_engine,
+        )
+        sense = "minimise" if self.maximise is None else "maximise"
+        goal = getattr(self, sense)
+        report = Report(self.output.json, self.output.csv)
+        _print(report, scene, found, goal)
+        report.say(*_certificate_lines(certificate))
+        figures = {"optimisation": lambda: jb.plot.optimisation(found)}
+        report.wrote(self.output.draw(figures | gait_figures(found.gait)))
+        report.finish(_optimum_numbers(found, certificate, goal, sense), found.to_csv)
+        ended = jb.optimise.Outcome
+        return int(found.outcome not in (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE))
+
+
+def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[float, float]]:
+    """Bounds by name from d=0.05:0.2,r,J."""
+    from jaxbiped.continuation._critical_values import farthest_allowed
+
+    own, found = jb.parameter_values(scene), {}
+    for part in text.split(","):
+        name, given, bounds = (each.strip() for each in part.partition("="))
+        check_choice("vary", name, jb.parameter_names(scene))
+        if given:
+            try:
+                low, high = map(float, bounds.split(":", 1))
+            except ValueError:
+                raise ArgumentError(
+                    f"vary = {part.strip()!r} is not understood: write {name}=low:high."
+                ) from None
+        elif (value := float(own[name])) > 0.0:
+            low, high = (farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
+        else:
+            raise ArgumentError(
+                f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
+            )
+        found[name] = (low, high)
+    return found
+
+
+def _optimum_numbers(
+    found: "jb.optimise.Optimum", certificate: "jb.optimise.Certificate", goal: str, sense: str
+) -> JsonObject:
+    """What is known of an optimum in SI units, for `strict_json`."""
+    return {
+        "outcome": str(found.outcome),
+        "message": found.message,
+        "variables": found.variables,
+        "objective": {
+            "name": goal,
+            "sense": sense,
+            "value": found.objective,
+            "error": found.error,
+            "unit": jb.optimise.OBJECTIVES[goal].quantity.unit,
+        },
+        "measures": {
+            name: {
+                "value": value,
+                "error": found.known.errors[name],
+                "beyond_range": name in found.known.beyond_range,
+            }
+            for name, value in found.known.values.items()
+        },
+        "history": records(found.history),
+        "evaluations": found.evaluations,
+        "lost": found.lost,
+        "unmeasured": found.unmeasured,
+        "certificate": _certificate_numbers(certificate),
+    }
+
+
+def _certificate_numbers(certificate: "jb.optimise.Certificate") -> JsonObject:
+    told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
+    basin, push = certificate.basin, certificate.fatal_push
+    numbers = {
+        "kkt_residual": told.residual,
+        "kkt_residual_error": told.error,
+        "excess": told.excess,
+        "constraints": records(told.requirements),
+        "bounds": records(told.bounds),
+    } | records(certificate)
+    del numbers["optimality"]
+    return numbers | {
+        "sensitivity_norm": {"value": norm, "error": norm_error},
+        "basin": basin and dataclasses.asdict(basin),
+        "fatal_push": push and {"distance": push.distance, "push": push.push},
+    }
+
+
+def _print(
+    report: Report, scene: "jb.Scene | jb.RigidScene", found: "jb.optimise.Optimum", goal: str
+) -> None:
+    units, own = jb.parameter_quantities(scene), jb.parameter_values(scene)
+    variables = {
+        "variable": "{0[0]}",
+        "began": "{0[1]:.6g}",
+        "best": "{0[2]:.6g}",
+        "unit": "{0[3].unit_in_text}",
+    }
+    rows = [(name, float(own[name]), x, units[name]) for name, x in found.variables.items()]
+    measures = {
+        "measure": "{0[0]}",
+        "began": "{0[1]}",
+        "best": "{0[2]}",
+        "error": "{0[3]}",
+        "unit": "{0[4].quantity.unit_in_text}",
+    }
+    report.say(columns(variables, rows), "", columns(measures, _measures(found)), "")
+    report.say(
+        f"{goal} {found.objective:.6g}, {found.outcome} after {len(found.history)} iterations and "
+        f"{found.evaluations} gaits ({found.message})"
+    )
+
+
+def _measures(found: "jb.optimise.Optimum") -> Iterator[tuple[object, ...]]:
+    """Each measure, its first value, its best one and the error, or more than a range holds."""
+    first = found.history[0].measures if found.history else {}
+    for name, value in found.known.values.items():
+        if name in jb.optimise.OBJECTIVES:
+            began = f"{first[name]:.6g}" if name in first else "–"
+            best, error = f"{value:.6g}", f"{found.known.errors[name]:.1e}"
+            if name in found.known.beyond_range:
+                best, error = f"> {best}", "–"
+            yield name, began, best, error, jb.optimise.OBJECTIVES[name]
+
+
+def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
+    told, basin, walk = certificate.optimality, certificate.basin, certificate.walk
+    yield f"optimality: residual {told.residual:.1e}, requirements missed by {told.excess:.1e}"
+    for each in (*told.requirements, *told.bounds):
+        if each.active:
+            yield (
+                f"held by {each.name} at {each.bound:.6g}: multiplier {each.multiplier:.4g} ± "
+                f"{each.multiplier_error:.1e}"
+            )
+    pairs = zip(certificate.multipliers, certificate.multiplier_errors, strict=True)
+    sizes = ", ".join(f"{abs(size):.4f} ± {error:.0e}" for size, error in list(pairs)[:3])
+    yield (
+        f"multipliers: {sizes}; the one that must be 1 is off by "
+        f"{certificate.unit_multiplier_error:.1e}; {_STABLE[certificate.stable]}"
+    )
+    yield "sensitivity norm {:.4g} ± {:.1e}".format(*certificate.sensitivity_norm)
+    if basin is not None:
+        yield (
+            f"basin: {basin.estimate:.3f} of the starts about the gait ({basin.low:.3f} to "
+            f"{basin.high:.3f})"
+        )
+    if certificate.fatal_push is not None:
+        yield f"smallest fatal push seen: {certificate.fatal_push.distance:.4f} (scaled)"
+    if walk is not None:
+        back = "back to the gait" if walk.returned else "NOT back to the gait"
+        yield f"walk from a push of {walk.push:g}: {walk.footsteps} footsteps, {back}"
+    for nearest in certificate.nearest_bifurcations:
+        times = "" if math.isnan(nearest.ratio) else f" ({nearest.ratio:.3g} times its value)"
+        if nearest.kind is None:
+            yield f"no bifurcation along {nearest.along} in the range that was followed"
+        else:
+            place = f"{nearest.kind} at {nearest.value:.6g}{times}"
+            yield f"along {nearest.along} the nearest is {place}"
+    for name, why in certificate.failed.items():
+        yield f"{name}: not known ({why})"
+    if (other := certificate.other_engine) is not None:
+        yield (
+            f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "
+            f"{other.length_difference:.1e}, spectral radius by {other.radius_difference:.1e}"
+        )
+
+
+class Fit(options.Command, of=("fit_gait",)):
+    """Fit parameters to measured gaits; print estimates, errors and undetermined parameters."""
+
+    file: Annotated[Positional[Path], _IS_MEASURED]
+    """File of measured gaits, CSV or JSON (see jaxbiped.identify.read_measured)."""
+    vary: str
+    """Names of the parameters to fit, separated by commas: K,c,mu_kinetic."""
+    scene: Annotated[SceneOptions, minimal(_REDUNDANT_FIT)]
+    accuracy: options.GaitAccuracy
+    engine: options.Engine
+    max_evaluations: options.Count
+    output: options.OutputOptions
+
+    def run(self) -> int:
+        scene = self.scene.scene()
+        assert not isinstance(scene, jb.RedundantScene)
+        self.output.make_folder()
+        names = tuple(name.strip() for name in self.vary.split(",") if name.strip())
+        measured, how = jb.identify.read_measured(self.file, scene), self.arguments("fit_gait")
+        fit = jb.fit_gait(scene, names, measured, **how)
+        report = Report(self.output.json, self.output.csv)
+        parts = (jb.parameter_quantities(scene), fit.estimates, fit.standard_errors, fit.intervals)
+        report.say(columns(_ESTIMATE, [(name, *(part[name] for part in parts)) for name in names]))
+        report.say(
+            f"{fit.ending} after {fit.evaluations} scenes; chi squared {fit.chi_squared:.3g} at "
+            f"{fit.freedom} degrees of freedom (p = {fit.p_value:.2g})"
+        )
+        if fit.undetermined:
+            report.say(f"these data do not determine {', '.join(fit.undetermined)}")
+        if fit.one_sided:
+            report.say(f"limited on one side only: {', '.join(fit.one_sided)}")
+        if fit.at_bounds:
+            report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
+        report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
+        numbers = vars(fit) | {"ending": str(fit.ending), "intervals_95": fit.intervals}
+        del numbers["intervals"]
+        also = {"chi_squared": fit.chi_squared, "p_value": fit.p_value}
+        report.finish(numbers | also, fit.to_csv)
+        return 0 if fit.ending is jb.identify.FitEnding.CONVERGED else 1

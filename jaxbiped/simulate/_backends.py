@@ -1,0 +1,300 @@
+"""Backends of simulations: diffrax, compiled by XLA, and lanes; and which of them is asked."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import Array, PyTree
+
+from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._ending import Ending
+from jaxbiped._types import as_float, is_traced
+from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.compiler import BY_NAME, LaneEngine, Request
+from jaxbiped.dynamics._state import field_of
+from jaxbiped.scene._scene import RedundantScene
+from jaxbiped.simulate._start import Options
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adaptive_program
+from jaxbiped.solve._engine_names import ENGINES, engine_for, lane_obstacle
+from jaxbiped.solve._failure_events import ending_code, ending_events
+from jaxbiped.solve._saved_outputs import Saved
+from jaxbiped.solve._solvers import with_projection, with_root_tolerances
+from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
+from jaxbiped.solve.controllers._event_steps import (
+    PATIENCE,
+    FootstepLimit,
+    LocatedEnding,
+    MissedContacts,
+)
+from jaxbiped.solve.controllers._step_size import walk_control
+from jaxbiped.solve.controllers._wrapped_control import (
+    Extremes,
+    GivenFirstStep,
+    first_step,
+    just_before_end,
+)
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+
+if TYPE_CHECKING:
+    from jaxbiped.simulate._simulation import Simulation
+
+_QUICK = 100_000
+"""Attempted steps that take less than a second."""
+_ROOM = 1 << 18
+"""Steps that there is room for at first; who takes more runs again, with room for as many."""
+
+
+def choose_engine(
+    asked: Options, solver: diffrax.AbstractSolver[PyTree], leaves: PyTree, *, redundant: bool
+) -> str:
+    """The engine that "auto" stands for, or the one that is asked for.
+
+    Raises:
+        ArgumentError: an unknown name, or lanes or CUDA for what they cannot do.
+    """
+    obstacle = _hindrance(asked, solver, leaves, redundant=redundant)
+    engine, section = asked.engine, asked.section
+    if section is None:
+        return engine_for(engine, obstacle=obstacle, prefers_xla=redundant, by_device=True)
+    check_choice("engine", engine, ENGINES)
+    if engine == "xla" or obstacle is not None:
+        chosen = 'engine = "xla" was chosen; choose "lanes" or "auto"'
+        why = f"here {obstacle}" if obstacle is not None else chosen
+        raise ArgumentError(
+            f"save = {type(section).__name__}() is not allowed here: only lanes do that, and {why}."
+        )
+    return engine_for("cuda", obstacle=None, by_device=True) if engine == "cuda" else "lanes"
+
+
+def _hindrance(
+    asked: Options, solver: diffrax.AbstractSolver[PyTree], leaves: PyTree, *, redundant: bool
+) -> str | None:
+    """Why lanes cannot do what is asked."""
+    if asked.dt is not None:
+        return "steps of one size (dt) are diffrax's"
+    if redundant and not (isinstance(asked.save, str) and asked.save == "end"):
+        return 'redundant coordinates are diffrax\'s, but for save="end"'
+    if asked.save_steps and is_traced(jtu.tree_leaves(leaves)):
+        return (
+            'under jit, vmap or derivatives it does not save every step (save="steps"); ask for '
+            'save="end", an array of times or a section'
+        )
+    if asked.adjoint is not None:
+        return "an adjoint is diffrax's"
+    if isinstance(asked.times, jax.core.Tracer):
+        return "the times to save at must be known beforehand"
+    return lane_obstacle(solver, asked.section, leaves)
+
+
+@cached_jit
+def by_xla(run: "Simulation") -> Trajectory:
+    """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
+    solver: diffrax.AbstractSolver[PyTree] = run.solver
+    adjoint = diffrax.RecursiveCheckpointAdjoint() if run.adjoint is None else run.adjoint
+    weight: float = getattr(solver, "switch_weight", 1.0)
+    controller: PyTree = walk_control(run.rtol, run.atol, run.units, switch_weight=weight)
+    if run.dt is not None:
+        constant: PyTree = diffrax.ConstantStepSize()
+        controller = MissedContacts(constant)
+        solver = with_root_tolerances(solver, run.rtol, run.atol)
+    if run.footsteps is not None:
+        controller = FootstepLimit(controller, run.footsteps)
+    if run.dt is None:
+        controller = LocatedEnding(controller, run.watch)
+    if run.extremes is not None:
+        controller = Extremes(controller, run.extremes)
+    size = first_step(run.duration, run.units.time) if run.dt is None else run.dt
+    events = ending_events(run.watch)
+    if isinstance(run.scene, RedundantScene):
+        solver = with_projection(run.scene, solver, adjoint)
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(field_of(run.scene)),
+        solver,
+        t0=jnp.zeros_like(run.duration),
+        t1=run.duration,
+        dt0=None,
+        y0=run.state,
+        args=run.scene,
+        saveat=_saveat(run),
+        stepsize_controller=GivenFirstStep(controller, size),
+        event=diffrax.Event(list(events.values())) if events else None,
+        max_steps=run.max_solver_steps,
+        adjoint=adjoint,
+        throw=False,
+    )
+    control: Any = solution.controller_state
+    lowest = highest = missed = None
+    if run.extremes is not None:
+        control, lowest, highest = control
+    if run.dt is not None:
+        _, missed = control if run.footsteps is None else control[0]
+    return Trajectory(
+        t=solution.ts,
+        state=solution.ys,
+        ending=_ending(solution, control, list(events), run),
+        accepted=solution.stats["num_accepted_steps"],
+        rejected=solution.stats["num_rejected_steps"],
+        dense=solution.interpolation if run.save_steps else None,
+        lowest=lowest,
+        highest=highest,
+        correction=run.correction,
+        missed_contacts=missed,
+    )
+
+
+def _saveat(run: "Simulation") -> diffrax.SaveAt:
+    keeps = any(each is not None for each in (run.footsteps, run.extremes, run.dt))
+    if run.save_steps:
+        return diffrax.SaveAt(t0=True, steps=True, dense=True, controller_state=keeps)
+    return diffrax.SaveAt(t1=run.times is None, ts=run.times, controller_state=keeps)
+
+
+def _ending(
+    solution: diffrax.Solution, control: PyTree, names: list[Ending], run: "Simulation"
+) -> Array:
+    results = diffrax.RESULTS
+    out_of_steps: Any = solution.result == results.max_steps_reached
+    done: Any = solution.result == results.successful
+    timed_out = jnp.zeros_like(done)
+    if run.footsteps is not None:
+        _, _, count = control
+        # Time ran out before the footsteps came, where only footsteps were asked for.
+        timed_out = done & (count < run.footsteps) & (run.duration >= PATIENCE * run.footsteps)
+        done = (done & ~timed_out) | (solution.result == results.event_occurred)
+    events = dict(zip(names, solution.event_mask or [], strict=True))
+    return ending_code(events, done=done, out_of_steps=out_of_steps, timed_out=timed_out)
+
+
+def trim(trajectory: Trajectory) -> Trajectory:
+    """Cuts unused room off a single trajectory; one that is being traced keeps it."""
+    if trajectory.dense is None or isinstance(trajectory.t, jax.core.Tracer):
+        return trajectory
+    length = int(trajectory.accepted) + 1
+    return eqx.tree_at(
+        lambda each: (each.t, each.state),
+        trajectory,
+        (trajectory.t[:length], jtu.tree_map(lambda leaf: leaf[:length], trajectory.state)),
+    )
+
+
+def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
+    """Runs a request; see `simulate`. What it asks of lanes may be known, see `lane_request`."""
+    request = lane_request(run) if request is None else request
+    dense, arrivals = None, None
+    if run.save_steps:
+        ended, rows = _step_by_step(run, request)
+        t, state, dense = recorded_steps(run.state, rows, run.solver)
+    else:
+        times = None if run.times is None else np.asarray(run.times)
+        room = 0 if run.section is None else run.max_arrivals
+        asked = request._replace(times=times, room=room)
+        ended, recorded, _ = BY_NAME[run.engine].run(asked)
+        t, state = single_time(ended.t, ended.state)
+        if recorded is not None:
+            # As diffrax has it: infinite where the solve ended before.
+            saved = arrivals_among(recorded.values, jnp.asarray(recorded.counts), run.state)
+            if run.section is None:
+                t, state = saved.t, saved.state
+            else:
+                arrivals = saved
+    return Trajectory(
+        t=t,
+        state=state,
+        ending=ended.ending,
+        accepted=ended.accepted,
+        rejected=ended.rejected,
+        dense=dense,
+        arrivals=arrivals,
+        lowest=ended.lowest,
+        highest=ended.highest,
+        correction=run.correction,
+        engine=run.engine,
+    )
+
+
+def lane_request(run: "Simulation") -> Request:
+    """What a request asks of lanes, which may hold no operation that it needs."""
+    footsteps = 0 if run.footsteps is None else run.footsteps
+    solve = Solve(
+        scene=run.scene,
+        state=run.state,
+        duration=run.duration,
+        almost=just_before_end(run.duration),
+        rtol=run.rtol,
+        atol=run.atol,
+        units=run.units,
+        footsteps=as_float(footsteps),
+        patience=as_float(PATIENCE * footsteps),
+        max_attempts=as_float(run.max_solver_steps),
+    )
+    saved = Saved(run.save_steps, run.times is not None, run.section, run.extremes)
+    assert isinstance(run.solver, AbstractRosenbrock)
+    steps = AdaptiveSolve(run.solver, run.watch, run.footsteps is not None, saved, located=True)
+    return Request(adaptive_program(steps), solve, quick=run.max_solver_steps <= _QUICK)
+
+
+def prepare_lanes(run: "Simulation", request: Request) -> Callable[["Simulation"], Trajectory]:
+    """`by_lanes`, with all compiled that it needs for one simulation.
+
+    Where only the end is asked for, what JAX does around it is compiled as well.
+    """
+    engine = BY_NAME[run.engine]
+    assert isinstance(engine, LaneEngine)
+    engine.compile(request).prepare(1)
+    within = run.save_steps or run.times is not None or run.section is not None
+    return by_lanes if within else _compiled
+
+
+_compiled = cached_jit(by_lanes)
+
+
+def _step_by_step(run: "Simulation", request: Request) -> tuple[Solved, np.ndarray]:
+    """One simulation, not traced, and the records of its steps, (n, numbers)."""
+    one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], request.inputs)
+    room = min(run.max_solver_steps, _ROOM)
+    while True:
+        asked = request._replace(inputs=one, room=room, batch=True)
+        outputs, recorded, _ = BY_NAME[run.engine].run(asked)
+        assert recorded is not None
+        steps = int(recorded.counts[0])
+        if steps <= room:
+            ended = jax.device_put(jtu.tree_map(lambda leaf: leaf[0], outputs))
+            return ended, recorded.values[0, :steps]
+        # Memory is asked for by what a solve takes, not by what it might.
+        room = steps
+
+
+def recorded_steps(
+    start: PyTree, rows: np.ndarray, solver: diffrax.AbstractSolver[PyTree]
+) -> tuple[Array, PyTree, diffrax.DenseInterpolation]:
+    """The times [s] of a start and of n steps' ends, (n + 1,), the states there, and the rest.
+
+    From the records of `Saved(steps=True)`, shape (n, numbers), as diffrax would have them.
+    """
+    kind, size = type(start), len(start)
+    first = np.array([0.0, *(float(leaf) for leaf in start)])
+    ends = np.vstack([first, rows[:, : 1 + size]]).T.copy()
+    # One step more than there are: where there are none, diffrax looks into one all the same.
+    times = np.append(ends[0], np.inf)
+    infos = np.vstack([ends[1:, :-1], rows[:, 1:].T])
+    infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
+    groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
+    # One transfer for all of them: each costs as much as several steps.
+    counts = len(rows) + 1, 1  # of a weak type, as a number in diffrax's own would be
+    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0), counts
+    times, groups, t, states, zero, (count, one) = jax.device_put(parts)
+    dense = diffrax.DenseInterpolation(
+        ts=times,
+        ts_size=count,
+        infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
+        interpolation_cls=solver.interpolation_cls,
+        direction=one,
+        t0_if_trivial=zero,
+        y0_if_trivial=start,
+    )
+    return t, states, dense
