@@ -1,4 +1,4 @@
-"""Names for the shapes that annotations use."""
+"""Names for the shapes that annotations use, and what is done with trees of any shape."""
 
 from collections.abc import Callable
 from typing import Any, TypeAlias, TypeVar
@@ -36,6 +36,9 @@ BoolScalarLike: TypeAlias = Array | np.ndarray | bool
 
 Time: TypeAlias = RealScalarLike
 """A time [s], likewise."""
+
+AT_ONCE = 4096
+"""Times or states in one call of a compiled function: one size for all lengths."""
 
 VectorField: TypeAlias = Callable[[Time, PyTree, PyTree], PyTree]
 """Rates of change f(t, state, args), in the form that `diffrax.ODETerm` takes."""
@@ -107,3 +110,23 @@ def as_float(value: Parameter) -> Scalar:
         return as_array(np.array(value, dtype=jax.dtypes.canonicalize_dtype(float)))
     except (TypeError, ValueError):
         return value
+
+
+def rows_of(tree: SomeTree, rows: Any) -> SomeTree:
+    """Rows of each leaf of a tree, as NumPy arrays; None for one more axis."""
+    found: SomeTree = jtu.tree_map(lambda leaf: np.asarray(leaf)[rows], tree)
+    return found
+
+
+def in_parts(function: Callable[[Any], PyTree], tree: PyTree, size: int = AT_ONCE) -> PyTree:
+    """`function` of a tree with leaves of shape (n, …), as NumPy arrays of n rows.
+
+    It is called with parts of one size, the last one filled up; with one part where n is 0.
+    """
+    leaves, structure = jtu.tree_flatten(jtu.tree_map(np.asarray, tree))
+    count = len(leaves[0])
+    whole = leaves if count else [np.zeros((1, *leaf.shape[1:]), leaf.dtype) for leaf in leaves]
+    places = np.minimum(np.arange(max(-(-count // size), 1) * size), max(count - 1, 0))
+    parts = [[leaf[k] for leaf in whole] for k in places.reshape(-1, size)]
+    found = jax.device_get([function(jtu.tree_unflatten(structure, part)) for part in parts])
+    return jtu.tree_map(lambda *rows: np.concatenate(rows)[:count], *found)

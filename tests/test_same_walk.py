@@ -9,7 +9,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._state import state_for
-from jaxbiped.solve._scene_key import scene_key
+from jaxbiped.solve._trajectory import scene_key
 from tests.mechanisms import scene_of
 
 SCENE, START = jb.seed_scene(), jb.seed_state()

@@ -38,7 +38,7 @@ _SETTINGS = (
     "jax_numpy_rank_promotion",
     "jax_threefry_partitionable",
 )
-_PLAIN = (bool, int, float, complex, str, bytes, slice)
+_PLAIN = (bool, int, float, complex, str, bytes, slice, np.dtype, np.generic)
 _MOST_NESTED = 200
 
 
@@ -84,8 +84,6 @@ def _parts(thing: Any, depth: int) -> Iterator[bytes]:
         yield repr(thing).encode()
     elif isinstance(thing, enum.Enum):
         yield thing.name.encode()
-    elif isinstance(thing, np.dtype | np.generic):
-        yield repr(thing).encode()
     elif isinstance(thing, jax.core.Tracer):
         raise UnknownMeaningError("a traced array")
     elif isinstance(thing, np.ndarray | jax.Array):

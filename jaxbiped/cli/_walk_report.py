@@ -14,6 +14,7 @@ import numpy as np
 import jaxbiped as jb
 from jaxbiped._files import JsonObject
 from jaxbiped._progress import stage
+from jaxbiped._types import rows_of
 from jaxbiped.cli._options import OutputOptions
 from jaxbiped.constraints._constraint_methods import name_of
 from jaxbiped.dynamics._contacts import contacts
@@ -21,7 +22,6 @@ from jaxbiped.measure._footsteps import footstep_dataset
 from jaxbiped.measure._samples import evaluate_along, from_start, places_of_standing
 from jaxbiped.solve._accuracy import unresolved_slip
 from jaxbiped.solve._error_estimate import error_numbers
-from jaxbiped.solve._trajectory import rows_of
 
 _SHOWN = 60.0
 """The part of a long walk that is drawn and can be watched [s]."""

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Scalar, as_float, rows_of
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._equivalent_states import exchange_legs
 from jaxbiped.dynamics._state import field_of
@@ -25,7 +25,6 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.identify._measured_gait import MeasuredAngles, MeasuredGait
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.solve._trajectory import rows_of
 
 AnyScene: TypeAlias = Scene | RigidScene
 Curve = Callable[[np.ndarray], np.ndarray]

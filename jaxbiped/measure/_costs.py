@@ -11,8 +11,7 @@ from jaxbiped.measure._energy_ledger import rigid_ledger
 from jaxbiped.measure._footsteps import driving_works, heel_strikes
 from jaxbiped.measure._samples import kept_strikes, places_of_standing
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
 
 class CostOfTransport(NamedTuple):

@@ -7,7 +7,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import check_increasing, check_type
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, rows_of
 from jaxbiped.dynamics._energy import (
     ActuatorPowers,
     Energies,
@@ -32,8 +32,7 @@ from jaxbiped.measure._samples import (
     states_after,
 )
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import Trajectory, rows_of
+from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
 
 class EnergyLedger(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from jaxbiped._checks import check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, Tabular, variables_of
-from jaxbiped._types import Numbers, Scalar
+from jaxbiped._types import Numbers, Scalar, rows_of
 from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._energy import energies, is_driven, powers
 from jaxbiped.dynamics._equivalent_states import minimal_state
@@ -24,8 +24,7 @@ from jaxbiped.measure._samples import (
 )
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene._structure import Structure
-from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import Trajectory, rows_of
+from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
 if TYPE_CHECKING:
     import xarray

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._types import Scalar, as_array, as_float
+from jaxbiped._types import AT_ONCE, Scalar, as_array, as_float, in_parts, rows_of
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._stance import of_stance
 from jaxbiped.dynamics._state import check_state, state_type
@@ -20,8 +20,7 @@ from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState, SomeState, State
 from jaxbiped.simulate._simulate import rigid_walk
-from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import AT_ONCE, Arrivals, Trajectory, in_parts, rows_of
+from jaxbiped.solve._trajectory import Arrivals, Trajectory, check_scene_of
 
 SomeScene = TypeVar("SomeScene", bound=AbstractWalkerScene)
 _Taken = TypeVar("_Taken")

@@ -16,8 +16,7 @@ from jaxbiped.plot._skeleton import Sole, skeleton_of
 from jaxbiped.plot._symbols import NORMAL_FORCE, PENETRATION, TANGENTIAL_FORCE, TIME
 from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots
 from jaxbiped.scene._scene import RedundantScene, Scene
-from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
 _KINDS = ("normal", "tangential")
 _EXACT = 1e-5

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._types import as_array
+from jaxbiped._types import as_array, in_parts, rows_of
 from jaxbiped.dynamics._equivalent_states import whole_state
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.measure._footsteps import HeelStrikes, heel_strikes
@@ -20,7 +20,7 @@ from jaxbiped.scene._rigid_feet import rigid_modes, standing_legs
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.scene._structure import Structure
-from jaxbiped.solve._trajectory import Trajectory, in_parts, rows_of
+from jaxbiped.solve._trajectory import Trajectory
 
 AnyScene: TypeAlias = Scene | RedundantScene | RigidScene
 _EVEN = 2048

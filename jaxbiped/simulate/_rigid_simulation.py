@@ -46,8 +46,7 @@ from jaxbiped.solve._rigid_progress import (
     state_with_hip,
 )
 from jaxbiped.solve._rigid_steps import attempt_step, ending_of
-from jaxbiped.solve._scene_key import scene_key
-from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
+from jaxbiped.solve._trajectory import Trajectory, arrivals_among, scene_key, single_time
 
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""

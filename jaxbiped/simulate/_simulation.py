@@ -56,9 +56,8 @@ from jaxbiped.solve._accuracy import (
 )
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._failure_events import WATCHES
-from jaxbiped.solve._scene_key import scene_key
 from jaxbiped.solve._solvers import check_adjoint, solver_named
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, scene_key
 from jaxbiped.solve.controllers._event_steps import PATIENCE
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas4P, Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock

@@ -137,14 +137,8 @@ def shortfall(error: ErrorEstimate) -> str:
 
 def error_numbers(error: ErrorEstimate) -> JsonObject:
     """What is known of an error but its bars, ready for JSON."""
-    return {
-        "relative": error.relative if np.isfinite(error.relative) else None,
-        "wanted": error.wanted,
-        "rtol": error.rtol,
-        "rounds": error.rounds,
-        "met": error.met,
-        "reason": error.reason,
-    }
+    others = {name: getattr(error, name) for name in ("wanted", "rtol", "rounds", "met", "reason")}
+    return {"relative": error.relative if np.isfinite(error.relative) else None, **others}
 
 
 def error_sentence(error: ErrorEstimate) -> str:

@@ -1,5 +1,12 @@
-"""Trajectory: the result of a simulation, and its states between the steps."""
+"""Trajectory: the result of a simulation, its states between the steps, and whose scene it is.
 
+A result knows the scene that it was computed with by a key, a number. The key is made of all the
+scene's numbers and of what the scene is made of, can be traced and batched, and tells scenes apart
+of which any number differs by more than rounding.
+"""
+
+import hashlib
+import json
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple
@@ -11,13 +18,16 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
-from jaxtyping import Array, Float, Int, PyTree
+from jaxtyping import Array, Float, Int, PyTree, PyTreeDef
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._ending import Ending
+from jaxbiped._identity import identity
 from jaxbiped._summary import summary
-from jaxbiped._types import Numbers, Scalar, SomeTree, by_numpy, is_traced
+from jaxbiped._types import Numbers, Scalar, as_array, by_numpy, in_parts, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.caching._caches import PROGRAMS, OfObjects, bounded_cache
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._error_estimate import ErrorEstimate
 from jaxbiped.solve._mode_history import ModeHistory
@@ -31,8 +41,8 @@ else:
 
     SomeState = TypeVar("SomeState")
 
-AT_ONCE = 4096
-"""Times or states in one call of a compiled function: one size for all lengths."""
+_ROUNDING = 1e2
+"""Differences of keys that count as none, in units of the walk's precision."""
 
 
 class Arrivals(NamedTuple, Generic[SomeState]):
@@ -205,26 +215,6 @@ def _check_inside(dense: diffrax.DenseInterpolation, times: np.ndarray) -> None:
         )
 
 
-def rows_of(tree: SomeTree, rows: Any) -> SomeTree:
-    """Rows of each leaf of a tree, as NumPy arrays; None for one more axis."""
-    found: SomeTree = jtu.tree_map(lambda leaf: np.asarray(leaf)[rows], tree)
-    return found
-
-
-def in_parts(function: Callable[[Any], PyTree], tree: PyTree, size: int = AT_ONCE) -> PyTree:
-    """`function` of a tree with leaves of shape (n, …), as NumPy arrays of n rows.
-
-    It is called with parts of one size, the last one filled up; with one part where n is 0.
-    """
-    leaves, structure = jtu.tree_flatten(jtu.tree_map(np.asarray, tree))
-    count = len(leaves[0])
-    whole = leaves if count else [np.zeros((1, *leaf.shape[1:]), leaf.dtype) for leaf in leaves]
-    places = np.minimum(np.arange(max(-(-count // size), 1) * size), max(count - 1, 0))
-    parts = [[leaf[k] for leaf in whole] for k in places.reshape(-1, size)]
-    found = jax.device_get([function(jtu.tree_unflatten(structure, part)) for part in parts])
-    return jtu.tree_map(lambda *rows: np.concatenate(rows)[:count], *found)
-
-
 def evaluate_dense(dense: diffrax.DenseInterpolation, times: np.ndarray) -> PyTree:
     """States at times of shape (n,), as NumPy arrays; NaN before the start and after the end.
 
@@ -255,3 +245,53 @@ def _evaluate(
         return kind(t0=start, t1=end, **info).evaluate(t)
 
     return jax.vmap(evaluate)(*jtu.tree_map(jnp.asarray, (start, end, info, t)))
+
+
+def scene_key(scene: Any) -> Scalar:
+    """The key of a scene, shaped as its leaves; without derivatives."""
+    leaves, structure = jtu.tree_flatten(scene)
+    weights = _weights(structure)
+    if is_traced(leaves):
+        leaves = [jax.lax.stop_gradient(leaf) for leaf in leaves]
+        return _sum(jnp, jnp.stack(jnp.broadcast_arrays(*map(jnp.asarray, leaves))), weights)
+    # Kept as NumPy's: under `jit` an array of JAX's would be a tracer.
+    return as_array(_KEYS(scene, lambda: _sum(np, np.stack(np.broadcast_arrays(*leaves)), weights)))
+
+
+_KEYS = OfObjects[np.ndarray]()
+
+
+def _sum(numpy: Any, values: Any, weights: np.ndarray) -> Any:
+    zeros = (values == 0.0).astype(float)
+    parts = (numpy.log(numpy.abs(values) + zeros), zeros, (values < 0.0).astype(float))
+    return sum(numpy.tensordot(w, part, 1) for w, part in zip(weights, parts, strict=True))
+
+
+def check_scene_of(trajectory: Any, scene: Any, name: str = "trajectory") -> None:
+    """Raises `ArgumentError` for a scene other than the one that a motion was simulated with."""
+    check_type("scene", scene, Scene, RedundantScene, RigidScene)
+    check_type(name, trajectory, Trajectory)
+    kept = trajectory.scene_key
+    if kept is None:
+        return
+    own = scene_key(scene)
+    if is_traced((own, kept)):
+        return
+    near = _ROUNDING * np.finfo(trajectory.t.dtype).eps * (1.0 + np.abs(kept))
+    if np.any(np.abs(np.asarray(own) - np.asarray(kept)) > near):
+        raise ArgumentError(
+            f"scene is not allowed: the {name} was simulated with another one; give that one, or "
+            "simulate this one."
+        )
+
+
+@bounded_cache(PROGRAMS)
+def _weights(structure: PyTreeDef) -> np.ndarray:
+    """Random numbers of each leaf, others for every structure: its weight, and two for its sign.
+
+    Shape (3, leaves).
+    """
+    numbered = jtu.tree_unflatten(structure, range(structure.num_leaves))
+    told = json.dumps(identity(numbered), sort_keys=True)
+    seed = int.from_bytes(hashlib.sha256(told.encode()).digest()[:8], "big")
+    return np.random.default_rng(seed).uniform(1.0, 2.0, (3, structure.num_leaves))

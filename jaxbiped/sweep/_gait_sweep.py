@@ -15,7 +15,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._identity import provenance
 from jaxbiped._progress import stage
-from jaxbiped._types import as_float
+from jaxbiped._types import as_float, rows_of
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
@@ -29,7 +29,6 @@ from jaxbiped.scene._parameter_access import (
     with_parameters,
 )
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.solve._trajectory import rows_of
 from jaxbiped.sweep._gait_grid import LARGE, Place, open_gait_grid
 from jaxbiped.sweep._gait_waves import GaitWaves
 from jaxbiped.sweep._store_files import store_path, what_is_kept

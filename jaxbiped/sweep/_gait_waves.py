@@ -13,10 +13,10 @@ from typing import TypeAlias
 import numpy as np
 
 from jaxbiped._progress import Stage
+from jaxbiped._types import rows_of
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.solve._trajectory import rows_of
 from jaxbiped.sweep._gait_grid import (
     LARGE,
     GaitGrid,

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, PyTree
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._types import as_float
+from jaxbiped._types import as_float, in_parts
 from jaxbiped.basins._labels import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock, minimal_fatal_shock
 from jaxbiped.basins._rays import Normal
@@ -17,7 +17,6 @@ from jaxbiped.dynamics._holds import admissible_directions
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.solve._trajectory import in_parts
 from jaxbiped.sweep._attractor import Attractor
 from jaxbiped.sweep._follow_starts import passes_a_stop
 from jaxbiped.sweep._gait_family import scene_with

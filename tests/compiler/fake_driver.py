@@ -108,7 +108,8 @@ class FakeDriver:
         self._handles = itertools.count(1)
         for name in dir(type(self)):
             if name.startswith("cu"):
-                setattr(self, name, _Function(getattr(self, name)))
+                # Unlike a method it takes the attributes of ctypes' functions.
+                setattr(self, name, functools.partial(getattr(self, name)))
 
     def cuInit(self, _):
         return 0
@@ -214,16 +215,6 @@ class FakeDriver:
         return 0
 
 
-class _Function:
-    """A method that takes the attributes of ctypes' functions."""
-
-    def __init__(self, method):
-        self.method = method
-
-    def __call__(self, *args):
-        return self.method(*args)
-
-
 def _give(pointer, value):
     pointer._obj.value = value
     return 0
@@ -235,5 +226,5 @@ def install(monkeypatch, **options):
     monkeypatch.setenv("JAXBIPED_CACHE", "")
     monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
     monkeypatch.setattr(_kernel, "ptx_text", lambda text, architecture: text)
-    monkeypatch.setattr(_processors, "devices", functools.cache(_cuda_device.find_devices))
+    monkeypatch.setattr(_processors, "devices", functools.cache(_cuda_device.devices.__wrapped__))
     return fake

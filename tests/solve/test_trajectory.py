@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.solve._trajectory import AT_ONCE, evaluate_dense, in_parts
+from jaxbiped._types import AT_ONCE, in_parts
+from jaxbiped.solve._trajectory import evaluate_dense
 
 
 def _oscillation(solver):

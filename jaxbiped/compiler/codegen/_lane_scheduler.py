@@ -91,47 +91,31 @@ class LaneScheduler:
     def exchange(self, lane: str) -> None:
         """A lane gives its outputs and takes the next simulation, or rests where there is none."""
         t = self.text
-        index_at = t.address(self.bits["index"], Kind.I64, lane)
-        count_at = t.address(self.bits["counts"], Kind.I64, lane)
-        index = t.assign(f"load i64, ptr {index_at}")
-        give, take, fill, rest, after = (t.fresh(s) for s in ("give", "take", "fill", "rest", "x"))
-        has = t.assign(f"icmp sge i64 {index}, 0")
-        t.line(f"br i1 {has}, label %{give}, label %{take}")
-        t.begin(give)
-        self._give_outputs(lane, index)
-        if self.sizes.recorded:
-            count = t.assign(f"load i64, ptr {count_at}")
-            self._put(count, self.field["record_counts"], index)
-        t.line(f"br label %{take}")
-        t.begin(take)
+        index = self._get(self.bits["index"], lane)
+        with t.where(t.assign(f"icmp sge i64 {index}, 0")):
+            self._give_outputs(lane, index)
+            if self.sizes.recorded:
+                count = self._get(self.bits["counts"], lane)
+                self._put(count, self.field["record_counts"], index)
         queue = self.field["queue"]
         following = t.assign(f"atomicrmw add ptr {queue}, i64 1 monotonic")
         more = t.assign(f"icmp slt i64 {following}, {self.field['count']}")
-        live_at = t.address(self.bits["live"], Kind.BOOL, lane)
-        fresh_at = t.address(self.bits["fresh"], Kind.BOOL, lane)
-        t.line(f"br i1 {more}, label %{fill}, label %{rest}")
-        t.begin(fill)
-        t.line(f"store i64 {following}, ptr {index_at}")
-        t.line(f"store i8 1, ptr {fresh_at}")
-        t.line(f"store i64 0, ptr {count_at}")
-        if self.sizes.row:
-            self._put("0", self.bits["rows"], lane)
-        if self.scheduled:
-            self._schedule(lane, "0")
-        self._take_inputs(lane, following)
-        t.line(f"br label %{after}")
-        t.begin(rest)
-        t.line(f"store i64 -1, ptr {index_at}")
-        t.line(f"store i8 0, ptr {live_at}")
-        t.line(f"store i8 0, ptr {fresh_at}")
-        t.line(f"br label %{after}")
-        t.begin(after)
+        taken = t.assign(f"select i1 {more}, i64 {following}, i64 -1")
+        self._put(taken, self.bits["index"], lane)
+        for name in ("live", "fresh"):
+            t.store(more, t.address(self.bits[name], Kind.BOOL, lane), Kind.BOOL, 1)
+        with t.where(more):
+            self._put("0", self.bits["counts"], lane)
+            if self.sizes.row:
+                self._put("0", self.bits["rows"], lane)
+            if self.scheduled:
+                self._schedule(lane, "0")
+            self._take_inputs(lane, following)
 
     def read(self, lane: str) -> None:
         """A lane reads the next row of its stream, behind the last one that one again."""
         t = self.text
-        at = t.address(self.bits["rows"], Kind.I64, lane)
-        place = t.assign(f"load i64, ptr {at}")
+        place = self._get(self.bits["rows"], lane)
         index = self._get(self.bits["index"], lane)
         first = t.assign(f"inttoptr i64 {self._get(self.field['streams'], index)} to ptr")
         row = t.assign(f"mul i64 {place}, {self.field['stream_stride']}")
@@ -140,7 +124,8 @@ class LaneScheduler:
         following = t.assign(f"add i64 {place}, 1")
         length = self._get(self.field["stream_lengths"], index)
         more = t.assign(f"icmp slt i64 {following}, {length}")
-        t.line(f"store i64 {t.assign(f'select i1 {more}, i64 {following}, i64 {place}')}, ptr {at}")
+        chosen = t.assign(f"select i1 {more}, i64 {following}, i64 {place}")
+        self._put(chosen, self.bits["rows"], lane)
 
     def _get(self, array: str, place: str) -> str:
         """A whole number of an array."""
@@ -164,7 +149,7 @@ class LaneScheduler:
         t = self.text
         if not self.sizes.inputs:
             return
-        with t.loop(t.fresh("copy"), t.fresh("copied"), self.sizes.inputs, index="k") as k:
+        with t.loop(self.sizes.inputs, index="k") as k:
             moved = t.assign(f"mul i64 {self._get(self.field['input_steps'], k)}, {index}")
             there = t.assign(f"add i64 {self._get(self.field['input_places'], k)}, {moved}")
             at = t.address(self.field["inputs"], Kind.F64, there)
@@ -177,7 +162,7 @@ class LaneScheduler:
         if not self.sizes.outputs:
             return
         row = t.assign(f"mul i64 {index}, {self.sizes.outputs}")
-        with t.loop(t.fresh("copy"), t.fresh("copied"), self.sizes.outputs, index="k") as k:
+        with t.loop(self.sizes.outputs, index="k") as k:
             number = t.assign(f"load double, ptr {self._own(self.rooms.given, k, lane)}")
             at = t.address(self.field["outputs"], Kind.F64, t.assign(f"add i64 {row}, {k}"))
             t.line(f"store double {number}, ptr {at}")
@@ -191,51 +176,31 @@ class LaneScheduler:
         """Looks up a lane's next time, infinity behind the last one."""
         t = self.text
         at = t.address(self.rooms.next_time, Kind.F64, lane)
-        look, none, after = (t.fresh(s) for s in ("look", "none", "seen"))
-        more = t.assign(f"icmp slt i64 {place}, {self.field['schedule_length']}")
-        t.line(f"br i1 {more}, label %{look}, label %{none}")
-        t.begin(look)
-        time = t.assign(f"load double, ptr {t.address(self.field['schedule'], Kind.F64, place)}")
-        t.line(f"store double {time}, ptr {at}")
-        t.line(f"br label %{after}")
-        t.begin(none)
         t.line(f"store double 0x7FF0000000000000, ptr {at}")
-        t.line(f"br label %{after}")
-        t.begin(after)
+        with t.where(t.assign(f"icmp slt i64 {place}, {self.field['schedule_length']}")):
+            there = t.address(self.field["schedule"], Kind.F64, place)
+            t.line(f"store double {t.assign(f'load double, ptr {there}')}, ptr {at}")
 
-    def visit_where(self, stem: str, where: str, visit: Callable[[str], None]) -> None:
+    def visit_where(self, where: str, visit: Callable[[str], None]) -> None:
         """Visits the lanes in which a mask in memory holds."""
         t = self.text
-        again, here = t.fresh(stem), t.fresh(stem)
-        skip, after = t.fresh("skip"), t.fresh("after")
-        with t.loop(again, after, self.width, index="lane") as lane:
-            bit = t.assign(f"load i8, ptr {t.address(self.bits[where], Kind.BOOL, lane)}")
-            holds = t.assign(f"trunc i8 {bit} to i1")
-            t.line(f"br i1 {holds}, label %{here}, label %{skip}")
-            t.begin(here)
-            visit(lane)
-            t.line(f"br label %{skip}")
-            t.begin(skip)
+        with t.loop(self.width, index="lane") as lane:
+            at = t.address(self.bits[where], Kind.BOOL, lane)
+            with t.where(t.load(at, Kind.BOOL, 1)):
+                visit(lane)
 
     def note(self, lane: str) -> None:
         """Appends a lane's record to its simulation's, where there is room."""
         t = self.text
-        count_at = t.address(self.bits["counts"], Kind.I64, lane)
-        count = t.assign(f"load i64, ptr {count_at}")
-        write, after = t.fresh("write"), t.fresh("written")
-        fits = t.assign(f"icmp slt i64 {count}, {self.field['record_room']}")
-        t.line(f"br i1 {fits}, label %{write}, label %{after}")
-        t.begin(write)
-        row = t.assign(
-            f"mul i64 {self._get(self.bits['index'], lane)}, {self.field['record_room']}"
-        )
-        row = t.assign(f"add i64 {row}, {count}")
-        row = t.assign(f"mul i64 {row}, {self.sizes.recorded}")
-        source = Stretch(self.rooms.noted, lane, self.width)
-        self._copy_numbers(self.sizes.recorded, source, Stretch(self.field["records"], row, 1))
-        t.line(f"br label %{after}")
-        t.begin(after)
+        count = self._get(self.bits["counts"], lane)
+        with t.where(t.assign(f"icmp slt i64 {count}, {self.field['record_room']}")):
+            index = self._get(self.bits["index"], lane)
+            row = t.assign(f"mul i64 {index}, {self.field['record_room']}")
+            row = t.assign(f"add i64 {row}, {count}")
+            row = t.assign(f"mul i64 {row}, {self.sizes.recorded}")
+            source = Stretch(self.rooms.noted, lane, self.width)
+            self._copy_numbers(self.sizes.recorded, source, Stretch(self.field["records"], row, 1))
         more = t.assign(f"add i64 {count}, 1")
-        t.line(f"store i64 {more}, ptr {count_at}")
+        self._put(more, self.bits["counts"], lane)
         if self.scheduled:
             self._schedule(lane, more)

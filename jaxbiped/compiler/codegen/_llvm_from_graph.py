@@ -119,14 +119,9 @@ class GraphWriter:
         wanted = [i for i in every if i not in stored]
         mask = self.use(here, width)
         before = [self.use(defaults[i], width) for i in wanted]
-        start, rare, after = self.text.label, self.text.fresh("some"), self.text.fresh("none")
-        hint = RARELY if inside.rare else ""
-        self.text.line(
-            f"br i1 {self.text.any_lane(mask, width)}, label %{rare}, label %{after}{hint}"
-        )
-        self.text.begin(rare)
+        start, hint = self.text.label, RARELY if inside.rare else ""
         chosen, either = [], dict[tuple[str, str, int], str]()
-        with self.text.scope():
+        with self.text.where(self.text.any_lane(mask, width), hint), self.text.scope():
             self.write(inside, width)
             for i in stored:
                 apart = self._apart(values[i], defaults[i])
@@ -136,9 +131,7 @@ class GraphWriter:
                 of, new = vector(values[i].kind, width), self.use(values[i], width)
                 text = f"select {vector(Kind.BOOL, width)} {mask}, {of} {new}, {of} {old}"
                 chosen.append(self.text.assign(text))
-        end = self.text.label
-        self.text.line(f"br label %{after}")
-        self.text.begin(after)
+            end = self.text.label
         for i, old, new in zip(wanted, before, chosen, strict=True):
             of = vector(values[i].kind, width)
             text = f"phi {of} [ {old}, %{start} ], [ {new}, %{end} ]"
@@ -171,9 +164,9 @@ class GraphWriter:
 
     def _write_repeat(self, head: Value, width: int) -> None:
         length, inside, starts, held, ends = head.args
-        start, again, after = self.text.label, self.text.fresh("again"), self.text.fresh("done")
+        start = self.text.label
         first = [self.use(v, width) for v in starts]
-        with self.text.loop(again, after, length):
+        with self.text.loop(length):
             at = len(self.text.lines)
             names = ["%" + self.text.fresh("h") for _ in held]
             for value, text in zip(held, names, strict=True):
@@ -199,8 +192,7 @@ class GraphWriter:
         sources = [self._row(value.args[0].args[0][value.args[1]], padded) for value in rows]
         parts = _parts_of(head)
         targets = self._targets(head, parts, padded)
-        again, after = self.text.fresh("each"), self.text.fresh("all")
-        with self.text.loop(again, after, length, step=step) as counter, self.text.scope():
+        with self.text.loop(length, step=step) as counter, self.text.scope():
             entry = {
                 stride: self.text.assign(f"mul i64 {counter}, {stride * self.width}")
                 for stride in sorted({1, *(stride for _, stride in sources)})

@@ -75,14 +75,9 @@ class FunctionBuilder:
         self._scopes.pop()
 
     @contextmanager
-    def loop(
-        self, again: str, after: str, length: int | str, *, index: str = "i", step: int = 1
-    ) -> Iterator[str]:
-        """What is written within runs until its number, which it gives, is `length`.
-
-        `again` and `after` are the labels of the loop and of what follows it.
-        """
-        start = self.label
+    def loop(self, length: int | str, *, index: str = "i", step: int = 1) -> Iterator[str]:
+        """What is written within runs until its number, which it gives, is `length`."""
+        start, again, after = self.label, self.fresh("again"), self.fresh("after")
         self.line(f"br label %{again}")
         self.begin(again)
         counter, following = "%" + self.fresh(index), "%" + self.fresh(index)
@@ -93,6 +88,16 @@ class FunctionBuilder:
         self.line(f"{following} = add i64 {counter}, {step}")
         more = self.assign(f"icmp slt i64 {following}, {length}")
         self.line(f"br i1 {more}, label %{again}, label %{after}")
+        self.begin(after)
+
+    @contextmanager
+    def where(self, condition: str, hint: str = "") -> Iterator[None]:
+        """What is written within runs only where a condition holds; `hint` may be `RARELY`."""
+        here, after = self.fresh("where"), self.fresh("after")
+        self.line(f"br i1 {condition}, label %{here}, label %{after}{hint}")
+        self.begin(here)
+        yield
+        self.line(f"br label %{after}")
         self.begin(after)
 
     def room(self, kind: Kind, count: int) -> str:

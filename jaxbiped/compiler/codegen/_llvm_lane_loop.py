@@ -131,7 +131,7 @@ class _Kernel:
                 self._store(w.use(value), value.kind, Place(lanes.rooms.given, offset))
         none = t.splat_constant("0", Kind.BOOL, self.width)
         t.store(none, lanes.bits["fresh"], Kind.BOOL, self.width)
-        lanes.visit_where("exchange", "done", lanes.exchange)
+        lanes.visit_where("done", lanes.exchange)
         with t.scope():
             live = self._any(self._mark("live"))
             t.line(f"br i1 {live}, label %prepare, label %leave")
@@ -178,7 +178,7 @@ class _Kernel:
         t.line(f"br i1 {going}, label %step, label %leave")
         t.begin("step")
         if graph.row:
-            lanes.visit_where("reading", "live", lanes.read)
+            lanes.visit_where("live", lanes.read)
         with t.scope():
             w.write(graph.body)
             found = [
@@ -223,7 +223,7 @@ class _Kernel:
             t.begin("note")
             for place, value in enumerate(graph.recorded):
                 self._store(w.use(value), value.kind, Place(lanes.rooms.noted, place))
-        lanes.visit_where("noting", "wants", lanes.note)
+        lanes.visit_where("wants", lanes.note)
         t.line(f"br label %{'record' if graph.scheduled else 'recorded'}")
         t.begin("recorded")
 

@@ -55,18 +55,11 @@ def eliminated_rows(
     given: list[_Operand] = [*map(_Known, inputs), *range(count)]
     found = [graph.output(end) for end in _linear(graph, program, consts, given)]
     graph.eliminate()
-    return [[graph.weight(i, output) for i in range(count)] for output in found]
+    return [[graph.into[output].get(i, 0.0) for i in range(count)] for output in found]
 
 
 class NoRuleError(NotImplementedError):
     """An operation that is not one of scalars."""
-
-
-class _Zero:
-    """A derivative that is zero."""
-
-
-_ZERO = _Zero()
 
 
 class _Known:
@@ -76,8 +69,8 @@ class _Known:
         self.value = value
 
 
-_Operand: TypeAlias = int | _Known | _Zero
-"""A vertex by its number, or what depends on none."""
+_Operand: TypeAlias = int | _Known | None
+"""A vertex by its number, or what depends on none; None: a derivative that is zero."""
 
 
 class _Graph:
@@ -89,11 +82,11 @@ class _Graph:
         self.out_of: list[dict[int, Weight]] = [{} for _ in range(inputs)]
         self.outputs: set[int] = set()
 
-    def vertex(self, edges: Sequence[tuple[int, Weight]]) -> "int | _Zero":
+    def vertex(self, edges: Sequence[tuple[int, Weight]]) -> int | None:
         """A sum of earlier ones; itself an earlier one, where it is nothing else."""
         edges = [(source, weight) for source, weight in edges if not is_number(weight, 0.0)]
         if not edges:
-            return _ZERO
+            return None
         if len(edges) == 1 and is_number(edges[0][1], 1.0):
             return edges[0][0]
         return self._new(edges)
@@ -103,10 +96,6 @@ class _Graph:
         found = self._new([(end, 1.0)] if isinstance(end, int) else [])
         self.outputs.add(found)
         return found
-
-    def weight(self, source: int, target: int) -> Weight:
-        """Of an edge, zero where there is none."""
-        return self.into[target].get(source, 0.0)
 
     def eliminate(self) -> None:
         """Removes all vertices but inputs and outputs."""
@@ -191,7 +180,7 @@ def _linear(
     return [read(atom) for atom in jaxpr.outvars]
 
 
-def _vertex(graph: _Graph, equation: JaxprEqn, given: list[Any]) -> int | _Zero:
+def _vertex(graph: _Graph, equation: JaxprEqn, given: list[Any]) -> int | None:
     """What a linear operation on scalars gives."""
     name, numbers = equation.primitive.name, graph.arithmetic
     if any(v.aval.shape for v in (*equation.invars, *equation.outvars)):  # type: ignore[attr-defined]
@@ -199,7 +188,7 @@ def _vertex(graph: _Graph, equation: JaxprEqn, given: list[Any]) -> int | _Zero:
 
     def scaled(each: _Operand, weight: Weight) -> list[tuple[int, Weight]]:
         # What a linear program knows beforehand of a sum or a choice can only be a zero.
-        return [] if isinstance(each, _Known | _Zero) else [(each, weight)]
+        return [(each, weight)] if isinstance(each, int) else []
 
     if name in ("add", "add_any"):
         return graph.vertex([*scaled(given[0], 1.0), *scaled(given[1], 1.0)])

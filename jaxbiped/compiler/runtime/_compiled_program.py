@@ -66,11 +66,6 @@ class CompiledProgram:
         digest = self.kernel.digest
         return object() if digest is None else (digest, self.processor.name)
 
-    @property
-    def size(self) -> int:
-        """How many numbers the inputs of one simulation are."""
-        return self.kernel.size
-
     def check(self) -> None:
         """Waits until it is traced, or known to have been.
 

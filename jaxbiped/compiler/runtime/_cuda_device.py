@@ -265,12 +265,7 @@ class Devices(NamedTuple):
 
 @bounded_cache(1)
 def devices() -> Devices:
-    """This machine's, as far as `CUDA_VISIBLE_DEVICES` allows: the driver heeds it."""
-    return find_devices()
-
-
-def find_devices() -> Devices:
-    """Asks the driver."""
+    """This machine's, as the driver tells them: as far as `CUDA_VISIBLE_DEVICES` allows."""
     library = load_library()
     if library is None:
         return Devices((), "no CUDA driver is installed")

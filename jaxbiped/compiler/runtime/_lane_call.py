@@ -267,7 +267,7 @@ class LaneRun(NamedTuple):
 
     def _own_and_rows(self, table: np.ndarray) -> tuple[np.ndarray, list[np.ndarray] | None]:
         """Own inputs of simulations, and the rows that others recorded for them."""
-        own, others = np.split(table, [self.compiled.size], axis=1)
+        own, others = np.split(table, [self.compiled.kernel.size], axis=1)
         return own, None if self.reads is None else self.reads.rows(others)
 
     def _width(self, count: int) -> int:

@@ -18,8 +18,7 @@ from jaxbiped.plot.style import view_colours
 from jaxbiped.plot.viewer._recording import Recording, record_rigid_walk, record_walk
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState
-from jaxbiped.solve._scene_key import check_scene_of
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
 _MODULES = (
     "dom", "channels", "pose", "stage", "chart", "linked_charts", "player", "step_table", "view",

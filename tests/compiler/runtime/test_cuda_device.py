@@ -1,6 +1,7 @@
 """Batches on an emulated CUDA device, against lanes: queue, endings, refill, failures."""
 
 import ctypes
+import functools
 import threading
 
 import jax
@@ -11,7 +12,7 @@ import pytest
 from jaxbiped._checks import ResourceError
 from jaxbiped.compiler import CUDA, LANES, LaneEngine, Program, Request
 from jaxbiped.compiler.runtime import _cuda_device, _processors
-from jaxbiped.compiler.runtime._cuda_device import CudaDriver, CudaError, find_devices
+from jaxbiped.compiler.runtime._cuda_device import CudaDriver, CudaError, devices
 from tests.compiler.fake_driver import FakeDriver, install
 
 NEVER = 2000.0
@@ -83,13 +84,13 @@ def test_an_endless_or_poisoned_start_does_not_hold_up_the_others(monkeypatch):
     assert np.sum(expected) <= fake.attempts(votes=3) < 1.05 * np.sum(expected)
 
 
-@pytest.mark.parametrize(("devices", "room"), [(3, 1 << 30), (1, 4000)])
-def test_devices_share_a_batch_in_parts_that_have_room(monkeypatch, devices, room):
-    fake = install(monkeypatch, devices=devices, lanes=2, multiprocessors=1)
+@pytest.mark.parametrize(("many", "room"), [(3, 1 << 30), (1, 4000)])
+def test_devices_share_a_batch_in_parts_that_have_room(monkeypatch, many, room):
+    fake = install(monkeypatch, devices=many, lanes=2, multiprocessors=1)
     monkeypatch.setattr(_processors, "_MOST_BYTES", room)
     lengths = 1 + np.arange(300) % 17
     _same(run_counting(CUDA, lengths), run_counting(LANES, lengths))
-    assert len(fake.launches) == 3 if devices == 3 else len(fake.launches) > 4
+    assert len(fake.launches) == 3 if many == 3 else len(fake.launches) > 4
     assert not fake.memory
 
 
@@ -168,25 +169,20 @@ def test_an_interrupt_stops_the_kernel(monkeypatch):
 def test_why_there_is_no_device(monkeypatch, options, why):
     fake = FakeDriver(**options)
     monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
-    found = find_devices()
+    found = devices.__wrapped__()
     assert not found.usable
     assert why in found.missing
 
 
 def test_a_driver_that_fails_is_no_device(monkeypatch):
     fake = FakeDriver()
-    fake.cuInit = _Failing()
+    fake.cuInit = functools.partial(lambda *args: 100)
     monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
-    assert "finds no device" in find_devices().missing
+    assert "finds no device" in devices.__wrapped__().missing
     monkeypatch.setattr(_cuda_device, "load_library", lambda: None)
-    assert find_devices().missing == "no CUDA driver is installed"
+    assert devices.__wrapped__().missing == "no CUDA driver is installed"
     with pytest.raises(CudaError, match="cuInit: launch failed"):
         CudaDriver(fake).call("cuInit", 0)
-
-
-class _Failing:
-    def __call__(self, *args):
-        return 100
 
 
 def test_batches_fill_a_device(monkeypatch):
