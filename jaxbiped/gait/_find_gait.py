@@ -207,7 +207,7 @@ def find_gait(
     if told is not origin:  # its scene may be of another structure, as of motors with a share
         gait = dataclasses.replace(gait, origin=jtu.tree_map(np.asarray, told))
     warn_of_unknown(gait)
-    return without_held(scene, gait)
+    return without_held(scene.mechanism, gait)
 
 
 @bounded_cache(1)  # the same object each time, so that nothing is compiled again

@@ -33,7 +33,7 @@ from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._search_provenance import Origin
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._parameter_access import parameter_quantities
 from jaxbiped.scene._rigid_feet import held_count
 from jaxbiped.scene._structure import Structure
@@ -126,7 +126,7 @@ def summarise_gait(
     )
 
 
-def without_held(scene: AbstractWalkerScene, gait: Gait) -> Gait:
+def without_held(mechanism: Mechanism, gait: Gait) -> Gait:
     """A gait without the multipliers, all zero, of what is held where its cycle begins.
 
     Those of a state's mode and of the angles and rates that a stop or a flat foot holds.
@@ -134,7 +134,7 @@ def without_held(scene: AbstractWalkerScene, gait: Gait) -> Gait:
     mode = float(getattr(gait.measures.state, "mode", np.nan))
     if not np.isfinite(mode):
         return gait
-    own = slice(np.shape(gait.multipliers)[-1] - 1 - 2 * held_count(scene.mechanism, mode))
+    own = slice(np.shape(gait.multipliers)[-1] - 1 - 2 * held_count(mechanism, mode))
     return dataclasses.replace(
         gait,
         multipliers=gait.multipliers[own],

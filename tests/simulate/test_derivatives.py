@@ -1,5 +1,6 @@
 """Derivatives of simulations, against central differences at tight, in every mode."""
 
+import dataclasses
 from functools import partial
 
 import diffrax
@@ -12,7 +13,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.simulate import _simulation
 from tests.compliant_walkers import held_walker
-from tests.mechanisms import WALKERS, scene_of, start_of
+from tests.mechanisms import WALKERS, scene_of, seed_walker, start_of
 
 pytestmark = pytest.mark.slow
 
@@ -181,6 +182,32 @@ def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name, draft):
     for accuracy, error in (("draft", draft), ("balanced", draft / 4.0), ("tight", 1e-5)):
         told = jax.jacfwd(partial(end, accuracy=accuracy))(rate)
         np.testing.assert_allclose(told, right, atol=error * np.max(np.abs(right)))
+
+
+def test_derivatives_at_a_touchdown_are_those_before_the_force_jumps():
+    """Of a walker with a heavier leg on Kelvin and Voigt's ground, against a much finer solve."""
+    law = dict(K=SEED.normal.K, c=SEED.normal.c, n=SEED.normal.n)
+    of_mass = dict(mass=SEED.walker.total_mass, g=SEED.ground.g)
+    slips = {name: getattr(SEED.friction, name) for name in ("mu_static", "mu_kinetic", "v0", "xi")}
+    scene = dataclasses.replace(
+        SEED,
+        walker=seed_walker(first=1.02),
+        normal=jb.laws.normal_law_like("kelvin-voigt", **law, **of_mass),
+        friction=jb.laws.friction_law_like("stribeck", **slips),
+    )
+    start = scene.state(theta_1=0.1, omega_1=2.3, omega_2=-0.69, standing="2")
+    start = start._replace(hip_z=start.hip_z - 1e-6)
+
+    def final(mu, rtol):
+        moved = jb.with_parameters(scene, {"mu_kinetic": mu})
+        return jnp.stack(jb.simulate(moved, start, footsteps=2, save="end", rtol=rtol).final)
+
+    # Nanoseconds behind the touchdown, some are fifty times as large.
+    mu = scene.friction.mu_kinetic
+    right = np.asarray(jax.jacfwd(final)(mu, 1e-10))
+    for rtol in (1e-6, 7e-7, 5e-7):
+        told = np.asarray(jax.jacfwd(final)(mu, rtol))
+        np.testing.assert_allclose(told, right, atol=2e-2 * np.max(np.abs(right)))
 
 
 @pytest.mark.parametrize(
