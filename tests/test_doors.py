@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.scene._abstract_scene import check_scene
+from jaxbiped.scene._scene_checks import check_scene
 
 SCENE, START = jb.seed_scene(), jb.seed_state()
 RIGID, ROLLING = jb.ladder()["rigid"], jb.dynamics.rigid_state(jb.seed_state())

@@ -57,7 +57,7 @@ def test_numbers_are_told_once_and_by_name():
     assert identity(SEED)["normal"]["class"] == "jaxbiped.RistowSchafer"
 
 
-@pytest.mark.parametrize("module", ["scene.laws._ristow_schafer", "scene._moved"])
+@pytest.mark.parametrize("module", ["scene.laws.normal._ristow_schafer", "scene._moved"])
 def test_a_class_that_moved_within_the_package_is_the_same_model(module):
     def told(name):
         return {"class": "jaxbiped.Scene", "normal": {"class": name}}

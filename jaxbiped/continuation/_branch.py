@@ -21,9 +21,9 @@ from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._gait import QUANTITIES
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 
 if TYPE_CHECKING:

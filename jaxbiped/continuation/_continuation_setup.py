@@ -15,9 +15,9 @@ from jaxbiped.gait._pseudo_arclength import Attempt, Change, Curve, CurvePoint, 
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.gait._search_starts import default_guess
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, precision_of, recurring_sizes
 

@@ -26,7 +26,6 @@ from jaxbiped.continuation._trace import Trace
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import state_of_guess
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import (
     parameter_names,
     parameter_values,
@@ -34,6 +33,7 @@ from jaxbiped.scene._parameter_access import (
     with_parameters,
 )
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 FACTOR = 8.0

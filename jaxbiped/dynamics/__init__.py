@@ -35,8 +35,8 @@ from jaxbiped.dynamics._redundant_motion import RedundantMotion as RedundantMoti
 from jaxbiped.dynamics._redundant_motion import hip_force as hip_force
 from jaxbiped.dynamics._redundant_motion import redundant_field as redundant_field
 from jaxbiped.dynamics._redundant_motion import redundant_motion as redundant_motion
-from jaxbiped.dynamics._rolling import rolling as rolling
-from jaxbiped.dynamics._rolling import rolling_field as rolling_field
+from jaxbiped.dynamics._stance_motion import rolling as rolling
+from jaxbiped.dynamics._stance_motion import rolling_field as rolling_field
 from jaxbiped.dynamics._state import standing_height as standing_height
 from jaxbiped.dynamics._surfaces import AbstractSection as AbstractSection
 from jaxbiped.dynamics._surfaces import Switch as Switch

@@ -27,7 +27,7 @@ from jaxbiped.scene._state_types import SomeState
 from jaxbiped.scene._structure import Structure
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw, AbstractNormalLaw
-from jaxbiped.scene.laws._coulomb import Frictionless
+from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
 _JUST_TOUCHING = 1e-6
 """Depth or height of a foot that counts as at the surface, in units of the leg's length."""

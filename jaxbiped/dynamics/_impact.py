@@ -25,16 +25,15 @@ from jaxbiped.dynamics._mode_changes import (
     with_mode,
     with_rates,
 )
-from jaxbiped.dynamics._plastic_impact import Impulse, plastic_impact
-from jaxbiped.dynamics._rolling import rolling
 from jaxbiped.dynamics._stance import Stance, of_stance
+from jaxbiped.dynamics._stance_motion import Impulse, plastic_impact, rolling
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.dynamics._strike_surfaces import clearance
 from jaxbiped.dynamics._tree import Loads, rehung
 from jaxbiped.dynamics._tree_inertia import composites, eliminate
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
 from jaxbiped.scene._scene import RigidScene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._structure import Indices
 from jaxbiped.scene.actuation._actuators import PushOff
 

@@ -12,9 +12,15 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._holds import ROUNDING, gap_of
-from jaxbiped.dynamics._plastic_impact import Grip, Struck, plastic_impact
-from jaxbiped.dynamics._rolling import Turning, ground_force, turning_of
 from jaxbiped.dynamics._stance import Stance, of_stance, stance_on
+from jaxbiped.dynamics._stance_motion import (
+    Grip,
+    Struck,
+    Turning,
+    ground_force,
+    plastic_impact,
+    turning_of,
+)
 from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.scene._modes import THROUGH_STRIKE, Mode, Modes
 from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes

@@ -15,8 +15,8 @@ from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import RigidState, State, WalkerState
 
 _SAME = 1e-4

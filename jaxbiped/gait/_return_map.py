@@ -24,9 +24,9 @@ from jaxbiped.gait._return_map_spec import (
     check_holds_none,
     return_map_spec,
 )
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, Precision, precision_of
 from jaxbiped.variational._hybrid_system import AbstractSystem, section_of, with_leg_names_of

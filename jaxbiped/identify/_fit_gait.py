@@ -22,9 +22,9 @@ from jaxbiped.identify._descent import UNLIKELY, Descent
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 

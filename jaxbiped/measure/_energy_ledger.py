@@ -19,7 +19,7 @@ from jaxbiped.dynamics._energy import (
 from jaxbiped.dynamics._equivalent_states import motion_in, whole_state
 from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._joint_loads import joint_energy
-from jaxbiped.dynamics._rolling import rolling_field, rolling_hip_motion
+from jaxbiped.dynamics._stance_motion import rolling_field, rolling_hip_motion
 from jaxbiped.measure._samples import (
     NODES,
     ModeChanges,

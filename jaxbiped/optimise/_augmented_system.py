@@ -18,7 +18,7 @@ from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._energy import actuator_powers, is_driven, kinetic_energy, powers
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._impact import impact, push_off_work
-from jaxbiped.dynamics._rolling import rolling_hip_motion
+from jaxbiped.dynamics._stance_motion import rolling_hip_motion
 from jaxbiped.dynamics._strike_surfaces import clearance
 from jaxbiped.dynamics._surfaces import AbstractSection, Switch
 from jaxbiped.scene._scene import RigidScene, Scene

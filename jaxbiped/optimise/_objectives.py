@@ -11,7 +11,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene.laws._coulomb import Frictionless
+from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
 
 def _of_driven(scene: Scene | RigidScene) -> str | None:

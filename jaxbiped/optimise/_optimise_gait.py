@@ -35,9 +35,9 @@ from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.optimise._runs import Runs, optimum_of, scattered_designs
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import scene_identity
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 

@@ -9,8 +9,8 @@ from jaxbiped.dynamics._state import STATE_QUANTITIES, state_quantity
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
-from jaxbiped.scene.laws._ristow_schafer import RistowSchafer
-from jaxbiped.scene.laws._stribeck import BengisuAkay
+from jaxbiped.scene.laws.friction._stribeck import BengisuAkay
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
 from jaxbiped.sweep.starts._coordinates import START_QUANTITIES
 
 TIME = Quantity("time", r"$t$", "s")

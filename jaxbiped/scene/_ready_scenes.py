@@ -8,10 +8,10 @@ from jaxbiped._types import Parameter
 from jaxbiped.scene._ground import Ground, StanceRotation
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Kneed, Walker
-from jaxbiped.scene.laws._bristles import LuGre
-from jaxbiped.scene.laws._coulomb import RegularisedCoulomb
-from jaxbiped.scene.laws._ristow_schafer import RistowSchafer
-from jaxbiped.scene.laws._stribeck import BengisuAkay
+from jaxbiped.scene.laws.friction._bristles import LuGre
+from jaxbiped.scene.laws.friction._coulomb import RegularisedCoulomb
+from jaxbiped.scene.laws.friction._stribeck import BengisuAkay
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
 
 
 def seed_scene(

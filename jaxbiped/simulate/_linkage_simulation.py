@@ -27,8 +27,8 @@ from jaxbiped.constraints._constraint_method import (
 )
 from jaxbiped.constraints._linkage import Constraints, constraints_of
 from jaxbiped.dynamics._constrained_motion import LinkageState, linkage_field
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._linkages import LinkageScene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.simulate._start import Options, check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
 from jaxbiped.solve._solvers import (

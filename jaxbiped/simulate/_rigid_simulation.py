@@ -23,9 +23,9 @@ from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import BY_NAME, Program, Request
 from jaxbiped.dynamics._state import check_state, state_type, without_whole_turns
 from jaxbiped.dynamics._surfaces import HeelStrike
-from jaxbiped.scene._abstract_scene import check_scene, where_allowed
 from jaxbiped.scene._rigid_feet import check_mode, rigid_modes
 from jaxbiped.scene._scene import RigidScene
+from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._derivatives import with_derivatives
 from jaxbiped.simulate._slopes import Slopes, rigid_slopes_of
 from jaxbiped.simulate._start import (

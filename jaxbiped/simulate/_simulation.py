@@ -26,8 +26,8 @@ from jaxbiped._types import Numbers, Scalar, as_array, as_float, is_traced
 from jaxbiped.compiler import BY_NAME, Request
 from jaxbiped.dynamics._constrained_motion import Consistent
 from jaxbiped.dynamics._surfaces import AbstractSection
-from jaxbiped.scene._abstract_scene import check_scene, where_allowed
 from jaxbiped.scene._scene import RedundantScene, Scene
+from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._backends import (
     by_lanes,
     by_xla,

@@ -14,7 +14,7 @@ from jaxbiped.compiler import CUDA, host_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._mode_changes import change_mode_on_surface, mode_switches
-from jaxbiped.dynamics._rolling import rolling_field
+from jaxbiped.dynamics._stance_motion import rolling_field
 from jaxbiped.dynamics._strike_surfaces import opening, uprightness
 from jaxbiped.dynamics._surfaces import AbstractSection, in_nearest_names, switches
 from jaxbiped.scene._scene import RigidScene, Scene

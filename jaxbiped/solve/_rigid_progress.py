@@ -6,8 +6,8 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._mode_changes import change_mode
-from jaxbiped.dynamics._rolling import ground_force, rolling_rates
 from jaxbiped.dynamics._stance import Stance, of_stance
+from jaxbiped.dynamics._stance_motion import ground_force, rolling_rates
 from jaxbiped.scene._rigid_feet import rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._mode_steps import SurfaceCourse, course_of

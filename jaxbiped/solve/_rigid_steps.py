@@ -9,8 +9,8 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._mode_changes import SLACK, change_mode
-from jaxbiped.dynamics._rolling import rolling_rates
 from jaxbiped.dynamics._stance import angles_and_rates
+from jaxbiped.dynamics._stance_motion import rolling_rates
 from jaxbiped.dynamics._strike_surfaces import lean
 from jaxbiped.solve._failure_events import rigid_ending
 from jaxbiped.solve._mode_steps import (

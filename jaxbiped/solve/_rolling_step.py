@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._rolling import rolling_rates
+from jaxbiped.dynamics._stance_motion import rolling_rates
 from jaxbiped.dynamics._strike_surfaces import (
     Surface,
     lead,

@@ -21,7 +21,6 @@ from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import default_guess
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import (
     parameter_quantities,
     parameter_values,
@@ -29,6 +28,7 @@ from jaxbiped.scene._parameter_access import (
     with_parameters,
 )
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._gait_grid import LARGE, Place, open_gait_grid
 from jaxbiped.sweep._gait_waves import GaitWaves
 from jaxbiped.sweep._store_files import store_path, what_is_kept

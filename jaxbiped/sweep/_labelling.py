@@ -19,9 +19,9 @@ from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.dynamics._state import state_type, without_whole_turns
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._parameter_access import scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named

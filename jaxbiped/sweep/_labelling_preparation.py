@@ -14,8 +14,8 @@ from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.basins._labels import Doubt, Label
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
 from jaxbiped.solve._engine_names import engine_for

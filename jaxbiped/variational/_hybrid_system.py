@@ -19,7 +19,7 @@ from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import WalkerField
 from jaxbiped.dynamics._mode_changes import change_mode, change_mode_on_surface, mode_switches
 from jaxbiped.dynamics._redundant_motion import BodiesField
-from jaxbiped.dynamics._rolling import rolling, rolling_field
+from jaxbiped.dynamics._stance_motion import rolling, rolling_field
 from jaxbiped.dynamics._state import cyclic_names
 from jaxbiped.dynamics._strike_surfaces import lead, opening
 from jaxbiped.dynamics._surfaces import AbstractSection, HeelStrike, MidStance, Switch, switches

@@ -19,11 +19,11 @@ from jaxbiped.caching._source_digest import SourceDigests
 PACKAGE = Path(jb.__file__).parent
 LATER = time.time_ns() + 10**15
 
-COULOMB = "scene/laws/_coulomb.py"
+COULOMB = "scene/laws/friction/_coulomb.py"
 WORDS = {
     "comment in a figure": ("plot/style.py", "import re\n", "import re  # of any kind\n"),
     "line above functions": ("gait/_find_gait.py", "import jax\n", "import jax\n\n# A word.\n"),
-    "docstring": ("dynamics/_rolling.py", "rolls without slip", "rolls and does not slip"),
+    "docstring": ("dynamics/_stance_motion.py", "rolls without slip", "rolls and does not slip"),
     "new docstring": (COULOMB, "switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:",
                       "switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:\n        'None.'"),
     "attribute's docstring": ("solve/_failure_events.py", "Rate of a leg at rest",
@@ -34,7 +34,7 @@ CODE = {
     "sign of a law": (COULOMB, "return -self.mu", "return self.mu"),
     "constant": ("solve/_failure_events.py", "_LOST_RATE = 0.1", "_LOST_RATE = 0.2"),
     "string": ("gait/_find_gait.py", '"newton"', '"newtons"'),
-    "registered for a class": ("dynamics/_rolling.py", "return rolling_field", "return None"),
+    "registered for a class": ("dynamics/_stance_motion.py", "return rolling_field", "return None"),
     "compiler": ("compiler/ir/_liveness.py", "value.op in", "value.op not in"),
     "how programs are kept": ("caching/_compiled_store.py", '_KIND = "xla"', '_KIND = "lax"'),
     "what laws there are": ("scene/laws/__init__.py", "Tsuji as Tsuji", "Tsuji as Fuji"),
@@ -135,7 +135,7 @@ def test_who_reaches_a_table_of_functions_reaches_those_that_are_put_there():
                     module = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
                     registered.append(module)
                     assert module in digests.reached(homes.get(each.split(".")[0], module))
-    assert "jaxbiped.dynamics._rolling" in registered
+    assert "jaxbiped.dynamics._stance_motion" in registered
 
 
 def _package(folder, **modules):

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._mode_changes import change_mode, foot_loads, mode_switches
-from jaxbiped.dynamics._rolling import turning_of
 from jaxbiped.dynamics._stance import stance_on
+from jaxbiped.dynamics._stance_motion import turning_of
 from jaxbiped.scene._bodies import Body, Foot, Point
 from jaxbiped.scene._joint_parts import HOLDS, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism

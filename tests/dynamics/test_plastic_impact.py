@@ -11,8 +11,8 @@ import numpy as np
 
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._mode_changes import settled, with_mode
-from jaxbiped.dynamics._plastic_impact import Grip, plastic_impact
 from jaxbiped.dynamics._stance import stance_on
+from jaxbiped.dynamics._stance_motion import Grip, plastic_impact
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode

@@ -3,7 +3,7 @@
 Each table (`*.toml`) holds the mutations of one part of the package, by name:
 
     [name-of-the-mutation]
-    file = "scene/laws/_viscoelastic.py"   # below jaxbiped/
+    file = "scene/laws/normal/_viscoelastic.py"   # below jaxbiped/
     stands = '''…'''                       # text that the file holds exactly once
     instead = '''…'''
     breaks = "one line: what is wrong then"

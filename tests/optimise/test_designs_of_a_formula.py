@@ -13,7 +13,7 @@ from jaxbiped._progress import Stage
 from jaxbiped.dynamics._actuation import hip_torques
 from jaxbiped.dynamics._energy import actuator_powers
 from jaxbiped.dynamics._impact import push_off_work
-from jaxbiped.dynamics._rolling import rolling_hip_motion
+from jaxbiped.dynamics._stance_motion import rolling_hip_motion
 from jaxbiped.optimise import _certificate, _design_gaits
 from jaxbiped.optimise._augmented_system import integrals_of
 from jaxbiped.optimise._cycle_functionals import Functional, _totals, with_errors

@@ -11,7 +11,7 @@ from reference.rigid import rigid_walker
 import jaxbiped as jb
 from jaxbiped.dynamics._energy import kinetic_energy
 from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._rolling import rolling_field
+from jaxbiped.dynamics._stance_motion import rolling_field
 from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._objective_values import evaluate

@@ -7,7 +7,7 @@ from reference.rigid_walks import rigid_walks
 from reference.scipy_solves import final_of
 
 import jaxbiped as jb
-from jaxbiped.dynamics._rolling import rolling_rates
+from jaxbiped.dynamics._stance_motion import rolling_rates
 from jaxbiped.solve._rolling_step import rolling_step
 from tests.rigid_walkers import STABLE, rigid_seed, simplest_state, simplest_walker
 

@@ -21,8 +21,8 @@ from jaxbiped.dynamics._state import state_type
 from jaxbiped.plot import style
 from jaxbiped.plot._skeleton import body_motion, motion_names, names_by_foot, skeleton_of
 from jaxbiped.plot.viewer._view import AbstractPage
-from jaxbiped.scene._abstract_scene import check_scene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._adaptive_program import Solve
 

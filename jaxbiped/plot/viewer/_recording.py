@@ -16,8 +16,8 @@ from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._energy import energies, kinetic_and_moment
 from jaxbiped.dynamics._equivalent_states import whole_state
 from jaxbiped.dynamics._mode_changes import foot_loads
-from jaxbiped.dynamics._rolling import ground_force, turning_of
 from jaxbiped.dynamics._stance import Stance, of_stance
+from jaxbiped.dynamics._stance_motion import ground_force, turning_of
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._samples import evaluate_along, places_of_standing
 from jaxbiped.plot._contact_charts import forces_in

@@ -16,32 +16,32 @@ from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw as AbstractNorm
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw as AbstractBristleLaw
 
 # Normal laws.
-from jaxbiped.scene.laws._hertz import Hertz as Hertz
-from jaxbiped.scene.laws._viscoelastic import KelvinVoigt as KelvinVoigt
-from jaxbiped.scene.laws._ristow_schafer import RistowSchafer as RistowSchafer
-from jaxbiped.scene.laws._ristow_schafer import SmoothRistowSchafer as SmoothRistowSchafer
-from jaxbiped.scene.laws._viscoelastic import KuwabaraKono as KuwabaraKono
-from jaxbiped.scene.laws._viscoelastic import Tsuji as Tsuji
-from jaxbiped.scene.laws._hunt_crossley import HuntCrossley as HuntCrossley
+from jaxbiped.scene.laws.normal._hertz import Hertz as Hertz
+from jaxbiped.scene.laws.normal._viscoelastic import KelvinVoigt as KelvinVoigt
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer as RistowSchafer
+from jaxbiped.scene.laws.normal._ristow_schafer import SmoothRistowSchafer as SmoothRistowSchafer
+from jaxbiped.scene.laws.normal._viscoelastic import KuwabaraKono as KuwabaraKono
+from jaxbiped.scene.laws.normal._viscoelastic import Tsuji as Tsuji
+from jaxbiped.scene.laws.normal._hunt_crossley import HuntCrossley as HuntCrossley
 
 # Friction laws, those with bristles last.
-from jaxbiped.scene.laws._coulomb import Frictionless as Frictionless
-from jaxbiped.scene.laws._coulomb import Viscous as Viscous
-from jaxbiped.scene.laws._coulomb import RegularisedCoulomb as RegularisedCoulomb
-from jaxbiped.scene.laws._coulomb import Threlfall as Threlfall
-from jaxbiped.scene.laws._coulomb import Ambrosio as Ambrosio
-from jaxbiped.scene.laws._stribeck import Stribeck as Stribeck
-from jaxbiped.scene.laws._stribeck import BengisuAkay as BengisuAkay
-from jaxbiped.scene.laws._stribeck import SmoothBengisuAkay as SmoothBengisuAkay
-from jaxbiped.scene.laws._stribeck import Andersson as Andersson
-from jaxbiped.scene.laws._stribeck import BrownMcPhee as BrownMcPhee
-from jaxbiped.scene.laws._bristles import Dahl as Dahl
-from jaxbiped.scene.laws._bristles import LuGre as LuGre
+from jaxbiped.scene.laws.friction._coulomb import Frictionless as Frictionless
+from jaxbiped.scene.laws.friction._coulomb import Viscous as Viscous
+from jaxbiped.scene.laws.friction._coulomb import RegularisedCoulomb as RegularisedCoulomb
+from jaxbiped.scene.laws.friction._coulomb import Threlfall as Threlfall
+from jaxbiped.scene.laws.friction._coulomb import Ambrosio as Ambrosio
+from jaxbiped.scene.laws.friction._stribeck import Stribeck as Stribeck
+from jaxbiped.scene.laws.friction._stribeck import BengisuAkay as BengisuAkay
+from jaxbiped.scene.laws.friction._stribeck import SmoothBengisuAkay as SmoothBengisuAkay
+from jaxbiped.scene.laws.friction._stribeck import Andersson as Andersson
+from jaxbiped.scene.laws.friction._stribeck import BrownMcPhee as BrownMcPhee
+from jaxbiped.scene.laws.friction._bristles import Dahl as Dahl
+from jaxbiped.scene.laws.friction._bristles import LuGre as LuGre
 
 # What is made of them: behind the laws, whose order the catalogue looks up here.
 from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS as FRICTION_LAWS
 from jaxbiped.scene.laws._abstract_laws import NORMAL_LAWS as NORMAL_LAWS
 from jaxbiped.scene.laws._catalogue import friction_law_like as friction_law_like
 from jaxbiped.scene.laws._catalogue import normal_law_like as normal_law_like
-from jaxbiped.scene.laws._hertz import hertz_stiffness as hertz_stiffness
-from jaxbiped.scene.laws._hunt_crossley import RESTITUTION_FORMULAS as RESTITUTION_FORMULAS
+from jaxbiped.scene.laws.normal._hertz import hertz_stiffness as hertz_stiffness
+from jaxbiped.scene.laws.normal._hunt_crossley import RESTITUTION_FORMULAS as RESTITUTION_FORMULAS

@@ -59,107 +59,6 @@ class AbstractNormalLaw(AbstractNamedPart):
         """Energy stored in the contact [J]: the integral of `elastic_force`."""
 
 
-class AbstractFrictionLaw(AbstractNamedPart):
-    """Tangential force of the ground on a foot as a function of normal force and slip speed.
-
-    A law with a `name` is in `FRICTION_LAWS`, and has a classmethod `like_seed(seed)`, which makes
-    the law that resembles the seed's `BengisuAkay`.
-
-    Attributes:
-        builds_up_over: name of the parameter for the slip speed [m/s] over which the force builds
-            up from rest, and which steps must resolve; None for a law without one. A property of
-            the class.
-    """
-
-    catalogue: ClassVar[dict[str, Any]] = FRICTION_LAWS
-    needed: ClassVar[tuple[str, ...]] = ("like_seed",)
-    builds_up_over: ClassVar[str | None] = None
-
-    @abc.abstractmethod
-    def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
-        """Tangential force [N] along the slope, opposing `slip_speed` [m/s]."""
-
-    @abc.abstractmethod
-    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
-        """Functions with zeros at which a first or second derivative in the slip speed jumps."""
-
-
-def power(base: Scalar, exponent: Scalar | float) -> Scalar:
-    """`base ** exponent` for a positive base, with one exponential shared by all derivatives."""
-    return jnp.exp(exponent * jnp.log(base))
-
-
-def depth_in_contact(penetration: Scalar) -> Scalar:
-    """The penetration where above zero, else 1 m: powers of it have finite derivatives."""
-    return jnp.where(penetration > 0.0, penetration, 1.0)
-
-
-def pushing(penetration: Scalar, force: Scalar) -> Scalar:
-    """`force` [N] in contact and where above zero, else zero: no foot is pulled."""
-    return jnp.where((penetration > 0.0) & (force > 0.0), force, 0.0)
-
-
-def hertz_force(stiffness: Scalar, exponent: Scalar | float, penetration: Scalar) -> Scalar:
-    """K δⁿ where δ > 0, else zero [N]; every derivative is finite at δ = 0."""
-    depth = depth_in_contact(penetration)
-    return jnp.where(penetration > 0.0, stiffness * power(depth, exponent), 0.0)
-
-
-def hertz_energy(stiffness: Scalar, exponent: Scalar | float, penetration: Scalar) -> Scalar:
-    """The integral of `hertz_force` over penetration [J]."""
-    return hertz_force(stiffness, exponent, penetration) * penetration / (exponent + 1.0)
-
-
-def smooth_ramp(x: Scalar, width: Scalar) -> Scalar:
-    """Zero up to 0, `x` from `width` on, twice continuously differentiable in between."""
-    t = jnp.clip(x / width, 0.0, 1.0)
-    return x * (t * t * t * (10.0 + t * (6.0 * t - 15.0)))
-
-
-class AbstractBristleLaw(AbstractNamedPart):
-    """Friction by bristles whose deflection is a state, with one number b for each foot.
-
-    The number is the elastic force of the deflected bristles as a share of the normal force [–]; a
-    deflection would be too small for the tolerances of the other components. The load engages the
-    bristles with the weight w = F_N/(F_N + engaging_load); out of contact, they relax:
-
-        ḃ = w (rate of the law) − (1 − w) relaxation b
-
-    A foot therefore lands with straight bristles, and nothing jumps at touchdown. A law with a
-    `name` is in `FRICTION_LAWS` and has `like_seed`, like an `AbstractFrictionLaw`.
-    """
-
-    catalogue: ClassVar[dict[str, Any]] = FRICTION_LAWS
-    needed: ClassVar[tuple[str, ...]] = ("like_seed",)
-
-    @abc.abstractmethod
-    def engagement(self) -> tuple[Scalar, Scalar]:
-        """Engaging load [N] and relaxation [1/s]."""
-
-    @abc.abstractmethod
-    def rate(self, slip_speed: Scalar, bristle: Scalar) -> Scalar:
-        """Rate of the bristle's share of the load [1/s] in full contact."""
-
-    @abc.abstractmethod
-    def coefficient(self, slip_speed: Scalar, bristle: Scalar) -> Scalar:
-        """Friction as a share of the normal force [–], with the sign of the slip it opposes."""
-
-    def force(self, normal_force: Scalar, slip_speed: Scalar, bristle: Scalar) -> Scalar:
-        """Tangential force [N] along the slope."""
-        return -normal_force * self.coefficient(slip_speed, bristle)
-
-    def bristle_rate(self, normal_force: Scalar, slip_speed: Scalar, bristle: Scalar) -> Scalar:
-        """Rate of the bristle's share of the load [1/s], in contact or out of it."""
-        load, relaxation = self.engagement()
-        engaged = normal_force / (normal_force + load)
-        rate = engaged * self.rate(slip_speed, bristle)
-        return rate - (1.0 - engaged) * relaxation * bristle
-
-    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
-        """The slip speed: the rate of a bent bristle has a corner where the slip changes sign."""
-        return (slip_speed,)
-
-
 class AbstractDampedLaw(AbstractNormalLaw):
     """A normal law with a stiffness K, its own damping coefficient, and perhaps an exponent n.
 
@@ -262,3 +161,104 @@ def _stiffness_and_damper(
     weight = mass * g
     slope = n * weight / penetration
     return weight / penetration**n, 2.0 * damping_ratio * jnp.sqrt(slope * mass)
+
+
+class AbstractFrictionLaw(AbstractNamedPart):
+    """Tangential force of the ground on a foot as a function of normal force and slip speed.
+
+    A law with a `name` is in `FRICTION_LAWS`, and has a classmethod `like_seed(seed)`, which makes
+    the law that resembles the seed's `BengisuAkay`.
+
+    Attributes:
+        builds_up_over: name of the parameter for the slip speed [m/s] over which the force builds
+            up from rest, and which steps must resolve; None for a law without one. A property of
+            the class.
+    """
+
+    catalogue: ClassVar[dict[str, Any]] = FRICTION_LAWS
+    needed: ClassVar[tuple[str, ...]] = ("like_seed",)
+    builds_up_over: ClassVar[str | None] = None
+
+    @abc.abstractmethod
+    def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
+        """Tangential force [N] along the slope, opposing `slip_speed` [m/s]."""
+
+    @abc.abstractmethod
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        """Functions with zeros at which a first or second derivative in the slip speed jumps."""
+
+
+class AbstractBristleLaw(AbstractNamedPart):
+    """Friction by bristles whose deflection is a state, with one number b for each foot.
+
+    The number is the elastic force of the deflected bristles as a share of the normal force [–]; a
+    deflection would be too small for the tolerances of the other components. The load engages the
+    bristles with the weight w = F_N/(F_N + engaging_load); out of contact, they relax:
+
+        ḃ = w (rate of the law) − (1 − w) relaxation b
+
+    A foot therefore lands with straight bristles, and nothing jumps at touchdown. A law with a
+    `name` is in `FRICTION_LAWS` and has `like_seed`, like an `AbstractFrictionLaw`.
+    """
+
+    catalogue: ClassVar[dict[str, Any]] = FRICTION_LAWS
+    needed: ClassVar[tuple[str, ...]] = ("like_seed",)
+
+    @abc.abstractmethod
+    def engagement(self) -> tuple[Scalar, Scalar]:
+        """Engaging load [N] and relaxation [1/s]."""
+
+    @abc.abstractmethod
+    def rate(self, slip_speed: Scalar, bristle: Scalar) -> Scalar:
+        """Rate of the bristle's share of the load [1/s] in full contact."""
+
+    @abc.abstractmethod
+    def coefficient(self, slip_speed: Scalar, bristle: Scalar) -> Scalar:
+        """Friction as a share of the normal force [–], with the sign of the slip it opposes."""
+
+    def force(self, normal_force: Scalar, slip_speed: Scalar, bristle: Scalar) -> Scalar:
+        """Tangential force [N] along the slope."""
+        return -normal_force * self.coefficient(slip_speed, bristle)
+
+    def bristle_rate(self, normal_force: Scalar, slip_speed: Scalar, bristle: Scalar) -> Scalar:
+        """Rate of the bristle's share of the load [1/s], in contact or out of it."""
+        load, relaxation = self.engagement()
+        engaged = normal_force / (normal_force + load)
+        rate = engaged * self.rate(slip_speed, bristle)
+        return rate - (1.0 - engaged) * relaxation * bristle
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        """The slip speed: the rate of a bent bristle has a corner where the slip changes sign."""
+        return (slip_speed,)
+
+
+def power(base: Scalar, exponent: Scalar | float) -> Scalar:
+    """`base ** exponent` for a positive base, with one exponential shared by all derivatives."""
+    return jnp.exp(exponent * jnp.log(base))
+
+
+def depth_in_contact(penetration: Scalar) -> Scalar:
+    """The penetration where above zero, else 1 m: powers of it have finite derivatives."""
+    return jnp.where(penetration > 0.0, penetration, 1.0)
+
+
+def pushing(penetration: Scalar, force: Scalar) -> Scalar:
+    """`force` [N] in contact and where above zero, else zero: no foot is pulled."""
+    return jnp.where((penetration > 0.0) & (force > 0.0), force, 0.0)
+
+
+def hertz_force(stiffness: Scalar, exponent: Scalar | float, penetration: Scalar) -> Scalar:
+    """K δⁿ where δ > 0, else zero [N]; every derivative is finite at δ = 0."""
+    depth = depth_in_contact(penetration)
+    return jnp.where(penetration > 0.0, stiffness * power(depth, exponent), 0.0)
+
+
+def hertz_energy(stiffness: Scalar, exponent: Scalar | float, penetration: Scalar) -> Scalar:
+    """The integral of `hertz_force` over penetration [J]."""
+    return hertz_force(stiffness, exponent, penetration) * penetration / (exponent + 1.0)
+
+
+def smooth_ramp(x: Scalar, width: Scalar) -> Scalar:
+    """Zero up to 0, `x` from `width` on, twice continuously differentiable in between."""
+    t = jnp.clip(x / width, 0.0, 1.0)
+    return x * (t * t * t * (10.0 + t * (6.0 * t - 15.0)))

@@ -12,8 +12,8 @@ from jaxbiped.scene.laws._abstract_laws import (
     AbstractFrictionLaw,
     AbstractNormalLaw,
 )
-from jaxbiped.scene.laws._ristow_schafer import RistowSchafer, Standing
-from jaxbiped.scene.laws._stribeck import BengisuAkay
+from jaxbiped.scene.laws.friction._stribeck import BengisuAkay
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
 
 _CATALOGUES: tuple[dict[str, Any], ...] = (NORMAL_LAWS, FRICTION_LAWS)
 for _law in list(vars(laws).values()):

@@ -22,7 +22,7 @@ from jaxbiped._types import Numbers, RealScalarLike, Scalar
 from jaxbiped.dynamics._contacts import feet, foot_force, limits_of
 from jaxbiped.dynamics._footfalls import FootMotion
 from jaxbiped.scene._scene import CompliantScene
-from jaxbiped.scene.laws._coulomb import Frictionless
+from jaxbiped.scene.laws.friction._coulomb import Frictionless
 from jaxbiped.solve._accuracy import Units, rms_norm
 from jaxbiped.solve.controllers._event_steps import ShallowContact, TouchdownAhead
 from jaxbiped.solve.controllers._wrapped_control import (

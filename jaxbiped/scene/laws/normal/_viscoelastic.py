@@ -12,7 +12,7 @@ from jaxbiped.scene.laws._abstract_laws import (
     depth_in_contact,
     pushing,
 )
-from jaxbiped.scene.laws._ristow_schafer import RistowSchafer, Standing
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
 
 
 class AbstractMatchedLaw(AbstractDampedLaw):

@@ -15,7 +15,7 @@ from jaxbiped._checks import check_choice, check_positive, check_within
 from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import AbstractHertzianLaw, depth_in_contact, power, pushing
-from jaxbiped.scene.laws._ristow_schafer import RistowSchafer, Standing
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
 
 
 class Restitution(NamedTuple):

@@ -13,7 +13,7 @@ from jaxbiped.scene.laws._abstract_laws import (
     hertz_force,
     matched_to_weight,
 )
-from jaxbiped.scene.laws._ristow_schafer import RistowSchafer, Standing
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
 
 
 class Hertz(AbstractNormalLaw):

@@ -8,7 +8,7 @@ from jaxbiped._checks import check_positive
 from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
-from jaxbiped.scene.laws._stribeck import BengisuAkay
+from jaxbiped.scene.laws.friction._stribeck import BengisuAkay
 
 _DAHL_GIVE = 4e-4
 """How far the bristles of the law like the seed's bend before they slip [m]."""

@@ -9,7 +9,7 @@ from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
-from jaxbiped.scene.laws._stribeck import BengisuAkay
+from jaxbiped.scene.laws.friction._stribeck import BengisuAkay
 
 
 class Frictionless(AbstractFrictionLaw):
