@@ -113,8 +113,8 @@ def lsoda_of(case: Case):
 
 def run_lanes(case: Case, rtol: float, starts: np.ndarray) -> np.ndarray:
     """Final states (n, 14) of walks from starts."""
-    how = dict(scene=case.scene, duration=DURATION, engine="lanes", max_solver_steps=10**6)
-    return walker(rtol, **how)(starts)[0]
+    how = dict(duration=DURATION, engine="lanes", max_solver_steps=10**6)
+    return walker(rtol, scene=case.scene, kind=type(case.guess), **how)(starts)[0]
 
 
 def on_a_spring(scene: jb.Scene) -> jb.Scene:
