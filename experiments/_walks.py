@@ -33,14 +33,17 @@ def scattered(state: Any, count: int, spread: float, moving: tuple[str, ...], *,
     return type(state)(**leaves)
 
 
-def walk_from(start: Any, rtol: Any, *, scene: Any = None, duration: float = DURATION, **how: Any):
-    """The end of a walk from its state's numbers; the absolute tolerance is the same for all.
+def walk_from(
+    start: Any, rtol: Any, *, scene: Any = None, kind: Any = jb.State, duration: float = DURATION,
+    **how: Any,
+):  # fmt: skip
+    """The end of a walk from the numbers of a kind of state, all with one absolute tolerance.
 
     With `atol=None` it is that of `simulate`, in units of the walker.
     """
     scene = jb.seed_scene() if scene is None else scene
     given = dict(duration=duration, rtol=rtol, atol=1e-2 * rtol, save="end") | how
-    return jb.simulate(scene, type(scene.state())(*start), **given)
+    return jb.simulate(scene, kind(*start), **given)
 
 
 def walker(rtol: float, **how: Any) -> Callable[[np.ndarray], tuple[np.ndarray, Any, Any]]:

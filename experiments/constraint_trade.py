@@ -125,6 +125,13 @@ def draw_trade(options, runs):
     return options.save(figure, "trade.png")
 
 
+def edges_of(values):
+    """Edges half way between values, on a logarithmic axis."""
+    logs = np.log10(values)
+    half = 0.5 * (logs[1] - logs[0])
+    return 10.0 ** np.append(logs - half, logs[-1] + half)
+
+
 def draw_maps(options, maps):
     shown = {"max_violation_m": "largest violation (m)", "state_error": "error of the state (SI)"}
     figure = new_figure(3.9 * len(maps), 6.4)
@@ -132,7 +139,8 @@ def draw_maps(options, maps):
     for column, (name, found) in zip(axes.T, maps.items(), strict=True):
         for ax, (key, title) in zip(column, shown.items(), strict=True):
             values = np.log10(np.maximum(np.array(found[key], dtype=float), FLOOR))
-            image = ax.pcolormesh(found["column"], found["row"], values, shading="nearest")
+            edges = edges_of(found["column"]), edges_of(found["row"])
+            image = ax.pcolormesh(*edges, values, cmap="viridis")
             ax.set_facecolor("#BBBBBB")  # where a run failed
             label(ax, found["columns"], found["rows"], name, log="xy")
             figure.colorbar(image, ax=ax, label=f"log10, {title}")

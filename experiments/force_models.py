@@ -137,37 +137,37 @@ def descent(scene):
 
 def descent_pictures(options, walks):
     """The paper's figures 9 and 10."""
-    angles, forces = (new_figure(10.0, 0.9 + 2.0 * -(-len(walks) // 2)) for _ in range(2))
-    for figure, curves, words, title in (
-        (
-            angles,
-            lambda rows: (rows.theta_1, rows.theta_2),
-            r"leg angle, $\theta$ (rad)",
-            "Leg angles",
-        ),
-        (forces, lambda rows: rows.normal_force, "normal force, $F_N$ (N)", "Contact forces"),
-    ):
-        axes = figure.subplots(-(-len(walks) // 2), 2, sharex=True, sharey=True, squeeze=False)
-        for ax, (slope, rows) in zip(axes.flat, walks.items(), strict=True):
-            for k, row in enumerate(curves(rows)):
-                look = dict(color=LEG_COLOURS[k], linestyle=LEG_STYLES[k], linewidth=1.0)
-                ax.plot(rows.time, row, label=f"leg {k + 1}", **look)
-            end, fell = float(rows.time[-1]), rows.attrs["ending"] != "walking"
-            when = f" at {end:.2f} s" * fell
-            said = f"slope {slope:.3f} rad: {rows.attrs['ending']}{when}"
-            dress(ax, said, "time, $t$ (s)", words)
-            ax.label_outer()
-            if figure is forces and float(rows.normal_force.max()) > TALLEST:
-                blow = float(rows.normal_force.max("foot").idxmax())
-                look = dict(textcoords="offset points", fontsize=8)
-                ax.annotate("beyond the scale", (blow, 0.9 * TALLEST), (6, 0), **look)
-        ax.set_xlim(0.0, DESCENT)
-        named = ax.get_legend_handles_labels()
-        figure.legend(*named, loc="outside upper right", ncols=2, frameon=False, fontsize=9)
-        figure.suptitle(f"{title} on different slopes", x=0.01, ha="left", fontsize=11)
+    angle, force = r"leg angle, $\theta$ (rad)", "normal force, $F_N$ (N)"
+    angles = by_slope(walks, lambda rows: (rows.theta_1, rows.theta_2), angle, "Leg angles")
+    forces = by_slope(walks, lambda rows: rows.normal_force, force, "Contact forces")
     forces.axes[0].set_ylim(0.0, TALLEST)
-    yield options.save(angles, "figure_9_leg_angle.png")
-    yield options.save(forces, "figure_10_contact_force.png")
+    for ax, rows in zip(forces.axes, walks.values(), strict=False):
+        load = rows.normal_force.max("foot")
+        if float(load.max()) > TALLEST:
+            look = dict(textcoords="offset points", fontsize=8)
+            ax.annotate("beyond the scale", (float(load.idxmax()), 0.9 * TALLEST), (6, 0), **look)
+    pictures = {"figure_9_leg_angle": angles, "figure_10_contact_force": forces}
+    return [options.save(figure, f"{name}.png") for name, figure in pictures.items()]
+
+
+def by_slope(walks, curves, words, title):
+    """Both legs' curves on each slope."""
+    rows = -(-len(walks) // 2)
+    figure = new_figure(10.0, 0.9 + 2.0 * rows)
+    axes = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
+    for ax, (slope, walk) in zip(axes.flat, walks.items(), strict=True):
+        for k, curve in enumerate(curves(walk)):
+            look = dict(color=LEG_COLOURS[k], linestyle=LEG_STYLES[k], linewidth=1.0)
+            ax.plot(walk.time, curve, label=f"leg {k + 1}", **look)
+        ending = walk.attrs["ending"]
+        when = "" if ending == "walking" else f" at {float(walk.time[-1]):.2f} s"
+        dress(ax, f"slope {slope:.3f} rad: {ending}{when}", "time, $t$ (s)", words)
+        ax.label_outer()
+    axes[0, 0].set_xlim(0.0, DESCENT)
+    named = axes[0, 0].get_legend_handles_labels()
+    figure.legend(*named, loc="outside upper right", ncols=2, frameon=False, fontsize=9)
+    figure.suptitle(f"{title} on different slopes", x=0.01, ha="left", fontsize=11)
+    return figure
 
 
 def look(place, name, kind):

@@ -49,7 +49,8 @@ def main(options: Options):
     named, picture = of_names(options, count)
     wishes = options.sized(WANTED, WANTED[:1])
     by_number = {name: of_numbers(name, wishes, count, draws) for name in SCENES}
-    rows, often = options.store("label_accuracy"), options.sized(FRACTIONS, QUICK_FRACTIONS)
+    rows = options.store("label_accuracy", starts=SIZE)
+    often = options.sized(FRACTIONS, QUICK_FRACTIONS)
     fractions = {
         name: {method: coverage(rows, name, method, often) for method in METHODS}
         for name in ("rigid", "compliant")
