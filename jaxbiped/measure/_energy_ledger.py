@@ -177,14 +177,15 @@ def rigid_ledger(scene: RigidScene, walk: Trajectory[Any]) -> RigidLedger:
     starts = rows_of(states, slice(-1))
     periods = np.diff(times)
     last, first = _before_impact(scene, starts, periods), rows_of(states, slice(1, None))
-    held_first, held_last, after = (_held(scene, each) for each in (starts, last, first))
+    held_first, held_last, after = (
+        evaluate_along(scene, each, _energies) for each in (starts, last, first)
+    )
     push = np.asarray(push_off_work(scene, last))
     changes = mode_changes(scene, starts, (1.0 - _BEFORE) * periods)
     works = _works(scene, starts, periods, changes)
-    gravity = np.asarray(held_first.gravitational - held_last.gravitational)
-    loss = np.asarray(held_last.kinetic + push - after.kinetic)
-    kept = after.kinetic - held_first.kinetic + held_last.elastic - held_first.elastic
-    stored = np.asarray(kept)
+    gravity = held_first.gravitational - held_last.gravitational
+    loss = held_last.kinetic + push - after.kinetic
+    stored = after.kinetic - held_first.kinetic + held_last.elastic - held_first.elastic
     work = works.hip + push
     stops = _stop_losses(scene, starts, periods, changes)
     residual = gravity + work - loss - stops - works.joints - stored
@@ -203,7 +204,7 @@ def _stop_losses(
 
     def energy(shift: np.ndarray) -> np.ndarray:
         states = states_after(scene, rows_of(starts, number), changes.since + shift)
-        return np.sum([np.asarray(each) for each in _held(scene, states)], axis=0)
+        return np.sum(evaluate_along(scene, states, _energies), axis=0)
 
     if len(number):
         rest = _BEFORE * periods[number]
@@ -211,12 +212,6 @@ def _stop_losses(
         before, behind = (2.0 * energy(r) - energy(2.0 * r) for r in (-rest, rest))
         np.add.at(lost, number, before - behind)
     return np.where(changes.known, lost, np.nan)
-
-
-def _held(scene: RigidScene, states: Any) -> Energies:
-    """Energies of states on rigid feet, leaves of shape (n,)."""
-    held: Energies = evaluate_along(scene, states, _energies)
-    return held
 
 
 def _energies(scene: RigidScene, state: Any) -> Energies:

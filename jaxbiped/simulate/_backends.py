@@ -22,7 +22,7 @@ from jaxbiped.simulate._start import Options
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adaptive_program
 from jaxbiped.solve._engine_names import ENGINES, engine_for, lane_obstacle
 from jaxbiped.solve._failure_events import ending_code, ending_events
-from jaxbiped.solve._saved_outputs import Saved
+from jaxbiped.solve._saved_outputs import Saved, recorded_steps
 from jaxbiped.solve._solvers import with_projection, with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 from jaxbiped.solve.controllers._event_steps import (
@@ -267,34 +267,3 @@ def _step_by_step(run: "Simulation", request: Request) -> tuple[Solved, np.ndarr
             return ended, recorded.values[0, :steps]
         # Memory is asked for by what a solve takes, not by what it might.
         room = steps
-
-
-def recorded_steps(
-    start: PyTree, rows: np.ndarray, solver: diffrax.AbstractSolver[PyTree]
-) -> tuple[Array, PyTree, diffrax.DenseInterpolation]:
-    """The times [s] of a start and of n steps' ends, (n + 1,), the states there, and the rest.
-
-    From the records of `Saved(steps=True)`, shape (n, numbers), as diffrax would have them.
-    """
-    kind, size = type(start), len(start)
-    first = np.array([0.0, *(float(leaf) for leaf in start)])
-    ends = np.vstack([first, rows[:, : 1 + size]]).T.copy()
-    # One step more than there are: where there are none, diffrax looks into one all the same.
-    times = np.append(ends[0], np.inf)
-    infos = np.vstack([ends[1:, :-1], rows[:, 1:].T])
-    infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
-    groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
-    # One transfer for all of them: each costs as much as several steps.
-    counts = len(rows) + 1, 1  # of a weak type, as a number in diffrax's own would be
-    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0), counts
-    times, groups, t, states, zero, (count, one) = jax.device_put(parts)
-    dense = diffrax.DenseInterpolation(
-        ts=times,
-        ts_size=count,
-        infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
-        interpolation_cls=solver.interpolation_cls,
-        direction=one,
-        t0_if_trivial=zero,
-        y0_if_trivial=start,
-    )
-    return t, states, dense

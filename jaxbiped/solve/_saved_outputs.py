@@ -3,10 +3,12 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import diffrax
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-from jaxtyping import PyTree
+import numpy as np
+from jaxtyping import Array, PyTree
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._contacts import feet
@@ -230,3 +232,34 @@ def arrival_time(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -
 
     start = (low, high, value(low), value(high), jnp.zeros_like(low), high)
     return jax.lax.fori_loop(0, _SECANTS, secant, start)[-1]
+
+
+def recorded_steps(
+    start: PyTree, rows: np.ndarray, solver: diffrax.AbstractSolver[PyTree]
+) -> tuple[Array, PyTree, diffrax.DenseInterpolation]:
+    """The times [s] of a start and of n steps' ends, (n + 1,), the states there, and the rest.
+
+    From the records of `Saved(steps=True)`, shape (n, numbers), as diffrax would have them.
+    """
+    kind, size = type(start), len(start)
+    first = np.array([0.0, *(float(leaf) for leaf in start)])
+    ends = np.vstack([first, rows[:, : 1 + size]]).T.copy()
+    # One step more than there are: where there are none, diffrax looks into one all the same.
+    times = np.append(ends[0], np.inf)
+    infos = np.vstack([ends[1:, :-1], rows[:, 1:].T])
+    infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
+    groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
+    # One transfer for all of them: each costs as much as several steps.
+    counts = len(rows) + 1, 1  # of a weak type, as a number in diffrax's own would be
+    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0), counts
+    times, groups, t, states, zero, (count, one) = jax.device_put(parts)
+    dense = diffrax.DenseInterpolation(
+        ts=times,
+        ts_size=count,
+        infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
+        interpolation_cls=solver.interpolation_cls,
+        direction=one,
+        t0_if_trivial=zero,
+        y0_if_trivial=start,
+    )
+    return t, states, dense

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.simulate import _backends
-from jaxbiped.simulate._backends import recorded_steps
+from jaxbiped.solve._saved_outputs import recorded_steps
 from tests.compliant_walkers import frictionless_walker
 from tests.unknown_to_lanes import ErrorFunction
 
