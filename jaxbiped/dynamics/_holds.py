@@ -11,14 +11,11 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._types import Scalar, as_float
-from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped._types import Scalar
 from jaxbiped.dynamics._implicit_field import fold
 from jaxbiped.dynamics._stance import Stance, angles_and_rates, stance_on
-from jaxbiped.dynamics._state import recurring_leaves, recurring_names
 from jaxbiped.linalg._small_matrices import symmetric_factors
 from jaxbiped.linalg._sparse_lu import SparseFactors
 from jaxbiped.scene._mechanism import Mechanism
@@ -196,46 +193,3 @@ def _unit_rows(mechanism: Mechanism) -> list[np.ndarray]:
     for j, row in zip(free, np.eye(len(free)), strict=True):
         found[j] = row
     return found
-
-
-def projection_of(scene: Any, state: Any) -> np.ndarray:
-    """Projection of the m recurring components on those that may change, shape (m, m).
-
-    The identity where nothing is held.
-    """
-    if scene.compliant or not rigid_modes(scene.mechanism).any:
-        return np.eye(len(recurring_leaves(state)))
-    return np.asarray(_projection(*jtu.tree_map(as_float, (scene, state))))
-
-
-@cached_jit
-def _projection(scene: RigidScene, state: Any) -> Scalar:
-    leaves, structure = jtu.tree_flatten(state)
-
-    def held(leaves: list[Scalar]) -> Scalar:
-        there = on_held(scene, jtu.tree_unflatten(structure, leaves))
-        return jnp.stack(recurring_leaves(there))
-
-    slopes = jax.jacfwd(held)(leaves)
-    return jnp.stack(recurring_leaves(jtu.tree_unflatten(structure, slopes)), axis=1)
-
-
-def admissible_directions(scene: Any, state: Any, scales: np.ndarray) -> np.ndarray:
-    """Orthonormal directions of scaled recurring components in which a state may move, (m, d)."""
-    import scipy.linalg
-
-    projection = projection_of(scene, state)
-    if np.array_equal(projection, np.eye(len(projection))):
-        return projection
-    found: np.ndarray = scipy.linalg.orth(projection / scales[:, None])
-    return found
-
-
-def independent_names(scene: Any, state: Any) -> tuple[str, ...]:
-    """Names of recurring components that may be chosen freely; what is held follows them."""
-    projection = projection_of(scene, state)
-    chosen: list[int] = []
-    for k in range(len(projection)):
-        if np.linalg.matrix_rank(projection[[*chosen, k]]) > len(chosen):
-            chosen.append(k)
-    return tuple(tuple(recurring_names(state))[k] for k in chosen)

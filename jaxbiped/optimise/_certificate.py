@@ -18,7 +18,6 @@ from jaxbiped.continuation._critical_values import (
     nearest_bifurcation,
     range_of,
 )
-from jaxbiped.dynamics._holds import independent_names
 from jaxbiped.dynamics._state import recurring_leaves, unit_of
 from jaxbiped.dynamics._surfaces import HeelStrike
 from jaxbiped.gait._find_gait import find_gait
@@ -37,6 +36,7 @@ from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure
 from jaxbiped.sweep.starts._samples import sample
+from jaxbiped.variational._hybrid_system import independent_names
 
 _SETTLED = 1e-4
 """Relative difference between a walk's last footstep and the gait's that counts as none."""

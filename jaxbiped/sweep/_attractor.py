@@ -18,7 +18,6 @@ from jaxbiped.basins._labels import Label
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._footfalls import leg_depth
-from jaxbiped.dynamics._holds import projection_of
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
 from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._fixed_point_search import Search
@@ -27,7 +26,7 @@ from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import sizes_of
 from jaxbiped.sweep._convergence_test import Goals
 from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts, passes_a_stop
-from jaxbiped.variational._hybrid_system import section_of
+from jaxbiped.variational._hybrid_system import projection_of, section_of
 
 _SHELLS = 1e-5 * 1.5 ** np.arange(30)
 """Distances that are tried."""

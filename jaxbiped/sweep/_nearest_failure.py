@@ -13,7 +13,6 @@ from jaxbiped.basins._labels import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock, minimal_fatal_shock
 from jaxbiped.basins._rays import Normal
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._holds import admissible_directions
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -21,6 +20,7 @@ from jaxbiped.sweep._attractor import Attractor
 from jaxbiped.sweep._follow_starts import passes_a_stop
 from jaxbiped.sweep._gait_family import scene_with
 from jaxbiped.sweep._labelling import Labelling
+from jaxbiped.variational._hybrid_system import admissible_directions
 
 _MOST_FOOTSTEPS = 6
 """After which the distance from the gait is differentiated."""

@@ -1,17 +1,22 @@
 """Hybrid systems: the vector field, switches, endings and reset map that a return map needs.
 
 The walker is only one of them: solves and searches ask this interface, so a user's own system does.
+At the end are the directions in which a state may move while everything held stays so.
 """
 
 import abc
 from typing import Any, ClassVar, cast
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._types import Scalar, Time
+from jaxbiped._types import Scalar, Time, as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._contacts import foot_forces, with_stance_leg_standing
 from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
 from jaxbiped.dynamics._holds import on_held
@@ -20,10 +25,11 @@ from jaxbiped.dynamics._minimal_motion import WalkerField
 from jaxbiped.dynamics._mode_changes import change_mode, change_mode_on_surface, mode_switches
 from jaxbiped.dynamics._redundant_motion import BodiesField
 from jaxbiped.dynamics._stance_motion import rolling, rolling_field
-from jaxbiped.dynamics._state import cyclic_names
+from jaxbiped.dynamics._state import cyclic_names, recurring_leaves, recurring_names
 from jaxbiped.dynamics._strike_surfaces import lead, opening
 from jaxbiped.dynamics._surfaces import AbstractSection, HeelStrike, MidStance, Switch, switches
 from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
+from jaxbiped.scene._rigid_feet import rigid_modes
 from jaxbiped.scene._scene import CompliantScene, RigidScene, is_compliant, is_rigid
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._failure_events import WATCHES, ending_events, rigid_ending
@@ -197,3 +203,46 @@ class Rolling(AbstractSystem):
     def load(self, args: RigidScene, y: Any) -> Scalar:
         """Normal force on the foot that rolls [N]; an impact has an impulse instead."""
         return rolling(args, y).force.normal
+
+
+def projection_of(scene: Any, state: Any) -> np.ndarray:
+    """Projection of the m recurring components on those that may change, shape (m, m).
+
+    The identity where nothing is held.
+    """
+    if scene.compliant or not rigid_modes(scene.mechanism).any:
+        return np.eye(len(recurring_leaves(state)))
+    return np.asarray(_projection(*jtu.tree_map(as_float, (scene, state))))
+
+
+@cached_jit
+def _projection(scene: RigidScene, state: Any) -> Scalar:
+    leaves, structure = jtu.tree_flatten(state)
+
+    def held(leaves: list[Scalar]) -> Scalar:
+        there = on_held(scene, jtu.tree_unflatten(structure, leaves))
+        return jnp.stack(recurring_leaves(there))
+
+    slopes = jax.jacfwd(held)(leaves)
+    return jnp.stack(recurring_leaves(jtu.tree_unflatten(structure, slopes)), axis=1)
+
+
+def admissible_directions(scene: Any, state: Any, scales: np.ndarray) -> np.ndarray:
+    """Orthonormal directions of scaled recurring components in which a state may move, (m, d)."""
+    import scipy.linalg
+
+    projection = projection_of(scene, state)
+    if np.array_equal(projection, np.eye(len(projection))):
+        return projection
+    found: np.ndarray = scipy.linalg.orth(projection / scales[:, None])
+    return found
+
+
+def independent_names(scene: Any, state: Any) -> tuple[str, ...]:
+    """Names of recurring components that may be chosen freely; what is held follows them."""
+    projection = projection_of(scene, state)
+    chosen: list[int] = []
+    for k in range(len(projection)):
+        if np.linalg.matrix_rank(projection[[*chosen, k]]) > len(chosen):
+            chosen.append(k)
+    return tuple(tuple(recurring_names(state))[k] for k in chosen)

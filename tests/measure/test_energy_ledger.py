@@ -74,7 +74,7 @@ def test_what_a_change_of_mode_takes_is_the_energy_beside_it(monkeypatch):
     changes = np.array([0, 2, 2]), np.array([0.25, 0.5, 0.75])
     taken = np.array([2.0, 0.5, 0.125])
 
-    def held(_, states):
+    def held(_, states, energies):
         number, time = states
         gone = [
             sum(taken[(changes[0] == k) & (changes[1] < t)])
@@ -82,7 +82,7 @@ def test_what_a_change_of_mode_takes_is_the_energy_beside_it(monkeypatch):
         ]
         return Energies(5.0 - 0.5 * time, 1.0 - 0.25 * time, -np.array(gone))
 
-    monkeypatch.setattr(_energy_ledger, "_held", held)
+    monkeypatch.setattr(_energy_ledger, "evaluate_along", held)
     monkeypatch.setattr(_energy_ledger, "rows_of", lambda starts, number: number)
     monkeypatch.setattr(_energy_ledger, "states_after", lambda _, rows, times: (rows, times))
     known = np.array([True, True, True, False])

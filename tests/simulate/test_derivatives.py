@@ -167,8 +167,12 @@ def test_derivatives_of_a_rigid_walk(how):
     np.testing.assert_allclose(reverse, forward, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize(("name", "draft"), [("kelvin-voigt", 2e-3), ("tsuji", 2e-4)])
-def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name, draft):
+@pytest.mark.parametrize("name", ["kelvin-voigt", "tsuji"])
+def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name):
+    """Errors vary tenfold with where the steps fall: of nine starts, the worst have half of these.
+
+    (With angular rates up to 2 % from this one: 2.1e-3, 2.5e-4 and 1.1e-6.)
+    """
     law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
     scene = eqx.tree_at(lambda scene: scene.normal, jb.seed_scene(), law)
 
@@ -179,7 +183,7 @@ def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name, draft):
 
     rate = jb.seed_state().omega_2
     right = _central(partial(end, rtol=1e-12), rate, 1e-4)
-    for accuracy, error in (("draft", draft), ("balanced", draft / 4.0), ("tight", 1e-5)):
+    for accuracy, error in (("draft", 4e-3), ("balanced", 4e-4), ("tight", 5e-6)):
         told = jax.jacfwd(partial(end, accuracy=accuracy))(rate)
         np.testing.assert_allclose(told, right, atol=error * np.max(np.abs(right)))
 
