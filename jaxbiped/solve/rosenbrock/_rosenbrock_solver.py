@@ -1,7 +1,6 @@
 """Rosenbrock methods as diffrax solvers: implicit steps without iterations."""
 
 import functools
-import math
 import operator
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -177,8 +176,8 @@ class Stages(NamedTuple):
         totals: list[PyTree] = [None] * len(self.start)
         for place, i in enumerate(self.kept):
             totals[i] = _sum(row, [stage[place] for stage in self.increments])
-        through = [_dot(row, column) for column in self.matrix[:count].T]
-        at_start = _dot(row, self.vector[:count])
+        through = row @ self.matrix[:count]
+        at_start = float(row @ self.vector[:count])
         for p, s in self.direct.items():
             totals[p] = self.step * self._chain(at_start, through, s)
         return totals
@@ -188,7 +187,7 @@ class Stages(NamedTuple):
         known, at_start = self.matrix[i, :i], float(self.vector[i])
         return {p: self.step * self._chain(at_start, known, s) for p, s in self.direct.items()}
 
-    def _chain(self, at_start: float, weights: Sequence[float] | np.ndarray, s: int) -> Scalar:
+    def _chain(self, at_start: float, weights: np.ndarray, s: int) -> Scalar:
         place = self.kept.index(s)
         stages = [stage[place] for stage in self.increments[: len(weights)]]
         terms = [at_start * self.start[s]] if at_start != 0.0 else []
@@ -196,22 +195,13 @@ class Stages(NamedTuple):
 
 
 def _recurrence(tableau: RosenbrockTableau) -> tuple[np.ndarray, np.ndarray]:
-    """B and b of `Stages`, by substitution: B_i = a_i + e_i + γ Σ_j c_ij B_j, and so b with 1."""
+    """B and b of `Stages`."""
     size = len(tableau.alpha)
-    matrix, vector = np.eye(size), np.ones(size)
+    a, c = np.zeros((size, size)), np.zeros((size, size))
     for i in range(1, size):
-        led = [tableau.gamma * weight for weight in tableau.c[i - 1]]
-        matrix[i, :i] = [
-            own + _dot(led, column)
-            for own, column in zip(tableau.a[i - 1], matrix[:i, :i].T, strict=True)
-        ]
-        vector[i] += _dot(led, vector[:i])
-    return matrix, vector
-
-
-def _dot(weights: Sequence[float] | np.ndarray, column: np.ndarray) -> float:
-    """Their product, rounded alike on every machine, which BLAS does not do."""
-    return math.fsum(map(operator.mul, weights, column))
+        a[i, :i], c[i, :i] = tableau.a[i - 1], tableau.c[i - 1]
+    inverse = np.linalg.inv(np.eye(size) - tableau.gamma * c)
+    return inverse @ (a + np.eye(size)), inverse @ np.ones(size)
 
 
 def stages_of(
