@@ -169,9 +169,9 @@ def test_derivatives_of_a_rigid_walk(how):
 
 @pytest.mark.parametrize("name", ["kelvin-voigt", "tsuji"])
 def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name):
-    """Errors vary tenfold with where the steps fall: of nine starts, the worst have half of these.
+    """Errors vary tenfold with where the steps fall.
 
-    (With angular rates up to 2 % from this one: 2.1e-3, 2.5e-4 and 1.1e-6.)
+    The worst of nine starts within 2 % of this one: 2.1e-3, 2.5e-4 and 1.1e-6.
     """
     law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
     scene = eqx.tree_at(lambda scene: scene.normal, jb.seed_scene(), law)
