@@ -20,6 +20,7 @@ COARSE, QUICK_COARSE = (50, 4), (16, 3)
 """Cells of the refined boundary's coarse grid along each axis, and its levels."""
 ALONG, QUICK_ALONG = (11, 60), (3, 24)
 """Values of a parameter, and points along each axis of the slice at each of them."""
+CHECKED, QUICK_CHECKED = 80, 40
 FARTHEST, TOLERANCE = 1.0, 1e-5
 """Of pushes: in units of 1 rad, speeds √(g l), rates √(g/l), and for the height the penetration."""
 PUSHES = {
@@ -60,6 +61,7 @@ def main(options: Options):
             "walking": float((boundary.on_grid() == WALKING).mean()),
             **dimension_of(boundary),
         },
+        "tolerances": tolerances(scene, options.sized(CHECKED, QUICK_CHECKED)),
         "pushes": [push(labelling, way) for way in PUSHES],
         "along": {name: of_change(each) for name, each in changes.items()},
         "pictures": draw(options, labelling, codes, cycles, boundary, changes),
@@ -101,6 +103,40 @@ def refined(labelling, cells, levels):
     label = jb.labels.label_at(labelling, ("theta_swing", "omega_swing"))
     cells = (cells, cells)
     return jb.basins.refine_boundary(label, lower, upper, cells, levels=levels, batch=16384)
+
+
+def tolerances(scene, side):
+    """How labels change with the tolerance, against the finest: which share, and where."""
+    efforts = {name: jb.ACCURACIES[name].walk for name in ("draft", "balanced")}
+    efforts |= {"1e-7": 1e-7, "1e-8": 1e-8}
+    found = {
+        name: codes_on_grid(jb.labelling(scene, rtol=rtol), side)[0]
+        for name, rtol in efforts.items()
+    }
+    exact, rows = found["1e-8"], []
+    for name, codes in found.items():
+        changed, walks = codes != exact, codes == WALKING
+        beside = changed & beside_boundary(exact)
+        rows.append(
+            {
+                "accuracy": name,
+                "changed": float(changed.mean()),
+                "changed_beside_boundary": float(beside.sum() / changed.sum())
+                if changed.any()
+                else None,
+                "walking": float(walks.mean()),
+                "walking_changed": float((walks != (exact == WALKING)).mean()),
+            }
+        )
+    return rows
+
+
+def beside_boundary(codes):
+    """Whether one of the eight points around a grid point has another label (boolean)."""
+    padded = np.pad(codes, 1, mode="edge")
+    rows, columns = codes.shape
+    around = [padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)]
+    return np.any([each != codes for each in around], axis=0)
 
 
 def push(labelling, way):

@@ -55,6 +55,7 @@ def basin_of(slope, sides, checked):
         "fractions": rows,
         # They have a value in common.
         "intervals_overlap": max(row["low"] for row in rows) <= min(row["high"] for row in rows),
+        "reach": reach(best, gait),
         "check": compared(best, slope, checked),
     }
 
@@ -105,6 +106,20 @@ def fraction_of(labelling, side):
     walks = jb.sweep(labelling, starts, look_for_gaits=False)["label"].values == WALKING
     low, high = jb.basins.wilson_interval(walks.sum(), walks.size)
     return jb.basins.Fraction(float(walks.mean()), float(low), float(high), int(walks.sum()))
+
+
+def reach(labelling, gait):
+    """How far the basin reaches from the gait each way along each axis, by bisection."""
+    found = {}
+    for k, name in enumerate(("angle", "rate")):
+        for sign, way in ((1.0, "+"), (-1.0, "-")):
+            push = jb.basins.minimal_fatal_shock(
+                labels_at(labelling), gait, scales=np.ones(2), max_distance=0.5, tolerance=1e-6,
+                directions=np.eye(2)[k : k + 1] * sign, steps=2000, improved=0,
+            )  # fmt: skip
+            label = str(jb.basins.Label(push.label))
+            found[f"{name} {way}"] = {"distance": push.distance, "label": label}
+    return found
 
 
 def compared(labelling, slope, count):

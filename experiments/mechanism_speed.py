@@ -63,6 +63,7 @@ def main(options: Options):
         "rates": rates,
         "chains": chains,
         "exponent": float(np.polyfit(*logs.T, 1)[0]),
+        "gait_cpu_s": warm_gait(case, options.sized(5, 1)),
         "rigid_walks": rigid_rows(options.sized(WALKS, QUICK_WALKS), options.sized(9, 1)),
         "picture": draw(options, rates["rows"], chains),
     }
@@ -147,6 +148,15 @@ def flops_per_step(scene):
     how = dict(duration=1.0, save="end", engine="lanes")
     request = jb.Simulation.prepare(scene, scene.state(), **how).lane_request()
     return sum(FLOPS.get(each.op, 0) for each in LANES.compile(request).kernel.graph.body.values)
+
+
+def warm_gait(case: Case, rounds: int) -> float:
+    """Processor seconds of a gait with the sensitivities of all measures, compiled before."""
+
+    def find():
+        return jax.block_until_ready(jb.find_gait(case.scene, case.guess).elasticities)
+
+    return seconds_of({0: find}, rounds, clock=time.process_time)[0]
 
 
 def rigid_rows(count: int, rounds: int):

@@ -24,6 +24,10 @@ def test_the_seeds_basin(tmp_path):
     # Whether it walks is parted by a curve that is less folded than which failure comes.
     folds = {name: each["dimension"] for name, each in numbers["boundary"].items()}
     assert 1.0 < folds["walking or not"] < folds["all labels"] < 2.0
+    # What a tolerance changes, it changes beside boundaries.
+    for row in numbers["tolerances"]:
+        assert row["changed"] < 0.02
+        assert row["changed_beside_boundary"] in (None, pytest.approx(1.0, abs=0.2))
     # Rays turned to the boundary's normal find a smaller push, by either kind of normal.
     rays, secants, gradients = numbers["pushes"]
     assert gradients["distance"] < rays["distance"]
@@ -43,5 +47,6 @@ def test_the_simplest_walkers_basin_is_thin_and_as_the_equations_say(tmp_path):
         assert found["gait_off"] < 1e-6
         assert found["intervals_overlap"]
         assert all(0.0 < row["estimate"] < 0.01 for row in found["fractions"])
+        assert all(1e-3 < each["distance"] < 1e-2 for each in found["reach"].values())
         assert found["check"]["disagree"] == 0
         assert 0 < found["check"]["walking"] < found["check"]["starts"]
