@@ -13,7 +13,7 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 EXPERIMENTS := $(filter-out _% quote,$(patsubst experiments/%.py,%,$(wildcard experiments/*.py)))
 ONLY ?= $(EXPERIMENTS)
 
-# Which of the nightly tests `make nightly` runs: of N parts the one whose number is I modulo N.
+# Which of the nightly tests `make nightly` runs: I/N, of N parts the one of that number; I,J/N: two.
 SHARE := 0/1
 
 .PHONY: walk gait check test nightly mutants unit landing lint types docs dist notebooks figures clean
@@ -39,7 +39,8 @@ unit: $(VENV)/.installed-dev
 landing: $(VENV)/.installed-dev
 	$(PYTEST) -m "not nightly"
 
-# Experiments, notebooks, the site: all of them, or by `make nightly SHARE=3/6` a part.
+# Experiments, notebooks, the site: all of them, or by `make nightly SHARE=3/6` a part;
+# each landing runs two sixths, by the time of day (`python -m tests.nightly`).
 nightly: $(VENV)/.installed-dev
 	$(PYTEST) --nightly-share=$(SHARE)
 

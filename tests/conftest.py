@@ -82,7 +82,8 @@ def pytest_addoption(parser):
     parser.addoption(
         "--nightly-share",
         metavar="I/N",
-        help="of the nightly tests alone, the I-th modulo N of N parts; compiled as for users",
+        help="of the nightly tests alone, the I-th modulo N of N parts, or with I,J/N two of them; "
+        "compiled as for users",
     )
 
 
