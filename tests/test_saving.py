@@ -135,6 +135,24 @@ def test_the_arrays_are_open_to_numpy_and_equal_contents_are_equal_files(tmp_pat
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a", "b"]
 
 
+@pytest.mark.parametrize("cause", [KeyboardInterrupt, OSError(28, "No space left on device")])
+def test_what_stops_amid_an_array_leaves_the_file_that_was_there_alone(tmp_path, monkeypatch, cause):
+    jb.save(tmp_path / "it.npz", {"one": np.ones(3), "two": np.zeros(2)})
+    write, written = np.lib.format.write_array, []
+
+    def stop(*args, **options):
+        written.append(write(*args, **options))
+        if len(written) == 2:
+            raise cause
+
+    monkeypatch.setattr(np.lib.format, "write_array", stop)
+    with pytest.raises((KeyboardInterrupt, jb.ResourceError)):
+        jb.save(tmp_path / "it.npz", {"one": np.zeros(3), "two": np.ones(2)})
+    assert len(written) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["it.npz"]
+    assert jb.load(tmp_path / "it.npz")["one"].tolist() == [1.0, 1.0, 1.0]
+
+
 @pytest.mark.parametrize(
     ("value", "said"),
     [

@@ -83,6 +83,15 @@ def test_other_shapes_types_and_settings_are_other_programs(cache):
     assert len(list(cache.iterdir())) == 4
 
 
+@pytest.mark.parametrize("numbers", [(1, 1.0), (1.0, 1), (0, False)])
+def test_equal_numbers_of_other_types_are_other_programs(cache, numbers):
+    """A number that is compiled in, equal to another, makes a result of its own type."""
+    joined = cached_jit(jnp.append)
+    with jax.numpy_dtype_promotion("standard"):
+        kinds = [joined(jnp.zeros(3, bool), number).dtype for number in numbers]
+    assert kinds == [jnp.asarray(number).dtype for number in numbers]
+
+
 def test_traced_and_transformed_it_is_a_part_of_the_whole(cache):
     np.testing.assert_array_equal(
         jax.jit(jax.vmap(just_before_end))(jnp.ones(3)), np.full(3, just_before_end(jnp.ones(())))

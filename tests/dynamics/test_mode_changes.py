@@ -1,20 +1,29 @@
 """Changes of mode, against contact conditions and angles that are written out here."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._holds import Holds
+from jaxbiped.dynamics._holds import Holds, on_held
 from jaxbiped.dynamics._mode_changes import change_mode
 from jaxbiped.dynamics._stance import stance_on
-from jaxbiped.scene._bodies import Foot
+from jaxbiped.scene._bodies import Body, Foot
 from jaxbiped.scene._joint_parts import HOLDS, Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
 from jaxbiped.variational._hybrid_system import Rolling
-from tests.dynamics.test_modes import ANGLES, HEEL_TOE, RATES, hsu_chen, in_mode, loads_of_feet
+from tests.dynamics.test_modes import (
+    ANGLES,
+    HEEL_TOE,
+    HIP,
+    RATES,
+    hsu_chen,
+    in_mode,
+    loads_of_feet,
+)
 from tests.dynamics.test_rolling_mechanisms import rigid
 from tests.mechanisms import FEET, LEGS, PAIR, SLOPE, WALKERS
 from tests.scene.test_mechanism import spokes
@@ -46,6 +55,41 @@ def test_of_two_stops_the_one_that_pulls_most_is_let_go_first(free, loose, expec
     values = {k: np.float64(x) for k, x in enumerate(free)}
     held = holds.pressed(values, (np.True_, np.True_), loose)
     assert tuple(map(bool, held)) == expected
+
+
+def test_what_was_let_go_is_held_again_where_it_would_pass():
+    """The one set of reactions λ ≥ 0 and rates W λ + free ≥ 0 of which one of each pair is 0: only
+    the second is let go. On the way the first is, too, and comes back."""
+    numbers = np.array([[6.0, -2.0, 0.0], [-2.0, 4.0, -4.0], [0.0, -4.0, 5.0]])
+    free = np.array([2.0, -3.0, 5.0])
+    sets = []
+    for held in itertools.product((False, True), repeat=3):
+        on, reactions = np.flatnonzero(held), np.zeros(3)
+        reactions[on] = np.linalg.solve(numbers[np.ix_(on, on)], -free[on])
+        if np.all(reactions >= 0.0) and np.all(numbers @ reactions + free >= -1e-12):
+            sets.append(held)
+    rows = [{i: np.float64(x) for i, x in enumerate(row)} for row in numbers]
+    mobility = [list(row[: i + 1]) for i, row in enumerate(numbers)]
+    holds = Holds([{i: 1.0} for i in range(3)], rows, mobility)
+    found = holds.pressed(dict(enumerate(free)), (np.True_,) * 3, (True,) * 3)
+    assert sets == [tuple(map(bool, found))]
+
+
+def test_held_limits_that_share_bodies_are_all_met_by_the_nearest_angles():
+    """Straight knees and thighs 0.3 apart, by least squares: thigh and shank of a leg at the mean
+    of 0.31, 0.33, 0.28 and 0.29."""
+    thigh, shank = (dict(mass=0.5, inertia=0.005, centre=0.1), dict(mass=0.3, inertia=0.003))
+    bodies = [Body(f"thigh_{i}", **thigh) for i in (1, 2)]
+    bodies += [Body(f"shank_{i}", **shank, centre=0.1, parent=f"thigh_{i}", at=0.2) for i in (1, 2)]
+    stops = [*(Stop(f"shank_{i}", upper=0.0) for i in (1, 2)), Stop(HIP, upper=0.3)]
+    feet = [Foot(f"shank_{i}", centre=0.2) for i in (1, 2)]
+    scene = rigid(Mechanism(root_mass=1.0, bodies=bodies, feet=feet, joints=stops))
+    angles = dict(
+        theta_thigh_1=0.31, theta_thigh_2=-0.02, theta_shank_1=0.33, theta_shank_2=-0.01
+    )
+    after = on_held(scene, in_mode(scene, scene.state(**angles, held=()), (0, 1, 2)))
+    found = [float(getattr(after, name)) for name in angles]
+    np.testing.assert_allclose(found, [0.3025, 0.0025, 0.3025, 0.0025], atol=1e-14)
 
 
 @pytest.mark.parametrize(

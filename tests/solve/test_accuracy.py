@@ -10,7 +10,13 @@ import pytest
 from reference.scipy_solves import final_of
 
 import jaxbiped as jb
-from jaxbiped.solve._accuracy import ACCURACIES, recurring_inverse_units, tolerances, units_of
+from jaxbiped.solve._accuracy import (
+    ACCURACIES,
+    check_precision,
+    recurring_inverse_units,
+    tolerances,
+    units_of,
+)
 
 SEED, START = jb.seed_scene(), jb.seed_state()
 DURATION = 0.8
@@ -181,3 +187,18 @@ def test_sizes_differ_within_a_batch():
     counts, angles = jax.vmap(end)(lengths)
     assert int(counts[0]) == pytest.approx(int(counts[1]), abs=4)
     assert float(angles[0]) == pytest.approx(float(angles[1]), abs=1e-6)
+
+
+def test_a_contact_is_too_stiff_for_a_precision_where_rounding_a_leg_carries_the_walker():
+    """K = W/(ε l), with the weight W = (2 m + m_h) g [N]; laws of the seed are linear at 1 m."""
+    walker, ground = SEED.walker, SEED.ground
+    weight = float(2.0 * walker.m + walker.hip_mass) * float(ground.g)
+    limit = weight / (float(np.finfo(np.float32).eps) * float(walker.l))
+
+    def check(share):
+        normal = dataclasses.replace(SEED.normal, K=jnp.asarray(share * limit))
+        check_precision(dataclasses.replace(SEED, normal=normal), np.dtype(np.float32))
+
+    check(0.9)
+    with pytest.raises(jb.ArgumentError, match=r"by 1\.1 times the walker's weight"):
+        check(1.1)
