@@ -44,11 +44,14 @@ landing: $(VENV)/.installed-dev
 nightly: $(VENV)/.installed-dev
 	$(PYTEST) --nightly-share=$(SHARE)
 
-# Breaks the package in one place at a time: the quick tests must fail each time (docs/testing.md).
-# All of them, or those whose names begin like `make mutants ONLY="saltation bars-divided"`.
+# Breaks the package in one place at a time: tests must fail each time (docs/testing.md). All that are
+# listed, or those whose names begin like `make mutants ONLY="saltation bars-divided"`; or so many as
+# are drawn by `make mutants DRAW=300 SEED=7` from the whole package, in a run that can be stopped.
 mutants: ONLY :=
+DRAW :=
+SEED := 0
 mutants: $(VENV)/.installed-dev
-	$(BIN)/python -m tests.mutants --jobs 2 $(ONLY)
+	$(BIN)/python -m tests.mutants $(if $(DRAW),--draw $(DRAW) --seed $(SEED),--jobs 2) $(ONLY)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

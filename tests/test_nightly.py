@@ -73,7 +73,9 @@ def test_a_landing_runs_the_share_of_the_time_and_no_other():
     assert output.stdout.decode().strip() in {share_of_hour(hour) for hour in range(24)}
 
 
-@pytest.mark.parametrize("text", ["", "3", "3/0", "/4", "3/", "-1/4", "a/4", "1,/4", ",/4", "1,b/4"])
+@pytest.mark.parametrize(
+    "text", ["", "3", "3/0", "/4", "3/", "-1/4", "a/4", "1,/4", ",/4", "1,b/4"]
+)
 def test_what_is_no_share_costs_one_sentence(text):
     with pytest.raises(pytest.UsageError, match=r"is not allowed; give I/N"):
         Share.parse(text)

@@ -136,7 +136,7 @@ def test_the_arrays_are_open_to_numpy_and_equal_contents_are_equal_files(tmp_pat
 
 
 @pytest.mark.parametrize("cause", [KeyboardInterrupt, OSError(28, "No space left on device")])
-def test_what_stops_amid_an_array_leaves_the_file_that_was_there_alone(tmp_path, monkeypatch, cause):
+def test_what_stops_amid_an_array_leaves_the_old_file_alone(tmp_path, monkeypatch, cause):
     jb.save(tmp_path / "it.npz", {"one": np.ones(3), "two": np.zeros(2)})
     write, written = np.lib.format.write_array, []
 

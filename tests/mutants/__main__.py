@@ -6,6 +6,7 @@ must pass in the same copy without the mutation, which is asked of all such test
 
 import argparse
 import json
+import math
 import queue
 import sys
 import tempfile
@@ -15,7 +16,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
+from tests.mutants import drawn_mutants
 from tests.mutants.copied_checkout import CopiedCheckout
+from tests.mutants.drawing import draw
 from tests.mutants.mutations import ROOT, Mutation, mutations
 
 OWN_CACHE = ("_", "compiler/")
@@ -50,7 +53,8 @@ def verdict_on(mutation: Mutation, checkout: CopiedCheckout, cache: Path, *, nea
     checkout.write(mutation.file, mutation.mutated(source))
     try:
         for stage in mutation.stages()[: 1 if near else None]:
-            caught_by = checkout.first_failure(stage, cache, slow=mutation.tier == "full")
+            tier = "" if mutation.tier == "full" else "not slow"
+            caught_by = checkout.first_failure(stage, cache, tier=tier)
             if caught_by is not None:
                 break
     finally:
@@ -78,7 +82,7 @@ def run(chosen: Sequence[Mutation], *, jobs: int, near: bool) -> tuple[list[Verd
         with ThreadPoolExecutor(jobs) as pool:
             verdicts = list(pool.map(verdict, chosen))
         catching = sorted({v.caught_by for v in verdicts if v.caught_by and "::" in v.caught_by})
-        failure = copies.get().first_failure(catching, cache, slow=True) if catching else None
+        failure = copies.get().first_failure(catching, cache, tier="") if catching else None
     if failure is not None:
         print(f"Fails without any mutation as well: {failure}")
     return verdicts, failure is None
@@ -91,7 +95,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--near", action="store_true", help="only run the tests tried first")
     parser.add_argument("--list", action="store_true", help="print the mutations and end")
     parser.add_argument("--json", type=Path, metavar="PATH", help="write the verdicts there")
+    parser.add_argument("--draw", type=int, default=0, help="draw so many from the whole package")
+    parser.add_argument("--seed", type=int, default=0, help="of the draw")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="of a draw, for this run")
+    parser.add_argument("--observe", action="store_true", help="keep which tests execute what")
     options = parser.parse_args(arguments)
+    if options.observe:
+        return drawn_mutants.observe()
+    if options.draw:
+        numbers = [int(number) for number in options.only]
+        if options.list:
+            for number, drawn in enumerate(draw(options.draw, options.seed)):
+                print(f"{number:4} {drawn.title()}")
+            return 0
+        caught = drawn_mutants.run(
+            options.draw, options.seed, only=numbers, minutes=options.minutes
+        )
+        return 0 if caught else 1
     every, only = mutations(), tuple(options.only)
     chosen = [each for name, each in every.items() if not only or name.startswith(only)]
     if not chosen:

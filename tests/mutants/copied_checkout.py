@@ -1,13 +1,18 @@
 """Copied checkout: a copy of the project in a temporary folder, in which tests are run."""
 
 import importlib.util
+import json
+import math
 import multiprocessing
 import os
+import resource
 import shutil
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from tests.mutants.executed_blocks import note_blocks
 from tests.mutants.mutations import ROOT
 
 LONGEST = 1800.0
@@ -39,29 +44,39 @@ class CopiedCheckout:
         Path(importlib.util.cache_from_source(str(path))).unlink(missing_ok=True)
         return before
 
-    def first_failure(self, paths: Sequence[str], cache: Path, *, slow: bool) -> str | None:
+    def first_failure(
+        self, paths: Sequence[str], cache: Path, *, tier: str, longest: float | None = None
+    ) -> str | None:
         """The first test under these paths that fails; None if all pass.
 
         Args:
             paths: files, folders or single tests.
             cache: pytest's folder, in which programs are kept.
-            slow: whether to run slow tests, too.
+            tier: the tests to run, an expression of pytest's markers; "" for all.
+            longest: processor time that they may take [s].
+
+        Raises:
+            OutOfTime: they take longer.
         """
-        tier = [] if slow else ["-m", "not slow"]
-        arguments = ["-x", "-rfE", "--tb=no", "--ignore=tests/mutants", f"--rootdir={self.folder}",
-                     "--hypothesis-profile=mutants", "-o", f"cache_dir={cache}"]  # fmt: skip
+        markers = ["-m", tier] if tier else []
+        arguments = ["-x", "-vv", "-rfE", "--tb=no", "--ignore=tests/mutants",
+                     f"--rootdir={self.folder}", "--hypothesis-profile=mutants",
+                     "-o", f"cache_dir={cache}"]  # fmt: skip
         output = self.folder / "output"
         run = _SERVER.Process(
-            target=_run_pytest, args=(str(self.folder), output, [*arguments, *tier, *paths])
+            target=_run_pytest,
+            args=(str(self.folder), output, [*arguments, *markers, *paths], longest),
         )
         run.start()
         run.join(LONGEST)
         if run.exitcode is None:
             run.kill()
             return f"no end within {LONGEST:g} s: {' '.join(paths)}"
-        if run.exitcode in (0, 5):  # 5: every test there is slow
+        if run.exitcode in (0, 5):  # 5: no test of the tier is there
             return None
         said = output.read_text(errors="replace")
+        if longest is not None and run.exitcode == -signal.SIGXCPU:
+            raise OutOfTime(said.rpartition("\n")[2].strip())  # its result is not there yet
         if run.exitcode == 4 and "while loading conftest" not in said:
             raise RuntimeError(f"pytest did not take {' '.join(paths)}: {said[-300:]}")
         for line in said.splitlines():
@@ -69,9 +84,33 @@ class CopiedCheckout:
                 return line.split(" ", 1)[1].split(" - ")[0]
         return f"pytest ended with {run.exitcode}: {said[-300:]}"
 
+    def observe(self, to: Path) -> int:
+        """Runs the unit tests and writes which blocks each executes (`executed_blocks`)."""
+        names = self.folder / "names.json"
+        names.write_text(json.dumps(note_blocks(self.folder / "jaxbiped")))
+        arguments = ["-n0", "-m", "not slow", "--ignore=tests/mutants", "--tb=no",
+                     f"--rootdir={self.folder}", "--hypothesis-profile=mutants",
+                     "-p", "tests.mutants.executed_blocks", f"--executed-blocks={to}",
+                     f"--block-names={names}", "-o", f"cache_dir={self.folder}/cache"]  # fmt: skip
+        run = _SERVER.Process(
+            target=_run_pytest, args=(str(self.folder), self.folder / "output", arguments)
+        )
+        run.start()
+        run.join()
+        return run.exitcode or 0
 
-def _run_pytest(folder: str, output: Path, arguments: list[str]) -> None:
+
+class OutOfTime(Exception):  # noqa: N818
+    """Tests took more processor time than they may; its argument is the test that was running."""
+
+
+def _run_pytest(
+    folder: str, output: Path, arguments: list[str], longest: float | None = None
+) -> None:
     """In a process of its own: pytest in a folder, whose package and tests are imported there."""
+    if longest is not None:
+        used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(used + longest), resource.RLIM_INFINITY))
     for name in list(sys.modules):
         if name.split(".")[0] in _OWN:
             del sys.modules[name]
