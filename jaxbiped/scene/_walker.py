@@ -95,8 +95,8 @@ class Kneed(eqx.Module):
         holds: how long the stops hold on rigid feet, see `Stop`.
 
     Raises:
-        ArgumentError: a mass or a length is not above 0, another number is below 0, l_shank is
-            below r, or `stop` or `holds` is of another kind.
+        ArgumentError: a mass or a length is not above 0, an inertia, r or hip_mass is below 0,
+            l_shank is below r, or `stop` or `holds` is of another kind.
     """
 
     m_thigh: Parameter = parameter("thigh mass", r"$m_\mathrm{t}$", "kg", positive=True)
