@@ -17,8 +17,8 @@ from jaxbiped._types import Numbers
 from jaxbiped.compiler.host_code import _arrays
 
 _OF_NUMPY = (
-    "abs add arccos arcsin arctan arctan2 array ceil complex128 concatenate conj cos cosh exp "
-    "expm1 float32 float64 floor fmod full int32 int64 isfinite log log1p log2 logical_and "
+    "abs add arccos arcsin arctan arctan2 array ceil complex128 concatenate conj cos cosh einsum "
+    "exp expm1 float32 float64 floor fmod full int32 int64 isfinite log log1p log2 logical_and "
     "logical_or maximum minimum multiply nextafter rint sign sin sinh sqrt stack tan tanh where"
 )
 NAMES: dict[str, Any] = {name: getattr(np, name) for name in _OF_NUMPY.split()} | {

@@ -1,6 +1,5 @@
 """Host operations: how a host program writes operations of JAX, linear algebra among them."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,7 +12,7 @@ from jaxbiped.compiler.host_code._host_writer import (
     Value,
     listed,
 )
-from jaxbiped.compiler.host_code._moves import reshaped, transposed
+from jaxbiped.compiler.host_code._moves import reshaped
 
 _ELEMENTARY = ("sqrt", "exp", "log", "log1p", "log2", "expm1")
 _CIRCULAR = ("sin", "cos", "tan", "sinh", "cosh", "tanh")
@@ -183,24 +182,23 @@ OPERATIONS: dict[str, Rule] = (
 
 
 def _product(w: HostWriter, op: Operation) -> list[Value]:
+    """Sums in one order: BLAS rounds otherwise on each kind of processor, and steps may follow."""
     shape, dtype = op.result()
-    (left, right), (left_batch, right_batch) = op.params["dimension_numbers"]
+    summed, batch = op.params["dimension_numbers"]
     a, b = (w.full(each) for each in op.inputs)
-    order_a = [*left_batch, *_others(a, [*left_batch, *left]), *left]
-    order_b = [*right_batch, *right, *_others(b, [*right_batch, *right])]
-    a, b = transposed(w, a, order_a), transposed(w, b, order_b)
-    n, summed = len(left_batch), len(left)
-    if not n and summed == 1 and len(b.shape) <= 2:
-        return [w.emit("({0} @ {1})", [a, b], shape, dtype)]
-    inner = math.prod(b.shape[n : n + summed])
-    rows = (*a.shape[:n], math.prod(a.shape[n : len(a.shape) - summed]), inner)
-    columns = (*b.shape[:n], inner, math.prod(b.shape[n + summed :]))
-    form = f"({{0}}.reshape({rows!r}) @ {{1}}.reshape({columns!r})).reshape({shape!r})"
+    ours = [chr(97 + i) for i in range(len(a.shape))]
+    theirs = [chr(65 + i) for i in range(len(b.shape))]
+    for i, j in zip((*batch[0], *summed[0]), (*batch[1], *summed[1]), strict=True):
+        theirs[j] = ours[i]
+    kept = [ours[i] for i in batch[0]] + _others(ours, batch[0], summed[0])
+    kept += _others(theirs, batch[1], summed[1])
+    form = f"einsum('{''.join(ours)},{''.join(theirs)}->{''.join(kept)}', {{0}}, {{1}})"
     return [w.emit(form, [a, b], shape, dtype)]
 
 
-def _others(value: Value, axes: Sequence[int]) -> list[int]:
-    return [i for i in range(len(value.shape)) if i not in axes]
+def _others(letters: Sequence[str], *axes: Sequence[int]) -> list[str]:
+    taken = [i for some in axes for i in some]
+    return [letter for i, letter in enumerate(letters) if i not in taken]
 
 
 def _triangular(w: HostWriter, op: Operation) -> list[Value]:

@@ -17,7 +17,13 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, linearise, split
 from jaxbiped.solve.rosenbrock._linearisation import AbstractLinearisation, Components, StepMatrix
-from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau, error_weights, last_stage
+from jaxbiped.solve.rosenbrock._tableau_form import (
+    RosenbrockTableau,
+    Row,
+    direct_weights,
+    error_weights,
+    last_stage,
+)
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
@@ -155,53 +161,41 @@ class Stages(NamedTuple):
     """The stages of a step, of which only the kept components are computed one by one.
 
     A direct component p, whose rate is the kept component s, obeys a linear recurrence: stage by
-    stage (I − γ c) u_p = g (1 s_0 + (a + I) u_s), with g = γ h. So its stages are
-    u_p = g (b s_0 + B u_s), with B and b known from the tableau alone.
+    stage (I − γ c) u_p = g (1 s_0 + (a + I) u_s), with g = γ h. So sums of its stages are sums of
+    s_0 and u_s, with weights known from the tableau alone.
     """
 
+    tableau: RosenbrockTableau
     start: Components
     step: Scalar
     step_matrix: StepMatrix
     lin: AbstractLinearisation
     direct: dict[int, int]
     kept: list[int]
-    matrix: np.ndarray
-    vector: np.ndarray
     increments: list[Components]
 
     def weighted(self, weights: Sequence[float] | np.ndarray) -> Components:
         """Σ_j weights_j u_j for every component."""
-        row = np.asarray(weights)
-        count = len(row)
+        row = tuple(map(float, weights))
         totals: list[PyTree] = [None] * len(self.start)
         for place, i in enumerate(self.kept):
             totals[i] = _sum(row, [stage[place] for stage in self.increments])
-        through = row @ self.matrix[:count]
-        at_start = float(row @ self.vector[:count])
-        for p, s in self.direct.items():
-            totals[p] = self.step * self._chain(at_start, through, s)
-        return totals
+        return [
+            self._chain(row, self.direct[i]) if i in self.direct else total
+            for i, total in enumerate(totals)
+        ]
 
     def direct_right(self, i: int) -> dict[int, Scalar]:
         """Right-hand sides of the direct components in stage i."""
-        known, at_start = self.matrix[i, :i], float(self.vector[i])
-        return {p: self.step * self._chain(at_start, known, s) for p, s in self.direct.items()}
+        unit = (0.0,) * i + (1.0,)
+        return {p: self._chain(unit, s) for p, s in self.direct.items()}
 
-    def _chain(self, at_start: float, weights: np.ndarray, s: int) -> Scalar:
+    def _chain(self, row: Row, s: int) -> Scalar:
+        """Σ_j row_j u_j of the component that follows s, by the stages of s there are so far."""
+        at_start, *weights = direct_weights(self.tableau, row)
         place = self.kept.index(s)
-        stages = [stage[place] for stage in self.increments[: len(weights)]]
-        terms = [at_start * self.start[s]] if at_start != 0.0 else []
-        return _sum([1.0] * len(terms) + list(weights), terms + stages)
-
-
-def _recurrence(tableau: RosenbrockTableau) -> tuple[np.ndarray, np.ndarray]:
-    """B and b of `Stages`."""
-    size = len(tableau.alpha)
-    a, c = np.zeros((size, size)), np.zeros((size, size))
-    for i in range(1, size):
-        a[i, :i], c[i, :i] = tableau.a[i - 1], tableau.c[i - 1]
-    inverse = np.linalg.inv(np.eye(size) - tableau.gamma * c)
-    return inverse @ (a + np.eye(size)), inverse @ np.ones(size)
+        terms = [stage[place] for stage in self.increments[: len(row)]]
+        return self.step * _sum([at_start, *weights], [self.start[s], *terms])
 
 
 def stages_of(
@@ -232,8 +226,7 @@ def stages_of(
     )
     factors = fusion_barrier(moves, lambda: lin.factorise(jacobian, step))
     matrix = StepMatrix(jacobian, step, factors)
-    recurrence = _recurrence(tableau)
-    stages = Stages(start, step, matrix, lin, lin.direct(), kept, *recurrence, increments=[])
+    stages = Stages(tableau, start, step, matrix, lin, lin.direct(), kept, increments=[])
     last_rate = slope
 
     def stage(i: int) -> tuple[Components, PyTree]:
@@ -269,7 +262,7 @@ def _repeats(tableau: RosenbrockTableau, i: int) -> bool:
     return tableau.a[i - 1] == (*tableau.a[i - 2], 0.0)
 
 
-def _sum(weights: Sequence[float] | np.ndarray, values: list[Scalar]) -> Scalar:
+def _sum(weights: Sequence[float], values: list[Scalar]) -> Scalar:
     """Σ weights_j values_j, zero weights left out and units not multiplied by."""
     terms = [v if w == 1.0 else float(w) * v for w, v in zip(weights, values, strict=False) if w]
     return functools.reduce(operator.add, terms) if terms else jnp.zeros_like(values[0])

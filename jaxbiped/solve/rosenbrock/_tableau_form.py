@@ -1,5 +1,7 @@
 """Form of a Rosenbrock method: the coefficients of its tableau."""
 
+import functools
+from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
 Row: TypeAlias = tuple[float, ...]
@@ -48,3 +50,21 @@ def error_weights(tableau: RosenbrockTableau) -> Row:
 def last_stage(tableau: RosenbrockTableau) -> Row:
     """Weights that select the last stage."""
     return (*[0.0] * (len(tableau.alpha) - 1), 1.0)
+
+
+@functools.lru_cache(maxsize=256)
+def direct_weights(tableau: RosenbrockTableau, row: Row) -> Row:
+    """Weights of s_0, u_s1, u_s2 … in (Σ_j row_j u_j)/(γ h) of a component with the rate s.
+
+    They are 1ᵀz and (a + I)ᵀz with (I − γ c)ᵀ z = row. Fractions find them exactly: LAPACK and BLAS
+    round otherwise on each kind of processor.
+    """
+    gamma, z = Fraction(tableau.gamma), [*map(Fraction, row)]
+    for i in range(len(z) - 1, 0, -1):
+        for j, c in enumerate(tableau.c[i - 1]):
+            z[j] += gamma * Fraction(c) * z[i]
+    weights = list(z)
+    for i in range(1, len(z)):
+        for j, a in enumerate(tableau.a[i - 1]):
+            weights[j] += Fraction(a) * z[i]
+    return (float(sum(z)), *map(float, weights))
