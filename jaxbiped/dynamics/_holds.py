@@ -27,6 +27,10 @@ from jaxbiped.scene._structure import Angle, weighted
 
 ROUNDING = 1e-13
 """Rate [rad/s], or acceleration, that nothing pulls with."""
+_CANCELLED = 1e-12
+"""Weight that is none: couplings cancel it."""
+_DEPENDENT = 1e-10
+"""What is left of a row's mobility where the rows before it move it along."""
 Row = dict[int, Any]
 """A sum of a tree's free angles: weights by their rows."""
 
@@ -35,7 +39,8 @@ class Holds(NamedTuple):
     """Rows G that may be held, with M⁻¹ Gᵀ and G M⁻¹ Gᵀ.
 
     Attributes:
-        rows: of the flat foot, where the leg that stands has two feet, then of each limit.
+        rows: of the flat foot, where the leg that stands has two feet, then of each limit. A row is
+            empty where couplings fix the sum: nothing can move it, and its reaction is zero.
         answers: of each row.
         mobility: lower half of a symmetric matrix.
     """
@@ -46,10 +51,14 @@ class Holds(NamedTuple):
 
     def along(self, values: Row) -> list[Scalar]:
         """The sums of values."""
-        return [_sum(row, values) for row in self.rows]
+        zero = 0.0 * self.mobility[0][0]
+        return [_sum(row, values, zero) for row in self.rows]
 
     def reactions(self, free: Row, held: Sequence[Scalar]) -> list[Scalar]:
-        """What holds the sums at zero against free values; zero where nothing is held."""
+        """What holds the sums at zero against free values; zero where nothing is held.
+
+        Of rows that depend on each other, the last have no reaction.
+        """
         one = jnp.ones_like(self.mobility[0][0])
         zero = 0.0 * one
         matrix = [
@@ -62,7 +71,7 @@ class Holds(NamedTuple):
         right = [
             jnp.where(h, -value, zero) for h, value in zip(held, self.along(free), strict=True)
         ]
-        return symmetric_factors(matrix).solve(right)
+        return symmetric_factors(matrix, least=_DEPENDENT).solve(right)
 
     def under(self, free: Row, reactions: Sequence[Scalar]) -> Row:
         """Values with the reactions."""
@@ -87,7 +96,7 @@ class Holds(NamedTuple):
         `least`: the rate or acceleration that is pressed away, below which one would have to pull.
         """
         held = [jnp.asarray(each) for each in held]
-        able = [i for i, each in enumerate(loose) if each is not False]
+        able = [i for i, each in enumerate(loose) if each is not False and self.rows[i]]
         wanted = [held[i] & loose[i] for i in able]
         for _ in range(_passes(len(able))):
             reactions = self.reactions(free, held)
@@ -132,16 +141,18 @@ def holds_of(stance: Stance, modes: Modes, factors: SparseFactors) -> Holds:
         weights: list[Any] = [None] * (2 + len(tree.bodies))
         for body, weight in angle.weights:
             weights[2 + body] = weight
-        row = fold(tree.weights, weights)
+        folded = fold(tree.weights, weights)
+        row = {k: value for k, value in folded.items() if abs(value) > _CANCELLED}
         rows.append(row)
         answers.append({k: value for k, value in factors.solve(row).items() if value is not None})
-    mobility = [[_sum(rows[i], answers[j]) for j in range(i + 1)] for i in range(len(rows))]
+    zero = jnp.zeros_like(stance.pose.motion.x)
+    mobility = [[_sum(rows[i], answers[j], zero) for j in range(i + 1)] for i in range(len(rows))]
     return Holds(rows, answers, mobility)
 
 
-def _sum(row: Row, values: Row) -> Scalar:
+def _sum(row: Row, values: Row, zero: Scalar) -> Scalar:
     terms = [weighted(values[k], weight) for k, weight in row.items() if k in values]
-    return sum(terms[1:], terms[0])
+    return sum(terms[1:], terms[0]) if terms else zero
 
 
 def gap_of(scene: RigidScene, limit: Limit, stance: Stance) -> Scalar:

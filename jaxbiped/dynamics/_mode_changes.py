@@ -78,10 +78,17 @@ def _loose(modes: Modes, mode: Mode) -> list[Any]:
 
 
 def foot_loads(scene: RigidScene, stance: Stance, turning: Turning) -> tuple[Scalar, Scalar]:
-    """Normal forces on both feet of a leg that lies flat [N]."""
+    """Normal forces on both feet of a leg that lies flat [N].
+
+    Where couplings keep them level, the weights are not determined and taken as equal.
+    """
     first, second = stance.feet
+    total = ground_force(scene, stance, turning.free).normal
+    assert turning.holds is not None
+    if not turning.holds.rows[0]:
+        return 0.5 * total, 0.5 * total
     front = turning.reactions[0] / (stance.foot(second).x - stance.foot(first).x)
-    return ground_force(scene, stance, turning.free).normal - front, front
+    return total - front, front
 
 
 def with_mode(scene: RigidScene, state: Any, mode: Mode) -> Any:

@@ -29,7 +29,7 @@ from jaxbiped.gait._fixed_point_search import (
     walks_only,
 )
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._gait_summary import summarise_gait, without_held
+from jaxbiped.gait._gait_summary import summarise_gait
 from jaxbiped.gait._guess_free_search import is_stable, search_on
 from jaxbiped.gait._homotopy import search_along
 from jaxbiped.gait._newton import Method
@@ -207,7 +207,7 @@ def find_gait(
     if told is not origin:  # its scene may be of another structure, as of motors with a share
         gait = dataclasses.replace(gait, origin=jtu.tree_map(np.asarray, told))
     warn_of_unknown(gait)
-    return without_held(scene.mechanism, gait)
+    return gait
 
 
 @bounded_cache(1)  # the same object each time, so that nothing is compiled again

@@ -74,6 +74,7 @@ class Gait(eqx.Module, Tabular):
             error of the leading multiplier.
         residual: largest change of a component of the state over the cycle, SI units.
         multipliers: Floquet multipliers, largest first, without the trivial one; shape (m − 1,).
+            Those of a mode, and of what a stop or a flat foot holds as a cycle begins, are 0.
         multiplier_errors: estimated errors of the multipliers, shape (m − 1,).
         directions: eigenvectors of the multipliers, in the space of the state without hip_x, shape
             (m, m − 1).

@@ -1,11 +1,8 @@
 """Summary of a search as a gait: measures, derivatives and errors of its orbit; step lengths."""
 
-import dataclasses
-
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
@@ -33,9 +30,7 @@ from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._search_provenance import Origin
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
-from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._parameter_access import parameter_quantities
-from jaxbiped.scene._rigid_feet import held_count
 from jaxbiped.scene._structure import Structure
 
 _NOTHING = 1e-9
@@ -123,23 +118,6 @@ def summarise_gait(
         engine=problem.spec.engine,
         cycle="stride" if len(structure.namings) == 1 else "step",
         quantities=tuple(map(parameter_quantities(problem.args).__getitem__, names)),
-    )
-
-
-def without_held(mechanism: Mechanism, gait: Gait) -> Gait:
-    """A gait without the multipliers, all zero, of what is held where its cycle begins.
-
-    Those of a state's mode and of the angles and rates that a stop or a flat foot holds.
-    """
-    mode = float(getattr(gait.measures.state, "mode", np.nan))
-    if not np.isfinite(mode):
-        return gait
-    own = slice(np.shape(gait.multipliers)[-1] - 1 - 2 * held_count(mechanism, mode))
-    return dataclasses.replace(
-        gait,
-        multipliers=gait.multipliers[own],
-        multiplier_errors=gait.multiplier_errors[own],
-        directions=gait.directions[:, own],
     )
 
 

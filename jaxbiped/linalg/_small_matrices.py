@@ -219,34 +219,35 @@ class SymmetricFactors(NamedTuple):
 
     def solve(self, right: list[Scalar]) -> list[Scalar]:
         """The solution of the system with this right side."""
-        lower, inverse = self
-        forward: list[Scalar] = []
+        lower, forward = self.lower, list[Scalar]()
         for i, value in enumerate(right):
             known = [lower[i][k] * forward[k] for k in range(i)]
             forward.append(value - _total(known, value))
-        found = [value * over for value, over in zip(forward, inverse, strict=True)]
+        found = [value * over for value, over in zip(forward, self.inverse, strict=True)]
         for i in reversed(range(len(found))):
             known = [lower[k][i] * found[k] for k in range(i + 1, len(found))]
             found[i] = found[i] - _total(known, found[i])
         return found
 
 
-def symmetric_factors(matrix: list[list[Scalar]]) -> SymmetricFactors:
+def symmetric_factors(matrix: list[list[Scalar]], least: float | None = None) -> SymmetricFactors:
     """Factors of a symmetric positive matrix; not finite, or huge, where it is singular.
 
-    Only the lower half of its rows is read.
+    Only the lower half of its rows is read. The solution is zero in a row whose pivot is at most
+    the share `least` of its own entry.
     """
-    lower: list[list[Scalar]] = []
-    diagonal: list[Scalar] = []
-    inverse: list[Scalar] = []
+    lower, diagonal, inverse = list[list[Scalar]](), list[Scalar](), list[Scalar]()
     for i, row in enumerate(matrix):
         scaled: list[Scalar] = []
         for j in range(i):
             known = [scaled[k] * diagonal[k] * lower[j][k] for k in range(j)]
             scaled.append((row[j] - _total(known, row[j])) * inverse[j])
         known = [scaled[k] * scaled[k] * diagonal[k] for k in range(i)]
-        diagonal.append(row[i] - _total(known, row[i]))
-        inverse.append(1.0 / diagonal[i])
+        pivot = row[i] - _total(known, row[i])
+        diagonal.append(pivot)
+        if least is not None:
+            pivot = jnp.where(pivot > least * row[i], pivot, jnp.inf)
+        inverse.append(1.0 / pivot)
         lower.append(scaled)
     return SymmetricFactors(lower, inverse)
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
-import numpy as np
 
 from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._types import Parameter, Scalar, as_float, by_numpy, is_traced
@@ -60,13 +59,6 @@ def rigid_modes(mechanism: Mechanism) -> Modes:
     structure = mechanism.structure
     legs = standing_legs(structure)
     return modes_of(mechanism, {leg: structure.feet_of_leg[leg] for leg in sorted(legs)})
-
-
-def held_count(mechanism: Mechanism, mode: float) -> int:
-    """How many angles a mode holds."""
-    modes = rigid_modes(mechanism)
-    found = modes.decoded(np, np.float64(mode))
-    return sum(map(bool, (*found.held, *modes.flat(found).values())))
 
 
 def check_stands(structure: Structure, standing: str | Sequence[str] | None) -> Indices:

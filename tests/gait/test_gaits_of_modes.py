@@ -22,6 +22,15 @@ def test_walks_go_through_the_modes(gait):
     assert np.sum(walk.mode_durations) == pytest.approx(float(walk.t[-1]), abs=1e-15)
 
 
+@pytest.mark.slow
+def test_multipliers_are_as_many_whatever_is_held(gait):
+    """Both legs are straight where a cycle begins: the knees' angles, rates and the mode have 0."""
+    assert gait.multipliers.shape == gait.multiplier_errors.shape == (8,)
+    assert gait.directions.shape == (9, 8)
+    assert np.abs(gait.multipliers[2]) > 0.1
+    np.testing.assert_allclose(gait.multipliers[3:], 0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     "derivative",
     [

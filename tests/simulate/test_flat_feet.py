@@ -247,3 +247,96 @@ def test_heel_strikes_and_toe_strikes_are_those_of_equations_by_hand():
     h = 1e-5
     difference = (float(lasts(0.2 + h)) - float(lasts(0.2 - h))) / (2.0 * h)
     assert float(jax.jacfwd(lasts)(0.2)) == pytest.approx(difference, rel=1e-5)
+
+
+FORWARD = dict(theta_leg_1=-0.25, theta_leg_2=0.25, omega_leg_1=-0.3, omega_leg_2=-1.6)
+
+
+def legs_on(ankle, *, bodies=(), joints=(), mass=1.0, inertia=0.0096, centre=0.1, feet=None):
+    """Two legs of 0.38 m to the ankle, and what is fixed there."""
+    legs = [jb.Body(f"leg_{i}", mass=mass, inertia=inertia, centre=centre) for i in (1, 2)]
+    pairs = [("leg_1", "leg_2"), ("foot_1", "foot_2")]
+    walker = jb.Mechanism(
+        root_mass=0.5,
+        bodies=(*legs, *bodies),
+        feet=feet or [jb.Foot(f"leg_{i}", centre=ankle) for i in (1, 2)],
+        joints=joints,
+        mirror=pairs if bodies else pairs[:1],
+    )
+    return jb.RigidScene(walker, jb.Ground(slope=0.02))
+
+
+def on_points():
+    """Legs that end in points at the ankles, and carry the mass of a foot there."""
+    centre = (1.0 * 0.1 + 0.05 * 0.38) / 1.05
+    inertia = 0.0096 + (centre - 0.1) ** 2 + 0.05 * (0.38 - centre) ** 2
+    return legs_on(0.38, mass=1.05, inertia=inertia, centre=centre)
+
+
+def on_level_feet(direction, rest=None, stop=None):
+    """The same legs on feet that couplings keep from turning: each moves as its ankle does."""
+    bodies = [
+        jb.Body(f"foot_{i}", mass=0.05, inertia=2e-5, centre=0.01, parent=f"leg_{i}", at=0.38)
+        for i in (1, 2)
+    ]
+    soles = [
+        jb.Foot(f"foot_{i}", centre=(0.02, ahead), name=name)
+        for i in (1, 2)
+        for name, ahead in (("heel", -0.03), ("toe", 0.03))
+    ]
+    angles = [{f"foot_{i}": 1, direction: -1} for i in (1, 2)]
+    joints = [jb.Coupling(angle, rest=rest) for angle in angles]
+    joints += [] if stop is None else [jb.Stop(angle, upper=stop) for angle in angles]
+    return legs_on(0.38, bodies=bodies, joints=joints, feet=soles)
+
+
+LEVEL = {
+    "normal": (on_level_feet("normal"), 3),
+    "vertical": (on_level_feet("vertical"), 1),
+    "toes up": (on_level_feet("normal", rest=0.1), 1),
+    "toes down": (on_level_feet("normal", rest=-0.1), 2),
+    "at a stop": (on_level_feet("normal", stop=0.0), 15),
+}
+"""Scenes, and the mode that tells which ends of the foot stand."""
+
+
+@pytest.mark.parametrize("name", LEVEL)
+def test_a_foot_that_couplings_keep_level_moves_and_strikes_as_its_ankle(name):
+    scene, mode = LEVEL[name]
+    state, plain = scene.state(**FORWARD), on_points().state(**FORWARD)
+    assert float(state.mode) == mode
+    moved = jb.dynamics.rolling_field(0.0, state, scene)
+    np.testing.assert_allclose(moved[:-1], jb.dynamics.rolling_field(0.0, plain, on_points()))
+    strikes = dict(theta_leg_1=0.25, theta_leg_2=-0.25, omega_leg_1=-1.0, omega_leg_2=-1.6)
+    struck, as_point = (
+        jb.dynamics.impact(each, each.state(**strikes)) for each in (scene, on_points())
+    )
+    np.testing.assert_allclose(struck.state[:-1], as_point.state, atol=1e-15)
+    np.testing.assert_allclose(struck[1:], as_point[1:])
+    assert float(struck.state.mode) == mode
+
+
+@pytest.mark.slow
+def test_a_walk_on_level_feet_is_that_of_its_ankles():
+    ends = [
+        jb.simulate(scene, scene.state(**FORWARD), footsteps=3)
+        for scene in (on_points(), LEVEL["normal"][0])
+    ]
+    plain, walk = ends
+    assert [str(each.outcome) for each in ends] == ["walking", "walking"]
+    np.testing.assert_allclose([walk.t[-1], *walk.final[:-1]], [plain.t[-1], *plain.final])
+    assert int(walk.pulls) == 0
+
+
+@pytest.mark.nightly
+def test_multipliers_of_a_gait_on_level_feet_are_as_many_under_jit():
+    """Those of its ankles, and zero for the mode."""
+    how = dict(parameters=(), radius_sensitivities=False)
+    plain, scene = on_points(), LEVEL["normal"][0]
+    expected = jb.find_gait(plain, plain.state(**FORWARD), **how).multipliers
+    gait = jb.find_gait(scene, scene.state(**FORWARD), **how)
+    traced = jax.jit(lambda y: jb.find_gait(scene, y, **how))(gait.measures.state)
+    for found in (gait, traced):
+        np.testing.assert_allclose(found.multipliers, [*expected, 0.0], atol=1e-8)
+    shapes = [[np.shape(leaf) for leaf in jax.tree.leaves(each)] for each in (gait, traced)]
+    assert shapes[0] == shapes[1]
