@@ -61,6 +61,7 @@ class FindGait(options.Command, of=("find_gait",)):
     engine: options.Engine
 
     def run(self) -> int:
+        from jaxbiped.dynamics._energy import is_driven
         from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 
         find_gait, imported = jb.find_gait, time.perf_counter()
@@ -80,7 +81,7 @@ class FindGait(options.Command, of=("find_gait",)):
             numbers["error"] = error_numbers(gait.error)
         if found and isinstance(scene, jb.RigidScene):
             numbers["assumptions"] = _assumptions(scene, gait)
-        if found and scene.actuation is not None:
+        if found and is_driven(scene):
             numbers |= _gait_cost(scene, gait)
         report = Report(self.output.json, self.output.csv)
         if found:

@@ -18,6 +18,7 @@ from jaxbiped._types import rows_of
 from jaxbiped.cli._options import OutputOptions
 from jaxbiped.constraints._constraint_methods import name_of
 from jaxbiped.dynamics._contacts import contacts
+from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.measure._footsteps import footstep_dataset
 from jaxbiped.measure._samples import evaluate_along, from_start, places_of_standing
 from jaxbiped.solve._accuracy import unresolved_slip
@@ -60,7 +61,7 @@ def walk_numbers(
     else:
         numbers |= _compliant_numbers(scene, walk)
         numbers["solver"] |= {"accepted": int(walk.accepted), "rejected": int(walk.rejected)}
-    if scene.actuation is not None and (numbers["steps"] or not rolls):
+    if is_driven(scene) and (numbers["steps"] or not rolls):
         numbers |= walk_cost(scene, walk)
     warnings_of = rigid_warnings if rolls else walk_warnings
     numbers["warnings"] = warnings_of(scene, numbers, rtol=settings["rtol"])
@@ -81,7 +82,7 @@ def _compliant_numbers(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
         "energy_residual_relative": relative_residual(ledger),
         "gravity_work_J": float(ledger.gravity_work[0]),
     }
-    if scene.actuation is not None:
+    if is_driven(scene):
         numbers["actuation_work_J"] = float(ledger.actuation_work[0])
     if scene.redundant:
         numbers["constraints"] = _constraint_numbers(scene, walk)

@@ -1,16 +1,16 @@
 """Energies of the walker and the powers that change them: gravity's, contacts', actuators'."""
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, cast
 
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import (
-    WalkerScene,
+    Carriers,
     hip_actuators,
-    hip_torques,
     load_shares,
     motor_torques,
     preload,
@@ -23,16 +23,16 @@ from jaxbiped.dynamics._contacts import (
     legs_at,
     normal_forces,
 )
-from jaxbiped.dynamics._equivalent_states import motion_in, poses_of
-from jaxbiped.dynamics._footfalls import LegMotion, touches
+from jaxbiped.dynamics._equivalent_states import motion_in, poses_of, whole_state
+from jaxbiped.dynamics._footfalls import FootMotion, LegMotion, touches
 from jaxbiped.dynamics._joint_loads import JointEnergy, angle_value, joint_energy
 from jaxbiped.dynamics._stance import Stance, of_stance
+from jaxbiped.dynamics._stance_motion import carriers_of, hip_motion_of
 from jaxbiped.dynamics._tree import Motion, PointMotion, point_motion
 from jaxbiped.linalg._sparse_lu import product
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._state_types import State
+from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion, LegTorques
 
 
@@ -43,7 +43,7 @@ class Energies(NamedTuple):
         kinetic: kinetic energy of all bodies and the root point.
         gravitational: potential energy of gravity, zero if all mass is at the origin of the slope's
             frame.
-        elastic: energy stored in the feet that touch, and in springs, stops and latches.
+        elastic: energy stored in compliant feet that touch, and in springs, stops and latches.
     """
 
     kinetic: Scalar
@@ -62,12 +62,12 @@ class Powers(NamedTuple):
     Attributes:
         gravity: power of gravity on the walker.
         indentation: power of the walker against the ground's normal reaction, F_N δ̇, summed over
-            all feet, and against springs, stops and latches.
+            all feet that are compliant, and against springs, stops and latches.
         damper: the part of `indentation` that is lost and not stored; for a foot that touches,
             (F_N − elastic force) δ̇.
         friction: power lost to friction, never negative.
-        actuation: power of the actuators, including springs and dampers between the legs; None for
-            a passive walker.
+        actuation: power of motors and actuators, including springs and dampers between the legs;
+            None for a passive walker.
         motors: power of each motor, as in `ActuatorPowers`; None for a passive walker.
     """
 
@@ -80,12 +80,13 @@ class Powers(NamedTuple):
 
 
 class ActuatorPowers(NamedTuple):
-    """Powers of a scene's actuators, leaves shaped as the state's.
+    """Powers of all that drives a walker, leaves shaped as the state's.
 
     Attributes:
-        total: power of all torques and set points on the walker, including springs and dampers [W].
-        motors: power of each motor [W]: one for each actuator at the hip that has a motor, then
-            one for each foot.
+        total: power of all motors and actuators on the walker, including the springs and dampers
+            of the latter [W].
+        motors: power of each motor [W]: one for each actuator at the hip that has a motor, one for
+            each foot that has a preload, and one for each motor at a joint.
     """
 
     total: Scalar
@@ -93,28 +94,40 @@ class ActuatorPowers(NamedTuple):
 
 
 @kept_alone
-def energies(scene: Scene, state: State) -> Energies:
+def energies(scene: AbstractWalkerScene, state: Any) -> Energies:
     """Kinetic, gravitational and elastic energy; leaves shaped as the state's.
 
     Args:
-        scene: the walker on its ground.
-        state: leaves of any common shape, SI units.
+        scene: the walker on its ground, on compliant or on rigid feet.
+        state: of the scene's kind, leaves of any common shape, SI units.
 
     Returns:
         The three energies [J], leaves shaped as the state's.
     """
-    kinetic, moment = kinetic_and_moment(scene, state)
-    elastic = sum(
-        jnp.where(touches(foot), scene.normal.elastic_energy(foot.penetration), 0.0)
-        for foot in feet(scene, state)
-    )
-    joints = _joint_energy(scene, state)
+    laws: Any = scene
+    whole = _placed(scene, state)
+    kinetic, moment = kinetic_and_moment(scene, whole)
+    elastic = jnp.zeros_like(kinetic)
+    for foot in _feet(scene, state):
+        stored = laws.normal.elastic_energy(foot.penetration)
+        elastic = elastic + jnp.where(touches(foot), stored, 0.0)
+    joints = _joint_energy(scene, whole)
     if joints is not None:
         elastic = elastic + joints.stored
-    return Energies(kinetic, scene.ground.g * moment, jnp.asarray(elastic))
+    return Energies(kinetic, scene.ground.g * moment, elastic)
 
 
-def kinetic_and_moment(scene: AbstractWalkerScene, state: State) -> tuple[Scalar, Scalar]:
+def _placed(scene: AbstractWalkerScene, state: Any) -> Any:
+    """A state that has the place of the root point, which a rigid walker's follows from."""
+    return state if scene.compliant else whole_state(scene, state)
+
+
+def _feet(scene: AbstractWalkerScene, state: Any) -> tuple[FootMotion, ...]:
+    """The feet that press into the ground: none of a walker on rigid feet."""
+    return feet(cast("CompliantScene", scene), state) if scene.compliant else ()
+
+
+def kinetic_and_moment(scene: AbstractWalkerScene, state: Any) -> tuple[Scalar, Scalar]:
     """Kinetic energy [J] and mass times height [kg·m] of a walker of any kind."""
     ground = scene.ground
     kinetic = moment_x = moment_z = jnp.zeros_like(state[0])
@@ -142,35 +155,37 @@ def _mass_points(scene: AbstractWalkerScene, state: Any) -> list[tuple[Scalar, P
     return points
 
 
-def _joint_energy(scene: Scene, state: Any) -> JointEnergy | None:
+def _joint_energy(scene: AbstractWalkerScene, state: Any) -> JointEnergy | None:
     motion = motion_in(scene, state)
     return joint_energy(scene.mechanism, motion, scene.ground.slope, stops=scene.compliant)
 
 
 @kept_alone
-def powers(scene: Scene, state: State) -> Powers:
-    """Power of gravity and the contact's powers; leaves shaped as the state's.
+def powers(scene: AbstractWalkerScene, state: Any) -> Powers:
+    """Power of gravity, contacts, joints and of all that drives; leaves shaped as the state's.
 
     Args:
-        scene: the walker on its ground.
-        state: leaves of any common shape, SI units.
+        scene: the walker on its ground, on compliant or on rigid feet.
+        state: of the scene's kind, leaves of any common shape, SI units.
 
     Returns:
-        The powers [W], leaves shaped as the state's.
+        The powers [W], leaves shaped as the state's. On rigid feet they are those of the motion
+        between impacts.
     """
-    ground = scene.ground
+    laws: Any = scene
+    ground, whole = scene.ground, _placed(scene, state)
     indentation = damper = friction = momentum_x = momentum_z = jnp.zeros_like(state[0])
-    for mass, point in _mass_points(scene, state):
+    for mass, point in _mass_points(scene, whole):
         momentum_x, momentum_z = momentum_x + mass * point.vx, momentum_z + mass * point.vz
     gravity = ground.g * (jnp.sin(ground.slope) * momentum_x - jnp.cos(ground.slope) * momentum_z)
-    for foot in feet(scene, state):
-        force = foot_force(scene, foot)
-        held = jnp.where(touches(foot), scene.normal.elastic_force(foot.penetration), 0.0)
+    for foot in _feet(scene, state):
+        force = foot_force(laws, foot)
+        held = jnp.where(touches(foot), laws.normal.elastic_force(foot.penetration), 0.0)
         indentation = indentation + force.normal * foot.penetration_rate
         damper = damper + (force.normal - held) * foot.penetration_rate
         if force.tangential is not None:
             friction = friction - force.tangential * foot.slip_speed
-    joints = _joint_energy(scene, state)
+    joints = _joint_energy(scene, whole)
     if joints is not None:
         indentation, damper = indentation + joints.taken, damper + joints.lost
     if not is_driven(scene):
@@ -184,17 +199,55 @@ def is_driven(scene: AbstractWalkerScene) -> bool:
     return scene.mechanism.has_motors or getattr(scene, "actuation", None) is not None
 
 
-def _actuator_powers(scene: Scene, state: State) -> ActuatorPowers:
+def _actuator_powers(scene: Any, state: Any) -> ActuatorPowers:
+    if not scene.compliant:
+
+        def standing(stance: Stance) -> ActuatorPowers:
+            hip = functools.partial(hip_motion_of, stance)
+            return _driving(scene, stance.pose.motion, carriers_of(stance), hip)
+
+        return of_stance(scene, state, standing)
+    structure = scene.mechanism.structure
     motion, found = poses_of(scene, state)[0].motion, feet(scene, state)
-    hip = None
-    if scene.mechanism.structure.pairs:
-        hip = hip_motion(scene, found, motion.angles, motion.rates)
     legs, forces = legs_at(scene, state), normal_forces(scene, found)
-    shares = leg_loads(scene.mechanism.structure, load_shares(scene, forces))
-    of_feet = (legs[leg] for leg in scene.mechanism.structure.leg_of_foot)
-    of_parts = actuator_powers(scene, hip, list(zip(forces, of_feet, strict=True)))
-    told = motor_powers(scene.mechanism, motion, scene.ground.slope, legs, shares)
-    return ActuatorPowers(sum(told, of_parts.total), of_parts.motors + tuple(told))
+    shares, pressing = leg_loads(structure, load_shares(scene, forces)), []
+    for force, leg in zip(forces, structure.leg_of_foot, strict=True):
+        moved = preload(scene, legs[leg])
+        if moved is not None and force is not None:
+            pressing.append(force * moved[1])
+    hip = functools.partial(hip_motion, scene, found, motion.angles, motion.rates)
+    return _driving(scene, motion, (legs, shares), hip, pressing)
+
+
+def _driving(
+    scene: Any,
+    motion: Motion,
+    carriers: Carriers,
+    hip: Callable[[], HipMotion],
+    pressing: Sequence[Scalar] = (),
+) -> ActuatorPowers:
+    """Powers of all that drives a walker on feet of either kind.
+
+    Args:
+        scene: whose parts drive.
+        motion: angles and rates of all bodies.
+        carriers: the lines of all legs, and the share of the load on each.
+        hip: what actuators at the hip know, asked where there are any.
+        pressing: powers of the feet's preloads [W].
+    """
+    total, motors = jnp.zeros_like(motion.x), list(pressing)
+    parts = hip_actuators(scene)
+    if parts:
+        now = hip()
+        turning = (part.motor_torques(now) for part in parts)
+        motors = [_power(torques, now) for torques in turning if torques is not None] + motors
+        total = sum((_power(part.torques(now), now) for part in parts), total)
+    joints = motor_powers(scene.mechanism, motion, scene.ground.slope, *carriers)
+    return ActuatorPowers(sum((*pressing, *joints), total), (*motors, *joints))
+
+
+def _power(torques: LegTorques, hip: HipMotion) -> Scalar:
+    return torques[0] * hip.rate[0] + torques[1] * hip.rate[1]
 
 
 def kinetic_energy(scene: AbstractWalkerScene, state: Any) -> Scalar:
@@ -209,38 +262,6 @@ def kinetic_energy(scene: AbstractWalkerScene, state: Any) -> Scalar:
         return found
 
     return of_stance(scene, state, energy)
-
-
-def actuator_powers(
-    scene: WalkerScene,
-    hip: HipMotion | None,
-    feet: Sequence[tuple[Scalar | None, LegMotion]] = (),
-) -> ActuatorPowers:
-    """Powers of the actuators of a walker that moves like this.
-
-    Args:
-        scene: what moves.
-        hip: what actuators at the hip know; None where the walker has no pair of legs.
-        feet: normal force on each foot [N] and how its leg moves; none of rigid feet.
-    """
-    total = jnp.zeros_like(feet[0][1].rate if hip is None else hip.angle[0])
-    motors: list[Scalar] = []
-    if hip is not None:
-        torques = hip_torques(scene, hip)
-        if torques is not None:
-            total = total + _power(torques, hip)
-        driven = (part.motor_torques(hip) for part in hip_actuators(scene))
-        motors += [_power(each, hip) for each in driven if each is not None]
-    for force, leg in feet:
-        moved = preload(scene, leg)
-        if moved is not None and force is not None:
-            motors.append(force * moved[1])
-            total = total + motors[-1]
-    return ActuatorPowers(total, tuple(motors))
-
-
-def _power(torques: LegTorques, hip: HipMotion) -> Scalar:
-    return torques[0] * hip.rate[0] + torques[1] * hip.rate[1]
 
 
 def motor_powers(

@@ -29,12 +29,8 @@ from jaxbiped.scene._structure import Indices
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 
 
-def rolling_hip_motion(scene: RigidScene, state: Any) -> HipMotion:
-    """What actuators at the hip know of the rigid walker: the leg that stands carries it."""
-    return of_stance(scene, state, _hip_motion)
-
-
-def _hip_motion(stance: Stance) -> HipMotion:
+def hip_motion_of(stance: Stance) -> HipMotion:
+    """What actuators at the hip know of a walker on rigid feet: the leg that stands carries it."""
     motion = stance.pose.motion
     structure = stance.tree.structure
     first, second = structure.pairs[0]
@@ -47,18 +43,25 @@ def _hip_motion(stance: Stance) -> HipMotion:
     )
 
 
+def carriers_of(stance: Stance) -> Carriers:
+    """The lines of all legs on rigid feet, and the leg that stands, which carries everything."""
+    mechanism = stance.mechanism
+    bodies = len(mechanism.structure.bodies)
+    legs = legs_in(mechanism, (rehung(mechanism, stance.pose),) * bodies)
+    shares: list[Scalar | None] = [None] * len(legs)
+    shares[stance.leg] = jnp.ones_like(stance.pose.motion.x)
+    return legs, shares
+
+
 def with_torques(loads: Loads, scene: RigidScene, stance: Stance) -> Loads:
     """With the torques of joint parts and actuators."""
-    mechanism, motion = stance.mechanism, stance.pose.motion
-    structure = mechanism.structure
-
-    def carriers() -> Carriers:
-        legs = legs_in(mechanism, (rehung(mechanism, stance.pose),) * len(structure.bodies))
-        shares: list[Scalar | None] = [None] * len(legs)
-        shares[stance.leg] = jnp.ones_like(motion.x)
-        return legs, shares
-
-    return with_driven_joints(loads, scene, motion, carriers, lambda: _hip_motion(stance))
+    return with_driven_joints(
+        loads,
+        scene,
+        stance.pose.motion,
+        lambda: carriers_of(stance),
+        lambda: hip_motion_of(stance),
+    )
 
 
 class Turning(NamedTuple):

@@ -11,6 +11,7 @@ import jax.tree_util as jtu
 
 from jaxbiped._parameter_declaration import with_fields
 from jaxbiped._types import as_float
+from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.scene._joint_parts import Motor, Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._ready_scenes import kneed_scene, seed_scene
@@ -33,8 +34,8 @@ def relaxed(scene: Scene) -> tuple[Scene, Scene] | None:
     """
     mechanism = scene.mechanism
     light, straight = _light_pieces(mechanism), _straightened_pieces(mechanism)
-    is_driven = mechanism.has_motors or scene.actuation is not None
-    if not light and not straight and not is_driven:
+    driven = is_driven(scene)
+    if not light and not straight and not driven:
         return None
     whole = [_with_share(piece) for piece in mechanism.pieces]
     easy = list(whole)
@@ -46,7 +47,7 @@ def relaxed(scene: Scene) -> tuple[Scene, Scene] | None:
         dataclasses.replace(scene, walker=with_fields(mechanism, pieces=tuple(pieces)))
         for pieces in (easy, whole)
     )
-    if is_driven:
+    if driven:
         ground = dataclasses.replace(scene.ground, slope=seed_scene().ground.slope)
         first = dataclasses.replace(first, ground=ground, actuation=_idle(scene))
     return jtu.tree_map(as_float, first), jtu.tree_map(as_float, last)

@@ -12,7 +12,7 @@ from jaxbiped._tables import Entry, variables_of
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._constrained_motion import violation
 from jaxbiped.dynamics._contacts import feet, foot_forces
-from jaxbiped.dynamics._energy import energies
+from jaxbiped.dynamics._energy import energies, powers
 from jaxbiped.dynamics._equivalent_states import BodiesState, minimal_state
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._state import state_quantity
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) -> "xarray.Dataset":
     """States, foot forces, penetrations and energies along a trajectory, labelled, in SI units.
+
+    Of a driven walker there is the power of its motors and actuators, too.
 
     Variables have the dimension `time` [s]. Forces and penetrations also have `foot`, with the
     names of the feet; the coordinate `leg` names the leg of each. Attributes hold the outcome and
@@ -51,7 +53,7 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
         raise ValueError("This is a batch of trajectories: take one of them at a time.")
     state = trajectory.state
     found, forces = feet(scene, state), foot_forces(scene, state)
-    held = energies(scene, state)  # type: ignore[arg-type]
+    held, driving = energies(scene, state), powers(scene, state).actuation
     along, per_foot = ("time",), ("foot", "time")
     entries = {
         name: Entry(along, value, state_quantity(name) or Quantity(name))
@@ -63,6 +65,9 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
         entries["violation"] = Entry(along, off, words)
     for name, value in held._asdict().items():
         entries[f"{name}_energy"] = Entry(along, value, Quantity(f"{name} energy", unit="J"))
+    if driving is not None:
+        words = Quantity("power of motors and actuators", unit="W")
+        entries["actuation_power"] = Entry(along, driving, words)
 
     def rows(values: Sequence[Scalar | None]) -> np.ndarray:
         return np.stack([np.asarray(value) for value in values])

@@ -2,24 +2,14 @@
 
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import check_increasing, check_type
-from jaxbiped._types import Scalar, rows_of
-from jaxbiped.dynamics._energy import (
-    ActuatorPowers,
-    Energies,
-    actuator_powers,
-    energies,
-    kinetic_and_moment,
-    powers,
-)
-from jaxbiped.dynamics._equivalent_states import motion_in, whole_state
+from jaxbiped._types import rows_of
+from jaxbiped.dynamics._energy import energies, is_driven, powers
 from jaxbiped.dynamics._impact import push_off_work
-from jaxbiped.dynamics._joint_loads import joint_energy
-from jaxbiped.dynamics._stance_motion import rolling_field, rolling_hip_motion
+from jaxbiped.dynamics._stance_motion import rolling_field
 from jaxbiped.measure._samples import (
     NODES,
     ModeChanges,
@@ -128,8 +118,8 @@ class RigidLedger(NamedTuple):
 
     Attributes:
         gravity_work: work of gravity on the walker.
-        actuation_work: work of the actuators, including push-off and the energy that a spring
-            between the legs stores and a damper loses. Zero for a passive walker.
+        actuation_work: work of motors and actuators, including push-off and the energy that a
+            spring among the actuators stores and a damper loses. Zero for a passive walker.
         impact_loss: energy lost in the impact that ends the footstep.
         stored_change: change of kinetic and elastic energy, from just after one impact to just
             after the next.
@@ -152,7 +142,8 @@ class RigidLedger(NamedTuple):
 def rigid_ledger(scene: RigidScene, walk: Trajectory[Any]) -> RigidLedger:
     """The energy ledger of the footsteps between the saved heel strikes of a rigid walk.
 
-    Work is the integral of the actuators' power over single support, simulated again tightly.
+    Work is the integral of the power of all that drives over single support, simulated again
+    tightly.
 
     Args:
         scene: the scene that was simulated.
@@ -178,7 +169,7 @@ def rigid_ledger(scene: RigidScene, walk: Trajectory[Any]) -> RigidLedger:
     periods = np.diff(times)
     last, first = _before_impact(scene, starts, periods), rows_of(states, slice(1, None))
     held_first, held_last, after = (
-        evaluate_along(scene, each, _energies) for each in (starts, last, first)
+        evaluate_along(scene, states, energies) for states in (starts, last, first)
     )
     push = np.asarray(push_off_work(scene, last))
     changes = mode_changes(scene, starts, (1.0 - _BEFORE) * periods)
@@ -186,7 +177,7 @@ def rigid_ledger(scene: RigidScene, walk: Trajectory[Any]) -> RigidLedger:
     gravity = held_first.gravitational - held_last.gravitational
     loss = held_last.kinetic + push - after.kinetic
     stored = after.kinetic - held_first.kinetic + held_last.elastic - held_first.elastic
-    work = works.hip + push
+    work = works.actuation + push
     stops = _stop_losses(scene, starts, periods, changes)
     residual = gravity + work - loss - stops - works.joints - stored
     motors = works.motors + np.maximum(push, 0.0)
@@ -204,7 +195,7 @@ def _stop_losses(
 
     def energy(shift: np.ndarray) -> np.ndarray:
         states = states_after(scene, rows_of(starts, number), changes.since + shift)
-        return np.sum(evaluate_along(scene, states, _energies), axis=0)
+        return np.sum(evaluate_along(scene, states, energies), axis=0)
 
     if len(number):
         rest = _BEFORE * periods[number]
@@ -212,16 +203,6 @@ def _stop_losses(
         before, behind = (2.0 * energy(r) - energy(2.0 * r) for r in (-rest, rest))
         np.add.at(lost, number, before - behind)
     return np.where(changes.known, lost, np.nan)
-
-
-def _energies(scene: RigidScene, state: Any) -> Energies:
-    whole = whole_state(scene, state)
-    kinetic, moment = kinetic_and_moment(scene, whole)
-    joints = joint_energy(
-        scene.mechanism, motion_in(scene, whole), scene.ground.slope, stops=scene.compliant
-    )
-    elastic = jnp.zeros_like(kinetic) if joints is None else joints.stored
-    return Energies(kinetic, scene.ground.g * moment, elastic)
 
 
 def _before_impact(scene: RigidScene, starts: Any, periods: np.ndarray) -> Any:
@@ -239,35 +220,17 @@ def _before_impact(scene: RigidScene, starts: Any, periods: np.ndarray) -> Any:
 
 
 class _Works(NamedTuple):
-    """In each footstep [J], shape (n,): of all actuators at the hip, of motors where they drive,
-    and what joints lose."""
+    """Works in each footstep [J], shape (n,): of all that drives, of motors where they drive, and
+    what joints lose."""
 
-    hip: np.ndarray
+    actuation: np.ndarray
     motors: np.ndarray
     joints: np.ndarray
 
 
-class _Flows(NamedTuple):
-    """Powers [W]: of all actuators at the hip, of each motor, and what joints lose."""
-
-    hip: Scalar
-    motors: tuple[Scalar, ...]
-    joints: Scalar
-
-
-def _flows(scene: RigidScene, state: Any) -> _Flows:
-    nothing = jnp.zeros_like(state[0])
-    driven = ActuatorPowers(nothing, ())
-    if scene.actuation is not None:
-        driven = actuator_powers(scene, rolling_hip_motion(scene, state))
-    motion = motion_in(scene, whole_state(scene, state))
-    joints = joint_energy(scene.mechanism, motion, scene.ground.slope, stops=scene.compliant)
-    return _Flows(driven.total, driven.motors, nothing if joints is None else joints.lost)
-
-
 def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeChanges) -> _Works:
     count = len(periods)
-    if scene.actuation is None and not scene.mechanism.joints:
+    if not is_driven(scene) and not scene.mechanism.joints:
         return _Works(*[np.zeros(count) for _ in _Works._fields])
     # Powers jump where the mode changes, so that no panel straddles a change, and settle behind it.
     even = np.linspace(0.0, 1.0, _PANELS + 1)
@@ -283,16 +246,17 @@ def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeCha
     many = rows_of(starts, np.repeat(number, len(NODES)))
     states = states_after(scene, many, times.ravel())
     flows = jtu.tree_map(
-        lambda leaf: leaf.reshape(times.shape), evaluate_along(scene, states, _flows)
+        lambda leaf: leaf.reshape(times.shape), evaluate_along(scene, states, powers)
     )
     samples = Samples(np.append(0.0, np.cumsum(widths)), None)
 
     def by_footstep(works: np.ndarray) -> np.ndarray:
         return np.bincount(number, works, count)
 
-    driving = [by_footstep(samples.positive_integral(each)) for each in flows.motors]
+    driving = [by_footstep(samples.positive_integral(power)) for power in flows.motors or ()]
+    driven = flows.motors is not None
     return _Works(
-        hip=by_footstep(samples.integral(flows.hip)),
-        motors=np.sum(driving, axis=0) if driving else np.zeros(count),
-        joints=by_footstep(samples.integral(flows.joints)),
+        actuation=by_footstep(samples.integral(flows.actuation)) if driven else np.zeros(count),
+        motors=sum(driving, np.zeros(count)),
+        joints=by_footstep(samples.integral(flows.damper)),
     )

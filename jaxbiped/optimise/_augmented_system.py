@@ -15,10 +15,9 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.dynamics._contacts import feet
-from jaxbiped.dynamics._energy import actuator_powers, is_driven, kinetic_energy, powers
+from jaxbiped.dynamics._energy import is_driven, kinetic_energy, powers
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._impact import impact, push_off_work
-from jaxbiped.dynamics._stance_motion import rolling_hip_motion
 from jaxbiped.dynamics._strike_surfaces import clearance
 from jaxbiped.dynamics._surfaces import AbstractSection, Switch
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -207,9 +206,9 @@ class WalkingIntegrals(AbstractAugmentedSystem):
 
 
 class RollingIntegrals(AbstractAugmentedSystem):
-    """`Rolling` with the energy that impacts take; its load is the swing foot's depth [m].
+    """`Rolling` with the energy that impacts and joints take; its load is the swing foot's depth.
 
-    The work of motors is that of the push-off, too.
+    Impacts are also those of stops and soles. The work of motors includes that of the push-off.
 
     Attributes:
         walker: that system.
@@ -221,14 +220,23 @@ class RollingIntegrals(AbstractAugmentedSystem):
 
     def vector_field(self, t: Time, y: PyTree, args: RigidScene) -> PyTree:
         state = motion_of(y)
-        rates = {"impact_loss": jnp.zeros_like(state[0])}
-        if MOTOR_WORK in self.coordinates:
-            rates[MOTOR_WORK] = _driving(_rolling_motors(args, state), state[0])
+        power = powers(args, state)
+        rates = {"impact_loss": power.indentation}
+        if power.motors is not None:
+            rates[MOTOR_WORK] = _driving(power.motors, state[0])
         return join(y, self.walker.vector_field(t, state, args), rates)
 
     def switches(self, args: RigidScene, y: PyTree) -> tuple[Switch, ...]:
-        """Each motor's change of sign."""
-        return tuple(Switch(power, True) for power in _rolling_motors(args, motion_of(y)))
+        """The walker's, and each motor's change of sign."""
+        state = motion_of(y)
+        motors = powers(args, state).motors or ()
+        return self.walker.switches(args, state) + tuple(Switch(power, True) for power in motors)
+
+    def reset_at_switch(self, args: RigidScene, y: PyTree) -> PyTree:
+        state = motion_of(y)
+        after = self.walker.reset_at_switch(args, state)
+        lost = kinetic_energy(args, state) - kinetic_energy(args, after)
+        return self.with_motion(y._replace(impact_loss=y.impact_loss + lost), after)
 
     def reset_map(self, args: RigidScene, y: PyTree) -> PyTree:
         state = motion_of(y)
@@ -243,13 +251,6 @@ class RollingIntegrals(AbstractAugmentedSystem):
     def load(self, args: RigidScene, y: PyTree) -> Scalar:
         """How deep the swing foot is underground [m]."""
         return -clearance(args, motion_of(y))
-
-
-def _rolling_motors(scene: RigidScene, state: Any) -> tuple[Scalar, ...]:
-    """Power of each motor at the hip of the walker that rolls on leg 2 [W]."""
-    if scene.actuation is None:
-        return ()
-    return actuator_powers(scene, rolling_hip_motion(scene, state)).motors
 
 
 def integrals_of(scene: Scene | RigidScene) -> WalkingIntegrals | RollingIntegrals:

@@ -22,9 +22,9 @@ from jaxbiped._identity import difference_of
 from jaxbiped._types import JsonObject, Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.continuation._bifurcations import BranchEvent
-from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._augmented_system import MOTOR_WORK
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import (
     Functional,
@@ -175,24 +175,22 @@ def _root_of_squares(rows: list[Functional]) -> Functional:
 
 
 def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, Functional]) -> Functional:
-    """Losses, or what the motors do and gravity's share, over weight times length."""
-    if not is_driven(scene):
-        losses = [rows[name] for name in ("impact_loss", "friction_loss") if name in rows]
-        return _over_weight_and_length(scene, losses, rows["step_length"])
-    driven = _over_weight_and_length(scene, [rows["motor_work"]], rows["step_length"])
-    slope = float(scene.ground.slope)
-    by_slope = np.zeros(len(driven.slopes))
+    """Work of the motors over weight times length, and gravity's share, exact over a cycle."""
+    slope, length = float(scene.ground.slope), rows["step_length"]
+    by_slope = np.zeros(len(length.slopes))
     by_slope[parameter_names(scene).index("slope")] = np.cos(slope)
+    if MOTOR_WORK not in rows:
+        return Functional(np.sin(slope), 0.0, by_slope, np.zeros(len(by_slope)))
+    driven = _over_weight_and_length(scene, rows[MOTOR_WORK], length)
     return driven._replace(value=driven.value + np.sin(slope), slopes=driven.slopes + by_slope)
 
 
 def _over_weight_and_length(
-    scene: Scene | RigidScene, works: list[Functional], length: Functional
+    scene: Scene | RigidScene, work: Functional, length: Functional
 ) -> Functional:
     weight, by_parameters = map(np.asarray, _weight(scene))
     own = length.slopes / length.value + by_parameters / weight
     divisor = float(weight) * length.value
-    work = weighted_sum([1.0] * len(works), works, len(own))
     cost = work.value / divisor
     return Functional(
         value=cost,

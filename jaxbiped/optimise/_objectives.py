@@ -10,6 +10,7 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.gait._gait import Gait
+from jaxbiped.scene._rigid_feet import rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
@@ -31,9 +32,16 @@ def _of_friction(scene: Scene | RigidScene) -> str | None:
 def _of_strike(scene: Scene | RigidScene) -> str | None:
     if isinstance(scene, Scene):
         return "its feet press into the ground for a while instead of striking at once"
-    if is_driven(scene):
-        return "what drives it changes volumes of phase space, too"
+    if is_driven(scene) or any(_damps(part) for part in scene.mechanism.joints):
+        return "what drives or damps it changes volumes of phase space, too"
+    if rigid_modes(scene.mechanism).any:
+        return "its stops or flat feet strike, too"
     return None
+
+
+def _damps(part: object) -> bool:
+    """Whether a joint part has a damper."""
+    return getattr(part, "damping", None) is not None
 
 
 def _of_steps(scene: Scene | RigidScene) -> str | None:
@@ -106,9 +114,9 @@ OBJECTIVES = {
 """By name. Those of a cycle: losses and slip are sums over its footsteps.
 
 - cost of transport: work of gravity and of the motors over weight times way, as
-  `measure.cost_of_transport` has it; a passive walker's is what it loses, sin(slope) in all.
+  `measure.cost_of_transport` has it; sin(slope) for a passive walker.
 - impact loss: work of the normal reactions, and what springs, stops and latches lose; a rigid
-  walker's kinetic energy lost in its impacts, after its push-off.
+  walker's kinetic energy lost in its impacts, after its push-off, and what its joints lose.
 - motor work: of each motor where its power is positive, added up, and the push-off's.
 - slip distance: path of the feet that touch, along the ground.
 - foot clearance: least height of the swinging foot, negative where it passes underground.

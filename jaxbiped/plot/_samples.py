@@ -222,9 +222,10 @@ def _exchanged_back(
     for j, twin in enumerate(structure.body_twins or ()):
         for word in ("theta", "omega"):
             own, other = (f"{word}_{structure.bodies[k]}" for k in (j, twin))
-            changed[own] = np.where(odd, found[other], found[own])
-    if structure.turn is not None:
-        name = f"theta_{structure.bodies[structure.turn.body]}"
+            if own in found:
+                changed[own] = np.where(odd, found[other], found[own])
+    name = "" if structure.turn is None else f"theta_{structure.bodies[structure.turn.body]}"
+    if structure.turn is not None and name in found:
         changed[name] = found[name] - 2.0 * np.pi / structure.turn.order * rows
     for word in ("normal", "tangential"):
         names = [f"{word}_{k + 1}" for k in range(len(structure.feet))]

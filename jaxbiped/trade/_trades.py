@@ -105,7 +105,7 @@ class WalkTrade(NamedTuple):
     def _books(self, walk: Trajectory) -> dict[str, np.ndarray]:
         ledger = energy_ledger(self.scene, walk)
         shares = (
-            ledger.gravity_work,
+            ledger.gravity_work + ledger.actuation_work,
             ledger.damper_loss,
             ledger.friction_loss,
             ledger.stored_change,

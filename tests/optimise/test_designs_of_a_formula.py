@@ -11,9 +11,10 @@ from reference.rigid import rigid_walker
 import jaxbiped as jb
 from jaxbiped._progress import Stage
 from jaxbiped.dynamics._actuation import hip_torques
-from jaxbiped.dynamics._energy import actuator_powers
+from jaxbiped.dynamics._energy import powers
 from jaxbiped.dynamics._impact import push_off_work
-from jaxbiped.dynamics._stance_motion import rolling_hip_motion
+from jaxbiped.dynamics._stance import of_stance
+from jaxbiped.dynamics._stance_motion import hip_motion_of
 from jaxbiped.optimise import _certificate, _design_gaits
 from jaxbiped.optimise._augmented_system import integrals_of
 from jaxbiped.optimise._cycle_functionals import Functional, _totals, with_errors
@@ -130,21 +131,17 @@ def test_variables_keep_their_bounds_and_gradients_are_differences_of_the_design
         np.testing.assert_allclose(variables.positions(variables.values(at)), at)
 
 
-@pytest.mark.parametrize("driven", [False, True])
-def test_the_cost_of_transport_moves_with_all_that_it_is_made_of(driven):
-    """Works over (2 m + M) g L, by differences."""
+def test_the_cost_of_transport_moves_with_all_that_it_is_made_of():
+    """The motors' work over (2 m + M) g L beside the slope's sine, by differences."""
     base = dict(m=1.0, hip_mass=0.7, g=9.8, slope=0.02, d=0.1)
     scene = jb.with_parameters(SCENE, base)
-    if driven:
-        push = jb.actuation.PushOff(0.1)
-        scene = jb.RigidScene(scene.walker, scene.ground, push)
+    scene = jb.RigidScene(scene.walker, scene.ground, jb.actuation.PushOff(0.1))
     names = jb.parameter_names(scene)
     work = lambda p: 0.05 + 0.3 * p["d"] + 0.2 * p["m"]
-    length = lambda p: 0.2 + 0.4 * p["d"] + 3.0 * p["slope"] * (1.0 if not driven else 0.0)
+    length = lambda p: 0.2 + 0.4 * p["d"] + 3.0 * p["slope"]
 
-    def cost(p):
-        own = work(p) / ((2.0 * p["m"] + p["hip_mass"]) * p["g"] * length(p))
-        return own + (np.sin(p["slope"]) if driven else 0.0)
+    def motors(p):
+        return work(p) / ((2.0 * p["m"] + p["hip_mass"]) * p["g"] * length(p))
 
     def as_row(function, error):
         slopes = np.zeros(len(names))
@@ -153,16 +150,16 @@ def test_the_cost_of_transport_moves_with_all_that_it_is_made_of(driven):
             slopes[names.index(name)] = difference(moved)
         return Functional(function(base), error, slopes, 0.0 * slopes)
 
-    works = "motor_work" if driven else "impact_loss"
-    found = _cost_of_transport(
-        scene, {works: as_row(work, 1e-3), "step_length": as_row(length, 2e-3)}
-    )
-    expected = as_row(cost, 0.0)
+    rows = {"motor_work": as_row(work, 1e-3), "step_length": as_row(length, 2e-3)}
+    found = _cost_of_transport(scene, rows)
+    expected = as_row(lambda p: motors(p) + np.sin(p["slope"]), 0.0)
     assert found.value == pytest.approx(expected.value)
     np.testing.assert_allclose(found.slopes, expected.slopes, rtol=1e-6, atol=1e-9)
-    share = 1e-3 / work(base) + 2e-3 / length(base)
-    own = cost(base) - (np.sin(0.02) if driven else 0.0)
-    assert found.error == pytest.approx(own * share)
+    assert found.error == pytest.approx(motors(base) * (1e-3 / work(base) + 2e-3 / length(base)))
+    passive = _cost_of_transport(scene, {"step_length": rows["step_length"]})
+    assert (passive.value, passive.error) == (np.sin(0.02), 0.0)
+    alone = {names[k]: slope for k, slope in enumerate(passive.slopes) if slope}
+    assert alone == {"slope": np.cos(0.02)}
 
 
 def test_a_root_of_squares_has_the_slopes_of_one():
@@ -330,8 +327,8 @@ def test_motors_work_where_they_drive_and_not_where_they_brake():
 
     @jax.jit
     def told(state):
-        hip = rolling_hip_motion(scene, state)
-        motors = actuator_powers(scene, hip).motors
+        motors = powers(scene, state).motors
+        hip = of_stance(scene, state, hip_motion_of)
         work = system.vector_field(0.0, system.begin(state), scene).motor_work
         return work, motors, hip_torques(scene, hip)
 

@@ -16,7 +16,7 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import JsonObject, Scalar
 from jaxbiped.compiler import LANES, Program, Request, web_module
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.dynamics._energy import Energies, energies
+from jaxbiped.dynamics._energy import Energies, energies, is_driven, powers
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.plot import style
 from jaxbiped.plot._skeleton import body_motion, motion_names, names_by_foot, skeleton_of
@@ -35,7 +35,8 @@ def recorded_names(scene: Scene) -> tuple[str, ...]:
     structure = scene.mechanism.structure
     contact = names_by_foot(structure, "touches", "place")
     forces = names_by_foot(structure, "normal", "tangential")
-    return ("t", *motion_names(structure), *forces, *Energies._fields, *contact)
+    power = ("power",) if is_driven(scene) else ()
+    return ("t", *motion_names(structure), *forces, *Energies._fields, *power, *contact)
 
 
 def played_request(scene: Scene, state: Any, footsteps: int) -> Request:
@@ -79,7 +80,10 @@ def _shown_numbers(scene: Any, state: Any) -> list[Scalar]:
     ]
     touching = [jnp.where(touches, 1.0, 0.0) for touches in found.touching]
     places = [foot.x for foot in found.feet]
-    rest = (*normal, *tangential, *energies(scene, state), *touching, *places)
+    power, driving = (), powers(scene, state).actuation
+    if driving is not None:
+        power = (driving,)
+    rest = (*normal, *tangential, *energies(scene, state), *power, *touching, *places)
     return [*named, *(zero + value for value in rest)]
 
 

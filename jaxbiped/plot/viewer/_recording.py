@@ -13,7 +13,7 @@ import numpy.typing as npt
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject, Scalar
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.dynamics._energy import energies, kinetic_and_moment
+from jaxbiped.dynamics._energy import Energies, energies, is_driven
 from jaxbiped.dynamics._equivalent_states import whole_state
 from jaxbiped.dynamics._mode_changes import foot_loads
 from jaxbiped.dynamics._stance import Stance, of_stance
@@ -23,12 +23,17 @@ from jaxbiped.measure._samples import evaluate_along, places_of_standing
 from jaxbiped.plot._contact_charts import forces_in
 from jaxbiped.plot._samples import RigidMotion, end_time, rigid_motion, state_at
 from jaxbiped.plot._skeleton import Skeleton, body_motion, motion_names, names_by_foot, skeleton_of
+from jaxbiped.plot.viewer._energy_channels import (
+    ENERGIES,
+    driving_work,
+    energy_channels,
+    rigid_driving_work,
+)
 from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory
 
 _FORCES = ("normal", "tangential")
-ENERGIES = ("kinetic", "elastic", "supplied", "lost")
 _FORCE, _ENERGY = 0.05, 5e-4
 """Errors allowed of forces, in weights, and of energies, in weights times the walker's height."""
 
@@ -60,7 +65,7 @@ class Recording:
         slope: [rad].
         skeleton: what is drawn.
         weight: of the walker [N].
-        driven: whether actuators act on it.
+        driven: whether motors or actuators act on it.
         t: knots [s], shape (n,).
         channels: coordinates, rates, forces [N] and energies [J] at the knots, shape (n,).
         footprints: in order of time.
@@ -105,7 +110,7 @@ def recording(
         slope=float(scene.ground.slope),
         skeleton=skeleton_of(scene.mechanism),
         weight=_weight(scene),
-        driven=scene.actuation is not None,
+        driven=is_driven(scene),
         t=t[:count],
         channels={each: values[:count] for each, values in channels.items()},
         footprints=tuple(footprints),
@@ -155,6 +160,9 @@ def record_walk(
         raise ArgumentError("trajectory ends where it begins: there is no motion to look at.")
     first = _first_times(scene, trajectory)
     started = evaluate_along(scene, state_at(trajectory, first[:1]), energies)
+    edges, work = np.union1d(first, np.asarray(trajectory.t)), None
+    if is_driven(scene) and not motion_only:
+        work = driving_work(scene, trajectory, edges)
 
     def evaluate(t: np.ndarray) -> Channels:
         states = state_at(trajectory, t)
@@ -162,14 +170,12 @@ def record_walk(
         if motion_only:
             return motion
         now = evaluate_along(scene, states, energies)
-        return {
-            **motion,
-            **forces_in(evaluate_along(scene, states, contacts)),
-            "kinetic": now.kinetic,
-            "elastic": now.elastic,
-            "supplied": started.gravitational - now.gravitational,
-            "lost": started.total - now.total,
-        }
+        forces = forces_in(evaluate_along(scene, states, contacts))
+        given = started.gravitational - now.gravitational
+        driven, held = None, started.kinetic + started.elastic
+        if work is not None:
+            driven = np.interp(t, edges, work)
+        return motion | forces | energy_channels(now.kinetic, given, now.elastic, driven, held)
 
     exact = _LOOKS_RIGHT if motion_only else _EXACT
     t, channels = adaptive_knots(evaluate, first, tolerances_for(scene, exact))
@@ -223,10 +229,13 @@ def record_rigid_walk(scene: RigidScene, walk: Trajectory[Any], name: str) -> Re
     motion = rigid_motion(scene, walk)
     t = _knot_times(motion, _EVEN * time_unit(scene))
     channels = motion.along(_quantities, t)
-    height = channels.pop("gravitational")
-    channels["supplied"] = height[0] - height
-    total = channels["kinetic"] - channels["supplied"]
-    channels["lost"] = total[0] - total
+    kinetic, height, elastic = (channels.pop(name) for name in Energies._fields)
+    driven, held = None, kinetic[0] + elastic[0]
+    if is_driven(scene):
+        driven = rigid_driving_work(motion, t)
+    channels |= energy_channels(kinetic, height[0] - height, elastic, driven, held)
+    if not elastic.any():
+        del channels["elastic"]
     return recording(scene, name, walk.outcome, t, channels, _rigid_footprints(motion))
 
 
@@ -240,11 +249,9 @@ def _knot_times(motion: RigidMotion, apart: float) -> np.ndarray:
 
 
 def _quantities(scene: RigidScene, state: Any) -> dict[str, Scalar]:
-    whole = whole_state(scene, state)
-    kinetic, moment = kinetic_and_moment(scene, whole)
-    energies = {"kinetic": kinetic, "gravitational": scene.ground.g * moment}
     forces = of_stance(scene, state, functools.partial(_forces, scene))
-    return body_motion(scene, whole) | forces | energies
+    held = energies(scene, state)._asdict()
+    return body_motion(scene, whole_state(scene, state)) | forces | held
 
 
 def _forces(scene: RigidScene, stance: Stance) -> dict[str, Scalar]:

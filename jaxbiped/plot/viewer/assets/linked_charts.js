@@ -4,21 +4,18 @@ import { linear, within } from "./channels.js";
 import { Chart, rangeOf } from "./chart.js";
 import { html } from "./dom.js";
 
-const ENERGIES = ["kinetic", "elastic", "supplied", "lost"];
-const ENERGY_NAMES = {
-  kinetic: "kinetic", elastic: "elastic", supplied: "gravity's work", lost: "lost",
+const ENERGIES = {
+  kinetic: "kinetic", elastic: "elastic", supplied: "gravity's work", driven: "motors' work",
+  lost: "lost",
 };
 
 /** What is drawn of a walk: each chart with its curves, `{name, label, look}`. */
-function chartsOf({ skeleton, driven }) {
+function chartsOf({ skeleton }) {
   const { noun, parts, feet } = skeleton;
   const turning = parts.map(({ name, label, look }) => ({ body: name, name: `theta_${name}`, label, look }));
   const loads = (kind) =>
     feet.map(({ label, look }, k) => ({ name: `${kind}_${k + 1}`, label, look }));
-  const lost = driven ? "lost less driven" : ENERGY_NAMES.lost;
-  const energies = ENERGIES.map((name) => ({
-    name, label: name === "lost" ? lost : ENERGY_NAMES[name], look: name,
-  }));
+  const energies = Object.entries(ENERGIES).map(([name, label]) => ({ name, label, look: name }));
   const angle = `${noun} angle (rad)`;
   return [
     { title: `${noun[0].toUpperCase()}${noun.slice(1)} angles`, y: angle, curves: turning },
@@ -96,7 +93,8 @@ function mostForce(walk) {
 }
 
 function mostEnergy({ channels }) {
-  const [low, high] = rangeOf([channels.kinetic, channels.supplied]);
+  const known = [channels.kinetic, channels.supplied, channels.driven].filter(Boolean);
+  const [low, high] = rangeOf(known);
   return 1.5 * Math.max(high, -low);
 }
 

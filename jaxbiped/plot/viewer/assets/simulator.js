@@ -63,10 +63,16 @@ class Simulator {
     });
     const [height, total] = [channels.gravitational, totalEnergy(channels)];
     channels.supplied = height.map((value) => height[0] - value);
-    channels.lost = total.map((value) => total[0] - value);
+    const { t, power } = channels;
+    if (power) {
+      let work = 0;
+      const gained = (k) => 0.5 * (power[k] + power[k - 1]) * (t[k] - t[k - 1]);
+      channels.driven = power.map((_, k) => (k ? (work += gained(k)) : 0));
+    }
+    channels.lost = total.map((value, k) => total[0] - value + (channels.driven?.[k] ?? 0));
     const footprints = heelStrikes(channels, skeleton);
-    const told = { name: "your walk", ending: endings[code], driven: false };
-    return { ...told, slope, skeleton, weight, t: channels.t, channels, footprints };
+    const told = { name: "your walk", ending: endings[code], driven: Boolean(power) };
+    return { ...told, slope, skeleton, weight, t, channels, footprints };
   }
 }
 
