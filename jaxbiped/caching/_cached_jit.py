@@ -4,6 +4,7 @@ A program that was compiled is kept on disk. The next process that calls the fun
 of the same structure neither traces nor compiles it.
 """
 
+import contextlib
 import functools
 import threading
 from collections.abc import Callable, Hashable, Sequence
@@ -14,7 +15,7 @@ import jax
 
 from jaxbiped._jax_versions import nothing_is_traced, without_switches
 from jaxbiped.caching import _caches
-from jaxbiped.caching._caches import Once, name_of, register_cache
+from jaxbiped.caching._caches import Once, OncePerVersion, name_of, register_cache
 from jaxbiped.caching._compiled_store import (
     ArrayFunction,
     KeptProgram,
@@ -91,7 +92,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         self._others = [] if form is None else [form]
         self._function: Callable[..., Any] = function
         self._jitted: Any = eqx.filter_jit(function)
-        self._programs: dict[Hashable, Once[KeptProgram | None]] = {}
+        self._programs: dict[Hashable, OncePerVersion[KeptProgram | None]] = {}
         self._lock = threading.Lock()
         register_cache(name_of(function), self._count, lambda: _caches.PROGRAMS, self.clear)
 
@@ -99,6 +100,8 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
         arguments = arguments_of((args, kwargs))
         program = None if arguments is None else self._program(arguments, *self._others, _XLA)
+        if arguments is None:
+            self._note_code((args, kwargs))
         found: _T
         if arguments is None or program is None:
             self._make_room()
@@ -142,8 +145,14 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         if known is None:
             self._make_room()
             with self._lock:
-                known = self._programs.setdefault(kind, Once())
-        return known
+                known = self._programs.setdefault(kind, OncePerVersion(kind))
+        return known()[1]
+
+    def _note_code(self, given: object) -> None:
+        """Has JAX trace again what is traced, if code of the user's in it reads anything else."""
+        skeleton, _ = Skeleton.of(given)
+        with contextlib.suppress(TypeError):  # unhashable
+            self._once((skeleton.structure, *skeleton.leaves))
 
     def _program(self, arguments: Arguments, *forms: Form) -> KeptProgram | None:
         """The program for such arguments in the first of these forms that it has."""

@@ -12,6 +12,7 @@ from collections.abc import Callable, Hashable
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from jaxbiped._files import CACHE_BYTES_VARIABLE, environment_number
+from jaxbiped.caching._user_code import users_code, versions_of
 
 _CACHE_BYTES = 1 << 30
 PROGRAMS = 64
@@ -100,6 +101,19 @@ class Once(Generic[_T]):
         return self._made[0]
 
 
+class OncePerVersion(Generic[_T]):
+    """A `Once` for the present version of the user's code in a key, with that version."""
+
+    def __init__(self, key: object) -> None:
+        self._code, self._known = users_code(key), ((), Once[_T]())
+
+    def __call__(self) -> tuple[tuple[int, ...], Once[_T]]:
+        versions = versions_of(self._code)
+        if versions != self._known[0]:
+            self._known = versions, Once()
+        return self._known
+
+
 class OfObjects(Generic[_T]):
     """A value for each of some immutable objects, kept for as long as the object lives."""
 
@@ -114,6 +128,20 @@ class OfObjects(Generic[_T]):
             gone = weakref.ref(thing, lambda _: self._known.pop(number, None))
             known = self._known[number] = (gone, make())
         return known[1]
+
+
+def versions_in(thing: Any) -> tuple[int, ...]:
+    """The versions of the user's code in an immutable object; see `versions_of`."""
+    import jax
+
+    return versions_of(_CODE(thing, lambda: _code_in(jax.tree.structure(thing))))
+
+
+_CODE = OfObjects[tuple[Hashable, ...]]()
+_code_in = functools.lru_cache(PROGRAMS)(users_code)
+register_cache(
+    "jaxbiped.users_code", lambda: _code_in.cache_info().currsize, lambda: PROGRAMS, _code_in.cache_clear
+)
 
 
 def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]]:
@@ -131,24 +159,24 @@ def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]
         )
 
         @functools.lru_cache(maxsize=bound)
-        def result_of(*args: Hashable) -> Once[_T]:
-            return Once()
+        def result_of(*args: Hashable) -> OncePerVersion[_T]:
+            return OncePerVersion(args)
 
-        def make(args: tuple[Hashable, ...]) -> _T:
+        def make(args: tuple[Hashable, ...], versions: tuple[int, ...]) -> _T:
             with lock:
-                known = alive.get(args)
+                known = alive.get((versions, *args))
             if known is not None:
                 return known
             made = function(*args)
             with lock, contextlib.suppress(TypeError):  # plain values have no identity to keep
-                made = alive.setdefault(args, made)
+                made = alive.setdefault((versions, *args), made)
             return made
 
         @functools.wraps(function)
         def cached(*args: Hashable) -> _T:
             with lock:
-                result = result_of(*args)
-            return result(lambda: make(args))
+                versions, result = result_of(*args)()
+            return result(lambda: make(args, versions))
 
         def size() -> int:
             return result_of.cache_info().currsize

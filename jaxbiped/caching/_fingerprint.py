@@ -9,7 +9,6 @@ import dataclasses
 import enum
 import functools
 import hashlib
-import inspect
 import os
 import sys
 import types
@@ -24,6 +23,7 @@ import numpy as np
 from jaxbiped.caching import IMPORT_BEGAN_AT
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.caching._source_digest import SourceDigests
+from jaxbiped.caching._user_code import code_members
 
 _PACKAGE = "jaxbiped"
 _LIBRARIES = (
@@ -108,7 +108,7 @@ def _members(thing: Any) -> Iterator[object]:
     elif isinstance(thing, types.FunctionType):
         yield from _function_members(thing)
     elif isinstance(thing, types.CodeType):
-        yield from _code_members(thing)
+        yield from code_members(thing)
     elif isinstance(thing, types.MethodType):
         yield from (thing.__func__, thing.__self__)
     elif isinstance(thing, types.BuiltinFunctionType | np.ufunc):
@@ -142,16 +142,6 @@ def _function_members(function: types.FunctionType) -> Iterator[object]:
             yield cell.cell_contents
         except ValueError as empty:
             raise UnknownMeaningError("a name that is not defined yet") from empty
-
-
-def _code_members(code: types.CodeType) -> Iterator[object]:
-    """Of a function's code, where others of its name lie in its module: no lines and no words."""
-    yield code.co_code
-    yield (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
-    flag = getattr(inspect, "CO_HAS_DOCSTRING", None)  # since Python 3.14
-    documented = code.co_flags & flag if flag else not code.co_name.startswith("<")
-    first = isinstance(next(iter(code.co_consts), None), str) and documented
-    yield code.co_consts[1 if first else 0 :]
 
 
 def _attributes(thing: object) -> dict[str, object]:

@@ -13,7 +13,7 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._jax_versions import current_trace
 from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
 from jaxbiped._types import Parameter, Scalar, by_numpy, is_traced
-from jaxbiped.caching._caches import OfObjects
+from jaxbiped.caching._caches import OfObjects, versions_in
 from jaxbiped.scene._bodies import Body, Foot
 from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Motor, Stop
 from jaxbiped.scene._mechanism_pieces import (
@@ -269,7 +269,7 @@ def mechanism_of(walker: Any) -> Mechanism:
         )
     # What is made within one trace means nothing in another.
     traced = is_traced(walker)
-    made, trace = _MADE(walker, dict), current_trace() if traced else None
+    made, trace = _MADE(walker, dict), (versions_in(walker), current_trace() if traced else None)
     if trace not in made:
         # The walker's own rules first: they name its fields, and its leaves may be new to them.
         getattr(walker, "__check_init__", lambda: None)()

@@ -16,7 +16,7 @@ from jaxbiped._checks import ArgumentError, check_type, is_number, traced_rules
 from jaxbiped._jax_versions import undifferentiated
 from jaxbiped._types import SomeTree, as_float, is_real, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.caching._caches import OfObjects
+from jaxbiped.caching._caches import OfObjects, versions_in
 
 SomeModule = TypeVar("SomeModule", bound=eqx.Module)
 
@@ -29,6 +29,7 @@ def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
             NaN throughout instead, in that lane.
     """
     check_type("scene", scene, *kinds)
+    versions_in(scene)  # before anything is looked up that was made of it
     leaves, structure = jtu.tree_flatten(scene)
     exact = [_in_64_bits(leaf) for leaf in leaves]
     if any(a is not b for a, b in zip(leaves, exact, strict=True)):

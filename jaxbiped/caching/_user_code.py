@@ -1,0 +1,207 @@
+"""User code: functions, classes and objects of the user's, told apart by all that they read.
+
+A compiled program holds the numbers that such a function read while it was traced: from globals,
+attributes, arrays, cells, helpers. They may change while the function stays the same object, so
+every cache also compares the version of the code that a program was made of.
+"""
+
+import inspect
+import io
+import itertools
+import pickle
+import sys
+import threading
+import types
+from collections.abc import Hashable, Iterator
+from typing import Any, NamedTuple
+
+from jaxbiped._checks import ArgumentError
+
+LIBRARIES = frozenset(
+    ("diffrax", "equinox", "jax", "jaxbiped", "jaxlib", "jaxtyping", "lineax", "llvmlite")
+).union(("ml_dtypes", "numpy", "optax", "optimistix"), sys.stdlib_module_names)
+"""Packages whose code is not the user's."""
+_NOT_READ = {"__dict__", "__weakref__", "__doc__", "__dataclass_fields__", "_abc_impl"}
+_BY_ANY_NAME = {"getattr", "vars", "__dict__", "attrgetter", "asdict", "astuple", "fields"}
+"""Names by which a function may read attributes that its code does not mention."""
+_PLAIN = (dict, list, tuple, set, frozenset, bytes, bool, int, float, complex, str)
+_MOST_READINGS = 256
+
+
+class _Reading(NamedTuple):
+    """What a piece of code read.
+
+    Attributes:
+        content: all of it, written down.
+        names: which the code mentions.
+        kept: objects that are told apart by their identity, so that no other gets the same.
+        version: a number that no other content had.
+    """
+
+    content: bytes
+    names: set[str]
+    kept: list[object]
+    version: int
+
+
+_READINGS: dict[Hashable, _Reading] = {}
+_VERSIONS = itertools.count()
+_LOCK = threading.RLock()
+
+
+def users_code(*things: object) -> tuple[Hashable, ...]:
+    """The functions, classes and objects of the user's of which some things are made."""
+    reader = _Reader(None)
+    reader.dump(things)
+    return tuple(reader.code)
+
+
+def versions_of(code: tuple[Hashable, ...]) -> tuple[int, ...]:
+    """The versions of pieces of code, which are other numbers once they read anything else.
+
+    Raises:
+        ArgumentError: one reads a value that is traced.
+    """
+    with _LOCK:
+        return tuple(map(_version, code))
+
+
+def _version(piece: Hashable) -> int:
+    known = _READINGS.get(piece)
+    names, size = set[str]() if known is None else known.names, -1
+    while size < len(names):  # what is read may mention more names
+        size, reader = len(names), _Reader(piece, names)
+        reader.dump(piece)
+    content = reader.file.getvalue()
+    if known is not None and known.content == content:
+        return known.version
+    if known is not None or len(_READINGS) >= _MOST_READINGS:
+        _READINGS.clear()
+        sys.modules["jax"].clear_caches()  # what it traced of this and of equal functions
+    _READINGS[piece] = _Reading(content, names, reader.kept, next(_VERSIONS))
+    return _READINGS[piece].version
+
+
+def _made(*parts: object) -> None:
+    """Stands for the function that would make a thing again, which nobody does."""
+
+
+class _Reader(pickle.Pickler):
+    """Writes down all that a piece of code reads, or without one, finds the pieces in a thing."""
+
+    def __init__(self, piece: object, names: set[str] | None = None) -> None:
+        self.file, self.piece, self.kept = io.BytesIO(), piece, list[object]()
+        self.finds, self.names, self.code = names is None, names or set(), dict[Any, None]()
+        super().__init__(self.file, protocol=5)
+
+    def reducer_override(self, thing: Any) -> Any:
+        """See `pickle.Pickler`. What is read is a state, as only states may contain themselves."""
+        jax: Any = sys.modules["jax"]
+        kind = thing if isinstance(thing, type | types.FunctionType) else type(thing)
+        users = _is_users(kind)
+        if thing is _made:
+            return NotImplemented
+        if isinstance(thing, jax.core.Tracer) and not self.finds:
+            raise ArgumentError(
+                f"{self.piece!r} reads a value that JAX traces from a closure or a global, which "
+                "is not allowed: make it an equinox.Module that has such values as leaves, or "
+                "read them from what it is called with, such as the scene."
+            )
+        # Of a node of JAX's trees, the package reads the parts, so that all of them count.
+        if users and self.finds and (thing is kind or jax.tree_util.all_leaves([thing])):
+            self.code[thing] = None
+            return _made, ()
+        return _made, (getattr(kind, "__qualname__", ""),), tuple(self._parts(thing, kind, users))
+
+    def _parts(self, thing: Any, kind: Any, users: bool) -> Iterator[object]:
+        if isinstance(thing, types.ModuleType):
+            yield thing.__name__, self._named(vars(thing)) if _is_users(thing) else None
+        elif isinstance(thing, types.FunctionType):
+            yield thing.__code__, thing.__defaults__, thing.__kwdefaults__, thing.__closure__
+            read = set(_names(thing.__code__)) if users else set[str]()
+            self.names.update(read)
+            yield {name: thing.__globals__.get(name) for name in sorted(read)}, vars(thing)
+        elif isinstance(thing, types.CodeType):
+            yield from code_members(thing)
+        elif isinstance(thing, types.CellType):
+            yield _content(thing)
+        elif isinstance(thing, types.MethodType):
+            yield thing.__func__, thing.__self__
+        elif thing is kind:
+            yield thing.__module__
+            if users:
+                own = {name: each for name, each in vars(thing).items() if name not in _NOT_READ}
+                yield thing.__bases__, own
+        elif users:
+            yield kind, [each(thing) for each in _PLAIN if isinstance(thing, each)]
+            state = object.__getstate__(thing)  # type: ignore[attr-defined]
+            for part in state if isinstance(state, tuple) else (state,):
+                yield part if self.finds else self._named(part or {})
+        elif isinstance(thing, sys.modules["jax"].tree_util.PyTreeDef):
+            yield thing.unflatten(range(thing.num_leaves))
+        elif hasattr(thing, "__fingerprint__"):
+            yield thing.__fingerprint__()
+        else:
+            yield from self._library_parts(thing)
+
+    def _library_parts(self, thing: Any) -> Iterator[object]:
+        """What an object of a library's class holds, or its identity if the class does not tell."""
+        try:
+            how = thing.__reduce_ex__(5)
+            yield how if isinstance(how, str) else [*how[:3], *map(_listed, how[3:])]
+        except Exception:  # whatever a library's class raises
+            self.kept.append(thing)
+            values = [getattr(thing, name, None) for name in sorted(self.names)]
+            yield [value for value in values if isinstance(value, _PLAIN)]
+            yield id(thing), getattr(thing, "__wrapped__", None)
+
+    def _named(self, attributes: dict[str, object]) -> dict[str, object]:
+        """The attributes that the code may read."""
+        by_any_name = self.names & _BY_ANY_NAME
+        return {n: each for n, each in attributes.items() if by_any_name or n in self.names}
+
+
+def _listed(items: Any) -> object:
+    return None if items is None or callable(items) else list(items)
+
+
+def _is_users(thing: Any) -> bool:
+    """Whether what a function, class or module reads is the user's to change."""
+    module = thing.__module__ if isinstance(thing, type) else None
+    name = module or getattr(thing, "__globals__", vars(thing)).get("__name__")
+    if str(name).partition(".")[0] in LIBRARIES:
+        return False
+    file = str(getattr(sys.modules.get(str(name)), "__file__", None))
+    # Classes of installed packages are many and do not change, unless they extend this package.
+    extends = any(
+        base.__module__.startswith("jaxbiped.") for base in getattr(module and thing, "__mro__", ())
+    )
+    return module is None or extends or "site-packages" not in file
+
+
+def _content(cell: types.CellType) -> object:
+    try:
+        return (cell.cell_contents,)
+    except ValueError:  # a name that is not defined yet
+        return None
+
+
+def _names(code: types.CodeType) -> Iterator[str]:
+    """What a function's code mentions: names, and texts that may be used as such."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _names(constant)
+        for text in constant if isinstance(constant, tuple) else (constant,):
+            if isinstance(text, str):
+                yield text
+
+
+def code_members(code: types.CodeType) -> Iterator[object]:
+    """Of a function's code, where others of its name lie in its module: no lines and no words."""
+    yield code.co_code
+    yield (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
+    flag = getattr(inspect, "CO_HAS_DOCSTRING", None)  # since Python 3.14
+    documented = code.co_flags & flag if flag else not code.co_name.startswith("<")
+    first = isinstance(next(iter(code.co_consts), None), str) and documented
+    yield code.co_consts[1 if first else 0 :]
