@@ -176,7 +176,7 @@ def uncertainty_exponent(
     all axes of the grid.
 
     Args:
-        labels: label codes, any dimension.
+        labels: label codes on a grid of any dimension, not of a sample (see `sampled_uncertainty`).
         distances: ε [grid spacings]. Default: powers of two, up to an eighth of the shortest axis.
             Points nearer to the grid's ends than the largest distance are not counted.
 

@@ -14,7 +14,7 @@ from jaxbiped._checks import (
     check_finite,
     check_not_negative,
 )
-from jaxbiped.basins._labels import Label, check_known, check_label_grid
+from jaxbiped.basins._labels import Label, check_known, check_label_grid, check_no_dataset
 
 _RARE = 3
 """Counts up to which an interval's end is that of Poisson's distribution."""
@@ -137,8 +137,7 @@ def fractions(
         {'walking': (0.75, 3), 'fell forward': (0.25, 1)}
     """
     _check_confidence(confidence)
-    if hasattr(labels, "data_vars"):
-        raise ArgumentError("labels is a whole dataset, which is not allowed: give its `label`.")
+    check_no_dataset(labels)
     names = _names(np.asarray(labels))
     unsure = np.zeros(np.shape(labels), bool) if doubt is None else np.asarray(doubt, dtype=bool)
     if unsure.shape != np.shape(labels):
@@ -212,7 +211,8 @@ def entropy(labels: npt.ArrayLike, *, box: int = 5) -> Entropy:
     The values depend on the size of a box: compare only values of one box size and resolution.
 
     Args:
-        labels: label codes. Points at the far ends that do not fill a whole box are left out.
+        labels: label codes on a grid, not of a sample. Points at the far ends that do not fill a
+            whole box are left out.
         box: side of a box [grid points], at least 2; the source uses 5.
 
     Returns:

@@ -3,7 +3,7 @@
 import enum
 import json
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -115,8 +115,15 @@ def check_label_grid(labels: npt.ArrayLike) -> np.ndarray:
     """Label codes on a grid of one or more dimensions, none of them pending.
 
     Raises:
-        ArgumentError: no entry, no axis, codes that are not whole numbers, or a pending one.
+        ArgumentError: no entry, no axis, codes that are not whole numbers, or a pending one; or a
+            list of starts, which are no neighbours.
     """
+    check_no_dataset(labels)
+    if _lists_starts(labels):
+        raise ArgumentError(
+            "labels is a list of starts, which are no neighbours, as of a sample or of a table's "
+            "column: it must be a grid, such as the labels of a sweep over `jaxbiped.starts.grid`."
+        )
     grid = np.asarray(labels)
     if grid.ndim == 0 or grid.size == 0:
         raise ArgumentError(
@@ -130,6 +137,24 @@ def check_label_grid(labels: npt.ArrayLike) -> np.ndarray:
             f"labels has {pending} pending entries of {grid.size}: they must all be labelled."
         )
     return grid
+
+
+def check_no_dataset(labels: object) -> None:
+    """Raises `ArgumentError` for a whole dataset."""
+    if hasattr(labels, "data_vars"):
+        raise ArgumentError("labels is a whole dataset, which is not allowed: give its `label`.")
+
+
+def _lists_starts(labels: Any) -> bool:
+    """Whether an axis numbers starts, or what lies along it has no coordinates in order."""
+    for name in getattr(labels, "dims", ()):
+        # Where there is none, xarray would make up numbers.
+        index = np.asarray(labels.coords[name] if name in labels.coords else None)
+        steps = np.diff(index) if index.dtype.kind in "iuf" else np.full(1, np.nan)
+        along = any(name in each.dims for each in labels.coords.values())
+        if name == "start" or (along and not (np.all(steps > 0) or np.all(steps < 0))):
+            return True
+    return hasattr(labels, "iloc") and np.ndim(labels) == 1
 
 
 def check_known(labels: np.ndarray) -> None:

@@ -102,7 +102,8 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         report.wrote(self.output.draw(figures | gait_figures(found.gait)))
         report.finish(_optimum_numbers(found, certificate, goal, sense), found.to_csv)
         ended = jb.optimise.Outcome
-        return int(found.outcome not in (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE))
+        done = (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE, ended.FLAT)
+        return int(found.outcome not in done)
 
 
 def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[float, float]]:

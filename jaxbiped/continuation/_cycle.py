@@ -14,14 +14,14 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.compiler import host_jit
-from jaxbiped.gait._fixed_point_search import is_sound, search_by_lanes, with_looser
+from jaxbiped.gait._fixed_point_search import is_sound, search_by_lanes, takes_steps, with_looser
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 
 NO_WALK = -1
-"""Code of an orbit that returns but is none of a walk: a foot deep underground, a step uphill."""
+"""Code of an orbit that returns but is no walk: a foot underground, steps uphill or hardly any."""
 
 
 class Cycle(NamedTuple):
@@ -40,7 +40,8 @@ class Cycle(NamedTuple):
         peak: largest force on a foot [N].
         code: 0 or that of the `Ending` that came instead.
         grazes: how often a switch was touched or missed by less than the tolerance resolves.
-        sound: whether every footstep goes downhill and on the ground (see `is_sound`).
+        sound: whether every footstep goes downhill and on the ground, and their mean is a step
+            (see `is_sound`).
     """
 
     recurring: Numbers
@@ -126,7 +127,7 @@ def _chain(
             peak=jnp.maximum(before.peak, once.peak),
             code=jnp.where(before.code != 0, before.code, once.code),
             grazes=before.grazes + once.grazes,
-            sound=before.sound & is_sound(scene, y, once.advance[0], once.period),
+            sound=before.sound & is_sound(scene, y, once.advance[0], once.period, 0),
         )
 
     zero = jnp.zeros(())
@@ -142,4 +143,5 @@ def _chain(
         grazes=jnp.asarray(0),
         sound=jnp.asarray(True),
     )
-    return jax.lax.fori_loop(0, arrivals, add, begin)
+    end: Cycle = jax.lax.fori_loop(0, arrivals, add, begin)
+    return end._replace(sound=end.sound & takes_steps(scene, end.advance, arrivals))

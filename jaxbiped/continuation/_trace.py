@@ -251,7 +251,7 @@ BOUND = "the range ends"
 def reason_of(code: int) -> tuple[BranchEnd, str]:
     """Why a curve could not be followed on, from the code of the last attempt."""
     if code == NO_WALK:
-        return BranchEnd.NO_WALK, "no walk: a foot deep underground, or a step uphill"
+        return BranchEnd.NO_WALK, "no walk: a foot deep underground, a step uphill, or hardly any"
     if code:
         return BranchEnd.WALK_ENDS, OF_ENDINGS.get(Ending(code), str(Ending(code)))
     return BranchEnd.BREAKS_OFF, NOT_SMOOTH

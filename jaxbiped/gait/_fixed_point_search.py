@@ -37,6 +37,8 @@ ROUGH = Precision(3e-6, 3e-4)
 """How exactly the search is solved until it is near."""
 _SHORTEST = 0.1
 """Duration of a cycle in units of √(l/g), about 2 for a footstep: a foot may also chatter."""
+_SHORTEST_STEP = 0.01
+"""Mean footstep, in units of the walker's height, up to which a gait is no walk."""
 _DEEPEST = 3.0
 """Elastic force of a standing foot, in units of the walker's weight: about 1 where it stands."""
 _ERRORS, _TOLERANCES = 4.0, 30.0
@@ -49,8 +51,8 @@ class Search(NamedCode):
     - found: the orbit returns to within the residual asked for.
     - no return: the first return already ended in a failure (its `Ending` tells which).
     - not converged: no step reduced the residual any more, or the evaluations allowed were used up.
-    - no walk: an orbit returns, but with a foot deep underground, a step uphill or hardly any
-      time between crossings of the section, and no other was found.
+    - no walk: an orbit returns, but with a foot deep underground, a step uphill or below 1 % of the
+      walker's height, or hardly any time between crossings of the section; no other was found.
     """
 
     FOUND = 0
@@ -162,7 +164,7 @@ def search(problem: FixedPointProblem, wanted: Scalar | bool = True) -> Found:
     )
     last = end.base_return
     # Not every system has a cyclic coordinate.
-    sound = is_sound(args, problem.state(end.base), jnp.sum(last.advance), last.period)
+    sound = is_sound(args, problem.state(end.base), jnp.sum(last.advance), last.period, spec.steps)
     return Found(
         ending=ending,
         code=end.code,
@@ -232,19 +234,21 @@ def _iterate(run: Run, begin: Progress, method: Method) -> Progress:
     return jax.lax.while_loop(goes_on, advance, begin)
 
 
-def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) -> Scalar:
+def is_sound(
+    scene: object, state: PyTree, step_length: Scalar, period: Scalar, arrivals: int = 1
+) -> Scalar:
     """Whether an orbit through a state on its section steps downhill and on the ground (boolean).
 
     Args:
         scene: the walker; what is none has nothing to be held to.
         state: on the section, where a foot stands or comes down.
-        step_length: advance along the slope in a cycle [m].
-        period: duration of a cycle [s].
+        step_length: advance along the slope [m] in a cycle of so many `arrivals`.
+        period: duration of the cycle [s].
     """
     if not isinstance(scene, AbstractWalkerScene):
         return jnp.asarray(True)
     pace = jnp.sqrt(scene.mechanism.height / scene.ground.g)
-    forward = (step_length > 0.0) & (period > _SHORTEST * pace)
+    forward = takes_steps(scene, step_length, arrivals) & (period > _SHORTEST * pace)
     if not scene.compliant:
         return forward
     modelled = scene.minimal
@@ -254,6 +258,12 @@ def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) 
         return touches(foot) & (modelled.normal.elastic_force(foot.penetration) > _DEEPEST * weight)
 
     return forward & ~any_of([deep(foot) for foot in feet(modelled, minimal_state(scene, state))])
+
+
+def takes_steps(scene: AbstractWalkerScene, step_length: Any, arrivals: Any) -> Any:
+    """Whether an advance [m] in so many arrivals is one of footsteps (boolean)."""
+    shortest = _SHORTEST_STEP * scene.mechanism.height
+    return step_length > shortest * arrivals * scene.arrival_footsteps
 
 
 def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: RealScalarLike) -> Scalar:
@@ -279,14 +289,6 @@ def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: RealScalarLike) -
         return found
 
     return by_numpy(least, crossings, error, rtol)
-
-
-def cycle_of(found: Found, rtol: float) -> int:
-    """The same of a fixed point that is known, its error that of Newton's next correction."""
-    last, m = found.last, found.recurring.shape[0]
-    change = np.asarray(last.recurring) - np.asarray(crossings_of(last))[0]
-    error, *_ = np.linalg.lstsq(np.eye(m) - np.asarray(last.jacobian)[:, :m], change)
-    return int(minimal_cycle(last, error, rtol))
 
 
 def crossings_of(last: LinearisedReturn) -> Scalar:

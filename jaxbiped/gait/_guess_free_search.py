@@ -12,7 +12,9 @@ from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
     Search,
-    cycle_of,
+    crossings_of,
+    minimal_cycle,
+    takes_steps,
     walks_only,
 )
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
@@ -28,7 +30,7 @@ from jaxbiped.gait._search_provenance import (
     single_stage_origin,
 )
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
-from jaxbiped.gait._walk_waves import SHORTEST, Walks, is_far_from_seed, state_rows, walks_of
+from jaxbiped.gait._walk_waves import Walks, is_far_from_seed, state_rows, walks_of
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.solve._accuracy import ACCURACIES, recurring_sizes
@@ -111,8 +113,8 @@ def search_in_stages(
 
     def add(found: Found, by: FoundBy) -> None:
         # What a walk itself settles on is one, however deep, but not where it stands and chatters.
-        steps = float(np.sum(found.last.advance)) > SHORTEST * float(modelled.mechanism.height)
-        sound = bool(found.sound) or (by is FoundBy.WALKING and steps)
+        steps = takes_steps(modelled, float(np.sum(found.last.advance)), problem.spec.steps)
+        sound = bool(found.sound) or (by is FoundBy.WALKING and bool(steps))
         known = any(_same(found, old) for old in seen)
         if int(found.ending) == int(Search.FOUND) and sound and not known:
             seen.append(Seen(found, by, spectral_radius(found), is_whole(found, problem)))
@@ -234,7 +236,15 @@ def is_stable(found: Found, problem: FixedPointProblem) -> bool:
 def is_whole(found: Found, problem: FixedPointProblem) -> bool:
     """Whether a fixed point's cycle has all the footsteps that were asked for."""
     steps = problem.spec.steps
-    return steps == 1 or cycle_of(found, float(problem.precision.rtol)) == steps
+    return steps == 1 or _cycle_of(found, float(problem.precision.rtol)) == steps
+
+
+def _cycle_of(found: Found, rtol: float) -> int:
+    """Arrivals of a fixed point's shortest cycle, its error that of Newton's next correction."""
+    last, m = found.last, found.recurring.shape[0]
+    change = np.asarray(last.recurring) - np.asarray(crossings_of(last))[0]
+    error, *_ = np.linalg.lstsq(np.eye(m) - np.asarray(last.jacobian)[:, :m], change)
+    return int(minimal_cycle(last, error, rtol))
 
 
 def spectral_radius(found: Found) -> float:

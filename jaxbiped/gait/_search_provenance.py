@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import warn
 from jaxbiped._ending import Ending, NamedCode
 from jaxbiped._types import Scalar
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search, takes_steps
 from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._ground import AlwaysTouching
 from jaxbiped.scene._parameter_access import parameter_values
@@ -155,7 +155,7 @@ def explain_search(scene: AbstractScene, gait: "Gait") -> str:
     """
     if gait.outcome is not Search.FOUND:
         told = _tried(gait) + _branch(scene, gait) + _what_to_try(scene, gait)
-        return f"no gait found: {_search_sentence(gait)}{told}"
+        return f"no gait found: {_search_sentence(scene, gait)}{told}"
     text = f"found by {gait.found_by}"
     asked, least = len(gait.step_lengths), int(gait.cycle_footsteps)
     if least < asked:
@@ -196,10 +196,13 @@ def warn_of_unknown(gait: "Gait") -> None:
         warn(told + ".")
 
 
-def _search_sentence(gait: "Gait") -> str:
+def _search_sentence(scene: Any, gait: "Gait") -> str:
     if gait.outcome is Search.NO_RETURN:
         return f"the walk from the start ends ({gait.walk_outcome})"
     if gait.outcome is Search.NO_WALK:
+        length = float(gait.measures.step_length) / len(gait.step_lengths)
+        if length > 0.0 and not takes_steps(scene.minimal, length, 1.0 / scene.arrival_footsteps):
+            return f"an orbit that returns has footsteps of {length:.2g} m, below 1 % of the height"
         return "an orbit that returns has a foot deep underground, or steps uphill"
     return "the search from the start does not converge"
 
@@ -234,7 +237,8 @@ def _branch(scene: AbstractScene, gait: "Gait") -> str:
     """Where the branch of the seed's gait ended, after a semicolon; nothing where it came here."""
     end = BranchEnd(int(gait.origin.branch_end))
     modelled = scene.minimal
-    if end is BranchEnd.NOT_FOLLOWED or (end is BranchEnd.REACHED and gait.outcome is Search.FOUND):
+    came = gait.outcome in (Search.FOUND, Search.NO_WALK)
+    if end is BranchEnd.NOT_FOLLOWED or (end is BranchEnd.REACHED and came):
         return ""
     of_seed = isinstance(scene, AbstractWalkerScene) and isinstance(scene.walker, Walker)
     begins = "the seed's gait" if of_seed else "the relaxed walker's gait"

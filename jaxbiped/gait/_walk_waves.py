@@ -36,7 +36,7 @@ _DIGITS = 9
 _CYCLES = 40
 _ALIKE = 1e-2
 """Scaled distance of two states that count as one."""
-SHORTEST = 0.02
+_SHORTEST = 0.02
 """Advance in units of the height below which two arrivals are no step: a foot may also chatter."""
 _DEPTH = 4
 """Longest cycle that is looked for in a walk's last arrivals."""
@@ -77,7 +77,7 @@ class Walks(NamedTuple):
 
     def settled(self, most: int = 4) -> list[np.ndarray]:
         """Where those that walked on are in the end, the most settled first, shapes (m,)."""
-        goes = np.diff(self.places[:, -2:])[:, 0] > SHORTEST  # one that stands may chatter
+        goes = np.diff(self.places[:, -2:])[:, 0] > _SHORTEST  # one that stands may chatter
         walking = np.flatnonzero((self.counts >= _CYCLES) & goes)
         latest, before = self.points[walking, -1], self.points[walking, -1 - _DEPTH : -1]
         moved = np.linalg.norm(latest[:, None] - before, axis=-1)
@@ -101,7 +101,7 @@ class Walks(NamedTuple):
 
     def _moved(self) -> np.ndarray:
         """Distance of each arrival's state from the next; infinite without a step between."""
-        is_step = np.diff(self.places, axis=1) > SHORTEST  # NaN is none
+        is_step = np.diff(self.places, axis=1) > _SHORTEST  # NaN is none
         before, after = (np.where(is_step[..., None], x, 0.0)
                          for x in (self.points[:, :-1], self.points[:, 1:]))  # fmt: skip
         return np.where(is_step, np.linalg.norm(after - before, axis=-1), np.inf)

@@ -22,6 +22,7 @@ from jaxbiped.optimise._design_gaits import (
     with_worse_members,
 )
 from jaxbiped.optimise._design_variables import Requirement, Variables
+from jaxbiped.optimise._jacobian_weights import CLUSTER
 from jaxbiped.optimise._objective_values import Evaluation, Evaluations, evaluate
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -135,16 +136,26 @@ class DesignProblem:
             raise
 
     def at(self, u: np.ndarray) -> Evaluation | None:
-        """What is known of a design; None where no gait was found on the way from the latest."""
+        """What is known of a design; None where no gait was found on the way from the latest.
+
+        None, too, where its measures have no derivatives, as where a foot grazes the ground.
+        """
         known = self.evaluations.get(u)
         if known is None and not self.evaluations.is_lost(u):
             known = self._follow(np.array(u))
             if known is None:
                 self.evaluations.add(u, None)
-        if known is None:
+        if known is None or not self._has_derivatives(known):
             self.lost += 1
             return None
         return self._note(u, known).known
+
+    def _has_derivatives(self, known: Evaluation) -> bool:
+        """Whether those that are used are finite: bounded from above, the radius's own are not."""
+        low = any(each.low is not None for each in self.requirements if each.name == CLUSTER[0])
+        is_smooth = self.has_cluster and not low and self.weights.get(CLUSTER[0], 1.0) > 0.0
+        names = {*self.wanted, *CLUSTER[1:]} & {*known.slopes} - {*CLUSTER[:is_smooth]}
+        return all(np.all(np.isfinite(known.slopes[n][self.variables.places])) for n in names)
 
     def _note(self, u: np.ndarray, known: Evaluation) -> Design:
         self.latest = Design(np.array(u), known)

@@ -11,14 +11,15 @@ from jaxbiped.optimise._objective_values import Evaluation
 
 OPTIMAL = 1e-3
 """Residual of the conditions of optimality from which a design counts as an optimum."""
-_NEAR = 1e-4
-"""Distance in u within which other designs' derivatives count where a design has a corner."""
+_NEAR, _BEND = (1e-5, 2e-2), 0.1
+"""Distances in u of designs whose differences the derivatives must explain, and what of the change
+of the derivatives between them these may miss."""
 _AT_BOUND = 1e-6
 """Distance in u at which a variable is at its bound."""
 _VANISHING = 1e-3
 """Size of a normal, as a share of the largest, below which it counts as none."""
-_SURE = 1e3
-"""Weight with which designs' shares add up to one, in least squares."""
+_FLAT = 1e-6
+"""Derivative of the objective, as a share of its size, that counts as none beside its error."""
 
 
 class Held(NamedTuple):
@@ -62,15 +63,11 @@ class Optimality(NamedTuple):
 
 
 class _Normal(NamedTuple):
-    """Inward normal of an active requirement or bound, its error, and its multiplier's limit.
-
-    `by_radius` is what the radius in the sum, where it is a variable of its own, adds to it.
-    """
+    """Inward normal of an active requirement or bound, its error, and its multiplier's limit."""
 
     gradient: np.ndarray
     error: np.ndarray
     least: float
-    by_radius: float = 0.0
 
 
 def smooth_weights(problem: DesignProblem) -> tuple[dict[str, float], float]:
@@ -89,17 +86,16 @@ class _Balance(NamedTuple):
 
     Attributes:
         left: what no multiplier balances, (k,), or with the radius's weight (k + 1,).
-        gradient_error: its error, (k,).
+        errors: of that, from all error bars, of its shape.
         active: rows that hold it, of requirements first, then of the radius in the sum.
-        normals: theirs, and those of the variables at a bound.
-        multipliers: of all these.
+        multipliers, spreads: of these, then of the variables at a bound; and their errors.
     """
 
     left: np.ndarray
-    gradient_error: np.ndarray
+    errors: np.ndarray
     active: list[tuple[AnyRow, bool]]
-    normals: list[_Normal]
     multipliers: np.ndarray
+    spreads: np.ndarray
 
 
 def _smooth_gradient(problem: DesignProblem, design: Design) -> np.ndarray:
@@ -108,45 +104,44 @@ def _smooth_gradient(problem: DesignProblem, design: Design) -> np.ndarray:
     return problem.gradient(design.u, problem.objective(design.known, weights).slopes)
 
 
-def _balance(
-    problem: DesignProblem, design: Design, others: list[Design], scale: float
-) -> _Balance:
+def _balance(problem: DesignProblem, design: Design, scale: float) -> _Balance:
     u, known = design
     weights, of_radius = smooth_weights(problem)
-    every = [design, *others]
-    gradients = [_smooth_gradient(problem, each) / scale for each in every]
-    error = problem.gradient(u, problem.objective(known, weights).slope_errors) / scale
+    total, more = problem.objective(known, weights), int(of_radius > 0.0)
+    gradient = np.append(problem.gradient(u, total.slopes), [of_radius] * more) / scale
+    errors = np.append(np.abs(problem.gradient(u, total.slope_errors)), [0.0] * more) / scale
     radius = known.values["spectral_radius"] if of_radius else np.inf
     rows = [(row, False) for row in rows_of(problem)]
     rows += [(row, True) for row in (cluster_rows(problem, radius) if of_radius else ())]
-    pairs = [
-        (row, in_sum, _of_row(problem, each, row, in_sum))
-        for each in every
-        for row, in_sum in rows
-        if row.is_active(each.known)
-    ]
-    sizes = [float(np.linalg.norm([*each.gradient, each.by_radius])) for _, _, each in pairs]
+    pairs = [(p, _of_row(problem, design, *p, more)) for p in rows if p[0].is_active(known)]
+    sizes = [float(np.linalg.norm(each.gradient)) for _, each in pairs]
     # Where multipliers pass through each other a condition's gradient vanishes, and tells nothing.
     pairs = [p for p, size in zip(pairs, sizes, strict=True) if size > _VANISHING * max(sizes)]
-    active = [(row, in_sum) for row, in_sum, _ in pairs]
-    normals = [each for _, _, each in pairs]
-    units, zero = np.eye(len(u)), np.zeros_like(u)
+    units, zero = np.eye(len(u), len(gradient)), np.zeros_like(gradient)
+    normals = [each for _, each in pairs]
     normals += [_Normal(side * units[place], zero, 0.0) for place, side in _at_bounds(u)]
-    # Columns: shares of the designs, which add up to one, and the multipliers.
-    columns = [np.append(each, [of_radius / scale, _SURE]) for each in gradients]
-    columns += [np.append(-each.gradient, [-each.by_radius, 0.0]) for each in normals]
-    matrix, right = np.stack(columns, axis=1), np.append(np.zeros(len(u) + 1), _SURE)
-    limits = np.append(np.zeros(len(every)), [each.least for each in normals])
-    found = scipy.optimize.lsq_linear(matrix, right, (limits, np.inf), method="bvls").x
-    left = (matrix @ found)[: len(u) + bool(of_radius)]
-    return _Balance(left, np.abs(error), active, normals, found[len(every) :])
+    matrix, error = (
+        np.reshape([getattr(n, part) for n in normals], (-1, len(gradient))).T
+        for part in ("gradient", "error")
+    )
+    least, found = np.asarray([each.least for each in normals]), np.zeros(len(normals))
+    if normals:
+        limits = least, np.inf
+        found = scipy.optimize.lsq_linear(matrix, gradient, limits, method="bvls").x
+    errors += error @ np.abs(found)
+    spreads = np.abs(np.linalg.pinv(matrix)) @ errors
+    # What surely holds the design makes up for any error along its normal.
+    sure = matrix[:, (found > spreads) | (least < 0.0)]
+    across = np.eye(len(gradient)) - sure @ np.linalg.pinv(sure)
+    left, errors = gradient - matrix @ found, np.abs(across) @ errors
+    return _Balance(left, errors, [pair for pair, _ in pairs], found, spreads)
 
 
 def lagrangian_change(
     problem: DesignProblem, here: Design, there: Design, scale: float
 ) -> np.ndarray:
     """How the gradient of the scaled Lagrangian changes, with the multipliers of `there`."""
-    found = _balance(problem, there, [], scale)
+    found = _balance(problem, there, scale)
     ends = []
     for each in (there, here):
         own = _smooth_gradient(problem, each) / scale
@@ -159,48 +154,90 @@ def lagrangian_change(
 def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
     """Multipliers that balance the gradient best, in the least-squares sense, with right signs.
 
-    Where they leave more than `OPTIMAL`, gradients of designs within 1e-4 may have a share in it: a
-    combination that balances says that no direction is better (Clarke's ε-subdifferential).
+    The design's own derivatives alone count. Where multipliers meet, the conditions on their
+    symmetric functions have derivatives that span all directions in which the radius grows.
     """
     u, known = design
     scale = max(abs(problem.objective(known).value), 1e-300)
-    found = _balance(problem, design, [], scale)
-    if np.max(np.abs(found.left)) > OPTIMAL:
-        near = [e for e in problem.asked if 0.0 < np.max(np.abs(e.u - u)) <= _NEAR]
-        found = _balance(problem, design, near, scale) if near else found
-    errors = np.zeros(len(found.normals))
-    gradient_error = found.gradient_error
-    if found.normals:
-        matrix = np.stack([each.gradient for each in found.normals], axis=1)
-        spreads = np.stack([each.error for each in found.normals], axis=1)
-        gradient_error = gradient_error + spreads @ np.abs(found.multipliers)
-        errors = np.abs(np.linalg.pinv(matrix)) @ gradient_error
+    found = _balance(problem, design, scale)
     count = len(found.active)
     held: dict[tuple[str, float, float], tuple[float, float]] = {}
     for (row, in_sum), multiplier, error in zip(
-        found.active, found.multipliers[:count], errors[:count], strict=True
+        found.active, found.multipliers[:count], found.spreads[:count], strict=True
     ):
         if not in_sum:
             size = scale * row.by_bound(known)
             total, spread = held.get(row[:3], (0.0, 0.0))
             held[row[:3]] = total - multiplier * size, spread + error * abs(size)
     rows = {row[:3]: row for row in rows_of(problem)}.values()
-    at_bounds = zip(_at_bounds(u), found.multipliers[count:], errors[count:], strict=True)
+    at_bounds = zip(_at_bounds(u), found.multipliers[count:], found.spreads[count:], strict=True)
     return Optimality(
         residual=float(np.max(np.abs(found.left))),
-        error=float(np.max(gradient_error)),
+        error=float(np.max(found.errors)),
         excess=problem.excess(known),
         requirements=tuple(_held_measure(problem, row, known, held.get(row[:3])) for row in rows),
         bounds=tuple(_held_variable(problem, u, scale, *each) for each in at_bounds),
     )
 
 
-def _of_row(problem: DesignProblem, design: Design, row: AnyRow, in_sum: bool) -> _Normal:
+def doubt_of(problem: DesignProblem, design: Design) -> str:
+    """Why a design does not count as an optimum, in a sentence; nothing where it does."""
+    found, allowance = optimality_of(problem, design), problem.allowance(design.known)
+    if not found.residual <= OPTIMAL:
+        return f"The derivatives do not balance: {found.residual:.1e} of the objective is left."
+    if not found.error <= OPTIMAL:
+        return f"The residual is known to within {found.error:.1e} of the objective only."
+    if not allowance <= OPTIMAL:
+        return f"Requirements are known to within {allowance:.1e} of their bounds only."
+    near = [each for each in problem.asked if is_near(design, each)]
+    if not all(_explains(problem, design, each) for each in near):
+        return "Designs tried nearby differ from it by other amounts than the derivatives say."
+    return ""
+
+
+def is_near(here: Design, there: Design) -> bool:
+    """Whether the difference of two designs shows what their derivatives are."""
+    return bool(_NEAR[0] <= np.max(np.abs(there.u - here.u)) <= _NEAR[1])
+
+
+def _explains(problem: DesignProblem, here: Design, there: Design) -> bool:
+    """Whether derivatives explain the difference of the smooth sum of a design that is near."""
+    weights, _ = smooth_weights(problem)
+    move, scale = there.u - here.u, abs(problem.objective(here.known).value)
+    one, two = (problem.objective(each.known, weights) for each in (here, there))
+    first, second = (_smooth_gradient(problem, each) @ move for each in (here, there))
+    off = abs(two.value - one.value - 0.5 * (first + second))
+    spread = problem.gradient(here.u, one.slope_errors) @ np.abs(move)
+    bar = one.error + two.error + abs(spread) + _BEND * abs(second - first)
+    return bool(off <= OPTIMAL * scale * np.max(np.abs(move)) + bar)
+
+
+def is_untried(u: np.ndarray, begin: np.ndarray) -> bool:
+    """Whether a variable inside its bounds is where it began."""
+    return bool(np.any((np.abs(u - begin) < _AT_BOUND) & (u > 0.0) & (u < 1.0)))
+
+
+def is_flat(problem: DesignProblem) -> bool:
+    """Whether the objective changes nowhere that was tried, as far as its error bars show."""
+    slopes, bars = np.zeros(0), np.zeros(0)
+    for u, known in problem.asked:
+        total = problem.objective(known)
+        slopes = np.append(slopes, problem.gradient(u, total.slopes))
+        more = 3.0 * np.abs(problem.gradient(u, total.slope_errors))
+        bars = np.append(bars, _FLAT * abs(total.value) + more)
+    return len(problem.asked) > 1 and bool(np.all(np.abs(slopes) <= bars))
+
+
+def _of_row(
+    problem: DesignProblem, design: Design, row: AnyRow, in_sum: bool, more: int
+) -> _Normal:
+    """Of a requirement, with `more` what the radius in the sum, its own variable, adds to it."""
     u, known = design
-    own = problem.gradient(u, row.slopes(known))
+    gradient = problem.gradient(u, row.slopes(known))
     error = np.abs(problem.gradient(u, row.slope_errors(known)))
+    by_radius, none = [[by] * more for by in (row.by_bound(known) if in_sum else 0.0, 0.0)]
     least = -np.inf if row.equality else 0.0
-    return _Normal(own, error, least, row.by_bound(known) if in_sum else 0.0)
+    return _Normal(np.append(gradient, by_radius), np.append(error, none), least)
 
 
 def _at_bounds(u: np.ndarray) -> list[tuple[int, float]]:

@@ -17,7 +17,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped.optimise._design_functions import RAISED, Functions, rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem
 from jaxbiped.optimise._local_model import Local, Model, local_of
-from jaxbiped.optimise._optimality import OPTIMAL, lagrangian_change, optimality_of
+from jaxbiped.optimise._optimality import OPTIMAL, is_untried, lagrangian_change, optimality_of
 
 if TYPE_CHECKING:
     import optax
@@ -61,16 +61,17 @@ def run_trust_region(
 
     A trial that is no better leaves its linearisation behind, as in bundle methods, and the next
     subproblem sees both sides of a corner. Fletcher, Practical Methods of Optimization (1987),
-    section 14.4 (Sl1QP). Where a design seems best and its derivatives do not balance, others are
-    scattered about it at several distances, and their linearisations are cuts, too (gradient
-    sampling: Burke, Lewis and Overton, SIAM J. Optim. 15, 2005).
+    section 14.4 (Sl1QP). Where a design seems best and its derivatives do not balance, or do but a
+    variable was never moved and may be at a maximum, others are scattered about it, and their
+    linearisations are cuts, too (gradient sampling: Burke, Lewis, Overton, SIAM J. Optim. 15).
     """
     problem = functions.problem
     search = _Search(problem, u, iterations, report)
     while search.descend():
-        if optimality_of(problem, search.design).residual <= OPTIMAL:
+        balanced = optimality_of(problem, search.design).residual <= OPTIMAL
+        if balanced and not is_untried(search.here.u, u):
             return RunEnding(True, search.message)
-        if not any(search.leaves(distance) for distance in _DISTANCES) and search.left > 0:
+        if not any(map(search.leaves, _DISTANCES[: 1 if balanced else 3])) and search.left > 0:
             return RunEnding(True, f"{search.message} None of those scattered about it is better.")
     return RunEnding(False, "Iteration limit reached.")
 
@@ -88,9 +89,8 @@ class _Search:
         self, problem: DesignProblem, u: np.ndarray, iterations: int, report: Callback
     ) -> None:
         assert problem.latest is not None
-        known = problem.latest.known
+        known, self.rows = problem.latest.known, rows_of(problem)
         self.problem, self.report, self.left = problem, report, iterations
-        self.rows = rows_of(problem)
         self.scale = max(abs(problem.objective(known).value), 1e-300)
         self.design = Design(np.array(u), known)
         self.here = local_of(problem, self.rows, self.scale, self.design)

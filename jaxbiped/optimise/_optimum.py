@@ -22,16 +22,18 @@ if TYPE_CHECKING:
 class Outcome(NamedCode):
     """How an optimisation ended. `str(outcome)` is its name in words.
 
-    - converged: the optimiser's own test is met, and every requirement holds to within its
-      measure's error bar.
-    - corner: no better design was found nearby, but the derivatives do not balance, for example at
-      corners of the spectral radius, where multipliers meet.
+    - converged: the optimiser's own test is met, every requirement holds to within its measure's
+      error bar, the design's own derivatives balance to 1e-3 of the objective, as surely as that,
+      and the gait is not at a fold.
+    - corner: no better design was found nearby, but it is not certain to be an optimum, for one of
+      these does not hold (the message says which), for example at a ridge of the objective.
     - unfinished: the iterations were used up, or the optimiser could not go on.
     - interrupted: by Ctrl-C; the best so far is kept.
     - infeasible: no design was found that meets the requirements; the nearest one is returned.
     - beyond range: the distance of a fold or doubling was to be optimised, and for the best design
       it lies beyond the range that is followed. The distance has no derivatives there, so better
       designs cannot be distinguished.
+    - flat: the objective does not depend on the variables, as far as its error bars show.
     """
 
     CONVERGED = 0
@@ -40,6 +42,7 @@ class Outcome(NamedCode):
     INTERRUPTED = 3
     INFEASIBLE = 4
     BEYOND_RANGE = 5
+    FLAT = 6
 
 
 class Iteration(NamedTuple):
@@ -67,7 +70,8 @@ class Optimum(Tabular):
 
     Attributes:
         outcome: how the optimisation ended.
-        message: the optimiser's message, and which fold or doubling lies beyond its range.
+        message: the optimiser's message, why the design is not certain to be an optimum, and which
+            fold or doubling lies beyond its range.
         scene: scene of the best design.
         gait: its gait, with the sensitivities to all parameters.
         variables: its parameters by name.

@@ -10,10 +10,11 @@ import numpy as np
 from jaxbiped._progress import Stage
 from jaxbiped.continuation._critical_values import allows, range_of
 from jaxbiped.dynamics._state import recurring_leaves
+from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.optimise._design_functions import Functions
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
-from jaxbiped.optimise._optimality import OPTIMAL, optimality_of
+from jaxbiped.optimise._optimality import OPTIMAL, doubt_of, is_flat, is_near, optimality_of
 from jaxbiped.optimise._optimisers import (
     Callback,
     RunEnding,
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 _DRAWN = 8
 """Designs that are drawn for each one that is kept."""
+_ASIDE = 1e-2
+"""How far from an optimum, in u, another design is tried."""
 _STAGES = 4
 """Steps in which the gaits of all of them are followed from the first design's."""
 
@@ -84,12 +87,16 @@ class Runs:
                 on.converged,
                 f"{ended.message.rstrip('.')}. From there by trust-region: {on.message}",
             )
+        best = self.best
+        if ended.converged and not any(is_near(best, each) for each in self.problem.asked):
+            # Another design shows whether derivatives tell how designs differ.
+            self.problem.at(best.u + np.where(best.u < 0.5, _ASIDE, -_ASIDE))
         better = rank_of(self.problem, self.best) < rank_of(self.problem, before)
         if not self.ended.message or better:
             self.ended = ended
 
     def outcome(self) -> Outcome:
-        """How it ended: converged only where the conditions of optimality say so, too."""
+        """How it ended: converged only where the design is certified as an optimum, too."""
         if self.interrupted:
             return Outcome.INTERRUPTED
         told = optimality_of(self.problem, self.best)
@@ -99,7 +106,9 @@ class Runs:
             return Outcome.BEYOND_RANGE
         if not self.ended.converged:
             return Outcome.UNFINISHED
-        return Outcome.CONVERGED if self._is_balanced() else Outcome.CORNER
+        if doubt_of(self.problem, self.best):
+            return Outcome.CORNER
+        return Outcome.FLAT if is_flat(self.problem) else Outcome.CONVERGED
 
     def _is_balanced(self) -> bool:
         """Whether the best design's derivatives balance."""
@@ -126,24 +135,28 @@ def rank_of(problem: DesignProblem, design: Design) -> tuple[float, float]:
     return 0.0 if excess <= KEPT else excess, problem.objective(design.known).value
 
 
-def _message(problem: DesignProblem, best: Design, ended: RunEnding) -> str:
-    """The optimiser's own words, and which bifurcations the best design does not meet."""
+def _message(problem: DesignProblem, best: Design, ended: RunEnding, doubt: str) -> str:
+    """The optimiser's own words, a doubt, and which bifurcations the best design does not meet."""
     low, high = range_of(problem.scene_at(best.u), "slope")
     ensemble = problem.ensemble
     worst = [ensemble.words] if ensemble and ensemble.criterion == "worst" else []
     none = [f"{name}: none from {low:.6g} to {high:.6g} rad." for name in best.known.beyond_range]
-    return " ".join([ended.message, *worst, *none])
+    return " ".join(filter(None, [ended.message, doubt, *worst, *none]))
 
 
 def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     """The best of the designs that runs came to."""
     best = runs.best
     found, scene = problem.objective(best.known), problem.scene_at(best.u)
+    gait, outcome = problem.settings.find_near(scene, best.known.state), runs.outcome()
+    doubt = doubt_of(problem, best) if outcome is Outcome.CORNER else ""
+    if outcome in (Outcome.CONVERGED, Outcome.FLAT) and gait.critical is Bifurcation.FOLD:
+        outcome, doubt = Outcome.CORNER, "Its gait is at a fold, where derivatives have no bound."
     return Optimum(
-        outcome=runs.outcome(),
-        message=_message(problem, best, runs.ended),
+        outcome=outcome,
+        message=_message(problem, best, runs.ended, doubt),
         scene=scene,
-        gait=problem.settings.find_near(scene, best.known.state),
+        gait=gait,
         variables=problem.variables.by_name(best.u),
         objective=problem.sense * found.value,
         error=found.error,

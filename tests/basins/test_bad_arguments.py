@@ -112,3 +112,38 @@ def test_bad_arguments_are_named(analysis, change, words):
     with pytest.raises(jb.ArgumentError) as caught:
         function(**(right | change))
     assert all(word in str(caught.value) for word in words.split("; "))
+
+
+def _lists(tmp_path):
+    """Labels of starts that are no neighbours: of a sample, kept, thinned, turned into others."""
+    label = ("start", np.arange(80) % 3)
+    sample = xr.Dataset({"label": label, "start_omega_1": ("start", np.linspace(0.0, 1.0, 80))})
+    sample.to_netcdf(tmp_path / "sample.nc", engine="scipy")
+    kept = xr.load_dataset(tmp_path / "sample.nc", engine="scipy")
+    axes = {"omega_1": np.linspace(0.0, 1.0, 80), "slope": [0.01, 0.02, 0.03]}
+    grid = xr.Dataset({"label": (tuple(axes), np.arange(240).reshape(80, 3) % 3)}, axes)
+    yield from (sample.label, kept.label, kept.label[20:], sample.label[np.arange(80) % 2 == 0])
+    yield sample.to_dataframe().to_xarray().label  # numbered by pandas
+    yield sample.set_coords("start_omega_1").label.rename(start="n")
+    yield sample.to_dataframe().label
+    yield grid.label.stack(start=["omega_1", "slope"])
+    yield grid.label.stack(place=["omega_1", "slope"])
+    yield grid.isel(omega_1=np.random.default_rng(0).permutation(80)).label
+    assert jb.basins.entropy(grid.label, box=2) == jb.basins.entropy(grid.label.values, box=2)
+    for known in (grid.label[::-1], grid.label.isel(slope=1), grid.label.drop_vars(list(axes))):
+        assert jb.basins.entropy(known, box=2).boxes == 40
+    grid.to_netcdf(tmp_path / "grid.nc", engine="scipy")
+    assert jb.basins.entropy(xr.load_dataset(tmp_path / "grid.nc").label, box=2).boxes == 40
+
+
+def test_a_list_of_starts_is_no_grid(tmp_path):
+    functions = jb.basins.entropy, jb.basins.boundary_dimension, jb.basins.uncertainty_exponent
+    for function in functions:
+        for labels in _lists(tmp_path):
+            with pytest.raises(jb.ArgumentError, match=r"no neighbours.*must be a grid"):
+                function(labels)
+            jb.basins.fractions(np.asarray(labels))
+        with pytest.raises(jb.ArgumentError, match="labels is a whole dataset"):
+            function(xr.Dataset())
+    sample = jb.starts.sample(jb.ladder()["rigid"], {"omega_1": (-4.0, 5.0)}, 4)
+    assert list(sample.axes) == ["start"]  # what it is told by

@@ -12,7 +12,13 @@ import jaxbiped as jb
 from jaxbiped._types import Scalar
 from jaxbiped.gait import _orbit_derivatives
 from jaxbiped.gait._accurate_gait import judge_gait
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, is_sound, walks_only
+from jaxbiped.gait._fixed_point_search import (
+    FixedPointProblem,
+    Found,
+    is_sound,
+    takes_steps,
+    walks_only,
+)
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gait_measures import _by_correction
 from jaxbiped.gait._gait_summary import elasticities_of, measure_errors, measure_slopes
@@ -309,6 +315,14 @@ def test_an_orbit_uphill_hasty_or_deep_underground_is_no_walk():
     assert sound(state, 0.18, 0.44)
     assert not sound(state, -0.18, 0.44)
     assert not sound(state, 0.18, 0.1 * np.sqrt(0.4 / 9.8))
+    # Footsteps of 1 % of the height, 0.4 m, in the mean.
+    assert (sound(state, 0.00404, 0.44), sound(state, 0.00396, 0.44)) == (True, False)
+    assert (sound(state, 0.00808, 0.44, 2), sound(state, 0.00792, 0.44, 2)) == (True, False)
+    for rigid, expected in ((0.00404, True), (0.00396, False)):
+        assert bool(is_sound(jb.ladder()["rigid"], state, rigid, 0.44)) is expected
+    for share in (0.99, 1.01):  # an arrival of unlike legs is two footsteps
+        unlike = SimpleNamespace(mechanism=scene.mechanism, arrival_footsteps=2)
+        assert bool(takes_steps(unlike, 0.008 * share, 1)) is (share > 1.0)
     for leg, other in ((1, 2), (2, 1)):
         # On a leg that turns back, so deep that it would carry a hundred times the weight.
         stands = {f"theta_{leg}": 0.0, f"omega_{leg}": -1.0, f"theta_{other}": 1.5}

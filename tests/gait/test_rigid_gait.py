@@ -32,6 +32,27 @@ def test_the_least_number_of_footsteps_is_that_of_the_map_itself(slope, asked, l
     assert (f"closes after {least} of the {asked} footsteps" in said) is (least < asked)
 
 
+def test_footsteps_below_a_hundredth_of_the_height_are_no_walk():
+    """Footsteps on slight slopes are as their third root (Garcia et al. 1998)."""
+    scene = jb.with_parameters(rigid_seed(), {"slope": 1e-6})
+    gait = jb.find_gait(scene, **PLAIN)
+    height = float(scene.mechanism.height)
+    assert gait.outcome is jb.gait.Search.FOUND
+    length = float(gait.measures.step_length) / height
+    last = 1e-6 * (0.01 / length) ** 3
+    beyond = jb.find_gait(jb.with_parameters(scene, {"slope": 0.5 * last}), gait, **PLAIN)
+    assert beyond.outcome is jb.gait.Search.NO_WALK
+    assert not bool(beyond.stable)
+    branch = jb.continue_gait(scene, "slope", bounds=(0.1 * last, 2e-6))
+    assert str(branch.stops[0].end) == "no walk"
+    assert min(each.value for each in branch.points) == pytest.approx(last, rel=0.01)
+    best = jb.optimise_gait(
+        scene, vary={"slope": (0.1 * last, 2e-6)}, minimise="step_length", guess=gait
+    )
+    assert best.outcome is jb.optimise.Outcome.CORNER
+    assert best.objective >= 0.01 * height
+
+
 def test_compass_gait_converges_and_is_stable():
     """One of the gaits that starts lead to is stable; an independent solve returns to it."""
     gaits = jb.find_gaits(compass_gait(), jb.gait.rolling_starts(compass_gait(), 32, spread=0.5))

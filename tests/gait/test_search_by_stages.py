@@ -143,10 +143,14 @@ def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
     assert len(walks_from(SCENE, START).settled(most=1)) == 1
 
 
-def gait(outcome, *, end=BranchEnd.NOT_FOLLOWED, stable=True, others=(), grazes=0, walk=0, walks=0):
+def gait(
+    outcome, *, end=BranchEnd.NOT_FOLLOWED, stable=True, others=(), grazes=0, walk=0, walks=0,
+    length=-0.2,
+):  # fmt: skip
     nearest = jb.with_parameters(SCENE, {"slope": 0.015})
     return SimpleNamespace(
         sensitivities=SimpleNamespace(period=np.zeros(2)),
+        measures=SimpleNamespace(step_length=length),
         outcome=outcome, found_by="walks", others=others, grazes=grazes, stable=stable,
         walk_outcome=jb.Ending.STUMBLED,
         step_lengths=np.zeros(1), cycle_footsteps=1,
@@ -169,6 +173,8 @@ def gait(outcome, *, end=BranchEnd.NOT_FOLLOWED, stable=True, others=(), grazes=
         ),
         (gait(jb.gait.Search.NO_RETURN), "the walk from the start ends (stumbled)"),
         (gait(jb.gait.Search.NO_WALK), "a foot deep underground"),
+        (gait(jb.gait.Search.NO_WALK, length=0.2), "a foot deep underground"),
+        (gait(jb.gait.Search.NO_WALK, length=3e-4), "footsteps of 0.0003 m, below 1 % of the"),
         (
             gait(jb.gait.Search.NO_RETURN, walks=1024),
             "(stumbled); 16 further searches and 1024 walks led to none",

@@ -15,6 +15,7 @@ from jaxbiped.optimise._runs import Runs
 SCENE = jb.ladder()["rigid"]
 NAMES = jb.parameter_names(SCENE)
 NO_STATE = np.zeros(4), np.zeros((4, len(NAMES)))
+FASTEST = {"speed": 1.0}, -1.0
 BOTH = {"d": (0.04, 0.2), "slope": (0.005, 0.08)}
 
 
@@ -31,25 +32,21 @@ def slopes_of(**slopes):
 class Drawn(DesignProblem):
     """By name value and derivatives with respect to the variables; None for a lost gait.
 
-    `errors` are relative to both.
+    `errors` are relative to both, unless the function returns errors of both behind them.
     """
 
     def _follow(self, u):
         told = self.function(self.variables.by_name(u), u)
         if told is None:
             return None
-        values = {name: float(value) for name, (value, _) in told.items()}
-        slopes = {
-            name: slopes_of(**dict(zip(self.variables.names, slope, strict=True)))
-            for name, (_, slope) in told.items()
-        }
-        known = Evaluation(
-            values,
-            {name: self.errors * abs(value) for name, value in values.items()},
-            slopes,
-            {name: self.errors * np.abs(slope) for name, slope in slopes.items()},
-            *NO_STATE,
-        )
+        names, columns = self.variables.names, ([], [], [], [])
+        for value, slope, *bars in told.values():
+            bars = bars or (self.errors * abs(value), self.errors * np.abs(slope))
+            for column, row in zip(columns, (value, bars[0], slope, bars[1]), strict=True):
+                is_row = bool(np.ndim(row))
+                row = slopes_of(**dict(zip(names, row, strict=True))) if is_row else float(row)
+                column.append(row)
+        known = Evaluation(*(dict(zip(told, c, strict=True)) for c in columns), *NO_STATE)
         self.evaluations.add(u, known)
         return known
 
@@ -63,6 +60,25 @@ def drawn(function, vary, told, sense=1.0, subject_to=None, *, begin=0.4, errors
     made.function, made.errors = function, errors
     made.at(np.full(len(vary), begin))
     return made
+
+
+BOX = {"d": (0.05, 0.2), "J": (0.003, 0.02), "r": (0.04, 0.12), "m": (1.0, 3.0), "g": (9.0, 10.0)}
+
+
+def best_of(count, function, goal="speed", subject_to=None, *, begin=0.3, **how):
+    """The runs over a function of u whose gradients, and errors of them, are in u."""
+    vary = dict(list(BOX.items())[:count])
+    rates = variables_of(SCENE, vary).rates
+
+    def told(_, u):
+        rows = function(u)
+        return rows and {
+            name: tuple(part / rates(u) if np.ndim(part) else part for part in row)
+            for name, row in rows.items()
+        }
+
+    made = drawn(told, vary, {goal: 1.0}, 1.0, subject_to, begin=begin)
+    return solved(made, **{"iterations": 300} | how)
 
 
 def solved(made, iterations=60, optimiser="trust-region"):
@@ -92,8 +108,8 @@ def formulas(d, slope):
 _VALUES, _SLOPES = jax.jit(formulas), jax.jit(jax.jacfwd(formulas, argnums=(0, 1)))
 
 
-def formula_problem(vary, told, sense, subject_to=None):
-    """Of the formulas, whose error bars are a thousandth; beyond d = 0.19 there is no gait."""
+def formula_problem(vary, told, sense, subject_to=None, *, errors=1e-3):
+    """Of the formulas, whose error bars are relative; beyond d = 0.19 there is no gait."""
 
     def function(named, u):
         if named["d"] > 0.19:
@@ -105,4 +121,4 @@ def formula_problem(vary, told, sense, subject_to=None):
             for name, value in values.items()
         }
 
-    return drawn(function, vary, told, sense, subject_to, errors=1e-3)
+    return drawn(function, vary, told, sense, subject_to, errors=errors)

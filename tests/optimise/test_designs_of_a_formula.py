@@ -34,6 +34,7 @@ from jaxbiped.optimise._optimisers import _damped_update
 from jaxbiped.optimise._optimum import Outcome
 from tests.optimise.drawn_designs import (
     BOTH,
+    FASTEST,
     NAMES,
     NO_STATE,
     SCENE,
@@ -44,7 +45,6 @@ from tests.optimise.drawn_designs import (
 )
 
 HEAVY_HIP = jb.Walker(m=1.0, J=0.01, l=0.4, d=0.1, r=0.08, hip_mass=0.5)
-FASTEST = {"speed": 1.0}, -1.0
 MU = 0.015 / 0.005625
 """Multiplier of a step of at most 0.21 m, by Lagrange."""
 

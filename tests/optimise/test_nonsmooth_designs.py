@@ -6,26 +6,9 @@ from scipy.optimize import lsq_linear
 
 import jaxbiped as jb
 from jaxbiped.optimise._design_functions import conditions, radius_of
-from jaxbiped.optimise._design_variables import variables_of
 from jaxbiped.optimise._optimality import optimality_of
 from jaxbiped.optimise._optimum import Outcome
-from tests.optimise.drawn_designs import SCENE, difference, drawn, solved
-
-BOX = {"d": (0.05, 0.2), "J": (0.003, 0.02), "r": (0.04, 0.12), "m": (1.0, 3.0), "g": (9.0, 10.0)}
-
-
-def best_of(count, function, goal="speed", subject_to=None, **how):
-    """The runs over a function of u whose gradients are in u."""
-    vary = dict(list(BOX.items())[:count])
-
-    rates = variables_of(SCENE, vary).rates
-
-    def told(_, u):
-        return {name: (value, slope / rates(u)) for name, (value, slope) in function(u).items()}
-
-    return solved(
-        drawn(told, vary, {goal: 1.0}, 1.0, subject_to, begin=0.3), **{"iterations": 300} | how
-    )
+from tests.optimise.drawn_designs import SCENE, best_of, difference
 
 
 def gained(runs, function):
@@ -105,7 +88,7 @@ def test_a_ridge_ends_at_its_foot(optimiser):
     """On u₁ = u₂ the derivative along it is that of (u₁ − ½)² + 0.3 (u₁ − ½)."""
     runs = best_of(2, ridge(1.0), optimiser=optimiser)
     assert runs.best.u == pytest.approx([0.35, 0.35], abs=2e-3)
-    assert runs.outcome() is Outcome.CONVERGED
+    assert runs.outcome() is Outcome.CORNER  # no multipliers meet there
 
 
 def test_designs_that_are_scattered_count_as_iterations():
