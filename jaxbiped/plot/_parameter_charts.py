@@ -16,8 +16,10 @@ from jaxbiped.basins._label_statistics import Fraction, wilson_interval
 from jaxbiped.continuation._bifurcation_curve import BifurcationCurve
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._branch_point import BranchPoint
+from jaxbiped.continuation._branch_point import BranchPoint, CycleFootsteps
+from jaxbiped.continuation._switch_branch import DoublingCascade
 from jaxbiped.dynamics._state import recurring_names, state_quantity
+from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import NORMAL_FORCE, axis_label
 from jaxbiped.scene._parameter_access import parameter_quantities
@@ -42,17 +44,23 @@ _MARKS = {
 
 
 def branch(
-    branches: Branch | Sequence[Branch], measure: str = "step_length", *, ax: Axes | None = None
+    branches: Branch | Sequence[Branch] | DoublingCascade,
+    measure: str = "step_length",
+    *,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draws a measure of the gaits on one branch or several over the parameter.
 
-    Lines are solid for stable gaits, dashed for unstable ones, and dotted if the multipliers'
-    errors leave the stability open. The colour and width of a line show the number of footsteps of
-    a cycle; marks show bifurcations. The spectral radius has a band of its errors and a line at
-    radius 1. Period and step length are averages over the footsteps of the cycle.
+    A cycle of several footsteps has a line for each of them, which begins where the branch of half
+    as many footsteps doubles its period, if that branch is drawn too. Lines are solid for stable
+    gaits, dashed for unstable ones, and dotted if the multipliers' errors leave the stability open.
+    The colour and width of a line show the number of footsteps of a cycle; marks show bifurcations.
+    The spectral radius has a band of its errors and a line at radius 1. If a compliant walker's
+    legs are unequal, period and step length are averages over the two footsteps of a stride.
 
     Args:
-        branches: one or several branches of one scene along one parameter.
+        branches: one or several branches of one scene along one parameter, or the result of
+            `jaxbiped.continuation.doubling_cascade`.
         measure: "period", "step_length", "speed", "peak_normal", "spectral_radius" or a component
             of the state, such as "theta_2".
         ax: axes to draw into. Default: a new figure.
@@ -64,7 +72,7 @@ def branch(
         ArgumentError: the measure is unknown, or branches are along several parameters or without
             points.
     """
-    given: list[Branch] = [*branches] if isinstance(branches, list | tuple) else [branches]  # type: ignore[list-item]
+    given = _branches_of(branches)
     for each in given:
         check_type("branches", each, Branch)
     if not given or not all(len(each) for each in given):
@@ -76,11 +84,13 @@ def branch(
     ax = style.axes_or_new(ax, 6.8, 4.6)
     counts = sorted({each.footsteps for each in given})
     for each in given:
-        _draw_lines(ax, each, measure, _look(counts.index(each.footsteps)))
+        begin = _doubling_of(each, given, measure)
+        _draw_lines(ax, each, measure, begin, _look(counts.index(each.footsteps)))
     for each in given:
         for event in each.bifurcations:
-            height, marker = _value(measure, each, event.point), _MARKS[event.kind][0]
-            ax.plot(event.value, height, marker, color=style.GROUND_COLOUR, markersize=6, zorder=3)
+            look = {"color": style.GROUND_COLOUR, "markersize": 6, "zorder": 3}
+            for height in _values(measure, each, event.point):
+                ax.plot(event.value, height, _MARKS[event.kind][0], **look)
     if given[0].axis.log:
         ax.set_xscale("log")
     if measure == "spectral_radius":
@@ -128,17 +138,39 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
     return style.figure_of(ax)
 
 
-def _value(measure: str, each: Branch, point: BranchPoint) -> float:
+def _branches_of(branches: Any) -> list[Branch]:
+    if isinstance(branches, DoublingCascade):
+        branches = branches.branches
+    return [*branches] if isinstance(branches, list | tuple) else [branches]
+
+
+def _values(measure: str, each: Branch, point: BranchPoint) -> np.ndarray:
+    """The measure of each footstep of a gait; the spectral radius is that of the cycle."""
     if measure == "spectral_radius":
-        return float(np.abs(point.multipliers[0]))
+        return np.abs(point.multipliers[:1])
+    whole = point.recurring, point.period, point.step_length, point.peak_normal
+    steps = point.footsteps or CycleFootsteps(*(np.array([value]) for value in whole))
     if measure == "speed":
-        return point.step_length / point.period
+        return steps.step_length / steps.period
     if measure in ("period", "step_length"):
-        return float(getattr(point, measure)) / each.footsteps
+        values: np.ndarray = getattr(steps, measure)
+        return values * len(values) / each.footsteps
     if measure == "peak_normal":
-        return point.peak_normal
-    place = each.state_type._fields.index(measure) - 1  # type: ignore[attr-defined]
-    return float(point.recurring[place])
+        return steps.peak_normal
+    return steps.recurring[:, recurring_names(each.state_type).index(measure)]
+
+
+def _doubling_of(
+    child: Branch, given: list[Branch], measure: str
+) -> tuple[float, np.ndarray] | None:
+    """The parameter and the measure at the period doubling from which a branch comes."""
+    stop = child.stops[0]
+    for each in given:
+        for event in each.bifurcations:
+            is_parent = event.kind is BranchEvent.PERIOD_DOUBLING and event.value == stop.value
+            if is_parent and stop.end is BranchEnd.BRANCHES_OFF:
+                return event.value, _values(measure, each, event.point)
+    return None
 
 
 def _look(k: int) -> dict[str, Any]:
@@ -156,19 +188,30 @@ def _draw_errors(ax: Axes, each: Branch, colour: str) -> None:
     ax.fill_between(values, sizes - errors, sizes + errors, **look)
 
 
-def _draw_lines(ax: Axes, each: Branch, measure: str, look: dict[str, Any]) -> None:
+def _draw_lines(
+    ax: Axes,
+    each: Branch,
+    measure: str,
+    begin: tuple[float, np.ndarray] | None,
+    look: dict[str, Any],
+) -> None:
     """Lines between neighbours; a bifurcation belongs to the gaits on either side of it."""
     special = {point.point.value for point in each.bifurcations}
-    values = [(point.value, _value(measure, each, point)) for point in each.points]
+    x = [point.value for point in each.points]
+    rows = [_values(measure, each, point) for point in each.points]
     kinds = [
         (there if here.value in special else here).stable for here, there in pairwise(each.points)
     ]
+    if begin is not None:  # Footsteps of a doubled cycle follow those of the cycle twice over.
+        x, rows = [begin[0], *x], [np.resize(begin[1], len(rows[0])), *rows]
+        kinds = [each.points[0].stable, *kinds]
     if not kinds:
-        ax.plot(*values[0], "o", color=look["color"], markersize=4)
+        ax.plot(x * len(rows[0]), rows[0], "o", color=look["color"], markersize=4)
     for kind, group in groupby(range(len(kinds)), key=kinds.__getitem__):
         first, *others = group
-        x, y = zip(*values[first : first + len(others) + 2], strict=True)
-        ax.plot(x, y, linestyle=_STYLES[kind], **look)
+        part = slice(first, first + len(others) + 2)
+        for y in np.transpose(rows[part]):
+            ax.plot(x[part], y, linestyle=_STYLES[kind], **look)
 
 
 def _entries(given: list[Branch], counts: list[int]) -> Iterator[Line2D]:
