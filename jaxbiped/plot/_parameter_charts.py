@@ -1,18 +1,16 @@
-"""Along a parameter: branches of gaits and fractions of basins; in two, curves of bifurcations."""
+"""Charts of branches of gaits along a parameter, and of curves of bifurcations in two."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive, check_type
+from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped._quantity import Quantity
-from jaxbiped.basins._label_statistics import Fraction, wilson_interval
 from jaxbiped.continuation._bifurcation_curve import BifurcationCurve
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch import Branch
@@ -21,7 +19,7 @@ from jaxbiped.continuation._switch_branch import DoublingCascade
 from jaxbiped.dynamics._state import recurring_names, state_quantity
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.plot import style
-from jaxbiped.plot._symbols import NORMAL_FORCE, axis_label
+from jaxbiped.plot._symbols import NORMAL_FORCE
 from jaxbiped.scene._parameter_access import parameter_quantities
 
 _MEASURES = {
@@ -33,7 +31,7 @@ _MEASURES = {
 }
 _STYLES: dict[bool | None, Any] = {True: "-", False: (0, (5, 2)), None: (0, (1, 1.5))}
 _WORDS = {True: "stable", False: "unstable", None: "undecided"}
-_MARKS = {
+EVENT_MARKS = {
     BranchEvent.FOLD: ("s", "fold"),
     BranchEvent.PERIOD_DOUBLING: ("D", "period doubling"),
     BranchEvent.NEIMARK_SACKER: ("^", "Neimark–Sacker"),
@@ -88,9 +86,10 @@ def branch(
         _draw_lines(ax, each, measure, begin, _look(counts.index(each.footsteps)))
     for each in given:
         for event in each.bifurcations:
-            look = {"color": style.GROUND_COLOUR, "markersize": 6, "zorder": 3}
+            size = 6 * 0.75 ** counts.index(each.footsteps)
+            look = {"color": style.GROUND_COLOUR, "markersize": size, "zorder": 3}
             for height in _values(measure, each, event.point):
-                ax.plot(event.value, height, _MARKS[event.kind][0], **look)
+                ax.plot(event.value, height, EVENT_MARKS[event.kind][0], **look)
     if given[0].axis.log:
         ax.set_xscale("log")
     if measure == "spectral_radius":
@@ -124,7 +123,7 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
         )
     ax = style.axes_or_new(ax, 6.4, 4.4)
     for k, curve in enumerate(curves):
-        marker, words = _MARKS[curve.kind]
+        marker, words = EVENT_MARKS[curve.kind]
         first, second = curve.values.T
         look = style.line_of(k) | {"markersize": 3.5, "linewidth": 1.2}
         ax.plot(second, first, marker=marker, label=words, **look)
@@ -226,7 +225,7 @@ def _entries(given: list[Branch], counts: list[int]) -> Iterator[Line2D]:
         words = f"{count} footstep{'s' * (count > 1)}"
         yield Line2D([], [], label=words, **_look(k))
     drawn = {event.kind for each in given for event in each.bifurcations}
-    for event, (marker, words) in _MARKS.items():
+    for event, (marker, words) in EVENT_MARKS.items():
         if event in drawn:
             yield Line2D([], [], color=grey, marker=marker, linestyle="none", label=words)
 
@@ -235,93 +234,3 @@ def _is_undecided(each: Branch) -> bool:
     """Whether gaits besides bifurcations are undecided."""
     special = {event.point.value for event in each.bifurcations}
     return any(point.stable is None and point.value not in special for point in each.points)
-
-
-def basin_fractions(
-    values: npt.ArrayLike,
-    fractions: Sequence[Mapping[str, Fraction]],
-    *,
-    name: str | Quantity,
-    unit: str = "",
-    kind: str = "lines",
-    confidence: float = 0.95,
-    log: bool = False,
-    ax: Axes | None = None,
-) -> Figure:
-    """Draws the fraction of starts with each label against a parameter.
-
-    The bands around the lines are Wilson's intervals of the counts (see `wilson_interval`). A label
-    that did not occur at a value has the fraction 0 there.
-
-    Args:
-        values: values of the parameter, increasing, shape (n,).
-        fractions: result of `jaxbiped.basins.fractions` at each value.
-        name, unit: name and unit of the parameter. A parameter's own name, such as "K", needs no
-            unit; nor does a `jaxbiped.laws.Quantity`.
-        kind: "lines", or "stacked": areas that add up to one, without bands.
-        confidence: confidence level of the bands.
-        log: whether the parameter's axis is logarithmic.
-        ax: axes to draw into. Default: a new figure.
-
-    Returns:
-        The figure that holds `ax`, or the new one.
-
-    Raises:
-        ArgumentError: there is no value, the number of fractions differs, values do not increase or
-            are not above 0 on a logarithmic axis, there is only one value to stack, or nothing is
-            labelled at a value.
-    """
-    check_choice("kind", kind, ("lines", "stacked"))
-    along = _check(values, fractions, log)
-    if kind == "stacked" and along.size == 1:
-        raise ArgumentError("values has one entry: a stacked figure must have at least 2.")
-    labels = style.in_order({label for found in fractions for label in found})
-    counts = np.asarray(
-        [[found[name].count if name in found else 0 for found in fractions] for name in labels]
-    )
-    totals = counts.sum(axis=0)
-    parts, colours = counts / totals, [style.label_colour(label) for label in labels]
-    ax = style.axes_or_new(ax, 7.2, 4.0)
-    title, margin, order = "Fractions of the starts", 0.0, -1
-    if kind == "stacked":
-        edges: dict[str, Any] = {"edgecolor": "white", "linewidth": 0.4}
-        ax.stackplot(along, parts, labels=labels, colors=colours, **edges)
-    else:
-        title += f" (bands: {100.0 * confidence:.4g} % confidence)"
-        margin, order = 0.02, 1
-        bands = zip(*wilson_interval(counts, totals, confidence=confidence), strict=True)
-        for label, colour, part, band in zip(labels, colours, parts, bands, strict=True):
-            ax.fill_between(along, *band, color=colour, alpha=0.25, linewidth=0.0)
-            look: dict[str, Any] = {"marker": style.label_marker(label), "markersize": 4.0}
-            ax.plot(along, part, color=colour, label=label, clip_on=False, **look)
-    style.dress(ax, title, axis_label(name, unit), "fraction of the starts")
-    if log:
-        ax.set_xscale("log")
-    if along.size > 1:
-        ax.set_xlim(along[0], along[-1])
-    ax.set_ylim(-margin, 1.0 + margin)
-    handles, entries = ax.get_legend_handles_labels()
-    style.legend_right(ax, handles=handles[::order], labels=entries[::order])
-    return style.figure_of(ax)
-
-
-def _check(
-    values: npt.ArrayLike, fractions: Sequence[Mapping[str, Fraction]], log: bool
-) -> np.ndarray:
-    check_finite("values", values)
-    along = np.asarray(values, dtype=float)
-    if along.ndim != 1 or along.size == 0 or along.size != len(fractions):
-        raise ArgumentError(
-            f"values has shape {along.shape} and there are {len(fractions)} fractions: there must "
-            "be one for each value, and at least one."
-        )
-    if (np.diff(along) <= 0.0).any():
-        raise ArgumentError("values does not increase everywhere: it must.")
-    if log:
-        check_positive("values", along)
-    empty = [k for k, found in enumerate(fractions) if not found]
-    if empty:
-        raise ArgumentError(
-            f"fractions[{empty[0]}] is empty: at least one start must be labelled at each value."
-        )
-    return along
