@@ -68,6 +68,14 @@ class Quantity(NamedTuple):
         """The same of a law between an angle and a torque, not a length and a force: N m/rad^n."""
         return self._replace(unit=_FORCE_OR_LENGTH.sub(lambda found: _ANGULAR[found[0]], self.unit))
 
+    def of_part(self, part: str) -> "Quantity":
+        """The same of a part, such as a body, which its words and its symbol name."""
+        base, _, index = self.symbol.strip("$").partition("_")
+        name = r"\mathrm{" + part.replace("_", r"\_") + "}"
+        words = self.words if self.words.endswith(part) else f"{self.words}, {part}"
+        symbol = f"${base}_{{{index}{',' if index else ''}{name}}}$" if base else ""
+        return self._replace(words=words, symbol=symbol)
+
     def in_row(self) -> str:
         """Words and symbol."""
         return f"{self.words}, {self.symbol}" if self.symbol else self.words

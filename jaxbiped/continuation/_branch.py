@@ -14,7 +14,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._summary import notebook_html
 from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
-from jaxbiped.continuation._branch_point import Axis, BranchPoint
+from jaxbiped.continuation._branch_point import Axis, BranchPoint, CycleFootsteps
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
 from jaxbiped.gait._branch_along import state_at
@@ -113,8 +113,9 @@ class Branch(eqx.Module, Tabular):
         Returns:
             In SI units. Along `point`: parameter, `state_…`, period, step_length, speed,
             peak_normal, spectral_radius and multipliers with their errors, `stable` (1, 0, or −1 if
-            the errors leave it open) and `bifurcation`. Along `event`: the same for special points,
-            with kind, critical multiplier and its error. Everything else is in the attributes.
+            the errors leave it open) and `bifurcation`; `footstep_…` are those of each footstep of
+            a cycle. Along `event`: the same for special points, with kind, critical multiplier and
+            its error. Everything else is in the attributes.
         """
         return _branch_dataset(self)
 
@@ -132,8 +133,7 @@ def _branch_dataset(branch: Branch) -> "xarray.Dataset":
     import xarray
 
     entries = _entries(branch, branch.points, "", "point")
-    special = [each.point for each in branch.bifurcations]
-    entries |= _entries(branch, special, "event_", "event")
+    entries |= _entries(branch, [e.point for e in branch.bifurcations], "event_", "event")
     kinds = np.array([EVENTS.index(each.kind) for each in branch.bifurcations], np.int8)
     flags = dict(enumerate(map(str, EVENTS)))
     entries["event_kind"] = Entry(("event",), kinds, Quantity("bifurcation"), flags=flags)
@@ -164,8 +164,9 @@ def _branch_dataset(branch: Branch) -> "xarray.Dataset":
         "accuracy": branch.accuracy,
         "engine": branch.engine,
     }
-    attributes = {"branch": strict_json(settings, unknown=str)}
-    return xarray.Dataset(variables_of(entries), attrs=attributes)
+    return xarray.Dataset(
+        variables_of(entries), attrs={"branch": strict_json(settings, unknown=str)}
+    )
 
 
 def _entries(
@@ -201,18 +202,24 @@ def _entries(
     for word, part in (("real", values.real), ("imaginary", values.imag)):
         words, bars = Quantity(f"multiplier, {word}"), f"{before}multipliers_error"
         entries[f"multipliers_{word[:4]}"] = Entry(each_of, part, words, bars)
-    words = Quantity("error of the multiplier")
-    entries["multipliers_error"] = Entry(each_of, errors, words)
+    entries["multipliers_error"] = Entry(each_of, errors, Quantity("error of the multiplier"))
     stable = np.array([_STABLE[point.stable] for point in points], np.int8)
     flags = {-1: "undecided", 0: "unstable", 1: "stable"}
     entries["stable"] = Entry((along,), stable, Quantity("stability"), flags=flags)
     codes = np.array([point.bifurcation for point in points], np.int8)
-    flags = {int(each): str(each) for each in Bifurcation}
-    words = Quantity("multiplier on the unit circle")
+    words, flags = Quantity("multiplier on the unit circle"), {int(e): str(e) for e in Bifurcation}
     entries["bifurcation"] = Entry((along,), codes, words, flags=flags)
     for name in ("place", "tangent"):
         words = Quantity(f"{name} on the curve of gaits", unit="scaled")
         entries[name] = Entry((along, "component"), table(name, m + 1, float), words)
+    steps = [point.footsteps for point in points if point.footsteps is not None]
+    if steps:
+        begins, *columns = map(np.stack, zip(*steps, strict=True))
+        named = zip(CycleFootsteps._fields[1:], columns, strict=True)
+        states = zip(names, np.moveaxis(begins, -1, 0), strict=True)
+        for name, values in (*named, *((f"state_{name}", x) for name, x in states)):
+            quantity = entries[name].quantity
+            entries[f"footstep_{name}"] = Entry((along, "footstep"), values, quantity)
     return {before + name: entry for name, entry in entries.items()}
 
 
@@ -280,6 +287,11 @@ def _points(dataset: "xarray.Dataset", kind: Any, along: str, before: str) -> li
     errors, codes = column("multipliers_error"), column("bifurcation")
     numbers = {name: column(name) for name in _NUMBERS}
     value, place, tangent = column(along), column("place"), column("tangent")
+    steps: list[CycleFootsteps | None] = [None] * len(value)
+    if f"{before}footstep_period" in dataset.variables:
+        begins = [column(f"footstep_state_{name}") for name in recurring_names(kind)]
+        columns = (column(f"footstep_{name}") for name in CycleFootsteps._fields[1:])
+        steps = [*map(CycleFootsteps, np.stack(begins, axis=-1), *columns)]
     return [
         BranchPoint(
             value=float(value[k]),
@@ -289,6 +301,7 @@ def _points(dataset: "xarray.Dataset", kind: Any, along: str, before: str) -> li
             bifurcation=int(codes[k]),
             place=place[k],
             tangent=tangent[k],
+            footsteps=steps[k],
             **{name: float(each[k]) for name, each in numbers.items()},
         )
         for k in range(len(value))

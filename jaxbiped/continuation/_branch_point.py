@@ -85,6 +85,22 @@ _LOCATED = 1e-9
 """Error of a multiplier at least: so near to the unit circle bifurcations are located."""
 
 
+class CycleFootsteps(NamedTuple):
+    """The k footsteps of a cycle one by one, from section to section (strides of unequal legs).
+
+    Attributes:
+        recurring: the m components with which each footstep begins, shape (k, m).
+        period: duration of each footstep [s], shape (k,).
+        step_length: distance from the foot that stands to the one that strikes [m], shape (k,).
+        peak_normal: largest normal force on a foot in each footstep [N], shape (k,).
+    """
+
+    recurring: np.ndarray
+    period: np.ndarray
+    step_length: np.ndarray
+    peak_normal: np.ndarray
+
+
 class BranchPoint(NamedTuple):
     """A gait on a branch. The state has m components besides hip_x.
 
@@ -102,6 +118,8 @@ class BranchPoint(NamedTuple):
         residual: largest change of a component over the cycle, SI units.
         place, tangent: point and tangent of the curve of gaits, scaled by the sizes of the
             components and the range, shape (m + 1,).
+        footsteps: the footsteps of a cycle of several; None for a single one, whose values are
+            those of the cycle.
     """
 
     value: float
@@ -116,6 +134,7 @@ class BranchPoint(NamedTuple):
     residual: float
     place: np.ndarray
     tangent: np.ndarray
+    footsteps: CycleFootsteps | None = None
 
     @property
     def stable(self) -> bool | None:

@@ -6,9 +6,16 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_unbatched
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point, change_of
+from jaxbiped.continuation._branch_point import (
+    Axis,
+    BranchPoint,
+    CycleFootsteps,
+    branch_point,
+    change_of,
+)
 from jaxbiped.continuation._cycle import Cycle, CycleProblem
 from jaxbiped.continuation._trace import Trace, limit_cause, trace
+from jaxbiped.dynamics._surfaces import foot_ahead
 from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Change, Curve, CurvePoint, correct
@@ -79,6 +86,21 @@ class ContinuationSetup(NamedTuple):
     def point(self, found: CurvePoint) -> BranchPoint:
         return branch_point(self.curve, self.axis, found)
 
+    def with_footsteps(self, point: BranchPoint) -> BranchPoint:
+        """The same point with its cycle's footsteps, if these are several."""
+        if self.arrivals == 1 or point.footsteps is not None:
+            return point
+        scene = with_parameters(self.scene, {self.axis.name: point.value})
+        begins, rows = point.recurring, []
+        for _ in range(self.arrivals):
+            once = self.cycle(begins, point.value, 1)
+            ahead = float(foot_ahead(scene, self.state_of(begins)))
+            rows.append((begins, once.period[0], once.advance[0], once.peak[0], ahead))
+            begins = once.recurring[0]
+        states, periods, advances, peaks, places = map(np.array, zip(*rows, strict=True))
+        lengths = advances + np.roll(places, -1) - places
+        return point._replace(footsteps=CycleFootsteps(states, periods, lengths, peaks))
+
     def trace(self, begin: CurvePoint, **options: Any) -> Trace:
         """The gaits onwards from a point of the curve; options are those of `trace`."""
         return trace(self.curve, self.axis, begin, **options)
@@ -99,10 +121,11 @@ class ContinuationSetup(NamedTuple):
 
     def branch(self, before: Trace, after: Trace) -> Branch:
         """The branch of two parts, of which the later begins where the earlier ends."""
+        events = (*before.bifurcations, *after.bifurcations)
         return Branch(
             scene=self.scene,
-            points=(*before.points, *after.points[1:]),
-            bifurcations=(*before.bifurcations, *after.bifurcations),
+            points=tuple(map(self.with_footsteps, (*before.points, *after.points[1:]))),
+            bifurcations=tuple(e._replace(point=self.with_footsteps(e.point)) for e in events),
             stops=(before.stop, after.stop),
             axis=self.axis,
             state_type=type(self.problem.like),

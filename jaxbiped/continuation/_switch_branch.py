@@ -19,6 +19,8 @@ from jaxbiped.gait._search_provenance import BranchEnd
 
 _AMPLITUDES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 """Distances along the eigenvector, in the sizes of the curve, at which the branch is sought."""
+_BESIDE = (0.25, 0.5, 0.75)
+"""Shares of that distance at which gaits are added, because the branch bends there like a root."""
 _NEAR = 0.01
 """How far in s from the doubling it may be found, unless the doublings themselves lie close."""
 _APART = 0.5
@@ -143,7 +145,7 @@ def _doubled_branch(
     near: float = _NEAR,
 ) -> Branch:
     setup = setup_of(branch, footsteps=2 * branch.footsteps)
-    begin = _doubled_cycle(setup, doubling, near)
+    first, begin = _doubled_cycles(setup, doubling, near)
     if begin is None:
         raise ArgumentError(
             f"doubling at {branch.along} = {doubling.value:.6g} is not allowed: no gait of "
@@ -155,14 +157,14 @@ def _doubled_branch(
         f"a branch of {branch.footsteps} footsteps doubles its period",
         doubling.value,
     )
-    first = Trace(beyond.points[:1], [], stop)
-    return setup.branch(first, beyond)
+    points = [*map(setup.point, first), beyond.points[0]]
+    return setup.branch(Trace(points, [], stop), beyond)
 
 
-def _doubled_cycle(
+def _doubled_cycles(
     setup: ContinuationSetup, doubling: BifurcationPoint, near: float
-) -> CurvePoint | None:
-    """A cycle of doubled period beside a doubling, its tangent pointing away from there."""
+) -> tuple[list[CurvePoint], CurvePoint | None]:
+    """A cycle of doubled period beside a doubling, its tangent pointing away, and some before."""
     point, curve, undoubled = doubling.point, setup.curve, setup.arrivals // 2
     sizes = curve.sizes
     seen = setup.cycle(point.recurring, point.value, undoubled)
@@ -175,14 +177,19 @@ def _doubled_cycle(
     # Normal to the branch of half the period, which then does not cross the plane of the search.
     across = along - (along @ point.tangent) * point.tangent
     across /= np.linalg.norm(across)
-    for amplitude in _AMPLITUDES:
+
+    def at(amplitude: float) -> CurvePoint | None:
         guess = point.place + amplitude * along
         found = correct(curve, guess, across, patient=True).found
         if found is None or abs(found.place[-1] - point.place[-1]) > near:
-            continue
+            return None
         own = found.place[:-1] * sizes[:-1]
         half = setup.cycle(own, setup.axis.value(found.place[-1]), undoubled)
         apart = np.linalg.norm((np.asarray(half.recurring[0]) - own) / sizes[:-1])
-        if apart > _APART * 2.0 * amplitude:
-            return found
-    return None
+        return found if apart > _APART * 2.0 * amplitude else None
+
+    for amplitude in _AMPLITUDES:
+        if begin := at(amplitude):
+            before = (at(share * amplitude) for share in _BESIDE)
+            return [cycle for cycle in before if cycle is not None], begin
+    return [], None

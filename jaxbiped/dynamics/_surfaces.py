@@ -13,6 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
+from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._contacts import feet, foot_force, legs_at, limits_of
 from jaxbiped.dynamics._equivalent_states import CompliantState, exchange_legs, images
 from jaxbiped.dynamics._footfalls import (
@@ -24,7 +25,8 @@ from jaxbiped.dynamics._footfalls import (
     touches,
     touching_legs,
 )
-from jaxbiped.dynamics._strike_surfaces import lead, lean, opening
+from jaxbiped.dynamics._stance import of_stance
+from jaxbiped.dynamics._strike_surfaces import lead, lean, opening, standing_place
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._scene import CompliantScene, is_rigid
 from jaxbiped.scene._state_types import SomeState
@@ -185,6 +187,14 @@ class HeelStrike(AbstractSection):
         carrier = carrier_place(structure, found, places, leg)
         lands = touching_legs(structure, found)[leg]
         return lands if carrier is None else lands & (places[leg] > carrier)
+
+
+@kept_alone
+def foot_ahead(scene: AbstractWalkerScene, state: PyTree) -> Scalar:
+    """How far ahead of the root point the stance leg's foot stands on a section [m]."""
+    if is_rigid(scene):
+        return of_stance(scene, state, lambda stance: standing_place(stance) - stance.root.x)
+    return legs_at(scene, state)[scene.mechanism.structure.stance_leg].x
 
 
 class Section(AbstractSection):

@@ -10,6 +10,7 @@ from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._footfalls import FootMotion, landings, standing_leg, touches
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
+from jaxbiped.dynamics._surfaces import foot_ahead
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
@@ -186,7 +187,7 @@ def nodes_of(last: LinearisedReturn, like: PyTree) -> tuple[Scalar, PyTree]:
 def step_lengths(problem: FixedPointProblem, last: LinearisedReturn, states: PyTree) -> Scalar:
     """Distances between the places of successive heel strikes in a cycle [m], shape (footsteps,).
 
-    The first one is from the last strike of the cycle before. Rigid feet: of the root point's
+    The first one is from the last strike of the cycle before. Rigid feet: of the standing foot's
     places just after the strikes.
     """
     mechanism = problem.args.mechanism
@@ -195,8 +196,9 @@ def step_lengths(problem: FixedPointProblem, last: LinearisedReturn, states: PyT
     if count == 1:
         return last.advance
     if not problem.args.compliant:
-        assert last.nodes is not None
-        return _distances(last.nodes.start[:, 1], last.advance)
+        begins = jtu.tree_map(lambda x: x[:, 0], states)
+        ahead = jax.vmap(lambda y: foot_ahead(problem.args, y))(begins)
+        return _distances(jtu.tree_leaves(begins)[0] + ahead, last.advance)
     scene = problem.args.minimal
     found = jax.vmap(jax.vmap(lambda y: feet(scene, y)))(states)
     before = jtu.tree_map(lambda x: x[:, :-1], found)

@@ -1,25 +1,25 @@
-"""Along a parameter: branches of gaits and fractions of basins; in two, curves of bifurcations."""
+"""Charts of branches of gaits along a parameter, and of curves of bifurcations in two."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive, check_type
+from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped._quantity import Quantity
-from jaxbiped.basins._label_statistics import Fraction, wilson_interval
 from jaxbiped.continuation._bifurcation_curve import BifurcationCurve
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._branch_point import BranchPoint
+from jaxbiped.continuation._branch_point import BranchPoint, CycleFootsteps
+from jaxbiped.continuation._switch_branch import DoublingCascade
 from jaxbiped.dynamics._state import recurring_names, state_quantity
+from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.plot import style
-from jaxbiped.plot._symbols import NORMAL_FORCE, axis_label
+from jaxbiped.plot._symbols import NORMAL_FORCE
 from jaxbiped.scene._parameter_access import parameter_quantities
 
 _MEASURES = {
@@ -31,7 +31,7 @@ _MEASURES = {
 }
 _STYLES: dict[bool | None, Any] = {True: "-", False: (0, (5, 2)), None: (0, (1, 1.5))}
 _WORDS = {True: "stable", False: "unstable", None: "undecided"}
-_MARKS = {
+EVENT_MARKS = {
     BranchEvent.FOLD: ("s", "fold"),
     BranchEvent.PERIOD_DOUBLING: ("D", "period doubling"),
     BranchEvent.NEIMARK_SACKER: ("^", "Neimark–Sacker"),
@@ -42,17 +42,23 @@ _MARKS = {
 
 
 def branch(
-    branches: Branch | Sequence[Branch], measure: str = "step_length", *, ax: Axes | None = None
+    branches: Branch | Sequence[Branch] | DoublingCascade,
+    measure: str = "step_length",
+    *,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draws a measure of the gaits on one branch or several over the parameter.
 
-    Lines are solid for stable gaits, dashed for unstable ones, and dotted if the multipliers'
-    errors leave the stability open. The colour and width of a line show the number of footsteps of
-    a cycle; marks show bifurcations. The spectral radius has a band of its errors and a line at
-    radius 1. Period and step length are averages over the footsteps of the cycle.
+    A cycle of several footsteps has a line for each of them, which begins where the branch of half
+    as many footsteps doubles its period, if that branch is drawn too. Lines are solid for stable
+    gaits, dashed for unstable ones, and dotted if the multipliers' errors leave the stability open.
+    The colour and width of a line show the number of footsteps of a cycle; marks show bifurcations.
+    The spectral radius has a band of its errors and a line at radius 1. If a compliant walker's
+    legs are unequal, period and step length are averages over the two footsteps of a stride.
 
     Args:
-        branches: one or several branches of one scene along one parameter.
+        branches: one or several branches of one scene along one parameter, or the result of
+            `jaxbiped.continuation.doubling_cascade`.
         measure: "period", "step_length", "speed", "peak_normal", "spectral_radius" or a component
             of the state, such as "theta_2".
         ax: axes to draw into. Default: a new figure.
@@ -64,7 +70,7 @@ def branch(
         ArgumentError: the measure is unknown, or branches are along several parameters or without
             points.
     """
-    given: list[Branch] = [*branches] if isinstance(branches, list | tuple) else [branches]  # type: ignore[list-item]
+    given = _branches_of(branches)
     for each in given:
         check_type("branches", each, Branch)
     if not given or not all(len(each) for each in given):
@@ -76,11 +82,14 @@ def branch(
     ax = style.axes_or_new(ax, 6.8, 4.6)
     counts = sorted({each.footsteps for each in given})
     for each in given:
-        _draw_lines(ax, each, measure, _look(counts.index(each.footsteps)))
+        begin = _doubling_of(each, given, measure)
+        _draw_lines(ax, each, measure, begin, _look(counts.index(each.footsteps)))
     for each in given:
         for event in each.bifurcations:
-            height, marker = _value(measure, each, event.point), _MARKS[event.kind][0]
-            ax.plot(event.value, height, marker, color=style.GROUND_COLOUR, markersize=6, zorder=3)
+            size = 6 * 0.75 ** counts.index(each.footsteps)
+            look = {"color": style.GROUND_COLOUR, "markersize": size, "zorder": 3}
+            for height in _values(measure, each, event.point):
+                ax.plot(event.value, height, EVENT_MARKS[event.kind][0], **look)
     if given[0].axis.log:
         ax.set_xscale("log")
     if measure == "spectral_radius":
@@ -114,7 +123,7 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
         )
     ax = style.axes_or_new(ax, 6.4, 4.4)
     for k, curve in enumerate(curves):
-        marker, words = _MARKS[curve.kind]
+        marker, words = EVENT_MARKS[curve.kind]
         first, second = curve.values.T
         look = style.line_of(k) | {"markersize": 3.5, "linewidth": 1.2}
         ax.plot(second, first, marker=marker, label=words, **look)
@@ -128,17 +137,39 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
     return style.figure_of(ax)
 
 
-def _value(measure: str, each: Branch, point: BranchPoint) -> float:
+def _branches_of(branches: Any) -> list[Branch]:
+    if isinstance(branches, DoublingCascade):
+        branches = branches.branches
+    return [*branches] if isinstance(branches, list | tuple) else [branches]
+
+
+def _values(measure: str, each: Branch, point: BranchPoint) -> np.ndarray:
+    """The measure of each footstep of a gait; the spectral radius is that of the cycle."""
     if measure == "spectral_radius":
-        return float(np.abs(point.multipliers[0]))
+        return np.abs(point.multipliers[:1])
+    whole = point.recurring, point.period, point.step_length, point.peak_normal
+    steps = point.footsteps or CycleFootsteps(*(np.array([value]) for value in whole))
     if measure == "speed":
-        return point.step_length / point.period
+        return steps.step_length / steps.period
     if measure in ("period", "step_length"):
-        return float(getattr(point, measure)) / each.footsteps
+        values: np.ndarray = getattr(steps, measure)
+        return values * len(values) / each.footsteps
     if measure == "peak_normal":
-        return point.peak_normal
-    place = each.state_type._fields.index(measure) - 1  # type: ignore[attr-defined]
-    return float(point.recurring[place])
+        return steps.peak_normal
+    return steps.recurring[:, recurring_names(each.state_type).index(measure)]
+
+
+def _doubling_of(
+    child: Branch, given: list[Branch], measure: str
+) -> tuple[float, np.ndarray] | None:
+    """The parameter and the measure at the period doubling from which a branch comes."""
+    stop = child.stops[0]
+    for each in given:
+        for event in each.bifurcations:
+            is_parent = event.kind is BranchEvent.PERIOD_DOUBLING and event.value == stop.value
+            if is_parent and stop.end is BranchEnd.BRANCHES_OFF:
+                return event.value, _values(measure, each, event.point)
+    return None
 
 
 def _look(k: int) -> dict[str, Any]:
@@ -156,19 +187,30 @@ def _draw_errors(ax: Axes, each: Branch, colour: str) -> None:
     ax.fill_between(values, sizes - errors, sizes + errors, **look)
 
 
-def _draw_lines(ax: Axes, each: Branch, measure: str, look: dict[str, Any]) -> None:
+def _draw_lines(
+    ax: Axes,
+    each: Branch,
+    measure: str,
+    begin: tuple[float, np.ndarray] | None,
+    look: dict[str, Any],
+) -> None:
     """Lines between neighbours; a bifurcation belongs to the gaits on either side of it."""
     special = {point.point.value for point in each.bifurcations}
-    values = [(point.value, _value(measure, each, point)) for point in each.points]
+    x = [point.value for point in each.points]
+    rows = [_values(measure, each, point) for point in each.points]
     kinds = [
         (there if here.value in special else here).stable for here, there in pairwise(each.points)
     ]
+    if begin is not None:  # Footsteps of a doubled cycle follow those of the cycle twice over.
+        x, rows = [begin[0], *x], [np.resize(begin[1], len(rows[0])), *rows]
+        kinds = [each.points[0].stable, *kinds]
     if not kinds:
-        ax.plot(*values[0], "o", color=look["color"], markersize=4)
+        ax.plot(x * len(rows[0]), rows[0], "o", color=look["color"], markersize=4)
     for kind, group in groupby(range(len(kinds)), key=kinds.__getitem__):
         first, *others = group
-        x, y = zip(*values[first : first + len(others) + 2], strict=True)
-        ax.plot(x, y, linestyle=_STYLES[kind], **look)
+        part = slice(first, first + len(others) + 2)
+        for y in np.transpose(rows[part]):
+            ax.plot(x[part], y, linestyle=_STYLES[kind], **look)
 
 
 def _entries(given: list[Branch], counts: list[int]) -> Iterator[Line2D]:
@@ -183,7 +225,7 @@ def _entries(given: list[Branch], counts: list[int]) -> Iterator[Line2D]:
         words = f"{count} footstep{'s' * (count > 1)}"
         yield Line2D([], [], label=words, **_look(k))
     drawn = {event.kind for each in given for event in each.bifurcations}
-    for event, (marker, words) in _MARKS.items():
+    for event, (marker, words) in EVENT_MARKS.items():
         if event in drawn:
             yield Line2D([], [], color=grey, marker=marker, linestyle="none", label=words)
 
@@ -192,93 +234,3 @@ def _is_undecided(each: Branch) -> bool:
     """Whether gaits besides bifurcations are undecided."""
     special = {event.point.value for event in each.bifurcations}
     return any(point.stable is None and point.value not in special for point in each.points)
-
-
-def basin_fractions(
-    values: npt.ArrayLike,
-    fractions: Sequence[Mapping[str, Fraction]],
-    *,
-    name: str | Quantity,
-    unit: str = "",
-    kind: str = "lines",
-    confidence: float = 0.95,
-    log: bool = False,
-    ax: Axes | None = None,
-) -> Figure:
-    """Draws the fraction of starts with each label against a parameter.
-
-    The bands around the lines are Wilson's intervals of the counts (see `wilson_interval`). A label
-    that did not occur at a value has the fraction 0 there.
-
-    Args:
-        values: values of the parameter, increasing, shape (n,).
-        fractions: result of `jaxbiped.basins.fractions` at each value.
-        name, unit: name and unit of the parameter. A parameter's own name, such as "K", needs no
-            unit; nor does a `jaxbiped.laws.Quantity`.
-        kind: "lines", or "stacked": areas that add up to one, without bands.
-        confidence: confidence level of the bands.
-        log: whether the parameter's axis is logarithmic.
-        ax: axes to draw into. Default: a new figure.
-
-    Returns:
-        The figure that holds `ax`, or the new one.
-
-    Raises:
-        ArgumentError: there is no value, the number of fractions differs, values do not increase or
-            are not above 0 on a logarithmic axis, there is only one value to stack, or nothing is
-            labelled at a value.
-    """
-    check_choice("kind", kind, ("lines", "stacked"))
-    along = _check(values, fractions, log)
-    if kind == "stacked" and along.size == 1:
-        raise ArgumentError("values has one entry: a stacked figure must have at least 2.")
-    labels = style.in_order({label for found in fractions for label in found})
-    counts = np.asarray(
-        [[found[name].count if name in found else 0 for found in fractions] for name in labels]
-    )
-    totals = counts.sum(axis=0)
-    parts, colours = counts / totals, [style.label_colour(label) for label in labels]
-    ax = style.axes_or_new(ax, 7.2, 4.0)
-    title, margin, order = "Fractions of the starts", 0.0, -1
-    if kind == "stacked":
-        edges: dict[str, Any] = {"edgecolor": "white", "linewidth": 0.4}
-        ax.stackplot(along, parts, labels=labels, colors=colours, **edges)
-    else:
-        title += f" (bands: {100.0 * confidence:.4g} % confidence)"
-        margin, order = 0.02, 1
-        bands = zip(*wilson_interval(counts, totals, confidence=confidence), strict=True)
-        for label, colour, part, band in zip(labels, colours, parts, bands, strict=True):
-            ax.fill_between(along, *band, color=colour, alpha=0.25, linewidth=0.0)
-            look: dict[str, Any] = {"marker": style.label_marker(label), "markersize": 4.0}
-            ax.plot(along, part, color=colour, label=label, clip_on=False, **look)
-    style.dress(ax, title, axis_label(name, unit), "fraction of the starts")
-    if log:
-        ax.set_xscale("log")
-    if along.size > 1:
-        ax.set_xlim(along[0], along[-1])
-    ax.set_ylim(-margin, 1.0 + margin)
-    handles, entries = ax.get_legend_handles_labels()
-    style.legend_right(ax, handles=handles[::order], labels=entries[::order])
-    return style.figure_of(ax)
-
-
-def _check(
-    values: npt.ArrayLike, fractions: Sequence[Mapping[str, Fraction]], log: bool
-) -> np.ndarray:
-    check_finite("values", values)
-    along = np.asarray(values, dtype=float)
-    if along.ndim != 1 or along.size == 0 or along.size != len(fractions):
-        raise ArgumentError(
-            f"values has shape {along.shape} and there are {len(fractions)} fractions: there must "
-            "be one for each value, and at least one."
-        )
-    if (np.diff(along) <= 0.0).any():
-        raise ArgumentError("values does not increase everywhere: it must.")
-    if log:
-        check_positive("values", along)
-    empty = [k for k, found in enumerate(fractions) if not found]
-    if empty:
-        raise ArgumentError(
-            f"fractions[{empty[0]}] is empty: at least one start must be labelled at each value."
-        )
-    return along

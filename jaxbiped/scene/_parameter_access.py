@@ -1,6 +1,7 @@
 """Parameters of a scene by name, and the identity of a scene that is made of them."""
 
 import dataclasses
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any, TypeAlias, TypeVar
 
@@ -72,7 +73,8 @@ def parameter_values(scene: AbstractScene) -> dict[str, Scalar]:
 def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
     """Words, symbol and unit of each of a scene's parameters, by name (see `parameter_names`).
 
-    For a field that was not declared with `jaxbiped.laws.parameter`, only the name is known.
+    For a field that was not declared with `jaxbiped.laws.parameter`, only the name is known. If two
+    parameters have one symbol, those of a part, such as a body, have its name as an index.
 
     Args:
         scene: a scene of any kind.
@@ -80,8 +82,14 @@ def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
     Returns:
         A `Quantity` (words, symbol and SI unit) for each name.
     """
-    known = _parameters(scene).items()
-    return {name: _quantity(_modelled(scene), name, path) for name, (path, _) in known}
+    paths = {name: path for name, (path, _) in _parameters(scene).items()}
+    quantities = {name: _quantity(_modelled(scene), name, path) for name, path in paths.items()}
+    shared = Counter(each.symbol or each.words for each in quantities.values())
+    for name, quantity in quantities.items():
+        part, dot, _ = name.rpartition(".")
+        if dot and shared[quantity.symbol or quantity.words] > 1:
+            quantities[name] = quantity.of_part(part)
+    return quantities
 
 
 def _quantity(part: object, name: str, path: _Path) -> Quantity:
