@@ -122,7 +122,7 @@ class Constraints(options.Command):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code, 1 where Ctrl-C ended it."""
+        """Runs the command; returns the exit code, or passes Ctrl-C on behind the rows so far."""
         scene = self.scene.scene()
         assert isinstance(scene, jb.Scene)
         integrators = [Integrator.read(text) for text in self.integrators]
@@ -144,7 +144,7 @@ class Constraints(options.Command):
                     report.say(_line(runs))
                     now.update()
             except KeyboardInterrupt:
-                report.say(f"stopped by Ctrl-C after {len(runs)} of {many} runs")
+                pass  # what is done is reported
         complete = len(runs) == many
         # Times by one engine are not those by the other.
         engines = {run.integrator: f"; {run.integrator} ({run.engine})" for run in runs}
@@ -153,14 +153,16 @@ class Constraints(options.Command):
             + "".join(engines.values())
         )
         numbers = [run._asdict() for run in runs]
-        if runs:
-            draw = {"constraints": lambda: jb.plot.constraint_runs(numbers)}
-            report.wrote(self.output.draw(draw))
         report.finish(
             {"duration_s": self.duration, "complete": complete, "runs": numbers},
             lambda: csv_of(numbers),
         )
-        return 0 if complete else 1
+        if runs:
+            draw = {"constraints": lambda: jb.plot.constraint_runs(numbers)}
+            report.wrote(self.output.draw(draw))
+        if not complete:
+            raise options.interrupted(f"{len(runs)} of {many} runs are done")
+        return 0
 
 
 def _line(runs: Sequence[ConstraintRun]) -> str:

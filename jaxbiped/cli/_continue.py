@@ -56,10 +56,15 @@ class ContinueGait(options.Command, of=("continue_gait",)):
             _print(report, branch, wall)
         else:
             report.say(branch.stops[0].cause)
+        report.finish(branch_numbers(branch) | {"wall_s": wall}, branch.to_csv)
         if len(branch) and self.output.out is not None:
             report.wrote(write_results(branch, self.output))
-        report.finish(branch_numbers(branch) | {"wall_s": wall}, branch.to_csv)
-        return 0 if len(branch) else 1
+        ends = [stop.end for stop in branch.stops]
+        if jb.gait.BranchEnd.INTERRUPTED in ends:
+            raise options.interrupted(
+                f"the branch has the {len(branch)} gaits so far, and ends where it was left"
+            )
+        return int(not len(branch) or jb.gait.BranchEnd.UNFINISHED in ends)
 
 
 def branch_numbers(branch: "jb.continuation.Branch") -> JsonObject:

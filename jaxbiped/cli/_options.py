@@ -112,6 +112,13 @@ class Command(Options):
         raise NotImplementedError
 
 
+def interrupted(kept: str) -> KeyboardInterrupt:
+    """An interrupt that a command passes on after it has written its results up to there."""
+    error = KeyboardInterrupt()
+    error.add_note(f"Interrupted: {kept}.")
+    return error
+
+
 def one_of(registry: str) -> Check:
     """Whether a name is in a public tuple or table."""
     return Check(lambda name, value: check_choice(name, value, names(registry)))

@@ -4,7 +4,7 @@ import dataclasses
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import Positional
 
@@ -85,23 +85,27 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         how = self.arguments("optimise_gait") | vary
         del how["footsteps"]  # of the certificate's walk
         found = jb.optimise_gait(scene, **how)
-        certificate = jb.optimise.certify(
-            found,
-            starts=self.basin,
-            footsteps=self.footsteps,
-            fatal_push=self.fatal_push,
-            bifurcations_along=along,
-            other_engine=self.other_engine,
-        )
+        ended = jb.optimise.Outcome
+        tests: dict[str, Any] = {
+            "starts": self.basin,
+            "footsteps": self.footsteps,
+            "fatal_push": self.fatal_push,
+            "bifurcations_along": along,
+            "other_engine": self.other_engine,
+        }
+        if found.outcome is ended.INTERRUPTED:
+            tests = {"starts": 0, "footsteps": 0, "bifurcations_along": ()}
+        certificate = jb.optimise.certify(found, **tests)
         sense = "minimise" if self.maximise is None else "maximise"
         goal = getattr(self, sense)
         report = Report(self.output.json, self.output.csv)
         _print(report, scene, found, goal)
         report.say(*_certificate_lines(certificate))
         figures = {"optimisation": lambda: jb.plot.optimisation(found)}
-        report.wrote(self.output.draw(figures | gait_figures(found.gait)))
         report.finish(_optimum_numbers(found, certificate, goal, sense), found.to_csv)
-        ended = jb.optimise.Outcome
+        report.wrote(self.output.draw(figures | gait_figures(found.gait)))
+        if found.outcome is ended.INTERRUPTED or "interrupted" in certificate.failed.values():
+            raise options.interrupted("the best design so far is what is reported")
         return int(found.outcome not in (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE))
 
 
@@ -291,9 +295,11 @@ class Fit(options.Command, of=("fit_gait",)):
             report.say(f"limited on one side only: {', '.join(fit.one_sided)}")
         if fit.at_bounds:
             report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
-        report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
         numbers = vars(fit) | {"ending": str(fit.ending), "intervals_95": fit.intervals}
         del numbers["intervals"]
         also = {"chi_squared": fit.chi_squared, "p_value": fit.p_value}
         report.finish(numbers | also, fit.to_csv)
+        report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
+        if fit.ending is jb.identify.FitEnding.INTERRUPTED:
+            raise options.interrupted("the best estimates so far are what is reported")
         return 0 if fit.ending is jb.identify.FitEnding.CONVERGED else 1

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
+from jaxbiped._files import read_csv
 from jaxbiped.cli._options import Check, Count, Options, one_of
 from jaxbiped.cli._scene_options import named_text, numbers_in
 from jaxbiped.cli._walkers import SEED as SEED_WALKER
@@ -260,8 +261,6 @@ def _usual_axes(scene: "jb.Scene | jb.RigidScene") -> tuple[str, ...]:
 
 def read_starts(path: Path, scene: "jb.Scene | jb.RigidScene") -> object:
     """Starts from a CSV file, leaves of shape (n,); a rigid walker keeps its part of them."""
-    import csv
-
     import numpy as np
 
     from jaxbiped._types import as_float
@@ -270,29 +269,16 @@ def read_starts(path: Path, scene: "jb.Scene | jb.RigidScene") -> object:
     structure = scene.mechanism.structure
     named, names = f"starts = {str(path)!r}", [*structure.coordinates, *structure.rates]
     wanted = ",".join(names)
-    try:
-        with path.open(newline="") as file:
-            rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError) as error:
-        raise ArgumentError(
-            f"{named} cannot be read ({error}): it must be a CSV file with the header {wanted}."
-        ) from None
-    if not rows or rows[0] != names:
-        head = ",".join(rows[0]) if rows else ""
-        raise ArgumentError(f"{named} has the header {head!r}: it must be {wanted}.")
-    if len(rows) == 1:
-        raise ArgumentError(f"{named} holds no starts: give at least one row.")
+    (_, header), *rows = read_csv("starts", path)
+    if header != names:
+        raise ArgumentError(f"{named} has the header {','.join(header)!r}: it must be {wanted}.")
     numbers = []
-    for line, row in enumerate(rows[1:], start=2):
+    for line, row in rows:
         try:
             numbers.append([float(cell) for cell in row])
         except ValueError:
             raise ArgumentError(
                 f"{named}, line {line}: {','.join(row)!r} is not all numbers."
             ) from None
-        if len(row) != len(names):
-            raise ArgumentError(
-                f"{named}, line {line}: {len(row)} numbers instead of {len(names)}."
-            )
     whole: Any = state_type_of(names)(*map(as_float, np.array(numbers).T))
     return whole if scene.compliant else jb.dynamics.rigid_state(whole)
