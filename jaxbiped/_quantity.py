@@ -3,6 +3,7 @@
 The one place that knows how a unit is written: in files, in text and in figures.
 """
 
+import contextlib
 import math
 import re
 from typing import NamedTuple
@@ -22,7 +23,7 @@ _BASES, _PLAIN = ("m", "s"), ("rad", "1")
 _SUPERSCRIPTS = dict(zip("0123456789n", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True))
 _DEGREE = math.pi / 180.0
 _SCALES = {
-    "s": {"s": 1.0, "ms": 1e-3},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
     "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "km/h": 1.0 / 3.6},
     "N": {"N": 1.0, "kN": 1e3},
@@ -31,7 +32,7 @@ _SCALES = {
     "kg": {"kg": 1.0, "g": 1e-3},
 }
 """SI units, and how many of them each unit is."""
-_WITH_UNIT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s.,].*)")
+_WITH_UNIT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)")
 
 
 def unit_scales(unit: str | None, given: str = "") -> dict[str, float]:
@@ -52,12 +53,11 @@ def si_number(text: str, unit: str | None = None) -> float:
     Raises:
         ValueError: it is not a number, or has a unit of another kind than `unit`.
     """
+    with contextlib.suppress(ValueError):
+        return float(text)
     found = _WITH_UNIT.fullmatch(text.strip())
     if found is None:
-        try:
-            return float(text)
-        except ValueError:
-            raise ValueError(f"{text!r} is not a number") from None
+        raise ValueError(f"{text!r} is not a number")
     scales = unit_scales(unit, found[2])
     if found[2] not in scales:
         allowed = ", ".join(filter(None, scales))

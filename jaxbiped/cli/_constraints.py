@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
+from jaxbiped._quantity import si_number
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._declarations import names
 from jaxbiped.cli._report import Report, csv_of, table
@@ -51,7 +52,7 @@ class Integrator(NamedTuple):
         name, _, number = text.partition(":")
         fixed = number.startswith("dt=")
         try:
-            value = float(number.removeprefix("dt="))
+            value = si_number(number.removeprefix("dt="), "s" if fixed else "")
         except ValueError:
             value = -1.0
         if name not in solvers or not value > 0.0:
