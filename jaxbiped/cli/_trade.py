@@ -102,10 +102,11 @@ class Trade(options.Command):
         try:
             with stage(f"solving the {name} with the reference methods"):
                 truth = trade.truth()
-            with stage(f"measuring the {name}", total=len(ways), unit="methods") as now:
-                for way in ways if truth is not None else ():
-                    rows.append(trade.row(way, truth))
-                    now.update()
+            if truth is not None:
+                with stage(f"measuring the {name}", total=len(ways), unit="methods") as now:
+                    for way in ways:
+                        rows.append(trade.row(way, truth))
+                        now.update()
         except KeyboardInterrupt:
             return rows, truth, False
         return rows, truth, True
