@@ -1,5 +1,35 @@
 """`python -m jaxbiped` is `jaxbiped`."""
 
-from jaxbiped.cli import main
+import _thread
+import signal
+import sys
+import threading
+from typing import Any
 
-main()
+
+def main() -> None:
+    """Runs a command and exits; Ctrl-C ends it in one line also while the package is imported."""
+    usual = sys.unraisablehook
+
+    def repeat_interrupt(lost: Any) -> None:
+        """Repeats a Ctrl-C that came in a callback, such as the garbage collector's, which cannot
+        raise it."""
+        if lost.exc_type is KeyboardInterrupt:
+            threading.Timer(0.05, _thread.interrupt_main).start()
+        else:
+            usual(lost)
+
+    sys.unraisablehook = repeat_interrupt
+    try:
+        from jaxbiped.cli import main as run_command
+
+        run_command()
+    except KeyboardInterrupt:
+        print("jaxbiped: Interrupted.", file=sys.stderr)
+        sys.exit(130)
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is written, and the process only ends
+
+
+if __name__ == "__main__":
+    main()

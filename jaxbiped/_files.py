@@ -70,6 +70,39 @@ def read_json(name: str, path: str | Path) -> Any:
         raise ArgumentError(f"{name} = {str(path)!r} is not JSON ({error}).") from None
 
 
+def read_csv(name: str, path: str | Path) -> list[tuple[int, list[str]]]:
+    """Rows of a CSV file, the header first: the line of each and its stripped cells.
+
+    Lines that begin with # and rows of empty cells are left out, and so are columns without a name
+    and without cells, as spreadsheets write them.
+
+    Raises:
+        ArgumentError: the file cannot be read, has no row below its header, or has a row with
+            another number of cells.
+    """
+    import csv
+
+    file = f"{name} = {str(path)!r}"
+    lines = read_text(name, path).splitlines()
+    reader = csv.reader("" if line.lstrip().startswith("#") else line for line in lines)
+    rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
+    rows = [(line, cells) for line, cells in rows if any(cells)]
+    if len(rows) < 2:
+        raise ArgumentError(f"{file} is not allowed: it must have a header and at least one row.")
+    header = rows[0][1]
+    named = [k for k, cell in enumerate(header) if cell]
+    remedy = "separate them by commas, and write numbers with a point"
+    for line, cells in rows:
+        if len(named) == 1 and any(mark in header[named[0]] for mark in ";\t"):
+            raise ArgumentError(f"{file}, line {line}: its cells have no commas: {remedy}.")
+        if len(cells) <= named[-1] or any(x for k, x in enumerate(cells) if k not in named):
+            raise ArgumentError(
+                f"{file}: line {line} has {len(cells)} cells, and the header {len(header)}: "
+                f"{remedy}."
+            )
+    return [(line, [cells[k] for k in named]) for line, cells in rows]
+
+
 def check_writable_directory(name: str, path: Path) -> None:
     """Creates the directory if need be; raises where files cannot be written.
 

@@ -3,6 +3,8 @@
 The one place that knows how a unit is written: in files, in text and in figures.
 """
 
+import contextlib
+import math
 import re
 from typing import NamedTuple
 
@@ -19,6 +21,50 @@ _FORCE_OR_LENGTH = re.compile(r"\b[Nm]\b")
 _ANGULAR = {"N": "N m", "m": "rad"}
 _BASES, _PLAIN = ("m", "s"), ("rad", "1")
 _SUPERSCRIPTS = dict(zip("0123456789n", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True))
+_DEGREE = math.pi / 180.0
+_SCALES = {
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+    "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "km/h": 1.0 / 3.6},
+    "N": {"N": 1.0, "kN": 1e3},
+    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE, "°": _DEGREE},
+    "rad/s": {"rad/s": 1.0, "deg/s": _DEGREE, "°/s": _DEGREE},
+    "kg": {"kg": 1.0, "g": 1e-3},
+}
+"""SI units, and how many of them each unit is."""
+_WITH_UNIT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)")
+
+
+def unit_scales(unit: str | None, given: str = "") -> dict[str, float]:
+    """The units in which a quantity may be written, and how many SI units each of them is.
+
+    Args:
+        unit: the quantity's SI unit; None if it is not known yet.
+        given: the unit that is given, which then tells the others of its kind.
+    """
+    if unit is not None:
+        return _SCALES.get(unit, {unit: 1.0})
+    return next((scales for scales in _SCALES.values() if given in scales), {given: 1.0})
+
+
+def si_number(text: str, unit: str | None = None) -> float:
+    """The number in SI units that a text means, with a unit as in "2deg" or without one.
+
+    Raises:
+        ValueError: it is not a number, or has a unit of another kind than `unit`.
+    """
+    with contextlib.suppress(ValueError):
+        return float(text)
+    found = _WITH_UNIT.fullmatch(text.strip())
+    if found is None:
+        raise ValueError(f"{text!r} is not a number")
+    scales = unit_scales(unit, found[2])
+    if found[2] not in scales:
+        allowed = ", ".join(filter(None, scales))
+        raise ValueError(
+            f"{text!r} is not a number" + (f" in {allowed}" if allowed else ": it has no unit")
+        )
+    return float(found[1]) * scales[found[2]]
 
 
 class Quantity(NamedTuple):

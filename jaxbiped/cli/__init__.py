@@ -72,7 +72,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Runs a command and exits.
 
     With one sentence and 2 for an argument that is not allowed, 1 for a full disk or lost workers,
-    130 for Ctrl-C.
+    130 for Ctrl-C. A result that is not what was asked for is 1, too.
     """
     try:
         try:
@@ -83,6 +83,10 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:  # who reads wants no more, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except KeyboardInterrupt as error:
+        notes = " ".join(getattr(error, "__notes__", ["Interrupted."]))
+        print(f"jaxbiped: {notes}", file=sys.stderr)
+        sys.exit(130)
 
 
 def _run(given: list[str]) -> None:
@@ -105,10 +109,6 @@ def _run(given: list[str]) -> None:
         sys.exit(command.run())
     except BrokenPipeError:
         raise
-    except KeyboardInterrupt as error:
-        told = " ".join(getattr(error, "__notes__", ["Interrupted."]))
-        print(f"jaxbiped: {told}", file=sys.stderr)
-        sys.exit(130)
     except (ArgumentError, ResourceError, OSError) as error:
         print(f"jaxbiped: {error}", file=sys.stderr)
         sys.exit(2 if isinstance(error, ArgumentError) else 1)

@@ -30,6 +30,8 @@ _GAIT = {
     "largest multiplier": "{0[largest]:.5f}",
     "radius": "{0[reach]}",
 }
+_MOST_UNFINISHED = 0.05
+"""Share of starts without an outcome, above which the labels are not what was asked for."""
 _REDUNDANT = (
     'formulation = "redundant" is not allowed for a basin: starts are labelled in minimal '
     "coordinates."
@@ -104,13 +106,17 @@ class Basin(options.Command):
             numbers["labels"] = _label_names(found)
         report = Report(self.output.json, self.output.csv)
         _print(report, numbers)
+        numbers["wall_s"] = time.perf_counter() - IMPORT_BEGAN
+        report.finish(numbers, lambda: jb.measure.to_csv(found, tuple(map(str, found.label.dims))))
         if self.output.out is not None:
             with stage("drawing the basin"):
                 paths = _write_results(found, starts, self.output)
             report.wrote(paths)
-        numbers["wall_s"] = time.perf_counter() - IMPORT_BEGAN
-        report.finish(numbers, lambda: jb.measure.to_csv(found, tuple(map(str, found.label.dims))))
-        return 0
+        kinds = jb.basins.Label
+        unfinished = (kinds.UNRESOLVED, kinds.OUT_OF_STEPS, kinds.SOLVER_FAILED)
+        share = sum(numbers["counts"].get(str(kind), 0) for kind in unfinished) / numbers["starts"]
+        met = "label_errors" not in numbers or numbers["label_errors"]["met"]
+        return int(share > _MOST_UNFINISHED or not met)
 
 
 def _basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
+from jaxbiped._quantity import si_number
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._declarations import names
 from jaxbiped.cli._report import Report, csv_of, table
@@ -51,7 +52,7 @@ class Integrator(NamedTuple):
         name, _, number = text.partition(":")
         fixed = number.startswith("dt=")
         try:
-            value = float(number.removeprefix("dt="))
+            value = si_number(number.removeprefix("dt="), "s" if fixed else "")
         except ValueError:
             value = -1.0
         if name not in solvers or not value > 0.0:
@@ -122,7 +123,7 @@ class Constraints(options.Command):
     output: options.OutputOptions
 
     def run(self) -> int:
-        """Runs the command; returns the exit code, 1 where Ctrl-C ended it."""
+        """Runs the command; returns the exit code, or passes Ctrl-C on behind the rows so far."""
         scene = self.scene.scene()
         assert isinstance(scene, jb.Scene)
         integrators = [Integrator.read(text) for text in self.integrators]
@@ -144,7 +145,7 @@ class Constraints(options.Command):
                     report.say(_line(runs))
                     now.update()
             except KeyboardInterrupt:
-                report.say(f"stopped by Ctrl-C after {len(runs)} of {many} runs")
+                pass  # what is done is reported
         complete = len(runs) == many
         # Times by one engine are not those by the other.
         engines = {run.integrator: f"; {run.integrator} ({run.engine})" for run in runs}
@@ -153,14 +154,16 @@ class Constraints(options.Command):
             + "".join(engines.values())
         )
         numbers = [run._asdict() for run in runs]
-        if runs:
-            draw = {"constraints": lambda: jb.plot.constraint_runs(numbers)}
-            report.wrote(self.output.draw(draw))
         report.finish(
             {"duration_s": self.duration, "complete": complete, "runs": numbers},
             lambda: csv_of(numbers),
         )
-        return 0 if complete else 1
+        if runs:
+            draw = {"constraints": lambda: jb.plot.constraint_runs(numbers)}
+            report.wrote(self.output.draw(draw))
+        if not complete:
+            raise options.interrupted(f"{len(runs)} of {many} runs are done")
+        return 0
 
 
 def _line(runs: Sequence[ConstraintRun]) -> str:

@@ -8,11 +8,11 @@ from typing import Annotated
 from tyro.conf import arg
 
 import jaxbiped as jb
-from jaxbiped._checks import check_finite
+from jaxbiped._checks import ArgumentError, check_finite
 from jaxbiped._files import JsonObject
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._report import Report, columns, records, table, wall_times
-from jaxbiped.cli._scene_options import SceneOptions
+from jaxbiped.cli._scene_options import SceneOptions, numbers_in, units_of
 from jaxbiped.cli._start_options import StartOptions
 
 _MOST_ROWS = 24
@@ -27,10 +27,10 @@ class ContinueGait(options.Command, of=("continue_gait",)):
     output: options.OutputOptions
     along: str = "slope"
     """Name of the parameter."""
-    first: Annotated[float, arg(name="from"), options.Check(check_finite)] = 0.005
-    """Beginning of the range of the parameter (SI units)."""
-    last: Annotated[float, arg(name="to"), options.Check(check_finite)] = 0.1
-    """End of the range (SI units)."""
+    first: Annotated[str, arg(name="from", metavar="FLOAT")] = "0.005"
+    """Beginning of the range of the parameter, in SI units or with a unit, such as 1deg."""
+    last: Annotated[str, arg(name="to", metavar="FLOAT")] = "0.1"
+    """End of the range, in the same form."""
     footsteps: options.CycleFootsteps
     log: bool | None
     largest_step: Annotated[float, options.positive()]
@@ -38,6 +38,20 @@ class ContinueGait(options.Command, of=("continue_gait",)):
     max_points: options.Count
     accuracy: options.GaitAccuracy
     engine: options.Engine
+
+    def check_names(self, scene: SceneOptions) -> None:
+        """Raises `ArgumentError` for a parameter that the scene lacks, or a range that is none."""
+        self.bounds(scene.check_parameter("along", self.along))
+
+    def bounds(self, unit: str | None) -> tuple[float, float]:
+        """The range in SI units; raises `ArgumentError`."""
+        first = numbers_in("from", self.along, self.first, unit)[0]
+        last = numbers_in("to", self.along, self.last, unit)[0]
+        check_finite("from", first)
+        check_finite("to", last)
+        if first == last:
+            raise ArgumentError(f"from = to = {first:g} is not allowed: the range is empty.")
+        return first, last
 
     def run(self) -> int:
         continue_gait, imported = jb.continue_gait, time.perf_counter()
@@ -47,7 +61,7 @@ class ContinueGait(options.Command, of=("continue_gait",)):
         branch = continue_gait(
             scene,  # type: ignore[arg-type]
             self.along,
-            bounds=(self.first, self.last),
+            bounds=self.bounds(units_of(jb.parameter_quantities(scene)).get(self.along, "")),
             guess=guess,
             **self.arguments("continue_gait"),
         )
@@ -56,10 +70,15 @@ class ContinueGait(options.Command, of=("continue_gait",)):
             _print(report, branch, wall)
         else:
             report.say(branch.stops[0].cause)
+        report.finish(branch_numbers(branch) | {"wall_s": wall}, branch.to_csv)
         if len(branch) and self.output.out is not None:
             report.wrote(write_results(branch, self.output))
-        report.finish(branch_numbers(branch) | {"wall_s": wall}, branch.to_csv)
-        return 0 if len(branch) else 1
+        ends = [stop.end for stop in branch.stops]
+        if jb.gait.BranchEnd.INTERRUPTED in ends:
+            raise options.interrupted(
+                f"the branch has the {len(branch)} gaits so far, and ends where it was left"
+            )
+        return int(not len(branch) or jb.gait.BranchEnd.UNFINISHED in ends)
 
 
 def branch_numbers(branch: "jb.continuation.Branch") -> JsonObject:

@@ -90,10 +90,10 @@ class FindGait(options.Command, of=("find_gait",)):
             report.say(_failure(numbers, gait))
         if gait.error is not None:
             report.say(error_sentence(gait.error))
+        report.finish(numbers, gait.to_csv)
         if found:
             report.wrote(self.output.draw(gait_figures(gait)))
-        report.finish(numbers, gait.to_csv)
-        return 0 if found else 1
+        return int(not found or (gait.error is not None and not gait.error.met))
 
 
 def gait_figures(gait: "jb.Gait") -> dict[str, Callable[[], Any]]:

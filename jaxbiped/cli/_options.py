@@ -2,11 +2,13 @@
 
 import dataclasses
 import inspect
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, dataclass_transform, get_args
 
 from tyro.conf import OmitArgPrefixes, arg
+from tyro.constructors import PrimitiveConstructorSpec
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -16,7 +18,10 @@ from jaxbiped._checks import (
     check_positive,
 )
 from jaxbiped._files import check_writable_directory, check_writable_file
+from jaxbiped._quantity import si_number
 from jaxbiped.cli._declarations import Argument, documentation, names, signature
+
+_UNIT = re.compile(r"\[(.+?)\]")
 
 
 class Check(NamedTuple):
@@ -67,12 +72,19 @@ class Options:
         for name, field in (made or {}).items():
             own[name] = field.kind
             setattr(cls, name, field.default)
+        for name, kind in own.items():
+            (words,) = (entry.help for entry in _said_by(kind) if getattr(entry, "help", None))
+            if get_args(kind)[0] in (float, float | None) and (unit := _UNIT.search(words)):
+                own[name] = Annotated[kind, _number_in(unit[1])]
         cls.__annotations__ = own
         dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)(cls)
 
     def arguments(self, function: str) -> dict[str, Any]:
         """The options that are keywords of a public function by their names."""
         return {name: value for name, value in vars(self).items() if name in signature(function)}
+
+    def check_names(self, scene: Any) -> None:
+        """Raises `ArgumentError` for names that no scene of these options has."""
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
@@ -88,6 +100,17 @@ class Options:
                     name = _name(field.name, field.type)
                     for entry in value if said.each else (value,):
                         said.value(name, entry)
+
+
+def _number_in(unit: str) -> Any:
+    """Reads a number in an SI unit, which may be written with its own: 0.03, 2deg, 500ms."""
+
+    def read(texts: list[str]) -> float | None:
+        return None if texts == ["None"] else si_number(texts[0], unit)
+
+    return PrimitiveConstructorSpec(
+        1, "FLOAT", read, lambda value: True, lambda value: [str(value)]
+    )
 
 
 def _said_by(kind: Any) -> tuple[Any, ...]:
@@ -107,9 +130,24 @@ def _name(name: str, kind: Any) -> str:
 class Command(Options):
     """A command with its options."""
 
+    def check(self) -> None:
+        """Raises `ArgumentError` for what is wrong in itself, and for names that no scene has."""
+        super().check()
+        groups = vars(self)
+        for group in (*groups.values(), self) if "scene" in groups else ():
+            if isinstance(group, Options):
+                group.check_names(groups["scene"])
+
     def run(self) -> int:
         """Runs it; returns the exit code."""
         raise NotImplementedError
+
+
+def interrupted(kept: str) -> KeyboardInterrupt:
+    """An interrupt that a command passes on after it has written its results up to there."""
+    error = KeyboardInterrupt()
+    error.add_note(f"Interrupted: {kept}.")
+    return error
 
 
 def one_of(registry: str) -> Check:

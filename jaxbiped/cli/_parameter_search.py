@@ -2,9 +2,10 @@
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import Positional
 
@@ -12,10 +13,12 @@ import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._files import JsonObject, read_json, read_text
 from jaxbiped.cli import _options as options
+from jaxbiped.cli._declarations import names
 from jaxbiped.cli._gait import gait_figures
 from jaxbiped.cli._report import Report, columns, records
-from jaxbiped.cli._scene_options import SceneOptions, minimal
+from jaxbiped.cli._scene_options import SceneOptions, minimal, numbers_in, units_of
 
+_MEASURE = re.compile(r"\s*(\w+)")
 _USUAL_RANGE = (0.5, 2.0)
 """Factors of a parameter's own value between which it varies unless bounds are given."""
 _STABLE = {True: "stable", False: "NOT STABLE", None: "undecided within the error"}
@@ -70,14 +73,27 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
     store: Path | None
     output: options.OutputOptions
 
+    def check_names(self, scene: SceneOptions) -> None:
+        """Raises `ArgumentError` for parameters and measures that the scene lacks."""
+        for name, bounds in _varied(self.vary):
+            unit = scene.check_parameter("vary", name)
+            if bounds:
+                _range(name, bounds, unit)
+        for name in _names(self.bifurcations):
+            scene.check_parameter("bifurcations", name)
+        bounded = [("subject_to", text) for text in self.subject_to]
+        for option, text in (*bounded, ("maximise", self.maximise), ("minimise", self.minimise)):
+            measure = _MEASURE.match(text or "")
+            if measure and measure[1] != "fatal_push":  # the search itself says why not that
+                check_choice(option, measure[1], names("optimise.OBJECTIVES"))
+
     def run(self) -> int:
         from jaxbiped.continuation._critical_values import range_of
 
         scene = self.scene.scene()
         assert not isinstance(scene, jb.RedundantScene)
         self.output.make_folder()
-        names = map(str.strip, self.bifurcations.split(","))
-        along = [name for name in names if name not in ("", "none")]
+        along = _names(self.bifurcations)
         for name in along:
             check_choice("bifurcations", name, jb.parameter_names(scene))
             range_of(scene, name)
@@ -85,25 +101,50 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         how = self.arguments("optimise_gait") | vary
         del how["footsteps"]  # of the certificate's walk
         found = jb.optimise_gait(scene, **how)
-        certificate = jb.optimise.certify(
-            found,
-            starts=self.basin,
-            footsteps=self.footsteps,
-            fatal_push=self.fatal_push,
-            bifurcations_along=along,
-            other_engine=self.other_engine,
-        )
+        ended = jb.optimise.Outcome
+        tests: dict[str, Any] = {
+            "starts": self.basin,
+            "footsteps": self.footsteps,
+            "fatal_push": self.fatal_push,
+            "bifurcations_along": along,
+            "other_engine": self.other_engine,
+        }
+        if found.outcome is ended.INTERRUPTED:
+            tests = {"starts": 0, "footsteps": 0, "bifurcations_along": ()}
+        certificate = jb.optimise.certify(found, **tests)
         sense = "minimise" if self.maximise is None else "maximise"
         goal = getattr(self, sense)
         report = Report(self.output.json, self.output.csv)
         _print(report, scene, found, goal)
         report.say(*_certificate_lines(certificate))
         figures = {"optimisation": lambda: jb.plot.optimisation(found)}
-        report.wrote(self.output.draw(figures | gait_figures(found.gait)))
         report.finish(_optimum_numbers(found, certificate, goal, sense), found.to_csv)
+        report.wrote(self.output.draw(figures | gait_figures(found.gait)))
         ended = jb.optimise.Outcome
+        if found.outcome is ended.INTERRUPTED or "interrupted" in certificate.failed.values():
+            raise options.interrupted("the best design so far is what is reported")
         done = (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE, ended.FLAT)
         return int(found.outcome not in done)
+
+
+def _names(text: str) -> list[str]:
+    """The names of a list that commas separate; none for "none"."""
+    names = map(str.strip, text.split(","))
+    return [name for name in names if name not in ("", "none")]
+
+
+def _varied(text: str) -> list[tuple[str, str]]:
+    """Names and bounds, which may be empty, from d=0.05:0.2,r,J."""
+    parts = (part.partition("=") for part in text.split(","))
+    return [(name.strip(), bounds.strip()) for name, _, bounds in parts]
+
+
+def _range(name: str, text: str, unit: str | None) -> tuple[float, float]:
+    """Bounds in SI units from low:high; raises `ArgumentError`."""
+    bounds = numbers_in("vary", name, text, unit, ":")
+    if len(bounds) != 2:
+        raise ArgumentError(f"vary = '{name}={text}' is not understood: write {name}=low:high.")
+    return bounds[0], bounds[1]
 
 
 def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[float, float]]:
@@ -111,16 +152,11 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
     from jaxbiped.continuation._critical_values import farthest_allowed
 
     own, found = jb.parameter_values(scene), {}
-    for part in text.split(","):
-        name, given, bounds = (each.strip() for each in part.partition("="))
-        check_choice("vary", name, jb.parameter_names(scene))
-        if given:
-            try:
-                low, high = map(float, bounds.split(":", 1))
-            except ValueError:
-                raise ArgumentError(
-                    f"vary = {part.strip()!r} is not understood: write {name}=low:high."
-                ) from None
+    units = units_of(jb.parameter_quantities(scene))
+    for name, bounds in _varied(text):
+        check_choice("vary", name, units)
+        if bounds:
+            low, high = _range(name, bounds, units[name])
         elif (value := float(own[name])) > 0.0:
             low, high = (farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
         else:
@@ -272,16 +308,21 @@ class Fit(options.Command, of=("fit_gait",)):
     max_evaluations: options.Count
     output: options.OutputOptions
 
+    def check_names(self, scene: SceneOptions) -> None:
+        """Raises `ArgumentError` for parameters that the scene lacks."""
+        for name in _names(self.vary):
+            scene.check_parameter("vary", name)
+
     def run(self) -> int:
         scene = self.scene.scene()
         assert not isinstance(scene, jb.RedundantScene)
         self.output.make_folder()
-        names = tuple(name.strip() for name in self.vary.split(",") if name.strip())
+        fitted = tuple(_names(self.vary))
         measured, how = jb.identify.read_measured(self.file, scene), self.arguments("fit_gait")
-        fit = jb.fit_gait(scene, names, measured, **how)
+        fit = jb.fit_gait(scene, fitted, measured, **how)
         report = Report(self.output.json, self.output.csv)
         parts = (jb.parameter_quantities(scene), fit.estimates, fit.standard_errors, fit.intervals)
-        report.say(columns(_ESTIMATE, [(name, *(part[name] for part in parts)) for name in names]))
+        report.say(columns(_ESTIMATE, [(name, *(part[name] for part in parts)) for name in fitted]))
         report.say(
             f"{fit.ending} after {fit.evaluations} scenes; chi squared {fit.chi_squared:.3g} at "
             f"{fit.freedom} degrees of freedom (p = {fit.p_value:.2g})"
@@ -292,9 +333,11 @@ class Fit(options.Command, of=("fit_gait",)):
             report.say(f"limited on one side only: {', '.join(fit.one_sided)}")
         if fit.at_bounds:
             report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
-        report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
         numbers = vars(fit) | {"ending": str(fit.ending), "intervals_95": fit.intervals}
         del numbers["intervals"]
         also = {"chi_squared": fit.chi_squared, "p_value": fit.p_value}
         report.finish(numbers | also, fit.to_csv)
+        report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
+        if fit.ending is jb.identify.FitEnding.INTERRUPTED:
+            raise options.interrupted("the best estimates so far are what is reported")
         return 0 if fit.ending is jb.identify.FitEnding.CONVERGED else 1

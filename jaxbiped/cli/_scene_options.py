@@ -1,13 +1,15 @@
 """Options that describe a scene: the walker, the model, its laws, their parameters, actuators."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice, check_pair
+from jaxbiped._quantity import Quantity, si_number
 from jaxbiped.cli._declarations import Argument, fields, registered, signature
 from jaxbiped.cli._options import Check, Field, Options, among, one_of
 from jaxbiped.cli._walkers import SEED as SEED_WALKER
@@ -22,6 +24,7 @@ MATCHED = {"normal": ("K", "c", "n"), "friction": ("mu_static", "mu_kinetic", "v
 CLEARANCES = {"stance-rotation": "StanceRotation", "always-touching": "AlwaysTouching"}
 _OF_WALKER = ("m", "J", "l", "d", "r", "hip_mass")
 """Parameters of the seed's walker."""
+_NUMBERED = re.compile(r"_\d+$")
 _OF_GROUND = ("slope", "g")
 """Parameters for which a published walker has its own values. Default: None."""
 
@@ -73,47 +76,62 @@ def named_text(option: str, text: str, example: str = "") -> tuple[str, str]:
     return name, value
 
 
-def numbers_in(option: str, name: str, text: str, parts: list[str]) -> list[float]:
-    """The parts of a text as numbers; raises `ArgumentError`."""
+def numbers_in(
+    option: str, name: str, text: str, unit: str | None, mark: str | None = None
+) -> list[float]:
+    """The numbers of name=text in SI units, between marks; raises `ArgumentError`."""
     try:
-        return [float(part) for part in parts]
-    except ValueError:
+        return [si_number(part, unit) for part in (text.split(mark) if mark else [text])]
+    except ValueError as error:
         raise ArgumentError(
-            f"{option} = '{name}={text}' is not allowed: {name} must be a number, and {text!r} is "
-            "none."
+            f"{option} = '{name}={text}' is not allowed: {name} must be a number, and {error}."
         ) from None
 
 
 class ActuationOptions(Options, made=dict(_actuator_fields())):
     """What drives the walker beside gravity, each by its numbers as name=value (SI units)."""
 
+    @property
+    def given(self) -> dict[str, dict[str, Any]]:
+        """Values of the actuators that were asked for, by their names; raises `ArgumentError`."""
+        return {
+            name: _actuator_values(name, home, texts)
+            for name, home in registered("actuation").items()
+            if (texts := getattr(self, name.replace("-", "_")))
+        }
+
+    def check(self) -> None:
+        """Raises `ArgumentError` for a name that an actuator lacks, or a value that is none."""
+        super().check()
+        _ = self.given
+
     def actuation(self) -> tuple[Any, ...] | None:
         """The actuators that were asked for, None where none was; raises `ArgumentError`."""
-        parts = (
-            _actuator(name, kind, texts)
-            for name, kind in jb.actuation.ACTUATORS.items()
-            if (texts := getattr(self, name.replace("-", "_")))
-        )
-        return tuple(parts) or None
+        kinds = jb.actuation.ACTUATORS
+        return tuple(kinds[name](**values) for name, values in self.given.items()) or None
 
 
-def _actuator(option: str, kind: Any, texts: tuple[str, ...]) -> Any:
-    from jaxbiped._parameter_declaration import parameter_infos
-
-    infos = parameter_infos(kind)
+def _actuator_values(option: str, home: str, texts: tuple[str, ...]) -> dict[str, Any]:
     values: dict[str, Any] = {}
-    known = {field.name: field for field in dataclasses.fields(kind)}
+    known = fields(home)
     for text in texts:
         name, value = named_text(option, text)
         check_choice(f"{option}'s name", name, known)
         values[name] = value
-        if name in infos:
-            numbers = numbers_in(option, name, value, value.split(","))
+        if info := known[name].info:
+            numbers = numbers_in(option, name, value, info.quantity.unit, ",")
+            for number in numbers:
+                info.check(name, number)
             values[name] = numbers if len(numbers) > 1 else numbers[0]
-    for name, field in known.items():
-        if field.default is dataclasses.MISSING and name not in values:
-            raise ArgumentError(f"{option} needs {name}=value, its {infos[name].quantity.words}.")
-    return kind(**values)
+    for name, (default, _, info) in known.items():
+        if default is None and info is not None and name not in values:
+            raise ArgumentError(f"{option} needs {name}=value, its {info.quantity.words}.")
+    return values
+
+
+def units_of(quantities: Mapping[str, Quantity]) -> dict[str, str]:
+    """The unit of each quantity, by its name."""
+    return {name: quantity.unit for name, quantity in quantities.items()}
 
 
 class SceneOptions(Options, made=dict(_parameter_fields())):
@@ -151,7 +169,7 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         check_choice("friction", self.friction, registered("laws", "friction"))
         if self._on_seed:
             check_pair("l", self.values["l"], "r", self.values["r"])
-        for name, value in self.named_values().items():
+        for name, value in self.named_values(self.check_parameter).items():
             own = name.rpartition(".")[2]
             if own in SEED and self.values[own] != SEED[own].default:
                 raise ArgumentError(
@@ -165,6 +183,24 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         """The seed's parameters, by their paper names."""
         said = {name: getattr(self, name) for name in SEED}
         return {name: SEED[name].default if x is None else x for name, x in said.items()}
+
+    def check_parameter(self, option: str, name: str, *others: str) -> str | None:
+        """The unit of a parameter; None for a walker whose parameters only its scene knows.
+
+        Raises:
+            ArgumentError: a name that neither the scene of these options nor `others` have.
+        """
+        if self.walker != SEED_WALKER:
+            return None
+        parts = ["Walker", "Ground", *map(registered("actuation").get, self.driven.given)]
+        if not self.rolls:
+            parts += [registered("laws", kind)[getattr(self, kind)] for kind in MATCHED]
+        infos = {own: entry.info for part in parts for own, entry in fields(str(part)).items()}
+        units = {own: info.quantity.unit for own, info in infos.items() if info}
+        own = name.rpartition(".")[2]
+        if own not in units and _NUMBERED.sub("", own) not in units:
+            check_choice(option, name, (*others, *units))
+        return units.get(own, units.get(_NUMBERED.sub("", own)))
 
     @property
     def rolls(self) -> bool:
@@ -203,10 +239,13 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
                 if (value := getattr(self, name)) != getattr(SceneOptions, name):
                     raise ArgumentError(f"{name} = {value} is not allowed with {told}: {why}")
 
-    def named_values(self) -> dict[str, float]:
-        """The parameters that were set by name; raises `ArgumentError`."""
+    def named_values(self, unit: Callable[[str, str], str | None]) -> dict[str, float]:
+        """The parameters that were set by name, with their units; raises `ArgumentError`."""
         named = (named_text("set", text, ", such as K=2e6") for text in self.set)
-        return {name: numbers_in("set", name, value, [value])[0] for name, value in named}
+        return {
+            name: numbers_in("set", name, value, unit("parameter", name))[0]
+            for name, value in named
+        }
 
     def scene(self) -> "AnyScene":
         """The scene that these options describe; raises `ArgumentError`."""
@@ -217,7 +256,8 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         scene: Any = jb.RigidScene(walker, own.ground) if rolls else self._with_laws(own, walker)
         driven = self.driven.actuation()
         scene = dataclasses.replace(scene, actuation=own.actuation if driven is None else driven)
-        scene = jb.with_parameters(scene, self.named_values())
+        units = units_of(jb.parameter_quantities(scene))
+        scene = jb.with_parameters(scene, self.named_values(lambda _, name: units.get(name, "")))
         if self.formulation == "minimal":
             return scene
         method = jb.constraints.CONSTRAINT_METHODS[self.method or "index1"]()

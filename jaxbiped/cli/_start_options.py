@@ -5,13 +5,16 @@ The starts of a basin lie on a grid, are samples, or those of a file.
 
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
+from jaxbiped._files import read_csv
+from jaxbiped._quantity import si_number
 from jaxbiped.cli._options import Check, Count, Options, one_of
-from jaxbiped.cli._scene_options import named_text, numbers_in
+from jaxbiped.cli._scene_options import SceneOptions, named_text, numbers_in, units_of
 from jaxbiped.cli._walkers import SEED as SEED_WALKER
 from jaxbiped.cli._walkers import usual_start
 
@@ -26,6 +29,8 @@ _STEP = 1.01
 _ROUNDS = 8
 _USUAL = ("theta_{swing}=-0.5:0.3:100", "omega_{swing}=-2:4:100")
 """Axes of a basin that nobody chose, and as many starts on each."""
+_OTHER_NAMES = ("theta_stance", "theta_swing", "omega_stance", "omega_swing")
+"""Names of the legs' angles and rates by what the legs do where a cycle begins."""
 _USUAL_RIGID = ("theta_{stance}=0:0.5:100", "omega_{stance}=-2.5:0:100")
 
 
@@ -62,8 +67,18 @@ class StartOptions(Options):
             name, value = named_text("state", text)
             if name in own:
                 raise ArgumentError(f"state = {text!r} is not allowed: {name} is given twice.")
-            own[name] = numbers_in("state", name, value, [value])[0]
+            own[name] = numbers_in("state", name, value, _unit_of(name))[0]
         return own
+
+    def check_names(self, scene: SceneOptions) -> None:
+        """Raises `ArgumentError` for scalars and a leg that the seed's walker lacks."""
+        if scene.walker != SEED_WALKER:
+            return
+        for name in self.given:
+            if not name.startswith("bristle"):
+                check_choice("a scalar of the state", name, _SCALARS)
+        if self.standing is not None:
+            check_choice("standing", self.standing.partition(".")[0], ("1", "2"))
 
     def check(self) -> None:
         """Raises `ArgumentError` for a number that is not finite."""
@@ -108,6 +123,16 @@ class StartOptions(Options):
         if self.standing is not None:
             whole["standing"] = self.standing
         return scene.minimal.state(**whole)
+
+
+_SCALARS = tuple(name for name in vars(StartOptions()) if name not in ("state", "standing"))
+"""Scalars of the state of the seed's walker."""
+_UNITS = {"theta_": "rad", "omega_": "rad/s", "_v": "m/s", "_x": "m", "_z": "m"}
+
+
+def _unit_of(name: str) -> str:
+    """The unit of a scalar of a state, which its name tells."""
+    return next((unit for part, unit in _UNITS.items() if part in name), "")
 
 
 def default_start(scene: Any) -> Any:
@@ -156,24 +181,30 @@ def _depth(law: Any, own: Any, depth: "Scalar", load: "Scalar") -> "Scalar":
     return found
 
 
-def parse_axis(text: str) -> tuple[str, tuple[float, float, int]]:
-    """Name, first, last and count of an axis, from name=first:last:count."""
+def parse_axis(
+    text: str, unit: Callable[[str], str | None] = lambda _: None
+) -> tuple[str, tuple[float, float, int]]:
+    """Name, first, last and count of an axis, from name=first:last:count; `unit` is by name."""
     match = re.fullmatch(r"([\w.-]+)=([^:]+):([^:]+):([^:]+)", text.strip())
     try:
         if match is None:
             raise ValueError
-        name, first, last, count = match[1], float(match[2]), float(match[3]), int(match[4])
+        name = match[1].replace("-", "_")
+        first, last = (si_number(match[k], unit(name)) for k in (2, 3))
+        count = int(match[4])
+    except ArgumentError:
+        raise
     except ValueError:
         raise ArgumentError(
             f"axis {text!r} is not allowed: write name=first:last:count, such as "
-            "theta_swing=-0.5:0.1:200."
+            "theta_swing=-0.5:0.1:200 or theta_swing=-30deg:5deg:200."
         ) from None
     check_positive(f"count of axis {text!r}", count)
     if not first < last:
         raise ArgumentError(
             f"axis {text!r} is empty: its first value must be finite and less than its last."
         )
-    return name.replace("-", "_"), (first, last, count)
+    return name, (first, last, count)
 
 
 _IS_AXIS = Check(lambda _, text: parse_axis(text))
@@ -215,6 +246,19 @@ class StartsOptions(Options, of=("starts.sample", "starts.grid")):
                 "samples: give one or the other."
             )
         super().check()
+        if self.starts is not None:
+            read_csv("starts", self.starts)
+
+    def check_names(self, scene: SceneOptions) -> None:
+        """Raises `ArgumentError` for axes along which no starts of the seed's walker differ."""
+
+        def unit(name: str) -> str | None:
+            if name in (*_SCALARS, *_OTHER_NAMES) or name.startswith("bristle"):
+                return _unit_of(name)
+            return scene.check_parameter("coordinate", name, *_OTHER_NAMES, *_SCALARS)
+
+        for text in self.axes if scene.walker == SEED_WALKER else ():
+            parse_axis(text, unit)
 
     def chosen(self, scene: "jb.Scene | jb.RigidScene") -> "jb.starts.AbstractStarts":
         """The starts; raises `ArgumentError`."""
@@ -237,11 +281,12 @@ class StartsOptions(Options, of=("starts.sample", "starts.grid")):
 
     def _ranges(self, scene: "jb.Scene | jb.RigidScene") -> dict[str, tuple[float, float, int]]:
         """First, last and count of each axis, the horizontal one last."""
-        from jaxbiped.sweep.starts._coordinates import check_coordinates
+        from jaxbiped.sweep.starts._coordinates import check_coordinates, coordinate_quantities
 
         axes: dict[str, tuple[float, float, int]] = {}
+        units = units_of(coordinate_quantities(scene))
         for text in self.axes or _usual_axes(scene):
-            name, axis = parse_axis(text)
+            name, axis = parse_axis(text, lambda name: units.get(name, ""))
             check_coordinates(scene, [name])
             if name in axes:
                 raise ArgumentError(f"{name} is named by two axes: each needs its own.")
@@ -260,8 +305,6 @@ def _usual_axes(scene: "jb.Scene | jb.RigidScene") -> tuple[str, ...]:
 
 def read_starts(path: Path, scene: "jb.Scene | jb.RigidScene") -> object:
     """Starts from a CSV file, leaves of shape (n,); a rigid walker keeps its part of them."""
-    import csv
-
     import numpy as np
 
     from jaxbiped._types import as_float
@@ -270,29 +313,16 @@ def read_starts(path: Path, scene: "jb.Scene | jb.RigidScene") -> object:
     structure = scene.mechanism.structure
     named, names = f"starts = {str(path)!r}", [*structure.coordinates, *structure.rates]
     wanted = ",".join(names)
-    try:
-        with path.open(newline="") as file:
-            rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError) as error:
-        raise ArgumentError(
-            f"{named} cannot be read ({error}): it must be a CSV file with the header {wanted}."
-        ) from None
-    if not rows or rows[0] != names:
-        head = ",".join(rows[0]) if rows else ""
-        raise ArgumentError(f"{named} has the header {head!r}: it must be {wanted}.")
-    if len(rows) == 1:
-        raise ArgumentError(f"{named} holds no starts: give at least one row.")
+    (_, header), *rows = read_csv("starts", path)
+    if header != names:
+        raise ArgumentError(f"{named} has the header {','.join(header)!r}: it must be {wanted}.")
     numbers = []
-    for line, row in enumerate(rows[1:], start=2):
+    for line, row in rows:
         try:
             numbers.append([float(cell) for cell in row])
         except ValueError:
             raise ArgumentError(
                 f"{named}, line {line}: {','.join(row)!r} is not all numbers."
             ) from None
-        if len(row) != len(names):
-            raise ArgumentError(
-                f"{named}, line {line}: {len(row)} numbers instead of {len(names)}."
-            )
     whole: Any = state_type_of(names)(*map(as_float, np.array(numbers).T))
     return whole if scene.compliant else jb.dynamics.rigid_state(whole)

@@ -53,7 +53,7 @@ class Trade(options.Command):
     output: options.OutputOptions
 
     def run(self) -> int:
-        from jaxbiped.trade import GaitTrade, WalkTrade
+        from jaxbiped.trade import GaitTrade, Row, Truth, WalkTrade
 
         scene = self.scene.scene()
         assert isinstance(scene, jb.Scene)
@@ -64,9 +64,12 @@ class Trade(options.Command):
             "walk": WalkTrade(scene, start, self.duration, self.repeats),
             "gait": GaitTrade(scene, 1),
         }
-        found = {name: self._measure(name, trade) for name, trade in trades.items()}
-        for name, (rows, truth) in found.items():
-            _say(report, name, rows, truth)
+        found, complete = dict[str, tuple[list[Row], Truth | None]](), True
+        for name, trade in trades.items():
+            if complete:
+                rows, truth, complete = self._measure(name, trade)
+                found[name] = rows, truth
+                _say(report, name, rows, truth)
         numbers: JsonObject = {
             "duration_s": self.duration,
             "rows": [{"of": name} | row.numbers() for name, (rows, _) in found.items()
@@ -74,32 +77,39 @@ class Trade(options.Command):
             "floors": {name: truth.floor for name, (_, truth) in found.items() if truth},
             "cheapest": {name: _advice(rows) for name, (rows, _) in found.items()},
         }  # fmt: skip
+        report.finish(numbers, lambda: csv_of(numbers["rows"]))
         for rows, truth in found.values():
             report.wrote(self.output.draw(_figures(rows, truth)))
-        report.finish(numbers, lambda: csv_of(numbers["rows"]))
-        return 0 if found["walk"][1] is not None else 1
+        if not complete:
+            raise options.interrupted(f"{len(numbers['rows'])} settings are measured")
+        return int(any(truth is None for _, truth in found.values()))
 
     def _measure(
         self, name: str, trade: "WalkTrade | GaitTrade"
-    ) -> "tuple[list[Row], Truth | None]":
-        """Rows of all methods, and the reference of their errors; no rows without a reference."""
-        from jaxbiped.trade import Way
+    ) -> "tuple[list[Row], Truth | None, bool]":
+        """Rows of all methods, the reference of their errors, and whether Ctrl-C cut none off.
 
-        with stage(f"solving the {name} with the reference methods"):
-            truth = trade.truth()
-        if truth is None:
-            return [], None
+        Without a reference there are no rows.
+        """
+        from jaxbiped.trade import Row, Way
+
+        rows, truth = list[Row](), None
         ways = [
             Way(solver, engine, setting, rtol)
             for solver, engine in _QUICK[name] + (_FURTHER[name] if self.full else ())
             for setting, rtol in self._settings(name, trade.scene)
         ]
-        rows = []
-        with stage(f"measuring the {name}", total=len(ways), unit="methods") as now:
-            for way in ways:
-                rows.append(trade.row(way, truth))
-                now.update()
-        return rows, truth
+        try:
+            with stage(f"solving the {name} with the reference methods"):
+                truth = trade.truth()
+            if truth is not None:
+                with stage(f"measuring the {name}", total=len(ways), unit="methods") as now:
+                    for way in ways:
+                        rows.append(trade.row(way, truth))
+                        now.update()
+        except KeyboardInterrupt:
+            return rows, truth, False
+        return rows, truth, True
 
     def _settings(self, name: str, scene: Any) -> Iterator[tuple[str, float]]:
         """What a user would write, and the relative tolerance that it stands for in this scene."""

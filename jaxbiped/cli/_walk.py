@@ -145,12 +145,13 @@ class Walk(options.Command):
         numbers = walk_numbers(scene, walk, settings, wall)
         report = Report(self.output.json, self.output.csv)
         _say(report, numbers, walk)
+        report.finish(numbers, lambda: footstep_csv(numbers["steps"]))
         if self.output.out is not None:
             with stage("drawing the figures and the animation"):
                 paths = write_outputs(scene, state, walk, self.output)
             report.wrote(paths)
-        report.finish(numbers, lambda: footstep_csv(numbers["steps"]))
-        return 1 if walk.outcome is jb.Ending.SOLVER_FAILED else 0
+        unfinished = walk.outcome in (jb.Ending.SOLVER_FAILED, jb.Ending.OUT_OF_STEPS)
+        return int(unfinished or (walk.error is not None and not walk.error.met))
 
     def _walk(self, scene: Any, state: Any) -> _Walked:
         solve = self.solve

@@ -99,10 +99,10 @@ class Linkage(eqx.Module):
             not exist, or the orientation is unknown.
     """
 
-    bodies: tuple[LinkBody, ...] = eqx.field(converter=tuple)
-    joints: tuple[Pin, ...] = eqx.field(converter=tuple)
+    bodies: Sequence[LinkBody] = eqx.field(converter=tuple)
+    joints: Sequence[Pin] = eqx.field(converter=tuple)
     orientation: str = eqx.field(static=True, default="angle")
-    angles: tuple[LinkAngle, ...] = eqx.field(converter=tuple, default=())
+    angles: Sequence[LinkAngle] = eqx.field(converter=tuple, default=())
 
     def __check_init__(self) -> None:
         check_choice("orientation", self.orientation, ORIENTATIONS)

@@ -123,7 +123,9 @@ def traces_from(setup: ContinuationSetup, begin: CurvePoint, **options: Any) -> 
     before = setup.trace(begin._replace(tangent=-begin.tangent), **options)
     known = before.reversed()
     if before.stop.end in (BranchEnd.CLOSED, BranchEnd.INTERRUPTED):
-        return before, Trace(known.points[-1:], [], before.stop)
+        # The other end is the first gait: a closed branch ends where it began.
+        stop = before.stop._replace(value=known.points[-1].value)
+        return before, Trace(known.points[-1:], [], stop)
     return before, setup.trace(begin, passed=known.points[:-1], **options)
 
 

@@ -1,7 +1,5 @@
 """Files of measured gaits: JSON, or a table in CSV under a header with units."""
 
-import csv
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -10,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._files import read_json, read_text
+from jaxbiped._files import read_csv, read_json
+from jaxbiped._quantity import unit_scales
 from jaxbiped._types import JsonObject
 from jaxbiped.identify._measured_gait import MEASURES, MeasuredAngles, MeasuredGait
 from jaxbiped.scene._abstract_scene import AbstractScene
@@ -58,7 +57,7 @@ def read_measured(path: str | Path, scene: AbstractScene | None = None) -> list[
             column has no unit, or a cell is not a number.
     """
     if Path(path).suffix.lower() == ".csv":
-        return _gaits_of_table(read_text("file", path), scene)
+        return _gaits_of_table(read_csv("file", path), scene)
     held = read_json("file", path)
     gaits = held.get("gaits") if isinstance(held, dict) else None
     if not isinstance(gaits, list) or not gaits or not all(isinstance(g, dict) for g in gaits):
@@ -105,15 +104,6 @@ def _check_keys(where: str, keys: Iterable[str], allowed: Iterable[str]) -> None
             raise ArgumentError(f"{key!r} is not known in {where}: choose from {names}.")
 
 
-_SCALES = {
-    "s": {"s": 1.0, "ms": 1e-3},
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
-    "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "km/h": 1.0 / 3.6},
-    "N": {"N": 1.0, "kN": 1e3},
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "°": math.pi / 180.0},
-    "kg": {"kg": 1.0, "g": 1e-3},
-}
-"""SI units, and how many of them each unit is."""
 _COLUMN_UNITS = _UNITS | {"time": "s"}
 _BAR = "_error"
 _PLAIN = ("gait", "footsteps", "since")
@@ -129,16 +119,14 @@ class _Column(NamedTuple):
     scale: float
 
 
-def _gaits_of_table(text: str, scene: AbstractScene | None) -> list[MeasuredGait]:
+def _gaits_of_table(
+    table: list[tuple[int, list[str]]], scene: AbstractScene | None
+) -> list[MeasuredGait]:
     """Measured gaits of a CSV file, whose conditions have the units of a scene's parameters."""
-    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip()]
-    lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
-    if len(lines) < 2:
-        raise ArgumentError("file is not allowed: it must have a header and at least one row.")
-    header, *rows = csv.reader(line for _, line in lines)
+    (_, header), *lines = table
     quantities = {} if scene is None else parameter_quantities(scene)
     units = {name: each.unit for name, each in quantities.items()}
-    columns = [_column(each.strip(), units) for each in header]
+    columns = [_column(cell, units) for cell in header]
     names = [each.name for each in columns]
     for name in names:
         if names.count(name) > 1:
@@ -146,18 +134,19 @@ def _gaits_of_table(text: str, scene: AbstractScene | None) -> list[MeasuredGait
                 f"the column {name!r} is there {names.count(name)} times: give one."
             )
     groups: dict[Any, list[dict[str, Any]]] = {}
-    for number, ((line, _), cells) in enumerate(zip(lines[1:], rows, strict=True)):
-        if len(cells) != len(columns):
-            raise ArgumentError(
-                f"line {line} has {len(cells)} cells, and the header {len(columns)}: separate them "
-                "by commas, and write numbers with a point."
-            )
-        row = {
-            c.name: _value(c, cell.strip(), line) for c, cell in zip(columns, cells, strict=True)
-        }
+    first: dict[Any, int] = {}
+    for number, (line, cells) in enumerate(lines):
+        row = {c.name: _value(c, cell, line) for c, cell in zip(columns, cells, strict=True)}
         label = row.get("gait", "time" in row or number)
         groups.setdefault(label, []).append(row)
-    return [_gait_of_rows(names, rows) for rows in groups.values()]
+        first.setdefault(label, line)
+    gaits = []
+    for label, rows in groups.items():
+        try:
+            gaits.append(_gait_of_rows(names, rows))
+        except ArgumentError as error:
+            raise ArgumentError(f"line {first[label]}: {error}") from None
+    return gaits
 
 
 def _column(header: str, units: Mapping[str, str]) -> _Column:
@@ -179,8 +168,7 @@ def _column(header: str, units: Mapping[str, str]) -> _Column:
         example = f"{name} [{wanted or 'rad'}]"
         raise ArgumentError(f"the column {header!r} names no unit: write it as {example!r}.")
     unit = "" if unit.strip() in ("1", "-", "–") else unit.strip()
-    known = next((each for each in _SCALES.values() if unit in each), {unit: 1.0})
-    allowed = known if wanted is None else _SCALES.get(wanted, {wanted: 1.0})
+    allowed = unit_scales(wanted, unit)
     if unit not in allowed:
         raise ArgumentError(
             f"the column {header!r} is not allowed: its unit must be one of {', '.join(allowed)}."

@@ -7,11 +7,12 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
-from jaxbiped.optimise._objectives import check_objective
+from jaxbiped._quantity import si_number
+from jaxbiped.optimise._objectives import OBJECTIVES, check_objective
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 
-_WORDS = re.compile(r"^\s*(\w+)\s*(<=|>=|==|<|>|=)\s*([-+.\w]+)\s*$")
+_WORDS = re.compile(r"^\s*(\w+)\s*(<=|>=|==|<|>|=)\s*([^<>=]+?)\s*$")
 
 
 class Variables(NamedTuple):
@@ -178,11 +179,13 @@ def _parse(text: str) -> tuple[str, tuple[float | None, float | None]]:
     try:
         if found is None:
             raise ValueError
-        name, sign, value = found[1], found[2], float(found[3])
+        name, sign = found[1], found[2]
+        unit = OBJECTIVES[name].quantity.unit if name in OBJECTIVES else None
+        value = si_number(found[3], unit)
     except ValueError:
         raise ArgumentError(
             f"subject_to = {text!r} is not understood: write name<number, name>number or "
-            "name=number, such as spectral_radius<0.4."
+            "name=number, such as spectral_radius<0.4 or step_length>20cm."
         ) from None
     check_finite("subject_to", value)
     if "<" in sign:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import equinox as eqx
 
@@ -35,6 +35,10 @@ class OwnHinge(eqx.Module):
 
     along: ClassVar[float] = 0.0
     ahead: ClassVar[None] = None
+
+
+Place: TypeAlias = Any
+"""A `Point`, which users also write as one number or as a pair."""
 
 
 def point_of(place: Any) -> Any:
@@ -100,9 +104,9 @@ class Body(eqx.Module):
     _: dataclasses.KW_ONLY
     mass: Parameter = parameter("mass", "$m$", "kg", minimum=0.0)
     inertia: Parameter = parameter("moment of inertia", "$J$", "kg m^2", minimum=0.0)
-    centre: Point = eqx.field(converter=point_of)
+    centre: Place = eqx.field(converter=point_of)
     parent: str | None = eqx.field(static=True, default=None)
-    at: Point | None = eqx.field(converter=point_of, default=None)
+    at: Place | None = eqx.field(converter=point_of, default=None)
 
     def __check_init__(self) -> None:
         check_name("name", self.name)
@@ -134,7 +138,7 @@ class Foot(eqx.Module):
 
     body: str = eqx.field(static=True)
     _: dataclasses.KW_ONLY
-    centre: Point = eqx.field(converter=point_of)
+    centre: Place = eqx.field(converter=point_of)
     radius: Parameter | None = parameter("foot radius", "$r$", "m", minimum=0.0, default=None)
     name: str | None = eqx.field(static=True, default=None)
     leg: str | None = eqx.field(static=True, default=None)

@@ -113,7 +113,7 @@ class OneFoot(AbstractClearance):
         ArgumentError: it is not a name. A scene refuses a leg that it does not have.
     """
 
-    leg: str = eqx.field(static=True, converter=_leg_name)
+    leg: Any = eqx.field(static=True, converter=_leg_name)
 
     def __check_init__(self) -> None:
         check_name("leg", self.leg)

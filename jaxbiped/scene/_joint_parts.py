@@ -17,6 +17,8 @@ from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 Weights: TypeAlias = tuple[tuple[str, float], ...]
 """Weights of bodies' absolute angles, in the order written."""
+Angle: TypeAlias = Any
+"""A body's name or `Weights`, which users write as a mapping."""
 
 HOLDS = ("while pressed", "until heel strike", "through heel strike")
 SIDES = ("role", "side")
@@ -56,7 +58,7 @@ class AbstractJointPart(eqx.Module):
     """
 
     kind: ClassVar[str]
-    angle: eqx.AbstractVar[str | Weights]
+    angle: eqx.AbstractVar[Angle]
     name: eqx.AbstractVar[str | None]
 
     def __check_init__(self) -> None:
@@ -105,7 +107,7 @@ class Spring(AbstractJointPart):
     """
 
     kind: ClassVar[str] = "spring"
-    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    angle: Angle = eqx.field(static=True, converter=angle_of)
     _: dataclasses.KW_ONLY
     stiffness: Parameter | None = parameter(
         "joint stiffness", "$k$", "N m/rad", minimum=0.0, default=None
@@ -150,7 +152,7 @@ class Stop(AbstractJointPart):
     """
 
     kind: ClassVar[str] = "stop"
-    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    angle: Angle = eqx.field(static=True, converter=angle_of)
     _: dataclasses.KW_ONLY
     upper: Parameter | None = parameter("upper limit", r"$\varphi_+$", "rad", default=None)
     lower: Parameter | None = parameter("lower limit", r"$\varphi_-$", "rad", default=None)
@@ -194,7 +196,7 @@ class Latch(AbstractJointPart):
     """
 
     kind: ClassVar[str] = "latch"
-    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    angle: Angle = eqx.field(static=True, converter=angle_of)
     _: dataclasses.KW_ONLY
     width: Parameter = parameter("width of the latch", "$w$", "rad", positive=True)
     torque: Parameter = parameter("torque of the latch", "$T$", "N m", minimum=0.0)
@@ -218,7 +220,7 @@ class Coupling(AbstractJointPart):
     """
 
     kind: ClassVar[str] = "coupling"
-    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    angle: Angle = eqx.field(static=True, converter=angle_of)
     _: dataclasses.KW_ONLY
     rest: Parameter | None = parameter("coupled angle", r"$\varphi_0$", "rad", default=None)
     name: str | None = eqx.field(static=True, default=None)
@@ -274,7 +276,7 @@ class Motor(AbstractJointPart):
     """
 
     kind: ClassVar[str] = "motor"
-    angle: str | Weights = eqx.field(static=True, converter=angle_of)
+    angle: Angle = eqx.field(static=True, converter=angle_of)
     law: Callable[[Any], Any] = eqx.field(converter=law_of)
     _: dataclasses.KW_ONLY
     by: str = eqx.field(static=True, default="role")

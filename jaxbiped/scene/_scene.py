@@ -9,7 +9,6 @@ import equinox as eqx
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped._types import Parameter
-from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.constraints._constraint_methods import Index1, method_named
 from jaxbiped.constraints._linkage import ORIENTATIONS, Linkage
 from jaxbiped.scene._abstract_scene import AbstractMinimalScene, AbstractWalkerScene
@@ -245,7 +244,7 @@ class RedundantScene(AbstractWalkerScene):
     compliant: ClassVar[bool] = True
     redundant: ClassVar[bool] = True
     scene: Scene
-    method: AbstractConstraintMethod = eqx.field(converter=method_named, default_factory=Index1)
+    method: Any = eqx.field(converter=method_named, default_factory=Index1)
     orientation: str = eqx.field(static=True, default="angle")
 
     def __check_init__(self) -> None:

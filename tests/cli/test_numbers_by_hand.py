@@ -44,13 +44,14 @@ HEAD = "hip_x,hip_z,theta_1,theta_2,hip_vx,hip_vz,omega_1,omega_2"
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "has the header ''"),
+        ("", "it must have a header and at least one row"),
+        ("hip_x;hip_z\n1;2\n", "line 1: its cells have no commas: separate them by commas"),
         ("hip_x,hip_z\n1,2\n", "has the header 'hip_x,hip_z'"),
-        (f"{HEAD}\n", "holds no starts"),
-        (f"{HEAD}\n1,2,3,4,5,6,7,8\n1,2,3,4,5,6,7\n", "line 3: 7 numbers instead of 8"),
-        (f"{HEAD}\n1,2,3,4,5,6,7,8,9\n", "line 2: 9 numbers instead of 8"),
-        (f"{HEAD}\n1,2,3\n", "line 2: 3 numbers instead of 8"),
-        (f"{HEAD}\n1,2,3,x,5,6,7,8\n", "line 2: '1,2,3,x,5,6,7,8' is not all numbers"),
+        (f"{HEAD}\n", "a header and at least one row"),
+        (f"{HEAD}\n1,2,3,4,5,6,7,8\n1,2,3,4,5,6,7\n", "line 3 has 7 cells, and the header 8"),
+        (f"{HEAD}\n1,2,3,4,5,6,7,8,9\n", "line 2 has 9 cells, and the header 8"),
+        (f"{HEAD}\n1,2,3\n", "line 2 has 3 cells, and the header 8"),
+        (f"{HEAD}\n\n1,2,3,x,5,6,7,8\n", "line 3: '1,2,3,x,5,6,7,8' is not all numbers"),
     ],
 )
 def test_a_file_of_starts_that_is_none_is_refused_by_its_line(text, said, tmp_path):
@@ -63,7 +64,8 @@ def test_a_file_of_starts_that_is_none_is_refused_by_its_line(text, said, tmp_pa
 
 def test_a_file_of_starts_is_read_column_by_column(tmp_path):
     path = tmp_path / "starts.csv"
-    path.write_text(f"{HEAD}\n1,2,3,4,5,6,7,8\n\n11,12,13,14,15,16,17,18\n")
+    rows = "1,2,3,4,5,6,7,8,,\r\n\r\n# more\r\n11,12,13,14,15,16,17,18,,\r\n,,,,,,,,,\r\n"
+    path.write_text(f"\ufeff{HEAD},,\r\n{rows}", encoding="utf-8")  # as spreadsheets write it
     found = read_starts(path, SCENE)
     np.testing.assert_array_equal(np.array(found), np.arange(1.0, 9.0)[:, None] + [0.0, 10.0])
     rigid = read_starts(path, jb.ladder()["rigid"])

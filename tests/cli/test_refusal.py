@@ -104,6 +104,45 @@ gait --engine gpu | engine = 'gpu'
 continue --from nan | from = nan | finite
 models --json /nowhere/models.json | --json | /nowhere/models.json
 constraints --json /nowhere/constraints.json | --json | /nowhere/constraints.json
+walk --set foo=3 | parameter = 'foo'
+walk --walker kneed --m 2 | m = 2.0 is not allowed with walker = 'kneed'
+walk --state theta_1=x | theta_1 must be a number
+walk --state theta_1=0.1 --theta-1 0.2 | theta_1 is given twice
+walk --clearance never | clearance = 'never'
+walk --model rigid --clearance always-touching | clearance = always-touching
+gait --hip-spring q=1 | 'q' is not known: choose one of k, b, theta_0
+gait --hip-spring b=1 | hip-spring needs k=value
+gait --hip-spring k=-1 | k = -1
+gait --hip-torque torque=much | torque must be a number, and 'much' is not a number
+continue --along slop | along = 'slop' is not known
+continue --from 0.1 --to 0.1 | the range is empty
+basin --x knee=0:1:3 | coordinate = 'knee' is not known
+basin --starts nowhere.csv | starts = 'nowhere.csv' cannot be read
+optimise --maximise speed --model rigid --vary q | vary = 'q' is not known
+optimise --maximise speed --model rigid --vary d=0.2 | write d=low:high
+continue --along slpe | along = 'slpe' is not known | perhaps slope is meant
+continue --along slope --from 1deg --to 60mm | '60mm' is not a number in rad, mrad, deg
+continue --from abc | 'abc' is not a number
+continue --model rigid --along K | along = 'K' is not known: choose one of m, J
+basin --x foo=0:1:3 | coordinate = 'foo' is not known: choose one of theta_stance
+basin --more foo=0:1:3 | 'foo' is not known
+basin --x theta_swing=-30cm:45deg:3 | axis 'theta_swing=-30cm:45deg:3' | theta_swing=-30deg:5deg:200
+optimise --vary d --maximise speeed | maximise = 'speeed' is not known | perhaps speed is meant
+optimise --vary d --minimise raduis | minimise = 'raduis' is not known
+optimise --vary d --maximise speed --subject-to 'speeed<1' | subject_to = 'speeed' is not known
+optimise --vary d=5cm:2kg --maximise speed | '2kg' is not a number in m, cm, mm
+optimise --vary d --maximise speed --bifurcations slpoe | bifurcations = 'slpoe'
+walk --hip-spring k=abc | hip-spring = 'k=abc' | k must be a number, and 'abc' is not
+walk --hip-spring theta_0=2cm k=1 | '2cm' is not a number in rad
+walk --hip-spline torque=1,x | 'x' is not a number
+walk --slope 2cm | --slope = '2cm' is not a number in rad, mrad, deg
+walk --duration 5m | '5m' is not a number in s, ms
+walk --set slope=2s | '2s' is not a number in rad
+walk --state theta_1=2cm | '2cm' is not a number in rad
+walk --state theta_3=1 | theta_3' is not known: choose one of hip_x
+walk --state theta_1=0 --standing 3 | standing = '3'
+constraints --integrators euler:dt=1m | integrator = 'euler:dt=1m'
+trade --set K=2kg | '2kg' is not a number in N/m^n
 """) + [(f"extremes{more}", "extremes is no longer a command", MOVED) for more in MORE]
 """Those that are refused before JAX is imported (see `test_declarations`)."""
 LATE = _rows("""
@@ -111,16 +150,10 @@ walk --solver euler | solver = euler | dt = 1e-6
 walk --solver euler --dt 1e-6 | 10 s | max_solver_steps = 1048576
 walk --model rigid --dt 1e-6 | dt = 1e-06 | rigid
 walk --J 0 | J = 0 | hip_mass = 0
-walk --set foo=3 | parameter = 'foo'
 walk --set v0=-1 | v0 = -1
-walk --walker kneed --m 2 | m = 2.0 is not allowed with walker = 'kneed'
 walk --walker kneed --theta-1 0.1 | theta_1' is not known: choose one of hip_x
 walk --walker kneed --state omega_nose=1 | omega_nose
 walk --walker with-torso --state theta_torso=1 | theta_torso
-walk --state theta_1=x | theta_1 must be a number
-walk --state theta_1=0.1 --theta-1 0.2 | theta_1 is given twice
-walk --clearance never | clearance = 'never'
-walk --model rigid --clearance always-touching | clearance = always-touching
 walk --normal hertz --c 1 | c = 1 | normal = hertz
 walk --out /dev/null/pictures | --out | /dev/null/pictures | directory
 walk --hip-z 0.2 | hip_z = 0.2 | 0.196 m below the ground | 0.3956
@@ -130,31 +163,21 @@ walk --model rigid --solver rodas5p | solver = rodas5p
 gait --friction coulomb --xi 9 | xi = 9 | friction = coulomb
 gait --model rigid --section mid-stance | HeelStrike
 gait --formulation redundant --engine lanes | redundant coordinates are
-gait --hip-spring q=1 | 'q' is not known: choose one of k, b, theta_0
-gait --hip-spring b=1 | hip-spring needs k=value
-gait --hip-spring k=-1 | k = -1
-gait --hip-torque torque=much | 'much' is none
 gait --hip-torque torque=1,2 | torque
 gait --hip-torque torque=1 reaction=hand | reaction = 'hand'
 gait --hip-spline torque=1 | two or more
 gait --push-off impulse=1 | needs rigid
 gait --model rigid --foot-preload extension=0.1 | needs compliant
-continue --along slop | along = 'slop' is not known
-continue --from 0.1 --to 0.1 | the range is empty
 continue --along K --from -1 --to 1e6 | K = -1 is not allowed
 continue --formulation redundant | redundant coordinates
-basin --x knee=0:1:3 | coordinate = 'knee' is not known
 basin --x K=-1:1:3 | K = -1
 basin --x g=1:2:3 --y g=1:2:3 | g is named by two axes
 basin --model rigid --x hip_z=0:1:3 | coordinate = 'hip_z' is not known
-basin --starts nowhere.csv | starts = 'nowhere.csv' cannot be read
 basin --accuracy 2 | accuracy = 2 is not allowed: it is the fraction of the labels
 basin --store /dev/null | store = '/dev/null' is a file
 constraints --out /proc/nowhere | --out
 trade --out /proc/nowhere | --out
-optimise --maximise speed --model rigid --vary q | vary = 'q' is not known
 optimise --maximise speed --model rigid --vary d=0.2:0.1 | bounds of d = (0.2, 0.1) are empty
-optimise --maximise speed --model rigid --vary d=0.2 | write d=low:high
 optimise --maximise speed --model rigid --vary hip_mass | hip_mass needs bounds
 optimise --maximise speed --model rigid --vary d --minimise period | either maximise or minimise
 optimise --maximise speed --model rigid --vary d --subject-to 'speed<0.1' 'speed>0.2' | contradict

@@ -78,6 +78,19 @@ def test_a_table_of_footsteps_is_read_back(tmp_path):
     assert gait.measures == {"period": measured}
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_what_spreadsheets_add_is_left_out(tmp_path, end):
+    """Rows and columns of empty cells, spaces, quotes, and lines with a comment."""
+    lines = [
+        "slope [deg],, period [s] ,period_error [s],,", "# first,run", '1.5,,"0.44", 0.001 ,,',
+        ",,,,,", "", "2,,0.43,0.001,,", ",,,,,", " , ,,,,", "",
+    ]  # fmt: skip
+    first, second = read(tmp_path, end.join(lines))
+    assert first.measures == {"period": (0.44, 0.001)}
+    assert second.measures == {"period": (0.43, 0.001)}
+    assert second.conditions == {"slope": pytest.approx(np.deg2rad(2.0))}
+
+
 HEAD = "period [s],period_error [s]"
 
 
@@ -91,6 +104,11 @@ HEAD = "period [s],period_error [s]"
         ("period [s]\n1", r"no standard deviation: give it in a column 'period_error \[s\]'"),
         (f"{HEAD}\n1", "line 2 has 1 cells, and the header 2"),
         (f"#\n{HEAD}\n\n1;2", "line 4 has 1 cells"),
+        ("period [s];period_error [s]\n0,44;0,001", "line 1: its cells have no commas: .* point"),
+        ("#\nperiod [s]\tperiod_error [s]\n1\t2", "line 2: its cells have no commas"),
+        (f"{HEAD}\n0,44,0,001", "line 2 has 4 cells, and the header 2: .* with a point"),
+        (f"{HEAD},\n1,1,3", "line 2 has 3 cells"),
+        (f"{HEAD},slope [deg]\n1,1,1\n,,2", "line 3: measures = {} is not allowed"),
         (f"{HEAD}\nfast,1", r"line 2: period \[s\] = 'fast' is not allowed: it must be a number"),
         (f"{HEAD},K [N/m]\n1,1,1", "a column = 'K' is not known: .*theta_BODY, m, J"),
         (f"{HEAD},{HEAD}\n1,1,1,1", "the column 'period' is there 2 times"),

@@ -104,8 +104,8 @@ class AbstractPhaseTorque(AbstractHipActuator):
         return self.torques(hip)
 
 
-Actuation: TypeAlias = tuple[AbstractActuator, ...] | None
-"""All actuators of a scene; None where it is passive."""
+Actuation: TypeAlias = Any
+"""A tuple of a scene's actuators, None where it is passive; users also write one actuator."""
 
 
 def actuation_of(parts: AbstractActuator | Sequence[AbstractActuator] | None) -> Actuation:

@@ -173,7 +173,7 @@ class HipSpline(AbstractPhaseTorque):
     """
 
     name: ClassVar[str] = "hip-spline"
-    torque: tuple[Parameter, ...] = parameter("hip torque", r"$\tau$", "N m", several=True)
+    torque: Parameter = parameter("hip torque", r"$\tau$", "N m", several=True)
     first: Parameter = parameter("first phase", r"$\varphi_1$", "rad", default=-0.2)
     last: Parameter = parameter("last phase", r"$\varphi_n$", "rad", default=0.2)
     reaction: str = eqx.field(static=True, default="swing")

@@ -13,7 +13,7 @@ from equinox import AbstractVar
 
 from jaxbiped._parameter_declaration import AbstractPart, parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene._joint_parts import Weights, angle_of
+from jaxbiped.scene._joint_parts import Angle, angle_of
 from jaxbiped.scene.actuation._actuators import check_spline, cubic_spline, pulse
 
 
@@ -54,7 +54,7 @@ class AbstractReadingLaw(AbstractMotorLaw):
             choice.
     """
 
-    of: AbstractVar[str | Weights | None]
+    of: AbstractVar[Angle | None]
 
     def read(self, motion: JointMotion) -> tuple[Scalar, Scalar] | None:
         """The angle that is read [rad] and its rate [rad/s]; None without `of`."""
@@ -93,7 +93,7 @@ class PD(AbstractReadingLaw):
     )
     target: Parameter | None = parameter("target angle", r"$\varphi_0$", "rad", default=None)
     _: dataclasses.KW_ONLY
-    of: str | Weights | None = eqx.field(static=True, converter=angle_of, default=None)
+    of: Angle | None = eqx.field(static=True, converter=angle_of, default=None)
 
     def __call__(self, motion: JointMotion) -> Scalar:
         angle, rate = self.read(motion) or (motion.angle, motion.rate)
@@ -118,7 +118,7 @@ class Pulse(AbstractReadingLaw):
     at: Parameter = parameter("phase of the pulse", r"$\varphi$", "rad")
     width: Parameter = parameter("width of the pulse", "$w$", "rad", positive=True)
     _: dataclasses.KW_ONLY
-    of: str | Weights | None = eqx.field(static=True, converter=angle_of, default=None)
+    of: Angle | None = eqx.field(static=True, converter=angle_of, default=None)
 
     def __call__(self, motion: JointMotion) -> Scalar:
         read = self.read(motion)
@@ -137,11 +137,11 @@ class Spline(AbstractReadingLaw):
         ArgumentError: fewer than two coefficients, or last not above first.
     """
 
-    torque: tuple[Parameter, ...] = parameter("motor torque", r"$\tau$", "N m", several=True)
+    torque: Parameter = parameter("motor torque", r"$\tau$", "N m", several=True)
     first: Parameter = parameter("first phase", r"$\varphi_1$", "rad")
     last: Parameter = parameter("last phase", r"$\varphi_n$", "rad")
     _: dataclasses.KW_ONLY
-    of: str | Weights | None = eqx.field(static=True, converter=angle_of, default=None)
+    of: Angle | None = eqx.field(static=True, converter=angle_of, default=None)
 
     def __check_init__(self) -> None:
         check_spline(self.torque, self.first, self.last)
