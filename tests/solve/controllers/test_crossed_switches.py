@@ -8,8 +8,8 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import feet
-from jaxbiped.solve._accuracy import units_of
 from jaxbiped.dynamics._surfaces import Switch
+from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve.controllers._step_size import CrossedSwitches, ErrorControl, crosses
 from jaxbiped.variational._switch_locator import _crosses
 
