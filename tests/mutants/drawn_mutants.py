@@ -82,7 +82,7 @@ def stages(drawn: Drawn, nearness: Nearness, executed: ExecutedBlocks) -> list[S
     return [
         *found,
         Stage(near[:3], QUICK, 25.0),
-        Stage(near[:3], SLOW, 45.0),
+        Stage(near[:5], SLOW, 90.0),
         Stage(near[3:8], QUICK, 25.0),
     ]
 
