@@ -64,7 +64,7 @@ BAD = {
     "max_arrivals": [-1, 1.5, "many"],
     "largest_step": [0.0, -1.0, np.nan, "large"],
     "bounds": [(0.02,), (0.02, 0.02), (np.nan, 0.02), "all"],
-    "parameters": [{"slpe": (0.01,)}],
+    "parameters": [{"slpe": (0.01,)}, "slope"],
     "iterations": [0, -1, 1.5, "many"],
     "restarts": [-1, "many"],
     "members": [0, -1, 1.5, "many"],
