@@ -107,3 +107,10 @@ def test_who_lowers_may_keep_the_calls_instead():
     compiled = lowered.compile()
     total, _ = compiled(np.ones(2), np.zeros((1, 1)))
     np.testing.assert_array_equal(total, [4.0])
+
+
+def test_functions_of_no_known_meaning_are_never_taken_for_each_other():
+    one, other = (host_call(lambda x, k=k: [k * x]) for k in (1, 2))
+    assert one.key != other.key
+    assert not one.storable
+    assert [call.function(3)[0] for call in (one, other)] == [3, 6]

@@ -78,6 +78,23 @@ def test_what_somebody_else_wrote_is_not_read(cache, monkeypatch):
     assert read_entry("xla", "a") is None
 
 
+def test_on_a_system_without_owners_what_was_written_is_read(cache, monkeypatch):
+    monkeypatch.delattr(os, "geteuid", raising=False)
+    write_entry("xla", "a", CONTENT)
+    assert read_entry("xla", "a") == CONTENT
+
+
+@pytest.mark.parametrize("spare", [0, -1])
+def test_the_folder_may_hold_so_many_bytes_and_not_one_more(cache, monkeypatch, spare):
+    write_entry("xla", "a", CONTENT)
+    size = (cache / "xla" / "a").stat().st_size
+    os.utime(cache / "xla" / "a", (1, 1))
+    monkeypatch.setattr(_disk_cache, "BYTES", 2 * size + spare)
+    write_entry("xla", "b", CONTENT)
+    assert (read_entry("xla", "a") is None) == (spare < 0)
+    assert read_entry("xla", "b") == CONTENT
+
+
 def test_nothing_is_kept_where_nothing_is_wanted(monkeypatch):
     monkeypatch.setenv(CACHE_VARIABLE, "")
     assert cache_folder() is None

@@ -5,6 +5,7 @@ import json
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.cli._parameter_search import _bounds
 from tests.cli.commands import numbers_of, outputs_of, run
 from tests.drawn import assert_is_drawn, points_of
 
@@ -95,3 +96,13 @@ def test_figures_of_a_fit_in_all_formats(file, tmp_path):
 def test_bad_options_of_a_fit(file, capsys, words, said):
     assert run("fit", file, "--model", "rigid", *words) == 2
     assert said in capsys.readouterr().err
+
+
+def test_bounds_that_are_not_given_are_half_and_twice_the_value_as_far_as_it_may_be():
+    """A leg is at least as long as its foot is high."""
+    scene = jb.with_parameters(jb.ladder()["rigid"], {"l": 0.4, "r": 0.3, "J": 0.01})
+    bounds = _bounds(scene, "J, d=0.05:0.2, l")
+    assert bounds["J"] == pytest.approx((0.005, 0.02))
+    assert bounds["d"] == (0.05, 0.2)
+    assert bounds["l"] == pytest.approx((0.3, 0.8), rel=1e-3)
+    assert list(bounds) == ["J", "d", "l"]

@@ -82,8 +82,9 @@ def stages(drawn: Drawn, nearness: Nearness, executed: ExecutedBlocks) -> list[S
     return [
         *found,
         Stage(near[:3], QUICK, 25.0),
-        Stage(near[:3], SLOW, 45.0),
-        Stage(near[3:8], QUICK, 25.0),
+        Stage(near[:5], SLOW, 90.0),
+        Stage(near[3:12], QUICK, 40.0),
+        Stage(near[5:20], SLOW, 240.0),
     ]
 
 

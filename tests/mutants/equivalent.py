@@ -7,8 +7,9 @@ import tomllib
 from pathlib import Path
 
 from tests.mutants.drawing import Drawn
+from tests.mutants.mutations import EQUIVALENT
 
-TABLE = Path(__file__).parent / "equivalent.toml"
+TABLE = Path(__file__).parent / EQUIVALENT
 
 
 _FIELDS = ("file", "within", "statement", "stands", "instead")

@@ -7,7 +7,7 @@ a function that calls it, over some calls. A name that many files have says litt
 
 import ast
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,9 +18,9 @@ _CALLS = 4
 """Over how many calls a test may reach a function that it does not name."""
 _NAMES = 3
 """How many of the names that a file has count: the best."""
-_OWN, _IMPORTED, _ALIKE, _FOLDER = 100.0, 3.0, 1.0, 0.3
-"""What the mirroring file is ahead of others, one that imports the module, one with a word of the
-module's name in its own, and those of the package's folder."""
+_OWN, _IMPORTED, _CALLED, _ALIKE, _FOLDER = 100.0, 3.0, 6.0, 1.0, 0.3
+"""What the mirroring file is ahead of others, one that imports the module, one that mirrors a
+caller's, one with a word of the module's name in its own, and those of the package's folder."""
 _WORD = 5
 """Letters that words have in common that are forms of one."""
 _NAME = re.compile(r"\b[A-Za-z_]\w+\b")
@@ -39,25 +39,42 @@ class Nearness:
         for words in self._words.values():
             for word in words:
                 self._shares[word] += 1
+        package = root / "jaxbiped"
+        defined = {
+            path.relative_to(package).as_posix(): list(_definitions(ast.parse(path.read_text())))
+            for path in sorted(package.rglob("*.py"))
+        }
+        names = Counter(name for rows in defined.values() for name in {name for name, _ in rows})
+        self._alone = {name for name, files in names.items() if files == 1}
         self._callers: dict[str, set[str]] = defaultdict(set)
-        for path in sorted((root / "jaxbiped").rglob("*.py")):
-            file = path.relative_to(root / "jaxbiped").as_posix()
-            for name, used in _definitions(ast.parse(path.read_text())):
+        self._mirrors: dict[str, set[str]] = defaultdict(set)
+        for file, rows in defined.items():
+            for name, used in rows:
+                self._mirrors[self._known_as(file, name)].add(_mirror(file))
                 for word in used - {name}:
-                    self._callers[_known_as(file, word)].add(_known_as(file, name))
+                    self._callers[self._known_as(file, word)].add(self._known_as(file, name))
+
+    def _known_as(self, file: str, name: str) -> str:
+        """A private name is its file's own, and so is one that several files have."""
+        return name if name in self._alone and not name.startswith("_") else f"{file} {name}"
 
     def files(self, drawn: Drawn) -> list[str]:
         """Files of tests, the nearest first; those that nothing leads to are left out."""
         module = Path(drawn.file)
-        own = Path("tests") / module.parent / f"test_{module.stem.lstrip('_')}.py"
         folder = f"{(Path('tests') / module.parent).as_posix()}/"
         top = f"tests/{module.parts[0]}/"
-        weights = self._names(drawn)
+        weights: dict[str, float] = {}
+        mirrors: dict[str, float] = {}
+        for name, weight in self._names(drawn).items():
+            bare = name.rpartition(" ")[2]
+            weights[bare] = max(weight, weights.get(bare, 0.0))
+            for file in self._mirrors[name]:
+                mirrors[file] = max(weight, mirrors.get(file, 0.0))
         scores: dict[str, float] = {}
         for file, words in self._words.items():
             worths = (w / self._shares[name] for name, w in weights.items() if name in words)
-            score = sum(sorted(worths, reverse=True)[:_NAMES])
-            score += _OWN * (file == own.as_posix()) + _IMPORTED * (module.stem in words)
+            score = sum(sorted(worths, reverse=True)[:_NAMES]) + _CALLED * mirrors.get(file, 0.0)
+            score += _OWN * (file == _mirror(drawn.file)) + _IMPORTED * (module.stem in words)
             if file.startswith(top):
                 score += _FOLDER * (1 + file.startswith(folder)) + _ALIKE * _alike(file, module)
             if score > 0.0:
@@ -67,17 +84,21 @@ class Nearness:
     def _names(self, drawn: Drawn) -> dict[str, float]:
         """Names that lead to a place, with what each is worth."""
         parts = [p for p in drawn.within.split(".") if p and not p.startswith("__")]
-        layer = {_known_as(drawn.file, n) for n in parts or re.findall(r"^\w+", drawn.statement)}
+        layer = {
+            self._known_as(drawn.file, n) for n in parts or re.findall(r"^\w+", drawn.statement)
+        }
         weights, worth = dict.fromkeys(layer, 1.0), 1.0
         for _ in range(_CALLS):
             layer = {caller for name in layer for caller in self._callers[name]} - weights.keys()
             worth /= 3.0
             weights |= dict.fromkeys(layer, worth)
-        named: dict[str, float] = {}
-        for name, weight in weights.items():
-            bare = name.rpartition(" ")[2]
-            named[bare] = max(weight, named.get(bare, 0.0))
-        return named
+        return weights
+
+
+def _mirror(file: str) -> str:
+    """The file of tests that mirrors a module."""
+    module = Path(file)
+    return (Path("tests") / module.parent / f"test_{module.stem.lstrip('_')}.py").as_posix()
 
 
 def _alike(file: str, module: Path) -> int:
@@ -87,11 +108,6 @@ def _alike(file: str, module: Path) -> int:
         for name in (file, module.as_posix())
     )
     return len(tests & package)
-
-
-def _known_as(file: str, name: str) -> str:
-    """A private name is its file's own."""
-    return f"{file} {name}" if name.startswith("_") else name
 
 
 def _words_of(path: Path, root: Path) -> set[str]:

@@ -26,6 +26,7 @@ from jaxbiped.optimise._design_gaits import (
     ensemble_of,
     with_worse_members,
 )
+from jaxbiped.optimise._design_problem import scale_of
 from jaxbiped.optimise._jacobian_weights import entry_weights, leading_multipliers
 from jaxbiped.optimise._local_model import Local
 from jaxbiped.optimise._objective_values import Evaluation, _cost_of_transport, _root_of_squares
@@ -403,3 +404,9 @@ def test_a_part_of_a_certificate_fails_by_itself():
     assert parts.failed == {
         "walk": "ValueError: no root", "push": "interrupted", "norm": "interrupted"
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(("bound", "size"), [(-0.2, 0.2), (0.2, 0.2), (0.0, 1.0)])
+def test_a_bound_of_either_sign_has_a_size(bound, size):
+    """Else what exceeds a bound below zero would be told to keep it."""
+    assert scale_of(bound) == size

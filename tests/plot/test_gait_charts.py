@@ -82,6 +82,20 @@ def test_multipliers_and_the_unit_circle():
     assert any(text.startswith("3 near 0") for text in texts)
 
 
+@pytest.mark.parametrize("largest", [0.5, 1.6])
+def test_the_plane_of_multipliers_has_both_axes_and_equal_scales(largest):
+    (ax,) = multipliers(_gait(values=(largest, 0, 0, 0, 0, 0), multiplier_errors=np.zeros(6))).axes
+    across = {tuple(line.get_ydata()) for line in ax.lines if tuple(line.get_xdata()) == (0, 1)}
+    up = {tuple(line.get_xdata()) for line in ax.lines if tuple(line.get_ydata()) == (0, 1)}
+    assert across == up == {(0.0, 0.0)}
+    assert ax.get_aspect() == 1.0
+    # The circle and all dots, and no more round them than names need.
+    assert ax.get_xlim() == ax.get_ylim() == (-ax.get_xlim()[1], ax.get_xlim()[1])
+    assert 1.05 < ax.get_xlim()[1] / max(largest, 1.0) < 1.3
+    assert ("Re" in ax.get_xlabel(), "Im" in ax.get_ylabel()) == (True, True)
+    assert not any(ax.spines[side].get_visible() for side in ("top", "right"))
+
+
 def test_an_unstable_gait_stays_inside_the_frame_and_names_its_bifurcation():
     errors = np.asarray([0.1, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4])
     values = (-1.6, 0.4, 0.1, 0.0, 0.0, 0.0)

@@ -28,6 +28,7 @@ def test_forces_at_each_rate():
     np.testing.assert_allclose(slow[-1], 1e6 * 5e-4**1.5 * 0.7)
     np.testing.assert_allclose(fast[-1], 1e6 * 5e-4**1.5 * 1.6)
     assert legend_of(left) == ["−0.1 m/s", "0.2 m/s"]
+    assert left.get_xlim() == (depth.min(), depth.max())
     for ax in (left, right):
         assert "(mm)" in ax.get_xlabel()
         assert "(N)" in ax.get_ylabel()

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 import jaxbiped as jb
 from jaxbiped.plot import constraint_runs
-from tests.drawn import assert_is_drawn, points_of
+from tests.drawn import assert_is_drawn, legend_of, points_of
 
 
 def _row(way, error, cpu_s, outcome="ok"):
@@ -37,6 +37,10 @@ def test_ways_are_lines_and_failures_a_band():
     shaded = ax.patches[0]  # no error is known below the floor
     assert shaded.get_x() + shaded.get_width() == pytest.approx(1e-7)
     assert [text.get_text() for text in ax.texts] == ["failed"]
+    (floor,) = [line for line in ax.lines if "disagreement" in line.get_label()]
+    assert list(floor.get_xdata()) == [1e-7, 1e-7]
+    assert ax.get_xlim()[0] < 1e-7
+    assert "the references' disagreement" in legend_of(ax)
 
 
 def test_steps_in_place_of_time():

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite
+from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
@@ -107,6 +107,7 @@ def parameter_axes(
     scene: AbstractWalkerScene, given: Mapping[str, npt.ArrayLike], argument: str
 ) -> dict[str, np.ndarray]:
     """`axis_values` of parameters that the scene has and allows, of an `argument` of that name."""
+    check_type(argument, given, Mapping)
     axes = {}
     for name, values in given.items():
         check_choice(argument, name, parameter_names(scene))

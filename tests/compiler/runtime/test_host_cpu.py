@@ -54,6 +54,31 @@ def test_narrower_vectors_do_without_the_wider_ones_instructions(monkeypatch):
     assert _host().features.endswith(f"-{_machine_code._WITHOUT[128]}")
 
 
+class _Features(dict):
+    """What LLVM tells of a processor."""
+
+    def flatten(self):
+        return ",".join(f"+{name}" for name in self)
+
+
+@pytest.mark.parametrize(
+    ("features", "width"),
+    [
+        ("avx2 avx512f avx512dq", 8),
+        ("avx2 avx512f", 4),
+        ("avx2 avx512dq", 4),
+        ("avx2", 4),
+        ("sse2", 2),
+    ],
+)
+def test_vectors_are_as_wide_as_all_their_instructions_allow(monkeypatch, features, width):
+    """Of eight numbers those of both extensions: conversions of whole numbers are in the second."""
+    monkeypatch.delenv(VECTOR_VARIABLE, raising=False)
+    of = _Features(dict.fromkeys(features.split(), True))
+    monkeypatch.setattr(_machine_code.llvm, "get_host_cpu_features", lambda: of)
+    assert _host().width == width
+
+
 @pytest.mark.slow
 def test_all_widths_give_the_same_bits():
     (widest, *wanted), (narrow, *found) = _asked(""), _asked("128")

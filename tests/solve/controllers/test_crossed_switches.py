@@ -8,8 +8,10 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve.controllers._step_size import CrossedSwitches, ErrorControl, crosses
+from jaxbiped.variational._switch_locator import _crosses
 
 SCENE = jb.seed_scene()
 V0 = float(SCENE.friction.v0)
@@ -83,3 +85,22 @@ def test_the_draft_is_near_an_independent_solution(reference):
     how = dict(duration=2.0, accuracy="draft", save=times, engine="lanes")
     found = np.stack(jb.simulate(SCENE, jb.seed_state(), **how).state, axis=1)
     np.testing.assert_allclose(found, exact, atol=2e-4)
+
+
+@pytest.mark.parametrize("resets", [True, False])
+@pytest.mark.parametrize("live", [(True, False), (False, True), (False, False)])
+def test_each_way_past_a_surface_is_met_in_one_step_alone(resets, live):
+    """A motion through zero that a step ends on: the next begins there. Where the state is reset
+    the surface counts downwards alone, and only if it is live before."""
+
+    def met(values):
+        ends = [Switch(jnp.asarray(v), jnp.asarray(at), resets=resets) for v, at in values]
+        return [bool(_crosses(*ends[k : k + 2])) for k in range(len(ends) - 1)]
+
+    begin, end = live
+    counts = begin if resets else begin or end
+    down, up = (1.0, 0.0, -1.0), (-1.0, 0.0, 1.0)
+    assert met([(down[0], begin), (down[1], end)]) == [counts]
+    assert met([(down[1], begin), (down[2], end)]) == [False]
+    assert met([(up[0], begin), (up[1], end)]) == [False]
+    assert met([(up[1], begin), (up[2], end)]) == [counts and not resets]
