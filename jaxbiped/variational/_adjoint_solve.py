@@ -28,7 +28,14 @@ from jaxbiped.variational._first_variation import (
     field_order,
     without_flow,
 )
-from jaxbiped.variational._flow import Arrival, Flow, after_reset, earlier_at, on_section
+from jaxbiped.variational._flow import (
+    Arrival,
+    Flow,
+    after_reset,
+    earlier_at,
+    on_section,
+    sides_of,
+)
 from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._solve_to_section import Nodes
 from jaxbiped.variational._tangents import Seeded
@@ -240,7 +247,8 @@ class _AdjointSolve:
         order, parameters = field_order(flow)
         rows = Rows(flow.rates, order, list(parameters))
         crossed, ends = step.which > 0.0, (step.before, now.state)
-        linear = linearise_about(rows, *ends, step.points, step.share, crossed)
+        sides = sides_of(flow, now.state, step.which, parameters)
+        linear = linearise_about(rows, *ends, step.points, step.share, crossed, sides)
         early = jax.lax.cond(
             crossed,
             lambda: earlier_at(flow, now.state, step.which, parameters),

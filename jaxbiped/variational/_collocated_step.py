@@ -18,7 +18,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.compiler import jacobian
 from jaxbiped.linalg._small_matrices import BlockFactors, factorise
 from jaxbiped.solve.rosenbrock._implicit_linearisation import linearise
-from jaxbiped.variational._flow import SIDES, jump_of
+from jaxbiped.variational._flow import jump_of
 from jaxbiped.variational._switch_locator import MARGIN
 
 _ROOT = 6.0**0.5
@@ -254,17 +254,26 @@ def collocate_step(rows: Rows, step: KnownStep) -> tuple[Scalar, Scalar, Scalar]
 
 
 def linearise_about(
-    rows: Rows, before: Scalar, after: Scalar, points: Scalar, share: Scalar, crossed: Scalar
+    rows: Rows,
+    before: Scalar,
+    after: Scalar,
+    points: Scalar,
+    share: Scalar,
+    crossed: Scalar,
+    sides: Scalar,
 ) -> Linear:
-    """The field about a step between two states, whose `points` and shares are known."""
+    """The field about a step between two states, whose `points` and shares are known.
+
+    If it ends on a switch, the Jacobian's jump there is told by its values at the times `sides`.
+    """
     order = rows.order
     c = len(order.every)
     found = jax.lax.map(rows.gradient, jnp.concatenate([points, before[None]]))
     stages = Stages.of(order, share, found[:3, :, :c])
 
     def jump() -> Scalar:
-        sides = after + jnp.asarray(SIDES)[:, None] * rows.velocity(after)
-        return jump_of(jax.lax.map(rows.by_state, sides))
+        states = after + sides[:, None] * rows.velocity(after)
+        return jump_of(jax.lax.map(rows.by_state, states))
 
     jumps = jax.lax.cond(crossed, jump, lambda: jnp.zeros_like(found[3, :, :c]))
     return Linear(

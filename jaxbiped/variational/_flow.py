@@ -25,9 +25,10 @@ _STEEPER, _LARGE = 1.2, 1e-4
 bound, and from which size, in units of the largest entry, such a change is no rounding."""
 SIDES = tuple(1e-11 * side for side in (1.0, 4.0, 16.0, -1.0, -4.0, -16.0))
 """When the two sides of a switch are looked at [s]: first the new one. Nearer, penetrations are all
-rounding; ten times farther away, load times slope of friction, which goes as the square of time,
-has changed by more than rounding where v0 is small.
-"""
+rounding."""
+_NEARER = 0.1
+"""Part of that at a corner of friction. There the slope goes as the square of time over the time in
+which slip changes by v0, and only the speed must tell the sides apart."""
 
 
 class Flow(eqx.Module):
@@ -149,6 +150,13 @@ def earlier_at(flow: Flow, landed: Scalar, which: Scalar, parameters: Scalar) ->
 
     gradient = jax.grad(value)(z)
     return gradient / jnp.where(which > 0, gradient @ _rate(flow, parameters)(z), 1.0)
+
+
+def sides_of(flow: Flow, landed: Scalar, which: Scalar, parameters: Scalar) -> Scalar:
+    """Times at which to look at both sides of the switch of this number, as in `SIDES`, (6,)."""
+    surfaces = flow.surfaces(jnp.concatenate([landed, parameters]))
+    parts = [jnp.asarray(_NEARER if surface.corner else 1.0) for surface in surfaces]
+    return jnp.asarray(SIDES) * _pick(which, parts, 1.0)
 
 
 def _rate(flow: Flow, parameters: Scalar) -> Callable[[Scalar], Scalar]:
