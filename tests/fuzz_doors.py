@@ -92,8 +92,10 @@ def _told(scene: Any, state: Any, wants: Wants) -> None:
 
 
 def _surfaces(scene: Any, state: Any, wants: Wants) -> None:
-    jb.dynamics.switches(scene, state)
     jb.dynamics.exchange_legs(scene, state)
+    if not scene.compliant:
+        return
+    jb.dynamics.switches(scene, state)
     for section in (jb.MidStance(), jb.HeelStrike()):
         section.value(scene, state)
 

@@ -11,6 +11,7 @@ import jax.tree_util as jtu
 from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._types import Parameter, Scalar, as_float, by_numpy, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.scene._bodies import Foot
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode, Modes, limits_named, modes_of
 from jaxbiped.scene._placement import angles_and_rates_named, feet_named, foot_motion
@@ -51,7 +52,27 @@ def check_rolls(mechanism: Mechanism) -> None:
             "feet yet: there must be two legs, each with one or two feet on one body; use a Scene "
             "for others, whose feet are compliant."
         )
+    for one, other in (feet for feet in structure.feet_of_leg if len(feet) == 2):
+        if holds_somewhere(_is_within(*(mechanism.feet[k] for k in (one, other)))):
+            raise ArgumentError(
+                f"feet {structure.feet_told[one]} and {structure.feet_told[other]} are not allowed "
+                "together on rigid feet: one circle lies in the other, so that they can never "
+                "stand side by side; leave one out."
+            )
     rigid_modes(mechanism)
+
+
+def _is_within(one: Foot, other: Foot) -> Scalar:
+    """Whether the circle of one of two feet lies in that of the other."""
+    places = [(foot.centre.along, foot.centre.ahead, foot.radius) for foot in (one, other)]
+    numbers = (0.0 if each is None else each for place in places for each in place)
+    found: Scalar = by_numpy(
+        lambda _, a, b, r, along, ahead, radius: (
+            (a - along) ** 2 + (b - ahead) ** 2 <= (r - radius) ** 2
+        ),
+        *numbers,
+    )
+    return found
 
 
 def rigid_modes(mechanism: Mechanism) -> Modes:
