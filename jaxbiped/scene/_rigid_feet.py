@@ -53,25 +53,25 @@ def check_rolls(mechanism: Mechanism) -> None:
             "for others, whose feet are compliant."
         )
     for one, other in (feet for feet in structure.feet_of_leg if len(feet) == 2):
-        if holds_somewhere(_is_within(*(mechanism.feet[k] for k in (one, other)))):
+        if holds_somewhere(_touch_within(mechanism, mechanism.feet[one], mechanism.feet[other])):
             raise ArgumentError(
                 f"feet {structure.feet_told[one]} and {structure.feet_told[other]} are not allowed "
-                "together on rigid feet: one circle lies in the other, so that they can never "
-                "stand side by side; leave one out."
+                "together on rigid feet: where both stand, they stand on one point, about which "
+                "the leg turns; leave one out."
             )
     rigid_modes(mechanism)
 
 
-def _is_within(one: Foot, other: Foot) -> Scalar:
-    """Whether the circle of one of two feet lies in that of the other."""
+def _touch_within(mechanism: Mechanism, one: Foot, other: Foot) -> Scalar:
+    """Whether the circles of two feet are one, or touch where one lies in the other."""
     places = [(foot.centre.along, foot.centre.ahead, foot.radius) for foot in (one, other)]
     numbers = (0.0 if each is None else each for place in places for each in place)
-    found: Scalar = by_numpy(
-        lambda _, a, b, r, along, ahead, radius: (
-            (a - along) ** 2 + (b - ahead) ** 2 <= (r - radius) ** 2
-        ),
-        *numbers,
-    )
+
+    def test(_: Any, height: Any, a: Any, b: Any, r: Any, c: Any, d: Any, s: Any) -> Any:
+        apart = (a - c) ** 2 + (b - d) ** 2 - (r - s) ** 2
+        return abs(apart) <= _LEVEL * height**2
+
+    found: Scalar = by_numpy(test, mechanism.height, *numbers)
     return found
 
 

@@ -332,11 +332,11 @@ def test_two_stops_of_one_limit_hold_as_one_does():
 
 @pytest.mark.parametrize(
     ("radius", "ahead", "side_by_side"),
-    [(0.05, 0.0, False), (0.05, 0.02, False), (0.05, 0.04, True), (0.02, 0.0, False),
+    [(0.05, 0.03, False), (0.05, 0.02, True), (0.05, 0.04, True), (0.02, 0.0, False),
      (0.02, 1e-3, True), (None, 0.0, False), (None, 0.03, True)],
 )  # fmt: skip
-def test_of_two_feet_none_lies_in_the_other(radius, ahead, side_by_side):
-    """Circles of 2 cm beside others, or points beside points."""
+def test_two_feet_that_stand_on_one_point_are_refused(radius, ahead, side_by_side):
+    """Circles of 2 cm and others, one that touches from within, and points."""
     legs = [Body(f"leg_{i}", mass=1.0, inertia=0.01, centre=0.1) for i in (1, 2)]
     first = None if radius is None else 0.02
     feet = [
