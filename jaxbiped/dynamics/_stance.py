@@ -259,7 +259,8 @@ def stance_on(scene: AbstractWalkerScene, state: Any, leg: int) -> Stance:
     mechanism, zero = scene.mechanism, jnp.zeros_like(state[0])
     angles, turning = angles_and_rates(mechanism.structure, state)
     modes, feet = rigid_modes(mechanism), mechanism.structure.feet_of_leg[leg]
-    mode = modes.decoded(jnp, state.mode) if modes.any else Mode((), (), ())
+    modal = scalars_named(state, ("mode",)) if modes.any else ()
+    mode = modes.decoded(jnp, *modal) if modal else Mode((), (), ())
     sole = sole_of(mechanism, feet[0])
     if mode.stands and len(feet) > 1:
         first, _ = modes.stands_of(mode, leg)
