@@ -45,7 +45,8 @@ def test_what_fails_is_told_by_the_features_that_it_needs(monkeypatch):
     monkeypatch.setitem(fuzz.DOORS, "field", {"falls": falls})
     features = {"contact": "rigid", "knees": "stop", "torso": "spring", "slope": 0.0}
     (failure,), ends = fuzz.tried(features, ("field",))
-    assert failure.door == "falls" and failure.kind.startswith("KeyError at test_fuzz.py:")
+    assert failure.door == "falls"
+    assert failure.kind.startswith("KeyError at test_fuzz.py:")
     assert ends["falls"] == "KeyError: 'a key'"
     del features["slope"]
     assert fuzz.smallest(features | {"slope": 0.0}, failure, ("field",)) == features

@@ -127,6 +127,9 @@ def redundant_state(scene: RedundantScene, state: MinimalState) -> BodiesState:
     Returns:
         A state of the scene's kind: for `Walker` a `RedundantState`, or an `EulerState` if the
         scene has Euler parameters.
+
+    Raises:
+        ArgumentError: the scene is not redundant, or the state is another walker's.
     """
     check_type("scene", scene, RedundantScene)
     mechanism = scene.mechanism

@@ -142,6 +142,9 @@ def vector_field(t: Time, state: Any, scene: Scene) -> Any:
 
     Returns:
         The rates of change [SI units per second], a state of the same kind and shape.
+
+    Raises:
+        ArgumentError: the scene is of another kind, or the state is another scene's.
     """
     structure = scene.mechanism.structure
     check_scalars(state, scene.minimal.state_names)

@@ -150,6 +150,9 @@ def rolling_field(t: Time, state: Any, scene: RigidScene) -> Any:
 
     Returns:
         The rates of change [SI units per second], leaves shaped as the state's.
+
+    Raises:
+        ArgumentError: the state is another scene's.
     """
     check_scalars(state, scene.state_names)
     _, rates = angles_and_rates(scene.mechanism.structure, state)
