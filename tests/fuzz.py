@@ -25,6 +25,7 @@ from tests.fuzz_doors import DOORS, WrongError
 Features = dict[str, Any]
 
 _METHODS = tuple(jb.constraints.CONSTRAINT_METHODS)
+_OF_LAWS = ("normal", "friction", "clearance", "coordinates")
 FEATURES: dict[str, tuple[Any, ...]] = {
     "contact": ("rigid", "compliant"),
     "legs": (2, 1, 3, "wheel"),
@@ -48,7 +49,7 @@ FEATURES: dict[str, tuple[Any, ...]] = {
         "stop at rest",
     ),
     "motor": (
-        "none", "by role", "by side", "share of 0", "spline of one", "PD", "phase by side",
+        "none", "by role", "by side", "share of 0", "PD", "phase by side",
         "plain function", "NaN",
     ),
     "actuation": (
@@ -74,8 +75,22 @@ FEATURES: dict[str, tuple[Any, ...]] = {
 """What a walker and a walk may be like; the first of each is plain."""
 
 
-_OF_LAWS = ("normal", "friction", "clearance", "coordinates")
-"""What rigid feet do not have."""
+_REFUSED_ON_RIGID = {name: FEATURES[name] for name in _OF_LAWS} | {
+    "legs": (1, 3),
+    "foot": ("three feet",),
+    "save": ("steps", "times", "midstance", "no time"),
+    "solver": FEATURES["solver"],
+    "actuation": ("FootPreload",),
+}
+"""What rigid feet refuse by itself."""
+
+
+_ONE_SIDED = {"by side", "phase by side", "PD", "stop at rest", "foot"}
+"""What no mirror has."""
+
+
+SINGLES = -1
+"""The seed with which each feature comes by itself."""
 
 
 class Draw(NamedTuple):
@@ -92,14 +107,32 @@ _OF_DOORS = ("precision", "save", "ends", "solver", "within")
 
 
 def draw(seed: int, number: int, doors: tuple[str, ...], only: Features | None = None) -> Draw:
-    """Two to four features that are not plain, and the kind of feet."""
-    rng = np.random.default_rng((seed, number))
-    contact = (only or {}).get("contact", str(rng.choice(FEATURES["contact"])))
-    silent = (*_OF_LAWS * (contact == "rigid"), *_OF_DOORS * (doors == ("field",)))
-    names = [name for name in FEATURES if name not in {"contact", *silent, *(only or {})}]
-    chosen = rng.choice(names, size=rng.integers(2, 5), replace=False).tolist()
-    features = {name: FEATURES[name][rng.integers(1, len(FEATURES[name]))] for name in chosen}
-    return Draw({"contact": contact} | features | (only or {}))
+    """Two to five features that are not plain, and the kind of feet."""
+    rng, only = np.random.default_rng((seed + 1, number)), only or {}
+    contact = only.get("contact", str(rng.choice(FEATURES["contact"])))
+    refused = _REFUSED_ON_RIGID if contact == "rigid" else {}
+    silent = _OF_DOORS if doors == ("field",) else ()
+    able = {
+        name: [value for value in values[1:] if value not in refused.get(name, ())]
+        for name, values in FEATURES.items()
+        if name not in {"contact", *silent, *only}
+    }
+    names = [name for name, values in able.items() if values]
+    chosen = rng.choice(names, size=rng.integers(2, 6), replace=False).tolist()
+    features = {name: able[name][rng.integers(len(able[name]))] for name in chosen}
+    return Draw({"contact": contact} | features | only)
+
+
+def single(number: int) -> Draw | None:
+    """Each feature by itself, on both kinds of feet; None behind the last."""
+    alone = [
+        {"contact": contact, name: value}
+        for name, values in FEATURES.items()
+        for value in values[1:]
+        for contact in FEATURES["contact"]
+        if not (contact == "rigid" and value in _REFUSED_ON_RIGID.get(name, ()))
+    ]
+    return Draw(alone[number]) if number < len(alone) else None
 
 
 def _wanted(features: Features, name: str) -> Any:
@@ -264,9 +297,7 @@ class _Plan:
         """What drives it at a joint."""
         constant = jb.actuation.Constant(torque=0.05)
         phased = jb.actuation.Pulse(torque=0.1, at=0.0, width=0.1)
-        wants, spline = self.wants("motor"), jb.actuation.Spline
-        if wants == "spline of one":
-            return [jb.Motor(legs, spline(torque=(0.1,), first=0.0, last=0.1))]
+        wants = self.wants("motor")
         return {
             "none": lambda: [],
             "by role": lambda: [jb.Motor(legs, constant)],
@@ -302,6 +333,7 @@ def walker_of(features: Features) -> Any:
         plan.between()
     names = [body.name for body in plan.bodies]
     pairs = [(n, n[:-1] + "2") for n in names if n.endswith("_1") and n[:-1] + "2" in names]
+    alike = "mirror" in features or not _ONE_SIDED & set(map(str, features.values()))
     mass = {"hip only": 1.0, "no root mass": None, "huge": 1e6}.get(plan.wants("masses"), 0.5)
     return jb.Mechanism(
         root={"hip": "hip", "foot": "sole", "torso": "top"}[plan.wants("root")],
@@ -309,7 +341,7 @@ def walker_of(features: Features) -> Any:
         bodies=plan.bodies,
         feet=plan.feet,
         joints=plan.joints,
-        mirror=pairs if plan.wants("mirror") is True else (),
+        mirror=pairs if plan.wants("mirror") is True and alike else (),
     )
 
 
@@ -462,7 +494,10 @@ def run(
     for number in numbers:
         if time.monotonic() > until:
             return
-        chosen, begun = draw(seed, number, doors, only), time.process_time()
+        begun = time.process_time()
+        chosen = single(number) if seed == SINGLES else draw(seed, number, doors, only)
+        if chosen is None:
+            return
         failures, ends = tried(chosen.features, doors)
         if verbose:
             print(f"{number} ({time.process_time() - begun:.1f} s) {chosen}: {ends}", flush=True)

@@ -92,8 +92,10 @@ def _told(scene: Any, state: Any, wants: Wants) -> None:
 
 
 def _surfaces(scene: Any, state: Any, wants: Wants) -> None:
-    jb.dynamics.switches(scene, state)
     jb.dynamics.exchange_legs(scene, state)
+    if not scene.compliant:
+        return
+    jb.dynamics.switches(scene, state)
     for section in (jb.MidStance(), jb.HeelStrike()):
         section.value(scene, state)
 
@@ -283,7 +285,7 @@ def _measured(scene: Any, state: Any, wants: Wants) -> Any:
 
 
 def _labels(scene: Any, state: Any, wants: Wants) -> Any:
-    label = jb.labelling(scene, guess=state, footsteps=5, look_for_gaits=False)
+    label = jb.labelling(scene, guess=state, footsteps=5)
     starts = jax.tree.map(lambda x: np.stack([np.asarray(x, float)] * 3), state)
     found = label(starts)
     _words(found) if hasattr(found, "_repr_html_") else repr(found)

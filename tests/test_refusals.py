@@ -100,3 +100,32 @@ def test_a_law_that_is_named_alone_is_like_the_seed_s():
 
 def test_counts_may_be_whole_floats():
     assert jb.labelling(RIGID, footsteps=12.0).effort.footsteps == 12
+
+
+def _of_dynamics():
+    """Functions with scenes of kinds that they do not take, then with states of other scenes."""
+    redundant = jb.RedundantScene(SCENE)
+    bodies = jb.dynamics.redundant_state(redundant, START)
+    needs_contact = ["energies", "powers", "feet", "foot_forces", "accelerations", "switches"]
+    needs_bodies = ["redundant_motion", "violation", "consistent_state", "project"]
+    yield from ((name, RIGID, START) for name in needs_contact)
+    yield from ((name, SCENE, bodies) for name in (*needs_bodies, "redundant_state"))
+    yield from ((name, redundant, START) for name in (*needs_bodies[:2], "project"))
+    yield from ((name, SCENE, ROLLING) for name in needs_contact[:-1])
+    yield from ((name, RIGID, START) for name in ("rolling_field", "vector_field"))
+    yield from ((name, SCENE, ROLLING) for name in ("vector_field", "redundant_field"))
+    yield from ((name, RIGID, bodies) for name in ("rolling_field", "redundant_field"))
+    yield "vector_field", SCENE, bodies
+    yield "redundant_field", redundant, START
+
+
+@pytest.mark.parametrize(
+    ("name", "scene", "state"),
+    [pytest.param(*each, id=f"{each[0]}-{k}") for k, each in enumerate(_of_dynamics())],
+)
+def test_a_scene_or_a_state_of_another_kind_is_refused_by_dynamics(name, scene, state):
+    function = getattr(jb.dynamics, name)
+    given = (0.0, state, scene) if name.endswith("field") else (scene, state)
+    with pytest.raises(jb.ArgumentError, match=r"^(scene = a|state (has|is minimal|= ))") as told:
+        function(*given)
+    assert "\n" not in str(told.value)

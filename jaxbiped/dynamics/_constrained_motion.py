@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, holds_somewhere
+from jaxbiped._checks import ArgumentError, check_type, holds_somewhere
 from jaxbiped._types import RealScalarLike, Scalar, StateLeaf, Time, by_numpy, in_64_bits
 from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._constraint_method import (
@@ -135,6 +135,12 @@ class Violation(NamedTuple):
 
 def coordinates_of(scene: RedundantScene, state: BodiesState) -> tuple[list[Scalar], list[Scalar]]:
     """Coordinates and rates of a redundant state as the linkage has them."""
+    check_type("scene", scene, RedundantScene)
+    if not is_redundant(state):
+        raise ArgumentError(
+            "state is minimal, which is not allowed here: give jb.dynamics.redundant_state(scene, "
+            "state)."
+        )
     count = len(scene.mechanism.structure.bodies) * scene.linkage.coordinates
     return list(state[:count]), list(state[count : 2 * count])
 
@@ -156,8 +162,9 @@ def violation(scene: RedundantScene, state: BodiesState) -> Violation:
         Distance [m], relative speed [m/s], normalisation [–], angle [rad] and its rate [rad/s],
         leaves shaped as the state's.
     """
+    q, v = coordinates_of(scene, state)
     linkage = scene.linkage
-    at = constraints_of(linkage, *coordinates_of(scene, state))
+    at = constraints_of(linkage, q, v)
     points = 2 * len(linkage.joints)
     angles = points + len(linkage.angles)
 
@@ -210,12 +217,12 @@ def project(scene: RedundantScene, state: BodiesState) -> BodiesState:
     Raises:
         ArgumentError: the scene's method does not project.
     """
+    q, v = coordinates_of(scene, state)
     method = scene.method
     if not isinstance(method, AbstractProjectingMethod):
         raise ArgumentError(
             f"method = {type(method).__name__} is not allowed here: it does not project."
         )
-    q, v = coordinates_of(scene, state)
     return with_coordinates(state, *correct_step(scene.linkage, method, q, v))
 
 
@@ -236,6 +243,7 @@ def consistent_state(
         ArgumentError: the state is not of the scene's kind, an entry is not finite, leaves have
             different shapes, or the start is too far off. Traced values are not checked.
     """
+    check_type("scene", scene, RedundantScene)
     if is_redundant(state):
         state = state_for(scene, state)
     else:

@@ -5,7 +5,7 @@ from typing import NamedTuple, cast
 
 import jax.numpy as jnp
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import load_shares, preload
@@ -22,7 +22,7 @@ from jaxbiped.dynamics._joint_loads import Pressed, stop_limits
 from jaxbiped.dynamics._tree import Pose, point_motion
 from jaxbiped.scene._ground import SteppedGround
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene._scene import CompliantScene, RedundantScene, Scene
 from jaxbiped.scene._state_types import SomeState
 from jaxbiped.scene._structure import Structure
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
@@ -59,6 +59,7 @@ def feet_at(
     scene: CompliantScene, poses: tuple[Pose, ...], bristles: tuple[Scalar | None, ...]
 ) -> tuple[FootMotion, ...]:
     """The feet of bodies in these poses."""
+    check_type("scene", scene, Scene, RedundantScene)
     ground: object = scene.ground
     structure, given = scene.mechanism.structure, scene.mechanism.feet
     points = tuple(

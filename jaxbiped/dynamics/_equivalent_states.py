@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import check_type
 from jaxbiped._trigonometry import angle_of_vector, sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import kept_alone
@@ -20,7 +20,13 @@ from jaxbiped.dynamics._tree import Motion, Pose, point_motion, pose_of
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._linkages import loaded_bodies
 from jaxbiped.scene._scene import RedundantScene, is_rigid
-from jaxbiped.scene._state_types import MinimalState, SomeState, is_redundant, state_type_of
+from jaxbiped.scene._state_types import (
+    MinimalState,
+    SomeState,
+    is_redundant,
+    scalars_named,
+    state_type_of,
+)
 from jaxbiped.scene._structure import Structure
 
 BodiesState: TypeAlias = Any
@@ -71,14 +77,8 @@ def motion_in(scene: AbstractWalkerScene, state: CompliantState) -> Motion:
         each = zip(*((own.x, own.z, own.vx, own.vz) for own in told), strict=True)
         x, z, vx, vz = (mean(values) for values in each)
         return told[0]._replace(x=x, z=z, vx=vx, vz=vz)
-    for name in (*structure.coordinates, *structure.rates):
-        if not hasattr(state, name):
-            raise ArgumentError(
-                f"state has no {name}, which the scene's walker has: give a state of this scene."
-            )
-    places = [getattr(state, name) for name in structure.coordinates]
-    rates = [getattr(state, name) for name in structure.rates]
-    return motion_of(scene.mechanism, scene.ground, places, rates)
+    places, rates = (scalars_named(state, n) for n in (structure.coordinates, structure.rates))
+    return motion_of(scene.mechanism, scene.ground, list(places), list(rates))
 
 
 def poses_of(scene: AbstractWalkerScene, state: CompliantState) -> tuple[Pose, ...]:
@@ -127,7 +127,11 @@ def redundant_state(scene: RedundantScene, state: MinimalState) -> BodiesState:
     Returns:
         A state of the scene's kind: for `Walker` a `RedundantState`, or an `EulerState` if the
         scene has Euler parameters.
+
+    Raises:
+        ArgumentError: the scene is not redundant, or the state is another walker's.
     """
+    check_type("scene", scene, RedundantScene)
     mechanism = scene.mechanism
     structure, motion = mechanism.structure, motion_in(scene, state)
     pose = pose_of(mechanism, motion)

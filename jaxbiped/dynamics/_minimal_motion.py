@@ -36,7 +36,7 @@ from jaxbiped.linalg._sparse_lu import SparseMatrix, times
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._scene import CompliantScene, Scene
-from jaxbiped.scene._state_types import state_type_of
+from jaxbiped.scene._state_types import check_scalars, state_type_of
 from jaxbiped.scene._structure import Structure
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
@@ -142,8 +142,12 @@ def vector_field(t: Time, state: Any, scene: Scene) -> Any:
 
     Returns:
         The rates of change [SI units per second], a state of the same kind and shape.
+
+    Raises:
+        ArgumentError: the scene is of another kind, or the state is another scene's.
     """
     structure = scene.mechanism.structure
+    check_scalars(state, scene.minimal.state_names)
     places = {
         place: getattr(state, rate)
         for place, rate in zip(structure.coordinates, structure.rates, strict=True)

@@ -22,6 +22,7 @@ from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode
 from jaxbiped.scene._rigid_feet import next_leg, rigid_modes, standing_legs
+from jaxbiped.scene._state_types import scalars_named
 from jaxbiped.scene._structure import Indices, Structure, weighted
 
 
@@ -258,7 +259,8 @@ def stance_on(scene: AbstractWalkerScene, state: Any, leg: int) -> Stance:
     mechanism, zero = scene.mechanism, jnp.zeros_like(state[0])
     angles, turning = angles_and_rates(mechanism.structure, state)
     modes, feet = rigid_modes(mechanism), mechanism.structure.feet_of_leg[leg]
-    mode = modes.decoded(jnp, state.mode) if modes.any else Mode((), (), ())
+    modal = scalars_named(state, ("mode",)) if modes.any else ()
+    mode = modes.decoded(jnp, *modal) if modal else Mode((), (), ())
     sole = sole_of(mechanism, feet[0])
     if mode.stands and len(feet) > 1:
         first, _ = modes.stands_of(mode, leg)
@@ -283,8 +285,8 @@ def angles_and_rates(
     structure: Structure, state: Any
 ) -> tuple[tuple[Scalar, ...], tuple[Scalar, ...]]:
     """The free angles of a state on rigid feet, and their rates."""
-    count = len(structure.free)
-    return tuple(state[1 : 1 + count]), tuple(state[1 + count : 1 + 2 * count])
+    angles, rates = structure.coordinates[2:], structure.rates[2:]
+    return scalars_named(state, angles), scalars_named(state, rates)
 
 
 def _rolling(tree: StandingTree, motion: Motion) -> Motion:

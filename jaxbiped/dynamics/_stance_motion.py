@@ -24,7 +24,7 @@ from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._modes import Modes
 from jaxbiped.scene._rigid_feet import rigid_modes
 from jaxbiped.scene._scene import RigidScene
-from jaxbiped.scene._state_types import state_type_of
+from jaxbiped.scene._state_types import check_scalars, state_type_of
 from jaxbiped.scene._structure import Indices
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 
@@ -153,7 +153,11 @@ def rolling_field(t: Time, state: Any, scene: RigidScene) -> Any:
 
     Returns:
         The rates of change [SI units per second], leaves shaped as the state's.
+
+    Raises:
+        ArgumentError: the state is another scene's.
     """
+    check_scalars(state, scene.state_names)
     _, rates = angles_and_rates(scene.mechanism.structure, state)
     modes = [jnp.zeros_like(state[0])] if rigid_modes(scene.mechanism).any else []
 

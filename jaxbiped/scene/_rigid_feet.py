@@ -11,6 +11,7 @@ import jax.tree_util as jtu
 from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._types import Parameter, Scalar, as_float, by_numpy, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.scene._bodies import Foot
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode, Modes, limits_named, modes_of
 from jaxbiped.scene._placement import angles_and_rates_named, feet_named, foot_motion
@@ -51,7 +52,27 @@ def check_rolls(mechanism: Mechanism) -> None:
             "feet yet: there must be two legs, each with one or two feet on one body; use a Scene "
             "for others, whose feet are compliant."
         )
+    for one, other in (feet for feet in structure.feet_of_leg if len(feet) == 2):
+        if holds_somewhere(_touch_within(mechanism, mechanism.feet[one], mechanism.feet[other])):
+            raise ArgumentError(
+                f"feet {structure.feet_told[one]} and {structure.feet_told[other]} are not allowed "
+                "together on rigid feet: where both stand, they stand on one point, about which "
+                "the leg turns; leave one out."
+            )
     rigid_modes(mechanism)
+
+
+def _touch_within(mechanism: Mechanism, one: Foot, other: Foot) -> Scalar:
+    """Whether the circles of two feet are one, or touch where one lies in the other."""
+    places = [(foot.centre.along, foot.centre.ahead, foot.radius) for foot in (one, other)]
+    numbers = (0.0 if each is None else each for place in places for each in place)
+
+    def test(_: Any, height: Any, a: Any, b: Any, r: Any, c: Any, d: Any, s: Any) -> Any:
+        apart = (a - c) ** 2 + (b - d) ** 2 - (r - s) ** 2
+        return abs(apart) <= _LEVEL * height**2
+
+    found: Scalar = by_numpy(test, mechanism.height, *numbers)
+    return found
 
 
 def rigid_modes(mechanism: Mechanism) -> Modes:

@@ -24,7 +24,6 @@ from jaxbiped.scene.actuation._abstract_actuator import (
     Actuation,
     actuation_of,
     check_actuation,
-    check_no_hip,
 )
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractBristleLaw,
@@ -85,13 +84,11 @@ class Scene(AbstractMinimalScene):
         check_type("normal", self.normal, AbstractNormalLaw)
         check_type("friction", self.friction, AbstractFrictionLaw, AbstractBristleLaw)
         check_type("clearance", self.clearance, AbstractClearance)
-        check_actuation(self.actuation, "compliant")
         warn_if_steep(self.ground, self.friction)
         mechanism = self.mechanism
+        check_actuation(self.actuation, "compliant", mirrored=bool(mechanism.structure.pairs))
         if isinstance(self.clearance, OneFoot):
             check_choice("clearance.leg", self.clearance.leg, mechanism.structure.legs)
-        if not mechanism.structure.pairs:
-            check_no_hip(self.actuation)
         for part in mechanism.joints:
             if isinstance(part, Stop) and part.law is None:
                 raise ArgumentError(
@@ -161,8 +158,9 @@ class RigidScene(AbstractMinimalScene):
 
     def __check_init__(self) -> None:
         check_type("ground", self.ground, Ground)
-        check_actuation(self.actuation, "rigid")
-        check_rolls(self.mechanism)
+        mechanism = self.mechanism
+        check_actuation(self.actuation, "rigid", mirrored=bool(mechanism.structure.pairs))
+        check_rolls(mechanism)
 
     def state(
         self,

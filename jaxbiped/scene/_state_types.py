@@ -5,6 +5,7 @@ import re
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, StateLeaf
 from jaxbiped.caching._caches import bounded_cache
 
@@ -197,6 +198,30 @@ def _made(names: tuple[str, ...]) -> type[Any]:
     made: Any = collections.namedtuple("State", names)  # type: ignore[misc]
     made.__module__, made.__qualname__ = __name__, f"StateOf({','.join(names)})"
     return made
+
+
+def scalars_named(state: Any, names: Sequence[str]) -> tuple[Any, ...]:
+    """The scalars of a state with these names.
+
+    Raises:
+        ArgumentError: the state is another scene's, and does not have one of them.
+    """
+    for name in names:
+        if not hasattr(state, name):
+            raise ArgumentError(
+                f"state has no {name}, which the scene's walker has: give a state of this scene."
+            )
+    return tuple(getattr(state, name) for name in names)
+
+
+def check_scalars(state: Any, names: Sequence[str]) -> None:
+    """Raises `ArgumentError` unless a state has just these scalars, in this order."""
+    scalars_named(state, names)
+    if state._fields != tuple(names):
+        raise ArgumentError(
+            f"state has the scalars {', '.join(state._fields)}, which is not allowed: those of "
+            f"this scene are {', '.join(names)}."
+        )
 
 
 def is_redundant(state: Any) -> bool:

@@ -306,3 +306,47 @@ def test_a_locked_knee_is_held_with_either_sign_and_a_pressed_one_is_let_go():
         assert still == (holds != HOLDS[0])
     assert modes[HOLDS[0]] == [True, True]
     assert modes[HOLDS[1]] == [False, False]
+
+
+def doubled(legs):
+    """Hsu Chen's walker, with a second stop of the same limit at the knees of some legs."""
+    given = hsu_chen("while pressed").mechanism.arguments()
+    more = [Stop(f"shank_{i}", upper=part.upper, name="more")
+            for i, part in enumerate(given["joints"], 1) if i in legs]  # fmt: skip
+    walker = Mechanism(**given | {"joints": (*given["joints"], *more)})
+    return dataclasses.replace(hsu_chen(), walker=walker)
+
+
+def test_two_stops_of_one_limit_hold_as_one_does():
+    """Only the sum of their reactions is determined."""
+    one, both = hsu_chen("while pressed"), doubled((1, 2))
+    stood, twice = (scene.state(**ANGLES, **RATES) for scene in (one, both))
+    moved, doubly = (
+        jb.dynamics.rolling_field(0.0, *each) for each in ((stood, one), (twice, both))
+    )
+    np.testing.assert_allclose(doubly[:-1], moved[:-1], rtol=1e-12)
+    struck, again = (jb.dynamics.impact(*each) for each in ((one, stood), (both, twice)))
+    np.testing.assert_allclose(again.state[:-1], struck.state[:-1], rtol=1e-12)
+    np.testing.assert_allclose(again[1:], struck[1:], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("radius", "ahead", "side_by_side"),
+    [(0.05, 0.03, False), (0.05, 0.02, True), (0.05, 0.04, True), (0.02, 0.0, False),
+     (0.02, 1e-3, True), (None, 0.0, False), (None, 0.03, True)],
+)  # fmt: skip
+def test_two_feet_that_stand_on_one_point_are_refused(radius, ahead, side_by_side):
+    """Circles of 2 cm and others, one that touches from within, and points."""
+    legs = [Body(f"leg_{i}", mass=1.0, inertia=0.01, centre=0.1) for i in (1, 2)]
+    first = None if radius is None else 0.02
+    feet = [
+        Foot(f"leg_{i}", centre=place, radius=size, name=name)
+        for i in (1, 2)
+        for name, place, size in (("heel", 0.3, first), ("toe", (0.3, ahead), radius))
+    ]
+    walker = Mechanism(bodies=legs, feet=feet, mirror=(("leg_1", "leg_2"),))
+    if side_by_side:
+        assert jb.RigidScene(walker, jb.Ground(slope=SLOPE)).state() is not None
+    else:
+        with pytest.raises(jb.ArgumentError, match=r"feet leg_1\.heel and leg_1\.toe are not all"):
+            jb.RigidScene(walker, jb.Ground(slope=SLOPE))

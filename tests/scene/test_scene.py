@@ -160,6 +160,8 @@ def test_a_scene_takes_any_mechanism_and_knows_its_rules():
         scene_of("torso", walker=bare)
     with pytest.raises(jb.ArgumentError, match="without a mirror"):
         scene_of("unequal", actuation=jb.actuation.HipSpring(k=1.0))
+    with pytest.raises(jb.ArgumentError, match="without a mirror"):
+        jb.RigidScene(WALKERS["unequal"], seed.ground, jb.actuation.HipTorque(torque=0.1))
     with pytest.raises(jb.ArgumentError, match="walker"):
         scene_of("torso", walker=3.0)
 

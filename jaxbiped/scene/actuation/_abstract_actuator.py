@@ -118,8 +118,14 @@ def actuation_of(parts: AbstractActuator | Sequence[AbstractActuator] | None) ->
     return tuple(parts) or None if isinstance(parts, list | tuple) else (cast(Any, parts),)
 
 
-def check_actuation(actuation: Actuation, feet: str) -> None:
-    """Raises `ArgumentError` for what is no actuator, or one that feet of this kind do not have."""
+def check_actuation(actuation: Actuation, feet: str, *, mirrored: bool) -> None:
+    """Raises `ArgumentError` for what is no actuator, or one that such a walker cannot have.
+
+    Args:
+        actuation: the actuators.
+        feet: kind of the walker's feet, "compliant" or "rigid".
+        mirrored: whether it has a pair of bodies, which an actuator at the hip acts between.
+    """
     for part in actuation or ():
         check_type("actuation", part, AbstractActuator)
         if part.feet not in (None, feet):
@@ -127,12 +133,7 @@ def check_actuation(actuation: Actuation, feet: str) -> None:
                 f"actuation = {type(part).__name__} is not allowed with {feet} feet: it needs "
                 f"{part.feet} ones."
             )
-
-
-def check_no_hip(actuation: Actuation) -> None:
-    """Raises `ArgumentError` for an actuator that turns two legs against each other."""
-    for part in actuation or ():
-        if isinstance(part, AbstractHipActuator):
+        if isinstance(part, AbstractHipActuator) and not mirrored:
             raise ArgumentError(
                 f"actuation = {type(part).__name__} is not allowed for a mechanism without a "
                 "mirror: it acts between the bodies of a pair; give mirror= or use joint parts."
