@@ -104,8 +104,10 @@ def energy_ledger(
     return EnergyLedger(gravity, damper, friction, stored, residual, driven)
 
 
-_PANELS = 48
-"""Parts of a footstep, each with its Gauss points."""
+_PANELS, _PARTS, _SPLITS = 48, 4, 10
+"""Parts of a footstep, each with its Gauss points; into how many one is split, and how often."""
+_SETTLED = 1e-8
+"""What a split may change, in units of the largest power times the footstep's period."""
 _BEFORE = 1e-7
 """How long before its impact a footstep is looked at, in units of its period."""
 
@@ -230,33 +232,45 @@ class _Works(NamedTuple):
 
 def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeChanges) -> _Works:
     count = len(periods)
+    works, sizes = np.zeros((3, count)), np.zeros(count)
     if not is_driven(scene) and not scene.mechanism.joints:
-        return _Works(*[np.zeros(count) for _ in _Works._fields])
-    # Powers jump where the mode changes, so that no panel straddles a change, and settle behind it.
+        return _Works(*works)
+    # Powers jump where the mode changes, so that no panel straddles a change. Panels are split
+    # where a motor's law jumps or bends, and where a damper settles.
     even = np.linspace(0.0, 1.0, _PANELS + 1)
-    early = np.append(0.0, even[1] * 0.5 ** np.arange(5))
-    edges = []
-    for k, period in enumerate(periods):
-        behind = np.add.outer([0.0, *changes.since[changes.number == k]], period * early)
-        edges.append(np.unique(np.minimum(np.append(period * even, behind), period)))
+    edges = [
+        np.unique([*(period * even), *changes.since[changes.number == k]])
+        for k, period in enumerate(periods)
+    ]
     number = np.repeat(np.arange(count), [len(each) - 1 for each in edges])
-    widths = np.concatenate([np.diff(each) for each in edges])
     begins = np.concatenate([each[:-1] for each in edges])
+    widths = np.concatenate([np.diff(each) for each in edges])
+    for splits in range(_SPLITS + 1):
+        sampled = _sampled_powers(scene, rows_of(starts, number), begins, widths)
+        samples = Samples(np.append(0.0, np.cumsum(widths)), None)
+        np.maximum.at(sizes, number, np.abs(sampled).max(axis=(0, 2)) * periods[number])
+        rough = np.max([samples.roughness(power) for power in sampled], axis=0)
+        ready = (rough <= _SETTLED * sizes[number]) | (splits == _SPLITS)
+        total, lost, *motors = sampled
+        driving = sum((samples.positive_integral(power) for power in motors), np.zeros(len(number)))
+        parts = samples.integral(total), driving, samples.integral(lost)
+        for row, part in zip(works, parts, strict=True):
+            row += np.bincount(number[ready], part[ready], count)
+        if ready.all():
+            break
+        begins, widths = begins[~ready], np.repeat(widths[~ready] / _PARTS, _PARTS)
+        begins = np.repeat(begins, _PARTS) + widths * np.resize(np.arange(_PARTS), len(widths))
+        number = np.repeat(number[~ready], _PARTS)
+    return _Works(*works)
+
+
+def _sampled_powers(
+    scene: RigidScene, starts: Any, begins: np.ndarray, widths: np.ndarray
+) -> np.ndarray:
+    """At the Gauss points of n panels, so long after their starts: powers of all that drives, of
+    what joints lose, and of each motor [W], shape (k, n, 5)."""
     times = begins[:, None] + widths[:, None] * 0.5 * (1.0 + NODES)
-    many = rows_of(starts, np.repeat(number, len(NODES)))
-    states = states_after(scene, many, times.ravel())
-    flows = jtu.tree_map(
-        lambda leaf: leaf.reshape(times.shape), evaluate_along(scene, states, powers)
-    )
-    samples = Samples(np.append(0.0, np.cumsum(widths)), None)
-
-    def by_footstep(works: np.ndarray) -> np.ndarray:
-        return np.bincount(number, works, count)
-
-    driving = [by_footstep(samples.positive_integral(power)) for power in flows.motors or ()]
-    driven = flows.motors is not None
-    return _Works(
-        actuation=by_footstep(samples.integral(flows.actuation)) if driven else np.zeros(count),
-        motors=sum(driving, np.zeros(count)),
-        joints=by_footstep(samples.integral(flows.damper)),
-    )
+    many = rows_of(starts, np.repeat(np.arange(len(begins)), len(NODES)))
+    flows = evaluate_along(scene, states_after(scene, many, times.ravel()), powers)
+    driven = np.zeros(times.size) if flows.actuation is None else flows.actuation
+    return np.reshape([driven, flows.damper, *(flows.motors or ())], (-1, *times.shape))

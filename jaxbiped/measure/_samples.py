@@ -26,6 +26,11 @@ SomeScene = TypeVar("SomeScene", bound=AbstractWalkerScene)
 _Taken = TypeVar("_Taken")
 
 NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_TO_ENDS = np.linalg.solve(np.vander(NODES).T, np.vander([-1.0, 1.0], len(NODES)).T)
+"""Weights of values at the Gauss points by which their polynomial has those at both ends."""
+_CUBIC = np.array([0.0, *[1.0 / (3.0 * NODES[3] ** 2)] * 3, 0.0])
+_CUBIC[2] = 2.0 - 2.0 * _CUBIC[1]
+"""Weights of a rule of order four at the three points within."""
 _RESOLUTION = 2.0**48
 """By how much an interval is narrowed down that holds a change."""
 
@@ -45,15 +50,19 @@ class Samples(NamedTuple):
         """Integral of a leaf of `values` over each interval, shape (n,)."""
         return np.asarray(np.diff(self.edges) * (leaf @ (0.5 * _WEIGHTS)))
 
+    def roughness(self, leaf: np.ndarray) -> np.ndarray:
+        """How much an integral differs from that by a rule of lower order, shape (n,)."""
+        return np.abs(np.diff(self.edges) * (leaf @ (0.5 * (_WEIGHTS - _CUBIC))))
+
     def positive_integral(self, leaf: np.ndarray) -> np.ndarray:
         """Integral of what of a leaf is above zero over each interval, shape (n,).
 
         Where its sign changes within an interval, between the roots of the polynomial through it.
         """
-        whole, found = self.integral(leaf), np.zeros(len(leaf))
-        found[(leaf > 0.0).all(axis=1)] = whole[(leaf > 0.0).all(axis=1)]
-        halves = 0.5 * np.diff(self.edges)
-        for row in np.flatnonzero((leaf > 0.0).any(axis=1) & (leaf <= 0.0).any(axis=1)):
+        drives = np.hstack([leaf, leaf @ _TO_ENDS]) > 0.0
+        always = drives.all(axis=1)
+        found, halves = np.where(always, self.integral(leaf), 0.0), 0.5 * np.diff(self.edges)
+        for row in np.flatnonzero(drives.any(axis=1) & ~always):
             curve = np.polynomial.Polynomial.fit(NODES, leaf[row], len(NODES) - 1, [-1.0, 1.0])
             roots = curve.roots()
             turns = np.sort(roots[np.abs(roots.imag) < 1e-9].real)

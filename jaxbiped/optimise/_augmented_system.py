@@ -111,6 +111,11 @@ class AbstractAugmentedSystem(AbstractSystem):
     def ending(self, args: PyTree, y: PyTree) -> Scalar:
         return self.walker.ending(self.scene_of(args, y), motion_of(y))
 
+    def arrival(self, section: AbstractSection, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
+        if isinstance(section, MotionSection):
+            return self.walker.arrival(section.section, self.scene_of(args, y), motion_of(y))
+        return super().arrival(section, args, y)
+
     def load(self, args: PyTree, y: PyTree) -> Scalar | None:
         return None
 

@@ -46,7 +46,7 @@ _ENERGY_COLOURS = {
     "kinetic": ("#0072B2", "#56B4E9"),
     "elastic": ("#A8578A", "#CC79A7"),
     "supplied": ("#00795A", "#2CC79B"),
-    "driven": ("#6B5B00", "#F0E442"),
+    "driven": ("#404040", "#D0D0D0"),
     "lost": ("#B84C00", "#E69F00"),
 }
 """Of each energy's curve in the viewer, on a light page and on a dark one."""

@@ -163,6 +163,45 @@ def test_a_press_on_a_chart_moves_every_cursor(page, walk):
     assert float(ticks) == pytest.approx(time, abs=0.01)
 
 
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    """A titan's rigid walk, which motors drive, in a page."""
+    require_chromium()
+    walker = jb.Walker(m=4e4, J=1.5e5, l=8.0, d=2.0, r=1.6, hip_mass=4e4)
+    parts = jb.actuation.HipPulse(6e4), jb.actuation.PushOff(1e4)
+    scene = jb.RigidScene(walker, jb.Ground(slope=0.02), parts)
+    start = scene.state(theta_1=-0.2, theta_2=0.2, omega_1=-0.17, omega_2=-0.28)
+    walk = jb.rigid_walk(scene, start, footsteps=3, max_arrivals=3)
+    page = jb.plot.view(scene, walk, start=start, name="titan")
+    return page.save(tmp_path_factory.mktemp("driven") / "walk.html")
+
+
+@pytest.mark.parametrize("width", [400, 800, 1600])
+def test_charts_are_whole_and_motors_have_their_line(browser, driven, width):
+    page = browser.open(driven, width=width)
+    assert "motors' work" in page.find(".charts figure:last-child figcaption").text
+    assert page.run("return document.querySelectorAll('.curve.driven').length") == 1
+    beyond = """return [...document.querySelectorAll(".chart")].flatMap((chart) => {
+      const frame = chart.querySelector("clipPath rect").getBBox();
+      const within = (one, other) => one.x >= other.x - 1 && one.y >= other.y - 1 &&
+        one.x + one.width <= other.x + other.width + 1 &&
+        one.y + one.height <= other.y + other.height + 1;
+      const [box, parts] = [chart.viewBox.baseVal, [...chart.querySelectorAll(".axes text")]];
+      const turned = (text) => text.hasAttribute("transform");
+      return [
+        ...[...chart.querySelectorAll(".curve")].filter((curve) => !within(curve.getBBox(), frame)),
+        ...parts.filter((text) => !turned(text) && !within(text.getBBox(), box)),
+      ].map((each) => each.textContent || each.getAttribute("class"));
+    });"""
+    assert page.run(beyond) == []
+    # What an impact takes is lost at once: no line leans.
+    path = page.find(".curve.lost").get_attribute("d")
+    points = np.array([each.split() for each in path[1:].split("L")], float)
+    apart = np.abs(np.diff(points, axis=0))
+    assert np.all((apart[:, 0] < 0.3) | (apart[:, 1] < 1.0))
+    assert apart[:, 1].max() > 10.0
+
+
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("width", [400, 800, 1600])
 def test_it_fits_any_width_by_day_and_by_night(page, file, tmp_path, dark, width):

@@ -1,6 +1,7 @@
 """Recordings, against the walks of every kind between their knots."""
 
 import base64
+import dataclasses
 
 import jax
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 import jaxbiped as jb
 from jaxbiped.plot._samples import DrawnMotion
 from jaxbiped.plot._skeleton import motion_names, poses
-from tests.mechanisms import scene_of, start_of
+from tests.mechanisms import BISECTING, FEET, LEGS, PAIR, scene_of, start_of
 
 pytestmark = pytest.mark.slow
 
@@ -76,6 +77,48 @@ def test_forces_and_energies_are_those_of_the_walk(seed_walk):
     assert found.channels["supplied"][-1] == pytest.approx(float(books.gravity_work[0]))
     lost = float(books.damper_loss[0] + books.friction_loss[0])
     assert found.channels["lost"][-1] == pytest.approx(lost, rel=1e-5)
+
+
+def test_motors_and_losses_of_a_rigid_walk_are_those_of_its_ledger():
+    """A torso held by a motor and a damper, and a push-off at each heel strike."""
+    law = jb.actuation.PD(kp=6.0, kd=0.6, target=0.03, of={"torso": 1, "vertical": -1})
+    walker = jb.Mechanism(
+        bodies=(*LEGS, jb.Body("torso", mass=0.5, inertia=0.003, centre=-0.15)),
+        feet=FEET,
+        joints=(
+            jb.Motor({"torso": 1, "leg_2": -1}, law),
+            jb.Spring(BISECTING, stiffness=2.0, damping=0.05),
+        ),
+        mirror=PAIR,
+    )
+    scene = jb.RigidScene(walker, jb.Ground(slope=0.03), jb.actuation.PushOff(0.02))
+    start = scene.state(
+        theta_leg_1=-0.27, theta_leg_2=0.27, theta_torso=0.09,
+        omega_leg_1=-0.9, omega_leg_2=-1.6, omega_torso=-0.4,
+    )  # fmt: skip
+    walk = jb.rigid_walk(scene, start, footsteps=3, max_arrivals=3, accuracy="tight")
+    played, books = recorded(scene, walk), jb.measure.rigid_ledger(scene, walk)
+    assert played.driven
+    strikes = np.searchsorted(played.t, np.asarray(walk.arrivals.t)[1:])
+    lost = books.impact_loss + books.joint_loss
+    for name, sums in (("driven", books.actuation_work), ("lost", lost)):
+        shown = played.channels[name][strikes[:1]]
+        np.testing.assert_allclose(shown, sums[:1], rtol=0.0, atol=1e-6)
+    assert abs(books.actuation_work[0]) > 1e-3
+    held = sum(played.channels[name] for name in ("kinetic", "elastic", "lost"))
+    given = played.channels["supplied"] + played.channels["driven"]
+    np.testing.assert_allclose(held - held[0], given, rtol=0.0, atol=1e-9)
+
+
+def test_motors_of_a_compliant_walk_are_those_of_its_ledger(seed_walk):
+    scene = dataclasses.replace(
+        seed_walk[0], actuation=(jb.actuation.HipTorque(0.02), jb.actuation.FootPreload(5e-4))
+    )
+    walk = jb.simulate(scene, START, footsteps=2, engine="lanes")
+    played, books = recorded(scene, walk), jb.measure.energy_ledger(scene, walk)
+    assert played.channels["driven"][-1] == pytest.approx(books.actuation_work[0], rel=1e-6)
+    lost = books.damper_loss[0] + books.friction_loss[0]
+    assert played.channels["lost"][-1] == pytest.approx(lost, rel=1e-4)
 
 
 def test_footprints_are_the_heel_strikes(seed_walk):

@@ -2,7 +2,10 @@
 
 import { fixed, setAttributes, svg } from "./dom.js";
 
-const MARGIN = { left: 52, right: 10, top: 8, bottom: 36 };
+const MARGIN = { left: 56, right: 10, top: 8, bottom: 36 };
+/** Room for a letter of the upright axis's numbers, and for what lies left and right of them [px]. */
+const LETTER = 7.6;
+const LABEL = 17;
 
 /**
  * Curves in axes. A curve is `{x, y, look}`, arrays of one length; `ranges` gives what is shown as
@@ -10,7 +13,7 @@ const MARGIN = { left: 52, right: 10, top: 8, bottom: 36 };
  */
 export class Chart {
   constructor({ title, xLabel, yLabel, curves, pick, height = 170 }) {
-    Object.assign(this, { xLabel, yLabel, curves, height, width: 420 });
+    Object.assign(this, { xLabel, yLabel, curves, height, width: 420, left: MARGIN.left });
     this.axes = svg("g", { class: "axes" });
     this.frame = svg("rect");
     const clip = `inner-${Math.random().toString(36).slice(2)}`;
@@ -33,7 +36,7 @@ export class Chart {
     this.element.classList.add("picks");
     const told = (event) => {
       const box = this.element.getBoundingClientRect();
-      const share = ((event.clientX - box.left) * this.width) / box.width - MARGIN.left;
+      const share = ((event.clientX - box.left) * this.width) / box.width - this.left;
       const [low, high] = this.ranges.x;
       const x = low + (share / this.inner) * (high - low);
       pick(Math.min(Math.max(x, low), high));
@@ -48,12 +51,15 @@ export class Chart {
   }
 
   get inner() {
-    return this.width - MARGIN.left - MARGIN.right;
+    return this.width - this.left - MARGIN.right;
   }
 
   /** Draws axes and curves anew for a width [px] and ranges. */
   show(width, ranges) {
     Object.assign(this, { width: Math.max(width, 200), ranges });
+    this.ticksY = niceTicks(...ranges.y, (this.height - MARGIN.top - MARGIN.bottom) / 32);
+    const letters = Math.max(...this.ticksY.map(({ text }) => text.length));
+    this.left = Math.max(MARGIN.left, LABEL + LETTER * letters);
     this.element.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
     this.drawAxes();
     this.curves.forEach((curve, k) => this.paths[k].setAttribute("d", this.path(curve)));
@@ -61,7 +67,7 @@ export class Chart {
 
   px(x) {
     const [low, high] = this.ranges.x;
-    return MARGIN.left + ((x - low) / (high - low)) * this.inner;
+    return this.left + ((x - low) / (high - low)) * this.inner;
   }
 
   py(y) {
@@ -80,10 +86,10 @@ export class Chart {
     let [path, column, letter] = ["", NaN, "M"];
     for (let k = first; k <= last; k++) {
       const [px, py] = [this.px(x[k]), this.py(y[k])];
-      // Of many knots within a fifth of a pixel, those that turn are enough.
+      // Of many knots within a fifth of a pixel, those that turn and the last one are enough.
       const between = k > first && k < last;
       const turns = between && (y[k] - y[k - 1]) * (y[k + 1] - y[k]) < 0;
-      if (ordered && between && !turns && Math.abs(px - column) < 0.2) continue;
+      if (ordered && between && !turns && this.px(x[k + 1]) - column < 0.2) continue;
       path += `${letter}${px.toFixed(1)} ${py.toFixed(1)}`;
       [column, letter] = [px, "L"];
     }
@@ -91,7 +97,7 @@ export class Chart {
   }
 
   drawAxes() {
-    const [left, right] = [MARGIN.left, this.width - MARGIN.right];
+    const [left, right] = [this.left, this.width - MARGIN.right];
     const [top, bottom] = [MARGIN.top, this.height - MARGIN.bottom];
     const parts = [];
     const ticksX = niceTicks(...this.ranges.x, this.inner / 45);
@@ -101,7 +107,7 @@ export class Chart {
       parts.push(svg("line", { x1: x, x2: x, y1: top, y2: bottom }));
       parts.push(svg("text", { x: within, y: bottom + 14, "text-anchor": "middle" }, text));
     }
-    for (const { at, text } of niceTicks(...this.ranges.y, (bottom - top) / 32)) {
+    for (const { at, text } of this.ticksY) {
       const y = this.py(at);
       parts.push(svg("line", { x1: left, x2: right, y1: y, y2: y }));
       parts.push(svg("text", { x: left - 5, y: y + 4, "text-anchor": "end" }, text));

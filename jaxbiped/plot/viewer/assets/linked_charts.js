@@ -20,11 +20,9 @@ function chartsOf({ skeleton }) {
   return [
     { title: `${noun[0].toUpperCase()}${noun.slice(1)} angles`, y: angle, curves: turning },
     { title: "Phase portrait", x: angle, y: `${noun} rate (rad/s)`, portrait: true, curves: turning },
-    { title: "Normal forces", y: "force (N)", most: mostForce, curves: loads("normal") },
-    {
-      title: "Tangential forces", y: "downhill force (N)", most: mostForce, curves: loads("tangential"),
-    },
-    { title: "Energies", y: "energy (J)", most: mostEnergy, curves: energies },
+    { title: "Normal forces", y: "force (N)", curves: loads("normal") },
+    { title: "Tangential forces", y: "downhill force (N)", curves: loads("tangential") },
+    { title: "Energies", y: "energy (J)", curves: energies },
   ];
 }
 
@@ -51,7 +49,7 @@ export class LinkedCharts {
       return walks.flatMap((each) => names(each).map((name) => each.channels[name]));
     };
     const same = walks.flatMap(({ channels }) => known.map(({ name }) => channels[name]));
-    const y = about.portrait ? rangeOf(all("omega")) : cut(rangeOf(same.filter(Boolean)), about, walks);
+    const y = rangeOf(about.portrait ? all("omega") : same.filter(Boolean));
     const x = about.portrait && rangeOf(all("theta"));
     const key = known.map(({ label: words }, k) => keyEntry(curves[k].look, words));
     const caption = html("figcaption", {}, about.title, html("span", { class: "key" }, ...key));
@@ -79,23 +77,6 @@ export class LinkedCharts {
       chart.mark(about.portrait ? null : t, points);
     }
   }
-}
-
-/** A range without what a foot deep in the ground makes of it: 50 weights, a few leg lengths. */
-function cut([low, high], about, walks) {
-  if (!about.most) return [low, high];
-  const most = Math.max(...walks.map(about.most));
-  return [Math.max(low, -most), Math.min(high, most)];
-}
-
-function mostForce(walk) {
-  return 50 * walk.weight;
-}
-
-function mostEnergy({ channels }) {
-  const known = [channels.kinetic, channels.supplied, channels.driven].filter(Boolean);
-  const [low, high] = rangeOf(known);
-  return 1.5 * Math.max(high, -low);
 }
 
 function timeCurve(walk, { name, look }) {
