@@ -25,12 +25,13 @@ from jaxbiped.dynamics._contacts import (
 )
 from jaxbiped.dynamics._equivalent_states import motion_in, poses_of
 from jaxbiped.dynamics._footfalls import LegMotion, touches
-from jaxbiped.dynamics._joint_loads import JointEnergy, angle_value, joint_energy
+from jaxbiped.dynamics._joint_loads import JointEnergy, joint_energy
 from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.dynamics._tree import Motion, PointMotion, point_motion
 from jaxbiped.linalg._sparse_lu import product
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._motor_motion import angle_value
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion, LegTorques

@@ -28,6 +28,7 @@ from jaxbiped.scene._mechanism_pieces import (
     number_of,
     parents_of,
 )
+from jaxbiped.scene._motor_motion import check_images
 from jaxbiped.scene._placement import check_zero_pose
 from jaxbiped.scene._structure import Indices, Structure
 from jaxbiped.scene._symmetry import (
@@ -149,6 +150,7 @@ class Mechanism(eqx.Module):
                     part.__check_init__()  # its lower limit follows from the upper one
         check_nothing_turns_along(self.structure, self.joints)
         check_zero_pose(self)
+        check_images(self)
 
     @property
     def bodies(self) -> tuple[Body, ...]:

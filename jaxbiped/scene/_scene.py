@@ -17,6 +17,7 @@ from jaxbiped.scene._ground import AbstractClearance, AlwaysTouching, Ground, On
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._linkages import check_loaded_bodies, walker_linkage
 from jaxbiped.scene._modes import limits_named
+from jaxbiped.scene._motor_motion import check_legs_alike
 from jaxbiped.scene._placement import placement
 from jaxbiped.scene._rigid_feet import check_rolls, check_stands, rigid_modes, starting_mode
 from jaxbiped.scene._state_types import state_type_of
@@ -87,6 +88,7 @@ class Scene(AbstractMinimalScene):
         check_type("friction", self.friction, AbstractFrictionLaw, AbstractBristleLaw)
         check_type("clearance", self.clearance, AbstractClearance)
         check_actuation(self.actuation, "compliant")
+        check_legs_alike(self.actuation)
         warn_if_steep(self.ground, self.friction)
         mechanism = self.mechanism
         if isinstance(self.clearance, OneFoot):
@@ -163,6 +165,7 @@ class RigidScene(AbstractMinimalScene):
     def __check_init__(self) -> None:
         check_type("ground", self.ground, Ground)
         check_actuation(self.actuation, "rigid")
+        check_legs_alike(self.actuation)
         check_rolls(self.mechanism)
 
     def state(
