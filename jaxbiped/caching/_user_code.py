@@ -6,6 +6,7 @@ every cache also compares the version of the code that a program was made of.
 """
 
 import contextvars
+import dis
 import functools
 import inspect
 import io
@@ -120,7 +121,7 @@ class _Reader(pickle.Pickler):
             yield thing.__name__, {n: read[n] for n in read.keys() - known}
         elif isinstance(thing, types.FunctionType):
             yield thing.__code__, thing.__defaults__, thing.__kwdefaults__, thing.__closure__
-            read = set(_names(thing.__code__)) if users else set[str]()
+            read = _names(thing.__code__) if users else frozenset[str]()
             self.names.update(read)
             yield {name: thing.__globals__.get(name) for name in sorted(read)}, vars(thing)
         elif isinstance(thing, types.CodeType):
@@ -157,7 +158,7 @@ class _Reader(pickle.Pickler):
             self.kept.append(thing)
             values = [getattr(thing, name, None) for name in sorted(self.names)]
             yield [value for value in values if isinstance(value, _PLAIN)]
-            yield id(thing), getattr(thing, "__wrapped__", None)
+            yield id(thing), getattr(thing, "__wrapped__", None), getattr(thing, "fget", None)
 
     def _named(self, attributes: dict[str, object]) -> dict[str, object]:
         """The attributes that the code may read."""
@@ -190,15 +191,20 @@ def _content(cell: types.CellType) -> object:
         return None
 
 
-def _names(code: types.CodeType) -> Iterator[str]:
+@functools.lru_cache(_MOST_READINGS)
+def _names(code: types.CodeType) -> frozenset[str]:
     """What a function's code mentions: names, and texts that may be used as such."""
-    yield from code.co_names
+    found = {
+        step.argval
+        for step in dis.get_instructions(code)
+        if step.opcode in dis.hasname and step.opname != "STORE_ATTR"
+    }
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            yield from _names(constant)
-        for text in constant if isinstance(constant, tuple) else (constant,):
-            if isinstance(text, str):
-                yield text
+            found |= _names(constant)
+        texts = constant if isinstance(constant, tuple) else (constant,)
+        found.update(text for text in texts if isinstance(text, str))
+    return frozenset(found)
 
 
 def code_members(code: types.CodeType) -> Iterator[object]:

@@ -149,7 +149,8 @@ class Mechanism(eqx.Module):
                 if isinstance(part, Stop):
                     part.__check_init__()  # its lower limit follows from the upper one
         check_nothing_turns_along(self.structure, self.joints)
-        check_zero_pose(self)
+        with jax.ensure_compile_time_eval():  # known numbers stay known under a transformation
+            check_zero_pose(self)
         check_images(self)
 
     @property
