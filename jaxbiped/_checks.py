@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     import numpy as np
     from jaxtyping import ArrayLike
 
+LIBRARIES = frozenset(
+    ("diffrax", "equinox", "jax", "jaxbiped", "jaxlib", "jaxtyping", "lineax", "llvmlite")
+).union(("ml_dtypes", "numpy", "optax", "optimistix"), sys.stdlib_module_names)
+"""Packages whose code is not the user's."""
 MOST_ROOM = 1 << 27
 """States that may be kept of one simulation: some ten gigabytes."""
 _T = TypeVar("_T")
@@ -35,11 +39,17 @@ class ResourceError(RuntimeError):
 
 
 def warn(sentence: str, category: type[Warning] = RuntimeWarning) -> None:
-    """Warns at the line of the caller's code that called the package, or made a module of it."""
-    frame, level, inside = sys._getframe(1), 2, {"jaxbiped", "equinox", "dataclasses"}
-    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in inside:
-        frame, level = frame.f_back, level + 1
-    warnings.warn(sentence, category, stacklevel=level)
+    """Warns at the line of the caller's code that called the package, or made a module of it.
+
+    Between the two may lie Python's library (decorators, threads) and the package's libraries.
+    """
+    frame = sys._getframe(1)
+    while frame.f_back and frame.f_globals.get("__name__", "").split(".")[0] in LIBRARIES:
+        frame = frame.f_back
+    names = frame.f_globals
+    place = frame.f_code.co_filename, frame.f_lineno, names.get("__name__")
+    registry = names.setdefault("__warningregistry__", {})
+    warnings.warn_explicit(sentence, category, *place, registry)
 
 
 def is_number(value: object) -> bool:
@@ -193,8 +203,10 @@ def check_unbatched(name: str, value: object, one: str = "one number") -> None:
     for path, leaf in leaves[0]:
         if np.ndim(leaf):
             full = name + jax.tree_util.keystr(path)
+            law = ", or for a law a tuple of numbers" if ".law." in full else ""
             raise ArgumentError(
-                f"{full} has the shape {np.shape(leaf)}: give {one}, and use jax.vmap for many."
+                f"{full} has the shape {np.shape(leaf)}: give {one}, and use "
+                f"jax.vmap for many{law}."
             )
 
 

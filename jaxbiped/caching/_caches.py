@@ -130,17 +130,19 @@ class OfObjects(Generic[_T]):
         return known[1]
 
 
-def versions_in(thing: Any) -> tuple[int, ...]:
-    """The versions of the user's code in an immutable object; see `versions_of`."""
+def versions_in(tree: Any) -> tuple[int, ...]:
+    """The versions of the user's code in the structure of a tree; see `versions_of`."""
     import jax
 
-    return versions_of(_CODE(thing, lambda: _code_in(jax.tree.structure(thing))))
+    return versions_of(_code_in(jax.tree.structure(tree)))
 
 
-_CODE = OfObjects[tuple[Hashable, ...]]()
 _code_in = functools.lru_cache(PROGRAMS)(users_code)
 register_cache(
-    "jaxbiped.users_code", lambda: _code_in.cache_info().currsize, lambda: PROGRAMS, _code_in.cache_clear
+    "jaxbiped.users_code",
+    lambda: _code_in.cache_info().currsize,
+    lambda: PROGRAMS,
+    _code_in.cache_clear,
 )
 
 

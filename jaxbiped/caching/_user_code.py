@@ -5,6 +5,9 @@ attributes, arrays, cells, helpers. They may change while the function stays the
 every cache also compares the version of the code that a program was made of.
 """
 
+import contextvars
+import dis
+import functools
 import inspect
 import io
 import itertools
@@ -15,12 +18,8 @@ import types
 from collections.abc import Hashable, Iterator
 from typing import Any, NamedTuple
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import LIBRARIES, ArgumentError
 
-LIBRARIES = frozenset(
-    ("diffrax", "equinox", "jax", "jaxbiped", "jaxlib", "jaxtyping", "lineax", "llvmlite")
-).union(("ml_dtypes", "numpy", "optax", "optimistix"), sys.stdlib_module_names)
-"""Packages whose code is not the user's."""
 _NOT_READ = {"__dict__", "__weakref__", "__doc__", "__dataclass_fields__", "_abc_impl"}
 _BY_ANY_NAME = {"getattr", "vars", "__dict__", "attrgetter", "asdict", "astuple", "fields"}
 """Names by which a function may read attributes that its code does not mention."""
@@ -91,21 +90,23 @@ class _Reader(pickle.Pickler):
 
     def __init__(self, piece: object, names: set[str] | None = None) -> None:
         self.file, self.piece, self.kept = io.BytesIO(), piece, list[object]()
-        self.finds, self.names, self.code = names is None, names or set(), dict[Any, None]()
+        self.finds, self.names = names is None, set[str]() if names is None else names
+        self.code = dict[Any, None]()
         super().__init__(self.file, protocol=5)
 
     def reducer_override(self, thing: Any) -> Any:
         """See `pickle.Pickler`. What is read is a state, as only states may contain themselves."""
         jax: Any = sys.modules["jax"]
         kind = thing if isinstance(thing, type | types.FunctionType) else type(thing)
-        users = _is_users(kind)
+        users = kind is functools.partial or _is_users(kind)
         if thing is _made:
             return NotImplemented
         if isinstance(thing, jax.core.Tracer) and not self.finds:
+            name = getattr(self.piece, "__qualname__", None) or type(self.piece).__qualname__
             raise ArgumentError(
-                f"{self.piece!r} reads a value that JAX traces from a closure or a global, which "
-                "is not allowed: make it an equinox.Module that has such values as leaves, or "
-                "read them from what it is called with, such as the scene."
+                f"{name} reads a value that JAX traces from a closure or a global, which is not "
+                "allowed: pass it as a leaf, of an equinox.Module that is the law, or for any "
+                "other function of the scene or args that it is called with."
             )
         # Of a node of JAX's trees, the package reads the parts, so that all of them count.
         if users and self.finds and (thing is kind or jax.tree_util.all_leaves([thing])):
@@ -115,10 +116,12 @@ class _Reader(pickle.Pickler):
 
     def _parts(self, thing: Any, kind: Any, users: bool) -> Iterator[object]:
         if isinstance(thing, types.ModuleType):
-            yield thing.__name__, self._named(vars(thing)) if _is_users(thing) else None
+            read = self._named(vars(thing))
+            known = set() if _is_users(thing) else {n for n in read if callable(read[n])}
+            yield thing.__name__, {n: read[n] for n in read.keys() - known}
         elif isinstance(thing, types.FunctionType):
             yield thing.__code__, thing.__defaults__, thing.__kwdefaults__, thing.__closure__
-            read = set(_names(thing.__code__)) if users else set[str]()
+            read = _names(thing.__code__) if users else frozenset[str]()
             self.names.update(read)
             yield {name: thing.__globals__.get(name) for name in sorted(read)}, vars(thing)
         elif isinstance(thing, types.CodeType):
@@ -127,12 +130,14 @@ class _Reader(pickle.Pickler):
             yield _content(thing)
         elif isinstance(thing, types.MethodType):
             yield thing.__func__, thing.__self__
+        elif isinstance(thing, contextvars.ContextVar):
+            yield thing.get(None)
         elif thing is kind:
             yield thing.__module__
             if users:
                 own = {name: each for name, each in vars(thing).items() if name not in _NOT_READ}
                 yield thing.__bases__, own
-        elif users:
+        elif users and kind is not functools.partial:
             yield kind, [each(thing) for each in _PLAIN if isinstance(thing, each)]
             state = object.__getstate__(thing)  # type: ignore[attr-defined]
             for part in state if isinstance(state, tuple) else (state,):
@@ -153,7 +158,7 @@ class _Reader(pickle.Pickler):
             self.kept.append(thing)
             values = [getattr(thing, name, None) for name in sorted(self.names)]
             yield [value for value in values if isinstance(value, _PLAIN)]
-            yield id(thing), getattr(thing, "__wrapped__", None)
+            yield id(thing), getattr(thing, "__wrapped__", None), getattr(thing, "fget", None)
 
     def _named(self, attributes: dict[str, object]) -> dict[str, object]:
         """The attributes that the code may read."""
@@ -186,15 +191,20 @@ def _content(cell: types.CellType) -> object:
         return None
 
 
-def _names(code: types.CodeType) -> Iterator[str]:
+@functools.lru_cache(_MOST_READINGS)
+def _names(code: types.CodeType) -> frozenset[str]:
     """What a function's code mentions: names, and texts that may be used as such."""
-    yield from code.co_names
+    found = {
+        step.argval
+        for step in dis.get_instructions(code)
+        if step.opcode in dis.hasname and step.opname != "STORE_ATTR"
+    }
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            yield from _names(constant)
-        for text in constant if isinstance(constant, tuple) else (constant,):
-            if isinstance(text, str):
-                yield text
+            found |= _names(constant)
+        texts = constant if isinstance(constant, tuple) else (constant,)
+        found.update(text for text in texts if isinstance(text, str))
+    return frozenset(found)
 
 
 def code_members(code: types.CodeType) -> Iterator[object]:

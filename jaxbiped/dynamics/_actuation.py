@@ -1,7 +1,7 @@
 """Actuation in the equations of motion: motors, and the motion that their laws see; actuators."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import equinox as eqx
 import jax
@@ -12,13 +12,13 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, is_number
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._footfalls import LegMotion
-from jaxbiped.dynamics._joint_loads import angle_value, with_joint_loads
+from jaxbiped.dynamics._joint_loads import with_joint_loads
 from jaxbiped.dynamics._tree import Loads, Motion
 from jaxbiped.scene._joint_parts import Motor
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._mechanism_pieces import named_sum
+from jaxbiped.scene._motor_motion import MotorMotion, exchange_of
 from jaxbiped.scene._scene import CompliantScene, RigidScene
-from jaxbiped.scene._structure import Angle, Indices, Structure
+from jaxbiped.scene._structure import Angle, Structure
 from jaxbiped.scene.actuation._abstract_actuator import (
     AbstractActuator,
     AbstractHipActuator,
@@ -26,78 +26,6 @@ from jaxbiped.scene.actuation._abstract_actuator import (
     LegTorques,
 )
 from jaxbiped.scene.actuation._actuators import FootPreload
-
-
-class MotorMotion(NamedTuple):
-    """A motion as a motor's law sees it; see `JointMotion`.
-
-    Attributes:
-        structure: of the mechanism.
-        motion: angles and rates of all bodies, exchanged where the law's sides are.
-        slope: angle of the vertical [rad].
-        own: the motor's angle.
-        stance: line of the leg that stands; None where no leg does.
-    """
-
-    structure: Structure
-    motion: Motion
-    slope: Scalar
-    own: Angle
-    stance: LegMotion | None
-
-    @property
-    def angle(self) -> Scalar:
-        """The motor's own angle [rad]."""
-        return angle_value(self.own, self.motion.angles, self.slope)
-
-    @property
-    def rate(self) -> Scalar:
-        """Its rate [rad/s]."""
-        return angle_value(self.own, self.motion.rates, None)
-
-    def of(self, angle: Any) -> tuple[Scalar, Scalar]:
-        """Value [rad] and rate [rad/s] of a body's angle by its name, or of weighted angles.
-
-        Raises:
-            ArgumentError: a name that is no body, "normal" or "vertical".
-        """
-        found = named_sum("motion.of", angle, self.structure.parents, self.structure.bodies)
-        value = angle_value(found, self.motion.angles, self.slope)
-        return value, angle_value(found, self.motion.rates, None)
-
-    @property
-    def phase(self) -> Scalar:
-        """Minus the angle of the leg that stands [rad]."""
-        return -self._stance().angle
-
-    @property
-    def phase_rate(self) -> Scalar:
-        """Its rate [rad/s]."""
-        return -self._stance().rate
-
-    @property
-    def time(self) -> NoReturn:
-        """Not known to laws."""
-        raise ArgumentError(
-            "motion.time is not known, because a motor's law may not depend on time: use "
-            "motion.phase, or an angle by motion.of."
-        )
-
-    def _stance(self) -> LegMotion:
-        if self.stance is None:
-            raise ArgumentError(
-                "motion.phase is not known for a motor by side, or of a mechanism without a "
-                "mirror: read an angle by motion.of instead."
-            )
-        return self.stance
-
-
-def exchange_of(structure: Structure) -> Indices:
-    """Number of the body whose role each body takes where the sides of the mirror are exchanged."""
-    twin = list(range(len(structure.bodies)))
-    for one, other in structure.pairs:
-        twin[one], twin[other] = other, one
-    return tuple(twin)
 
 
 def exchanged(structure: Structure, motion: Motion) -> Motion:

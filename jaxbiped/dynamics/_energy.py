@@ -25,13 +25,14 @@ from jaxbiped.dynamics._contacts import (
 )
 from jaxbiped.dynamics._equivalent_states import motion_in, poses_of, whole_state
 from jaxbiped.dynamics._footfalls import FootMotion, LegMotion, touches
-from jaxbiped.dynamics._joint_loads import JointEnergy, angle_value, joint_energy
+from jaxbiped.dynamics._joint_loads import JointEnergy, joint_energy
 from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.dynamics._stance_motion import carriers_of, hip_motion_of
 from jaxbiped.dynamics._tree import Motion, PointMotion, point_motion
 from jaxbiped.linalg._sparse_lu import product
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._motor_motion import angle_value
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion, LegTorques
 

@@ -16,17 +16,12 @@ from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._mechanism_pieces import with_fixed
+from jaxbiped.scene._motor_motion import angle_value
 from jaxbiped.scene._structure import Angle, Structure, weighted
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 _ROOT_E = 1.6487212707001282
 """√e, the factor with which a latch's largest torque is its parameter `torque`."""
-
-
-def angle_value(angle: Angle, values: tuple[Scalar, ...], vertical: Scalar | None) -> Scalar:
-    """A sum of angles, or of rates, for which `vertical` is None."""
-    total = angle.of(values, vertical)
-    return jnp.zeros_like(values[0]) if total is None else total
 
 
 class Pressed(NamedTuple):

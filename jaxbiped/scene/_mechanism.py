@@ -28,6 +28,7 @@ from jaxbiped.scene._mechanism_pieces import (
     number_of,
     parents_of,
 )
+from jaxbiped.scene._motor_motion import check_images
 from jaxbiped.scene._placement import check_zero_pose
 from jaxbiped.scene._structure import Indices, Structure
 from jaxbiped.scene._symmetry import (
@@ -148,7 +149,9 @@ class Mechanism(eqx.Module):
                 if isinstance(part, Stop):
                     part.__check_init__()  # its lower limit follows from the upper one
         check_nothing_turns_along(self.structure, self.joints)
-        check_zero_pose(self)
+        with jax.ensure_compile_time_eval():  # known numbers stay known under a transformation
+            check_zero_pose(self)
+        check_images(self)
 
     @property
     def bodies(self) -> tuple[Body, ...]:

@@ -205,7 +205,8 @@ def _check_shapes(mechanism: "Mechanism") -> None:
             except ValueError:
                 raise ArgumentError(
                     f"{other} and {name} have the shapes {shape} and {np.shape(leaf)}, which are "
-                    "not allowed together: give arrays of one shape."
+                    "not allowed together: give arrays of one shape, an entry for each scene; many "
+                    "numbers of a law are a tuple of numbers."
                 ) from None
         known.setdefault(np.shape(leaf), name)
 

@@ -16,6 +16,7 @@ from jaxbiped.scene._ground import AbstractClearance, AlwaysTouching, Ground, On
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._linkages import check_loaded_bodies, walker_linkage
 from jaxbiped.scene._modes import limits_named
+from jaxbiped.scene._motor_motion import check_legs_alike
 from jaxbiped.scene._placement import placement
 from jaxbiped.scene._rigid_feet import check_rolls, check_stands, rigid_modes, starting_mode
 from jaxbiped.scene._state_types import state_type_of
@@ -87,6 +88,7 @@ class Scene(AbstractMinimalScene):
         warn_if_steep(self.ground, self.friction)
         mechanism = self.mechanism
         check_actuation(self.actuation, "compliant", mirrored=bool(mechanism.structure.pairs))
+        check_legs_alike(self.actuation)
         if isinstance(self.clearance, OneFoot):
             check_choice("clearance.leg", self.clearance.leg, mechanism.structure.legs)
         for part in mechanism.joints:
@@ -160,6 +162,7 @@ class RigidScene(AbstractMinimalScene):
         check_type("ground", self.ground, Ground)
         mechanism = self.mechanism
         check_actuation(self.actuation, "rigid", mirrored=bool(mechanism.structure.pairs))
+        check_legs_alike(self.actuation)
         check_rolls(mechanism)
 
     def state(

@@ -29,7 +29,7 @@ def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
             NaN throughout instead, in that lane.
     """
     check_type("scene", scene, *kinds)
-    versions_in(scene)  # before anything is looked up that was made of it
+    versions = versions_in(scene)  # before anything is looked up that was made of it
     leaves, structure = jtu.tree_flatten(scene)
     exact = [_in_64_bits(leaf) for leaf in leaves]
     if any(a is not b for a, b in zip(leaves, exact, strict=True)):
@@ -41,11 +41,15 @@ def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
         return where_allowed(rules, scene)
     # Within a caller's trace, too, what is computed of known numbers is known.
     with jax.ensure_compile_time_eval():
-        _CHECKED(told, lambda: _check_parts(told))
+        checked = _CHECKED(told, set)
+        if versions not in checked:
+            _check_parts(told)
+            checked.add(versions)
     return scene
 
 
-_CHECKED = OfObjects[None]()
+_CHECKED = OfObjects[set[tuple[int, ...]]]()
+"""The versions of the user's code for which a scene was checked."""
 
 
 def _check_parts(scene: Any) -> None:

@@ -1,0 +1,196 @@
+"""Motion that a motor's law sees, and what laws must not tell apart: the images of a motion."""
+
+import contextlib
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple, NoReturn
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped._checks import LIBRARIES, ArgumentError
+from jaxbiped._jax_versions import untraced
+from jaxbiped._types import Scalar, is_traced
+from jaxbiped.compiler import kept_alone
+from jaxbiped.scene._joint_parts import Motor
+from jaxbiped.scene._mechanism_pieces import named_sum, with_fixed
+from jaxbiped.scene._structure import Angle, Indices, Structure
+from jaxbiped.scene.actuation._abstract_actuator import AbstractHipActuator, HipMotion
+
+_MOTIONS = 64
+_ROUNDING = 1e-9
+
+
+def angle_value(angle: Angle, values: tuple[Scalar, ...], vertical: Scalar | None) -> Scalar:
+    """A sum of angles, or of rates, for which `vertical` is None."""
+    total = angle.of(values, vertical)
+    return jnp.zeros_like(values[0]) if total is None else total
+
+
+class BodyAngles(NamedTuple):
+    """Angles [rad] and rates [rad/s] of all bodies."""
+
+    angles: Sequence[Scalar]
+    rates: Sequence[Scalar]
+
+
+class MotorMotion(NamedTuple):
+    """A motion as a motor's law sees it; see `JointMotion`.
+
+    Attributes:
+        structure: of the mechanism.
+        motion: angles and rates of all bodies, exchanged where the law's sides are.
+        slope: angle of the vertical [rad].
+        own: the motor's angle.
+        stance: line of the leg that stands; None where no leg does.
+    """
+
+    structure: Structure
+    motion: Any
+    slope: Scalar
+    own: Angle
+    stance: Any
+
+    @property
+    def angle(self) -> Scalar:
+        """The motor's own angle [rad]."""
+        return angle_value(self.own, self.motion.angles, self.slope)
+
+    @property
+    def rate(self) -> Scalar:
+        """Its rate [rad/s]."""
+        return angle_value(self.own, self.motion.rates, None)
+
+    def of(self, angle: Any) -> tuple[Scalar, Scalar]:
+        """Value [rad] and rate [rad/s] of a body's angle by its name, or of weighted angles.
+
+        Raises:
+            ArgumentError: a name that is no body, "normal" or "vertical".
+        """
+        found = named_sum("motion.of", angle, self.structure.parents, self.structure.bodies)
+        value = angle_value(found, self.motion.angles, self.slope)
+        return value, angle_value(found, self.motion.rates, None)
+
+    @property
+    def phase(self) -> Scalar:
+        """Minus the angle of the leg that stands [rad]."""
+        return -self._stance().angle
+
+    @property
+    def phase_rate(self) -> Scalar:
+        """Its rate [rad/s]."""
+        return -self._stance().rate
+
+    @property
+    def time(self) -> NoReturn:
+        """Not known to laws."""
+        raise ArgumentError(
+            "motion.time is not known, because a motor's law may not depend on time: use "
+            "motion.phase, or an angle by motion.of."
+        )
+
+    def _stance(self) -> Any:
+        if self.stance is None:
+            raise ArgumentError(
+                "motion.phase is not known for a motor by side, or of a mechanism without a "
+                "mirror: read an angle by motion.of instead."
+            )
+        return self.stance
+
+
+def exchange_of(structure: Structure) -> Indices:
+    """Number of the body whose role each body takes where the sides of the mirror are exchanged."""
+    twin = list(range(len(structure.bodies)))
+    for one, other in structure.pairs:
+        twin[one], twin[other] = other, one
+    return tuple(twin)
+
+
+def check_images(mechanism: Any) -> None:
+    """Raises `ArgumentError` for a law that differs at motions which its mechanism takes for alike.
+
+    Laws are evaluated at random motions and at their images by the mirror or the turn. Those by
+    role are their own images, and numbers that JAX traces cannot be compared.
+    """
+    s, twins = mechanism.structure, mechanism.structure.joint_twins
+    numbers = [k for k, part in enumerate(mechanism.joints) if _acts_by_side(part, s)]
+    if not numbers or (twins is None and s.turn is None) or is_traced(mechanism.joints):
+        return
+    draw, count = np.random.default_rng(0).uniform, len(s.bodies)
+    motions = draw(-1.0, 1.0, (_MOTIONS, 2 * count + 1)) * draw(0.0, 1.0, (_MOTIONS, 1))
+    torques: Any = None
+    with contextlib.suppress(Exception), untraced():  # a law that fails is refused where it acts
+        torques = np.asarray(_torques_at_images(mechanism, motions))
+    for place, k in enumerate(() if torques is None else numbers):
+        twin = place if twins is None else numbers.index(twins[k])
+        words = f"the law of Motor({mechanism.joints[k].angle!r})"
+        symmetry = "turn" if twins is None else "mirror"
+        _check_same(words, symmetry, torques[:, 0, place], torques[:, 1, twin])
+
+
+def check_legs_alike(actuation: Any) -> None:
+    """Raises `ArgumentError` for an actuator at the hip that tells one leg from the other."""
+    draw = np.random.default_rng(0).uniform
+    for part in actuation or ():
+        for load in (tuple(draw(0.0, 0.5, (2, _MOTIONS))), (None, np.ones(_MOTIONS))):
+            hip = HipMotion(*map(tuple, draw(-1.0, 1.0, (2, 2, _MOTIONS))), load)
+            torques: Any = None
+            users = type(part).__module__.partition(".")[0] not in LIBRARIES
+            if users and isinstance(part, AbstractHipActuator) and not is_traced(part):
+                with contextlib.suppress(Exception), untraced():
+                    torques = np.asarray(_torques_of_legs(part, hip))
+            if torques is not None:
+                _check_same(type(part).__name__, "mirror", *np.moveaxis(torques, 1, 0))
+
+
+def _check_same(words: str, symmetry: str, own: np.ndarray, image: np.ndarray) -> None:
+    off = np.nan_to_num(np.abs(own - image))
+    if np.max(off) > _ROUNDING * np.max(np.abs(own)):
+        worst = np.unravel_index(np.argmax(off), off.shape)
+        raise ArgumentError(
+            f"{words} gives {own[worst]:.4g} N m at a motion and {image[worst]:.4g} N m at its "
+            f"image by the {symmetry}, which is not allowed: treat both alike, or leave the "
+            f"{symmetry} out."
+        )
+
+
+def _acts_by_side(part: Any, structure: Structure) -> bool:
+    return isinstance(part, Motor) and (part.by == "side" or not structure.pairs)
+
+
+@kept_alone
+def _torques_at_images(mechanism: Any, motions: Any) -> Any:
+    """Torques of laws by side [N·m] at motions (n, 2 bodies + 1) and at images, (n, 2, motors)."""
+    s, joints, count = mechanism.structure, mechanism.joints, len(mechanism.structure.bodies)
+    twin = range(count) if s.body_twins is None else s.body_twins
+
+    def torques(values: Any) -> Any:
+        slope = values[-1]
+        angles = with_fixed(s, values[:count], slope, joints)
+        rates = with_fixed(s, values[count:-1])
+        turned = [angles[j] for j in twin]
+        if s.turn is not None:
+            turned[s.turn.body] += 2.0 * math.pi / s.turn.order
+        images = BodyAngles(angles, rates), BodyAngles(turned, [rates[j] for j in twin])
+        return [
+            [
+                jnp.asarray(part.law(MotorMotion(s, seen, slope, own, None)))
+                for part, own in zip(joints, s.joints, strict=True)
+                if _acts_by_side(part, s)
+            ]
+            for seen in images
+        ]
+
+    return jax.vmap(lambda values: jnp.asarray(torques(values)))(motions)
+
+
+@kept_alone
+def _torques_of_legs(part: AbstractHipActuator, hip: HipMotion) -> Any:
+    """Torques [N·m] at motions and, exchanged back, at those of the other leg, shape (n, 2, 2)."""
+
+    def torques(hip: HipMotion) -> Any:
+        exchanged = part.torques(HipMotion(*(pair[::-1] for pair in hip)))[::-1]
+        return jnp.asarray([part.torques(hip), exchanged])
+
+    return jax.vmap(torques)(hip)
