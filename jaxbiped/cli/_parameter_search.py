@@ -121,11 +121,11 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
                 raise ArgumentError(
                     f"vary = {part.strip()!r} is not understood: write {name}=low:high."
                 ) from None
-        elif (value := float(own[name])) > 0.0:
-            low, high = (farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
+        elif (value := float(own[name])) != 0.0:
+            low, high = sorted(farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
         else:
             raise ArgumentError(
-                f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
+                f"vary = {name} needs bounds, as its value is 0: write {name}=low:high."
             )
         found[name] = (low, high)
     return found

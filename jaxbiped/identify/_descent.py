@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit, information
-from jaxbiped.identify._interval_end import interval_end, linear_step
+from jaxbiped.identify._interval_end import interval_end, linear_step, told_by_data
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
 from jaxbiped.scene._parameter_access import (
@@ -55,7 +55,7 @@ class Descent:
         self.names, self.first = tuple(bounds), np.array([float(own[name]) for name in bounds])
         limits = np.array(list(bounds.values())).T
         self.widths = np.where(self.first == 0.0, limits[1] - limits[0], 1.0)
-        self.limits = np.stack([self.variables(each) for each in limits])
+        self.limits = np.sort([self.variables(each) for each in limits], axis=0)
         self.how = dict(accuracy=accuracy, engine=engine)
         self.values = np.concatenate([gait.values for gait in measured])
         self.deviations = np.concatenate([gait.deviations for gait in measured])
@@ -240,13 +240,14 @@ class Descent:
         covariance[lost] = covariance[:, lost] = np.nan
         ends[:, undetermined] = np.nan
         spread = np.sqrt(np.diag(covariance))
+        errors = spread * self.sizes(at)  # negative where a parameter is
         low, high = (self.parameters(end) for end in np.clip(ends, *self.limits))
         return GaitFit(
             ending=ending,
             estimates=self.parameters(at),
-            standard_errors=dict(zip(self.names, (spread * self.sizes(at)).tolist(), strict=True)),
+            standard_errors=dict(zip(self.names, np.abs(errors).tolist(), strict=True)),
             intervals={n: (min(low[n], high[n]), max(low[n], high[n])) for n in self.names},
-            correlation=covariance / np.outer(spread, spread),
+            correlation=covariance / np.outer(spread, spread) * np.sign(np.outer(errors, errors)),
             undetermined=tuple(names[undetermined].tolist()),
             at_bounds=tuple(names[held].tolist()),
             one_sided=tuple(names[lost & ~undetermined & ~held].tolist()),
@@ -295,4 +296,4 @@ class Descent:
             end = sign * interval_end(self._model, at, here, square, which, sign, limits)
             return sign * max(end, *(sign * float(each[1][which]) for each in within))
 
-        return end(-1.0), end(1.0)
+        return told_by_data((end(-1.0), end(1.0)), limits[:, which])
