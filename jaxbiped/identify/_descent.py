@@ -36,7 +36,7 @@ Tried: TypeAlias = tuple[float, np.ndarray, list[Prediction]]
 
 
 class Descent:
-    """A fit under way. Variables are log(p/p₀), or where p₀ is 0 a share of the bounds' width."""
+    """A fit under way. Variables are log(p/p₀), or p − p₀ over the width of bounds that hold 0."""
 
     def __init__(
         self,
@@ -54,7 +54,8 @@ class Descent:
         self.units = {name: each.unit for name, each in parameter_quantities(scene).items()}
         self.names, self.first = tuple(bounds), np.array([float(own[name]) for name in bounds])
         limits = np.array(list(bounds.values())).T
-        self.widths = np.where(self.first == 0.0, limits[1] - limits[0], 1.0)
+        self.linear = np.isfinite(limits).all(axis=0) & (limits[0] <= 0.0) & (limits[1] >= 0.0)
+        self.widths = np.where(self.linear, limits[1] - limits[0], 1.0)
         self.limits = np.sort([self.variables(each) for each in limits], axis=0)
         self.how = dict(accuracy=accuracy, engine=engine)
         self.values = np.concatenate([gait.values for gait in measured])
@@ -136,20 +137,19 @@ class Descent:
         return FitEnding.CONVERGED if found.success else FitEnding.OUT_OF_EVALUATIONS
 
     def parameters(self, at: np.ndarray) -> dict[str, float]:
-        zero = self.first == 0.0
-        values = np.where(zero, at * self.widths, self.first * np.exp(np.where(zero, 0.0, at)))
+        by_factor = self.first * np.exp(np.where(self.linear, 0.0, at))
+        values = np.where(self.linear, self.first + at * self.widths, by_factor)
         return dict(zip(self.names, values.tolist(), strict=True))
 
     def variables(self, values: np.ndarray) -> np.ndarray:
-        zero = self.first == 0.0
-        ratios = np.where(zero, 1.0, values) / np.where(zero, 1.0, self.first)
-        with np.errstate(divide="ignore"):
-            return np.where(zero, values / self.widths, np.log(ratios))
+        moved = (values - self.first) / self.widths
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.linear, moved, np.log(values / self.first))
 
     def sizes(self, at: np.ndarray) -> np.ndarray:
         """Derivatives of the parameters with respect to the variables."""
         values = np.array(list(self.parameters(at).values()))
-        return np.where(self.first == 0.0, self.widths, values)
+        return np.where(self.linear, self.widths, values)
 
     def predictions(self, at: np.ndarray) -> list[Prediction] | None:
         """Of every measured gait; None where one is lost."""

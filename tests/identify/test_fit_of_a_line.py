@@ -114,6 +114,28 @@ def test_parameters_below_zero_are_fitted_as_those_above(monkeypatch):
         assert low < fit.estimates["torso.centre"] < high < 0.0
 
 
+@pytest.mark.parametrize("first", [0.03, 0.0, -0.04])
+def test_between_bounds_that_hold_zero_a_parameter_changes_its_sign(first, monkeypatch):
+    """A line in the parameter itself, whose truth lies below zero: its estimate and errors."""
+    truth, rate = -0.02, np.array([[3.0], [0.0], [1.0]])
+
+    def predicted(scene, measured, values, sizes, guess, **how):
+        moved = rate @ (np.array(list(values.values())) - truth)
+        return Prediction(SEEN.values + moved, rate * sizes, 0.0 * rate, (), (), True)
+
+    monkeypatch.setattr(_descent, "predict", predicted)
+    scene = jb.with_parameters(SCENE, {"slope": first})
+    fit = jb.fit_gait(scene, {"slope": (-0.05, 0.1)}, SEEN)
+    error = 1.0 / np.linalg.norm(rate[:, 0] / SEEN.deviations)
+    assert fit.estimates["slope"] == pytest.approx(truth, abs=0.02 * error)
+    assert fit.standard_errors["slope"] == pytest.approx(error)
+    assert fit.intervals["slope"] == pytest.approx(
+        (truth - 1.96 * error, truth + 1.96 * error), abs=0.05 * error
+    )
+    with pytest.raises(jb.ArgumentError, match=r"slope"):
+        jb.fit_gait(scene, {"slope": (-2.0, 0.1)}, SEEN)
+
+
 def test_two_parameters_that_make_up_for_each_other_are_told(monkeypatch):
     matrix = np.outer([0.3, 0.1, 0.2], [1.0, -2.0])
     monkeypatch.setattr(_descent, "predict", linear(matrix, SEEN.values))
