@@ -23,7 +23,6 @@ _FLAT = 0.05
 units along its direction change the sum of squares by 0.02."""
 _FAR = 3.0
 """How far from the fit a variable is followed: a factor of 20."""
-
 _AT_LIMIT = 1e-9
 """Distance of a variable from its limit that counts as none."""
 
