@@ -102,8 +102,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         report.wrote(self.output.draw(figures | gait_figures(found.gait)))
         report.finish(_optimum_numbers(found, certificate, goal, sense), found.to_csv)
         ended = jb.optimise.Outcome
-        done = (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE, ended.FLAT)
-        return int(found.outcome not in done)
+        return int(found.outcome in (ended.UNFINISHED, ended.INTERRUPTED, ended.INFEASIBLE))
 
 
 def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[float, float]]:
