@@ -148,8 +148,8 @@ def check_no_dataset(labels: object) -> None:
 def _lists_starts(labels: Any) -> bool:
     """Whether an axis numbers starts, or what lies along it has no coordinates in order."""
     for name in getattr(labels, "dims", ()):
-        # Where there is none, xarray would make up numbers.
-        index = np.asarray(labels.coords[name] if name in labels.coords else None)
+        # By `dict`: where there are none, xarray makes up numbers.
+        index = np.asarray(dict(labels.coords).get(name))
         steps = np.diff(index) if index.dtype.kind in "iuf" else np.full(1, np.nan)
         along = any(name in each.dims for each in labels.coords.values())
         if name == "start" or (along and not (np.all(steps > 0) or np.all(steps < 0))):

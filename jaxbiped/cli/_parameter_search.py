@@ -123,8 +123,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         ended = jb.optimise.Outcome
         if found.outcome is ended.INTERRUPTED or "interrupted" in certificate.failed.values():
             raise options.interrupted("the best design so far is what is reported")
-        done = (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE, ended.FLAT)
-        return int(found.outcome not in done)
+        return int(found.outcome in (ended.UNFINISHED, ended.INFEASIBLE))
 
 
 def _names(text: str) -> list[str]:
@@ -157,11 +156,11 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
         check_choice("vary", name, units)
         if bounds:
             low, high = _range(name, bounds, units[name])
-        elif (value := float(own[name])) > 0.0:
-            low, high = (farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
+        elif (value := float(own[name])) != 0.0:
+            low, high = sorted(farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
         else:
             raise ArgumentError(
-                f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
+                f"vary = {name} needs bounds, as its value is 0: write {name}=low:high."
             )
         found[name] = (low, high)
     return found

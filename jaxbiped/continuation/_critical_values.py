@@ -81,7 +81,7 @@ def range_of(scene: Scene | RigidScene, along: str, factor: float = FACTOR) -> t
     if own == 0.0 and along != "slope":
         raise ArgumentError(f"along = {along!r} is not allowed where {along} is 0: no factor fits.")
     ends = (own / factor, own * factor) if own != 0.0 else (-STEEPEST, STEEPEST)
-    low, high = (farthest_allowed(scene, along, end) for end in ends)
+    low, high = sorted(farthest_allowed(scene, along, end) for end in ends)
     return low, high
 
 

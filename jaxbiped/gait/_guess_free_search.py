@@ -235,16 +235,13 @@ def is_stable(found: Found, problem: FixedPointProblem) -> bool:
 
 def is_whole(found: Found, problem: FixedPointProblem) -> bool:
     """Whether a fixed point's cycle has all the footsteps that were asked for."""
-    steps = problem.spec.steps
-    return steps == 1 or _cycle_of(found, float(problem.precision.rtol)) == steps
-
-
-def _cycle_of(found: Found, rtol: float) -> int:
-    """Arrivals of a fixed point's shortest cycle, its error that of Newton's next correction."""
-    last, m = found.last, found.recurring.shape[0]
+    steps, last, m = problem.spec.steps, found.last, found.recurring.shape[0]
+    if steps == 1:
+        return True
+    # The error is that of Newton's next correction.
     change = np.asarray(last.recurring) - np.asarray(crossings_of(last))[0]
     error, *_ = np.linalg.lstsq(np.eye(m) - np.asarray(last.jacobian)[:, :m], change)
-    return int(minimal_cycle(last, error, rtol))
+    return int(minimal_cycle(last, error, float(problem.precision.rtol))) == steps
 
 
 def spectral_radius(found: Found) -> float:

@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit, information
-from jaxbiped.identify._interval_end import interval_end, linear_step
+from jaxbiped.identify._interval_end import interval_end, linear_step, told_by_data
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
 from jaxbiped.scene._parameter_access import (
@@ -36,7 +36,7 @@ Tried: TypeAlias = tuple[float, np.ndarray, list[Prediction]]
 
 
 class Descent:
-    """A fit under way. Variables are log(p/p₀), or where p₀ is 0 a share of the bounds' width."""
+    """A fit under way. Variables are log(p/p₀), or p − p₀ over the width of bounds that hold 0."""
 
     def __init__(
         self,
@@ -54,8 +54,9 @@ class Descent:
         self.units = {name: each.unit for name, each in parameter_quantities(scene).items()}
         self.names, self.first = tuple(bounds), np.array([float(own[name]) for name in bounds])
         limits = np.array(list(bounds.values())).T
-        self.widths = np.where(self.first == 0.0, limits[1] - limits[0], 1.0)
-        self.limits = np.stack([self.variables(each) for each in limits])
+        self.linear = np.isfinite(limits).all(axis=0) & (limits[0] <= 0.0) & (limits[1] >= 0.0)
+        self.widths = np.where(self.linear, limits[1] - limits[0], 1.0)
+        self.limits = np.sort([self.variables(each) for each in limits], axis=0)
         self.how = dict(accuracy=accuracy, engine=engine)
         self.values = np.concatenate([gait.values for gait in measured])
         self.deviations = np.concatenate([gait.deviations for gait in measured])
@@ -136,20 +137,19 @@ class Descent:
         return FitEnding.CONVERGED if found.success else FitEnding.OUT_OF_EVALUATIONS
 
     def parameters(self, at: np.ndarray) -> dict[str, float]:
-        zero = self.first == 0.0
-        values = np.where(zero, at * self.widths, self.first * np.exp(np.where(zero, 0.0, at)))
+        by_factor = self.first * np.exp(np.where(self.linear, 0.0, at))
+        values = np.where(self.linear, self.first + at * self.widths, by_factor)
         return dict(zip(self.names, values.tolist(), strict=True))
 
     def variables(self, values: np.ndarray) -> np.ndarray:
-        zero = self.first == 0.0
-        ratios = np.where(zero, 1.0, values) / np.where(zero, 1.0, self.first)
-        with np.errstate(divide="ignore"):
-            return np.where(zero, values / self.widths, np.log(ratios))
+        moved = (values - self.first) / self.widths
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.linear, moved, np.log(values / self.first))
 
     def sizes(self, at: np.ndarray) -> np.ndarray:
         """Derivatives of the parameters with respect to the variables."""
         values = np.array(list(self.parameters(at).values()))
-        return np.where(self.first == 0.0, self.widths, values)
+        return np.where(self.linear, self.widths, values)
 
     def predictions(self, at: np.ndarray) -> list[Prediction] | None:
         """Of every measured gait; None where one is lost."""
@@ -240,13 +240,14 @@ class Descent:
         covariance[lost] = covariance[:, lost] = np.nan
         ends[:, undetermined] = np.nan
         spread = np.sqrt(np.diag(covariance))
+        errors = spread * self.sizes(at)  # negative where a parameter is
         low, high = (self.parameters(end) for end in np.clip(ends, *self.limits))
         return GaitFit(
             ending=ending,
             estimates=self.parameters(at),
-            standard_errors=dict(zip(self.names, (spread * self.sizes(at)).tolist(), strict=True)),
+            standard_errors=dict(zip(self.names, np.abs(errors).tolist(), strict=True)),
             intervals={n: (min(low[n], high[n]), max(low[n], high[n])) for n in self.names},
-            correlation=covariance / np.outer(spread, spread),
+            correlation=covariance / np.outer(spread, spread) * np.sign(np.outer(errors, errors)),
             undetermined=tuple(names[undetermined].tolist()),
             at_bounds=tuple(names[held].tolist()),
             one_sided=tuple(names[lost & ~undetermined & ~held].tolist()),
@@ -295,4 +296,4 @@ class Descent:
             end = sign * interval_end(self._model, at, here, square, which, sign, limits)
             return sign * max(end, *(sign * float(each[1][which]) for each in within))
 
-        return end(-1.0), end(1.0)
+        return told_by_data((end(-1.0), end(1.0)), limits[:, which])

@@ -42,12 +42,12 @@ def fit_gait(
 ) -> GaitFit:
     """Finds the parameters with which a scene's gaits match measured ones.
 
-    Weighted least squares over the logarithms of the parameters, by SciPy's trust-region method
-    (Branch, Coleman and Li 1999). Each gait is searched from the state of the one before; the
-    derivatives, with their error bars, are those of `find_gait`. Measurement errors are assumed to
-    be independent and normal. The covariance is that of the linearised fit of all parameters, (Jᵀ
-    J)⁻¹. Intervals are profile intervals; if a standard error exceeds 2 % of its parameter, the
-    ends are found with further scenes.
+    Weighted least squares over the logarithms of the parameters, or over themselves between bounds
+    that hold 0, by SciPy's trust-region method (Branch, Coleman and Li 1999). Each gait is searched
+    from the state of the one before; the derivatives, with their error bars, are those of
+    `find_gait`. Measurement errors are assumed to be independent and normal. The covariance is that
+    of the linearised fit of all parameters, (Jᵀ J)⁻¹. Intervals are profile intervals; if a
+    standard error exceeds 2 % of its parameter, the ends are found with further scenes.
 
     Args:
         scene: the walker, with the parameters at which the fit begins.
@@ -127,11 +127,8 @@ def _check_bounds(
                     f"vary[{name!r}] = {pair!r} does not hold the scene's own {name} = {value:g}, "
                     "where the fit begins."
                 )
-            if value != 0.0 and pair[0] * pair[1] <= 0.0:
-                raise ArgumentError(
-                    f"vary[{name!r}] = {pair!r} is not allowed: bounds must have the sign of the "
-                    f"scene's own {name} = {value:g}."
-                )
+            for bound in pair if pair[0] * pair[1] <= 0.0 else ():
+                with_parameters(scene, {name: bound})
         bounds[name] = (float(pair[0]), float(pair[1]))
     return bounds
 

@@ -96,8 +96,8 @@ class GaitFit(Tabular):
             are undetermined, one-sided or at a bound, or whose error exceeds their size.
         intervals: ends of the 95 % interval by name; farther out, no values of the other
             parameters, within their bounds, compensate for this one. An end that the data do not
-            tell is the bound, 0 or infinite. NaN for parameters that are undetermined or at a
-            bound.
+            tell is the bound, 0 or infinite, and the parameter is one-sided. NaN for parameters
+            that are undetermined or at a bound.
         correlation: of the estimates' errors, shape (k, k).
         undetermined: names of the parameters that the data limit on neither side.
         at_bounds: names of the parameters that are held by a bound, because the data favour a value

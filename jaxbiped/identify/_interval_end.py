@@ -23,6 +23,8 @@ _FLAT = 0.05
 units along its direction change the sum of squares by 0.02."""
 _FAR = 3.0
 """How far from the fit a variable is followed: a factor of 20."""
+_AT_LIMIT = 1e-9
+"""Distance of a variable from its limit that counts as none."""
 
 Model = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray] | None]
 """Residuals (n,) and their derivatives (n, k) at variables; None where there are none."""
@@ -48,7 +50,7 @@ def interval_end(
         limits: of all variables, shape (2, k).
 
     Returns:
-        The end, infinite where none is found.
+        The end, infinite where none is found, as where the sum of squares is less at the limit.
     """
     here, near = at, np.clip(limits, at - _FAR, at + _FAR)
     bend = np.zeros((len(at), len(at)))
@@ -61,13 +63,14 @@ def interval_end(
             break  # it moves as far where the sum of squares does not change
         if np.any(np.abs(here + step - at) >= _FAR):
             break  # the others might make up for even more
-        if ahead in limits[:, which]:
-            return float(ahead)
         if abs(step[which]) <= _SHARE * farthest and excess <= 1.96**2 * _SHARE:
             return float(ahead)
         for _ in range(_HALVINGS):
             there = model(here + step)
             if there is not None:
+                is_limit = np.isclose(here + step, limits, rtol=0.0, atol=_AT_LIMIT)[:, which].any()
+                if is_limit and _excess(there, square) == 0.0:
+                    return sign * np.inf
                 bend = _secant(bend, step, known, there)
                 gain = sign * step[which] * worth + excess - _excess(there, square)
                 if gain > 0.0:
@@ -77,6 +80,13 @@ def interval_end(
             break
         here, known = here + step, there
     return sign * np.inf
+
+
+def told_by_data(ends: tuple[float, float], limits: np.ndarray) -> tuple[float, float]:
+    """The ends, infinite at the variable's limits (2,), which the data did not set."""
+    is_limit = np.isclose(ends, limits, rtol=0.0, atol=_AT_LIMIT)
+    low, high = np.where(is_limit, [-np.inf, np.inf], ends).tolist()
+    return low, high
 
 
 def _bent(

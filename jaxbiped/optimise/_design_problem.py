@@ -136,10 +136,7 @@ class DesignProblem:
             raise
 
     def at(self, u: np.ndarray) -> Evaluation | None:
-        """What is known of a design; None where no gait was found on the way from the latest.
-
-        None, too, where its measures have no derivatives, as where a foot grazes the ground.
-        """
+        """What is known of a design; None without a gait on the way there, or derivatives of it."""
         known = self.evaluations.get(u)
         if known is None and not self.evaluations.is_lost(u):
             known = self._follow(np.array(u))

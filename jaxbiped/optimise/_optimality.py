@@ -62,14 +62,6 @@ class Optimality(NamedTuple):
     bounds: tuple[Held, ...]
 
 
-class _Normal(NamedTuple):
-    """Inward normal of an active requirement or bound, its error, and its multiplier's limit."""
-
-    gradient: np.ndarray
-    error: np.ndarray
-    least: float
-
-
 def smooth_weights(problem: DesignProblem) -> tuple[dict[str, float], float]:
     """Weights of the sum but for the spectral radius's, which comes behind them.
 
@@ -111,20 +103,23 @@ def _balance(problem: DesignProblem, design: Design, scale: float) -> _Balance:
     gradient = np.append(problem.gradient(u, total.slopes), [of_radius] * more) / scale
     errors = np.append(np.abs(problem.gradient(u, total.slope_errors)), [0.0] * more) / scale
     radius = known.values["spectral_radius"] if of_radius else np.inf
-    rows = [(row, False) for row in rows_of(problem)]
+    rows: list[tuple[AnyRow, bool]] = [(row, False) for row in rows_of(problem)]
     rows += [(row, True) for row in (cluster_rows(problem, radius) if of_radius else ())]
-    pairs = [(p, _of_row(problem, design, *p, more)) for p in rows if p[0].is_active(known)]
-    sizes = [float(np.linalg.norm(each.gradient)) for _, each in pairs]
+    rows = [pair for pair in rows if pair[0].is_active(known)]
+    normals = [
+        np.append(problem.gradient(u, row.slopes(known)), [row.by_bound(known) * in_sum] * more)
+        for row, in_sum in rows
+    ]
+    sizes = np.linalg.norm(np.reshape(normals, (-1, len(gradient))), axis=1)
     # Where multipliers pass through each other a condition's gradient vanishes, and tells nothing.
-    pairs = [p for p, size in zip(pairs, sizes, strict=True) if size > _VANISHING * max(sizes)]
-    units, zero = np.eye(len(u), len(gradient)), np.zeros_like(gradient)
-    normals = [each for _, each in pairs]
-    normals += [_Normal(side * units[place], zero, 0.0) for place, side in _at_bounds(u)]
-    matrix, error = (
-        np.reshape([getattr(n, part) for n in normals], (-1, len(gradient))).T
-        for part in ("gradient", "error")
-    )
-    least, found = np.asarray([each.least for each in normals]), np.zeros(len(normals))
+    large = np.flatnonzero(sizes > _VANISHING * np.max(sizes, initial=0.0)).tolist()
+    rows, normals = [rows[k] for k in large], [normals[k] for k in large]
+    normals += [side * np.eye(len(gradient))[place] for place, side in _at_bounds(u)]
+    matrix = np.reshape(normals, (-1, len(gradient))).T
+    error, least, found = np.zeros_like(matrix), np.zeros(len(normals)), np.zeros(len(normals))
+    for k, (row, _) in enumerate(rows):
+        error[: len(u), k] = np.abs(problem.gradient(u, row.slope_errors(known)))
+        least[k] = -np.inf if row.equality else 0.0
     if normals:
         limits = least, np.inf
         found = scipy.optimize.lsq_linear(matrix, gradient, limits, method="bvls").x
@@ -133,8 +128,9 @@ def _balance(problem: DesignProblem, design: Design, scale: float) -> _Balance:
     # What surely holds the design makes up for any error along its normal.
     sure = matrix[:, (found > spreads) | (least < 0.0)]
     across = np.eye(len(gradient)) - sure @ np.linalg.pinv(sure)
-    left, errors = gradient - matrix @ found, np.abs(across) @ errors
-    return _Balance(left, errors, [pair for pair, _ in pairs], found, spreads)
+    with np.errstate(invalid="ignore"):  # of errors without bound
+        errors = np.abs(across) @ errors
+    return _Balance(gradient - matrix @ found, errors, rows, found, spreads)
 
 
 def lagrangian_change(
@@ -189,8 +185,7 @@ def doubt_of(problem: DesignProblem, design: Design) -> str:
         return f"The residual is known to within {found.error:.1e} of the objective only."
     if not allowance <= OPTIMAL:
         return f"Requirements are known to within {allowance:.1e} of their bounds only."
-    near = [each for each in problem.asked if is_near(design, each)]
-    if not all(_explains(problem, design, each) for each in near):
+    if not all(_explains(problem, design, e) for e in problem.asked if is_near(design, e)):
         return "Designs tried nearby differ from it by other amounts than the derivatives say."
     return ""
 
@@ -226,18 +221,6 @@ def is_flat(problem: DesignProblem) -> bool:
         more = 3.0 * np.abs(problem.gradient(u, total.slope_errors))
         bars = np.append(bars, _FLAT * abs(total.value) + more)
     return len(problem.asked) > 1 and bool(np.all(np.abs(slopes) <= bars))
-
-
-def _of_row(
-    problem: DesignProblem, design: Design, row: AnyRow, in_sum: bool, more: int
-) -> _Normal:
-    """Of a requirement, with `more` what the radius in the sum, its own variable, adds to it."""
-    u, known = design
-    gradient = problem.gradient(u, row.slopes(known))
-    error = np.abs(problem.gradient(u, row.slope_errors(known)))
-    by_radius, none = [[by] * more for by in (row.by_bound(known) if in_sum else 0.0, 0.0)]
-    least = -np.inf if row.equality else 0.0
-    return _Normal(np.append(gradient, by_radius), np.append(error, none), least)
 
 
 def _at_bounds(u: np.ndarray) -> list[tuple[int, float]]:

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 _DRAWN = 8
 """Designs that are drawn for each one that is kept."""
-_ASIDE = 1e-2
-"""How far from an optimum, in u, another design is tried."""
 _STAGES = 4
 """Steps in which the gaits of all of them are followed from the first design's."""
 
@@ -79,7 +77,8 @@ class Runs:
         else:
             optimise = functools.partial(run_optax, transformation=self.optimiser)
         ended = optimise(functions, begin.u, self.iterations, self.note)
-        if ended.converged and optimise is not run_trust_region and not self._is_balanced():
+        balanced = optimality_of(self.problem, self.best).residual <= OPTIMAL
+        if ended.converged and optimise is not run_trust_region and not balanced:
             # It may have stopped on a ridge of the objective, along which designs get better.
             self.problem.latest = self.best
             on = run_trust_region(functions, self.best.u, self.iterations, self.note)
@@ -90,7 +89,7 @@ class Runs:
         best = self.best
         if ended.converged and not any(is_near(best, each) for each in self.problem.asked):
             # Another design shows whether derivatives tell how designs differ.
-            self.problem.at(best.u + np.where(best.u < 0.5, _ASIDE, -_ASIDE))
+            self.problem.at(best.u + np.where(best.u < 0.5, 0.01, -0.01))
         better = rank_of(self.problem, self.best) < rank_of(self.problem, before)
         if not self.ended.message or better:
             self.ended = ended
@@ -109,10 +108,6 @@ class Runs:
         if doubt_of(self.problem, self.best):
             return Outcome.CORNER
         return Outcome.FLAT if is_flat(self.problem) else Outcome.CONVERGED
-
-    def _is_balanced(self) -> bool:
-        """Whether the best design's derivatives balance."""
-        return optimality_of(self.problem, self.best).residual <= OPTIMAL
 
     def note(self, u: np.ndarray) -> None:
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)

@@ -186,7 +186,7 @@ SEEN = MeasuredGait({"period": (0.44, 1e-3)}, conditions={"slope": 0.02})
         (("stiffness",), SEEN, "vary = 'stiffness' is not known: choose one of"),
         ({"J": (0.2, 0.1)}, SEEN, r"vary\['J'\] = \(0.2, 0.1\) is not allowed"),
         ({"J": (0.2, 0.3)}, SEEN, "does not hold the scene's own J = 0.0096"),
-        ({"J": (-1.0, 0.3)}, SEEN, "must have the sign"),
+        ({"J": (-1.0, 0.3)}, SEEN, "J = -1"),
         (("hip_mass",), SEEN, "own hip_mass is 0 and gives no scale"),
         (("J",), [], r"measured = \[\] is not allowed"),
         (("slope",), SEEN, "slope is both known"),

@@ -9,7 +9,9 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.identify import _descent, _predicted_gait
+from jaxbiped.identify._interval_end import interval_end
 from jaxbiped.identify._predicted_gait import Prediction, predict
+from tests.mechanisms import scene_of
 
 SCENE = jb.ladder()["rigid"]
 SEEN = jb.identify.MeasuredGait(
@@ -17,9 +19,9 @@ SEEN = jb.identify.MeasuredGait(
 )
 
 
-def linear(matrix, center):
+def linear(matrix, center, scene=SCENE):
     """Predicts center + matrix · log(parameters / the scene's own)."""
-    own = jb.parameter_values(SCENE)
+    own = jb.parameter_values(scene)
 
     def predicted(scene, measured, values, sizes, guess, **how):
         names = list(values)
@@ -55,6 +57,83 @@ def test_a_linear_model_has_the_covariance_of_least_squares(vary, monkeypatch):
     assert fit.freedom == 3 - len(vary)
     assert fit.ending is jb.identify.FitEnding.CONVERGED
     assert fit.undetermined == ()
+
+
+@pytest.mark.parametrize("bent", [False, True])
+def test_an_end_at_a_bound_is_none_that_data_set(bent, monkeypatch):
+    """One number, log J ± σ: chi squared grows by a quarter of what an end takes to the bound above
+    it, by all of it below; and by less on both sides where the bounds are narrow."""
+    deviation = 0.1 if bent else 0.01  # followed by further scenes, or linear
+    monkeypatch.setattr(_descent, "predict", linear(np.ones((1, 1)), np.ones(1)))
+    seen = jb.identify.MeasuredGait({"period": (1.0, deviation)})
+    own = float(jb.parameter_values(SCENE)["J"])
+    low, near = own * np.exp(-1.959964 * deviation), own * np.exp(0.5 * 1.959964 * deviation)
+    fit = jb.fit_gait(SCENE, {"J": (0.5 * own, near)}, seen)
+    assert (fit.one_sided, fit.undetermined, fit.at_bounds) == (("J",), (), ())
+    assert fit.intervals["J"] == pytest.approx((low, near), rel=1e-6)
+    assert "limited on one side: J" in repr(fit)
+    assert fit.to_dataset().one_sided.item() == 1
+    wide = jb.fit_gait(SCENE, {"J": (0.5 * own, 2.0 * own)}, seen)
+    assert (wide.one_sided, wide.undetermined) == ((), ())
+    narrow = jb.fit_gait(SCENE, {"J": (own**2 / near, near)}, seen)
+    assert narrow.undetermined == ("J",)
+    assert np.isnan(narrow.intervals["J"]).all()
+
+
+def test_a_bound_beyond_which_nothing_fits_is_no_end():
+    """A residual that bends: by its derivatives the end lies beyond the limit, in truth before."""
+    model = lambda x: (2.0 * x + x**3, 2.0 + 3.0 * x[:, None] ** 2)
+    known = model(np.zeros(1))
+    end = np.roots([1.0, 0.0, 2.0, -1.96])
+    expected = float(end[np.isreal(end)][0].real)
+    limits = np.array([[-5.0], [0.9]])
+    found = interval_end(model, np.zeros(1), known, 1.96**2, 0, 1.0, limits)
+    assert found == pytest.approx(expected, rel=0.01)
+    assert interval_end(model, np.zeros(1), known, 1.96**2, 0, 1.0, 0.1 * limits) == np.inf
+
+
+def test_parameters_below_zero_are_fitted_as_those_above(monkeypatch):
+    """Estimates, errors and correlations of parameters of both signs, by linear least squares."""
+    names, matrix = ("torso.centre", "torso.mass"), np.array([[0.3, -0.1], [0.1, 0.4], [0.2, 0.3]])
+    scene = scene_of("torso")
+    scene = jb.with_parameters(scene, {"torso.centre": -0.15})
+    off = np.array([0.002, -0.001, 0.003])
+    monkeypatch.setattr(_descent, "predict", linear(matrix, SEEN.values + off, scene))
+    own = np.array([float(jb.parameter_values(scene)[name]) for name in names])
+    weighed = matrix / SEEN.deviations[:, None]
+    covariance = np.linalg.inv(weighed.T @ weighed)
+    values = own * np.exp(-covariance @ weighed.T @ (off / SEEN.deviations))
+    for vary in (names, {"torso.centre": (-1.5, -0.01), "torso.mass": (0.01, 50.0)}):
+        fit = jb.fit_gait(scene, vary, SEEN)
+        spread = np.abs(values) * np.sqrt(np.diag(covariance))
+        assert np.all(np.abs(np.array(list(fit.estimates.values())) - values) < 0.02 * spread)
+        assert list(fit.standard_errors.values()) == pytest.approx(spread, rel=1e-2)
+        by_parameters = covariance * np.outer(values, values) / np.outer(spread, spread)
+        np.testing.assert_allclose(fit.correlation, by_parameters, rtol=1e-6)
+        low, high = fit.intervals["torso.centre"]
+        assert low < fit.estimates["torso.centre"] < high < 0.0
+
+
+@pytest.mark.parametrize("first", [0.03, 0.0, -0.04])
+def test_between_bounds_that_hold_zero_a_parameter_changes_its_sign(first, monkeypatch):
+    """A line in the parameter itself, whose truth lies below zero: its estimate and errors."""
+    truth, rate = -0.02, np.array([[3.0], [0.0], [1.0]])
+
+    def predicted(scene, measured, values, sizes, guess, **how):
+        moved = rate @ (np.array(list(values.values())) - truth)
+        return Prediction(SEEN.values + moved, rate * sizes, 0.0 * rate, (), (), True)
+
+    monkeypatch.setattr(_descent, "predict", predicted)
+    scene = jb.with_parameters(SCENE, {"slope": first})
+    fit = jb.fit_gait(scene, {"slope": (-0.05, 0.1)}, SEEN)
+    error = 1.0 / np.linalg.norm(rate[:, 0] / SEEN.deviations)
+    assert fit.estimates["slope"] == pytest.approx(truth, abs=0.02 * error)
+    assert fit.standard_errors["slope"] == pytest.approx(error)
+    assert fit.intervals["slope"] == pytest.approx(
+        (truth - 1.96 * error, truth + 1.96 * error), abs=0.05 * error
+    )
+    with pytest.raises(jb.ArgumentError, match=r"slope"):
+        jb.fit_gait(scene, {"slope": (-2.0, 0.1)}, SEEN)
 
 
 def test_two_parameters_that_make_up_for_each_other_are_told(monkeypatch):

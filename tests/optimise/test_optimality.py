@@ -1,4 +1,4 @@
-"""Certificates of optima: constructed stalls and folds, none of which is one, and true optima."""
+"""Certificates of optima, against constructed stalls and folds, and against true optima."""
 
 import numpy as np
 import pytest
