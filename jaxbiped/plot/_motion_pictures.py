@@ -248,8 +248,8 @@ class _Picture:
         self._clock = ax.text(0.02, 0.95, "", transform=ax.transAxes, va="top")
         ax.set_aspect("equal", adjustable="datalim")
         style.legend(ax, loc="upper right", handlelength=3.5)
-        for line in ax.get_legend().get_lines()[: len(self._bodies)]:
-            line.set_linewidth(2.0)  # thinner than in the picture, which shows all dashes
+        for line in ax.legend_.get_lines()[: len(self._bodies)]:  # type: ignore[attr-defined]
+            line.set_linewidth(2.0)  # thinner than in the picture, to show all dashes
         ax.set_axis_off()
         self.draw(0)
 
