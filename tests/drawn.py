@@ -65,6 +65,25 @@ def points_of(ax, label=None):
     return [np.asarray(line.get_xydata(), float) for line in lines]
 
 
+def assert_ticks_apart(figure):
+    """No two labels of ticks overlap, and none leaves the page."""
+    FigureCanvasAgg(figure).draw()
+    renderer, boxes = figure.canvas.get_renderer(), []
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis) if ax.get_visible() and ax.axison else ():
+            low, high = sorted(axis.get_view_interval())
+            ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+            labels = [t for tick in ticks if low <= tick.get_loc() <= high for t in
+                      (tick.label1, tick.label2) if t.get_visible() and t.get_text()]  # fmt: skip
+            boxes += [(t.get_text(), t.get_window_extent(renderer)) for t in labels]
+    for k, (text, box) in enumerate(boxes):
+        assert box.x0 > -1.0, text
+        assert box.x1 < figure.bbox.x1 + 1.0, text
+        for other, its in boxes[k + 1 :]:
+            across = min(box.x1, its.x1) - max(box.x0, its.x0)
+            assert min(across, min(box.y1, its.y1) - max(box.y0, its.y0)) <= 0.0, (text, other)
+
+
 def assert_is_drawn(figure, *, unitless=()):
     """Every axes shows something finite within its limits, and its labels say units.
 

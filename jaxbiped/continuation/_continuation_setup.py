@@ -96,7 +96,7 @@ class ContinuationSetup(NamedTuple):
             once = self.cycle(begins, point.value, 1)
             ahead = float(foot_ahead(scene, self.state_of(begins)))
             rows.append((begins, once.period[0], once.advance[0], once.peak[0], ahead))
-            begins = once.recurring[0]
+            begins = np.asarray(once.recurring[0])
         states, periods, advances, peaks, places = map(np.array, zip(*rows, strict=True))
         lengths = advances + np.roll(places, -1) - places
         return point._replace(footsteps=CycleFootsteps(states, periods, lengths, peaks))

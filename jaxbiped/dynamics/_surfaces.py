@@ -6,7 +6,7 @@ observed, once per cycle.
 
 import abc
 from collections.abc import Callable
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -190,11 +190,12 @@ class HeelStrike(AbstractSection):
 
 
 @kept_alone
-def foot_ahead(scene: AbstractWalkerScene, state: PyTree) -> Scalar:
+def foot_ahead(scene: Any, state: PyTree) -> Scalar:
     """How far ahead of the root point the stance leg's foot stands on a section [m]."""
     if is_rigid(scene):
         return of_stance(scene, state, lambda stance: standing_place(stance) - stance.root.x)
-    return legs_at(scene, state)[scene.mechanism.structure.stance_leg].x
+    ahead: Scalar = legs_at(scene, state)[scene.mechanism.structure.stance_leg].x
+    return ahead
 
 
 class Section(AbstractSection):

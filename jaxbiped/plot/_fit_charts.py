@@ -73,7 +73,9 @@ def _draw_estimates(ax: Axes, fitted: GaitFit, names: list[str]) -> None:
     ax.hlines(places, -deviations, deviations, linewidth=3.5, label="standard error", **look)
     ax.plot(np.zeros(len(names)), places, "o", markersize=5, **look)
     ax.axvline(0.0, color=style.GROUND_COLOUR, linewidth=0.8, zorder=0.5)
-    quantities = [quantity_of(name) or Quantity(name) for name in names]
+    quantities = [
+        (quantity_of(name) or Quantity(name))._replace(unit=fitted.units[name]) for name in names
+    ]
     short = style.is_narrow() and len({each.symbol for each in quantities} - {""}) == len(names)
     ax.set_yticks(places, [each.symbol if short else each.in_row() for each in quantities])
     ax.set_ylim(len(names) - 0.6, -0.8)

@@ -36,19 +36,6 @@ def fit_data(
     Raises:
         ArgumentError: no measure was given, or the branch has no points, is not that of the fitted
             walker, or has another number of footsteps or other conditions than a measured gait.
-
-    Examples:
-        >>> import jaxbiped as jb
-        >>> scene = jb.ladder()["rigid"]
-        >>> periods = {0.02: 0.4438, 0.03: 0.4364}
-        >>> seen = [
-        ...     jb.identify.MeasuredGait({"period": (T, 1e-4)}, conditions={"slope": slope})
-        ...     for slope, T in periods.items()
-        ... ]
-        >>> fit = jb.fit_gait(scene, ("J",), seen)
-        >>> model = jb.with_parameters(scene, fit.estimates)
-        >>> branch = jb.continue_gait(model, "slope", bounds=(0.015, 0.035))
-        >>> figure = jb.plot.fit_data(fit, seen, branch)
     """
     check_type("fitted", fitted, GaitFit)
     check_type("branch", branch, Branch)
@@ -61,8 +48,7 @@ def fit_data(
     lines = -(-len(names) // columns)
     figure = style.new_figure(max(4.2 * columns, 5.6), 0.6 + 2.6 * lines)
     panels = list(figure.subplots(lines, columns, squeeze=False, sharex=True).flat)
-    along, dataset = parameter_quantities(branch.scene)[branch.along], branch.to_dataset()
-    stable = np.array([each is not False for each in branch.stable])
+    dataset, stable = branch.to_dataset(), [gait is not False for gait in branch.stable]
     look: dict[str, Any] = {"color": style.LEG_COLOURS[1], "linewidth": 1.4}
     bars: dict[str, Any] = {"color": style.LEG_COLOURS[0], "markersize": 4, "capsize": 2.5}
     for ax, name in zip(panels, names, strict=False):
@@ -76,7 +62,7 @@ def fit_data(
     for ax in panels[len(names) :]:
         ax.set_axis_off()
     for ax in panels[max(len(names) - columns, 0) : len(names)]:
-        ax.set_xlabel(along.on_axis())
+        ax.set_xlabel(parameter_quantities(branch.scene)[branch.along].on_axis())
         ax.tick_params(labelbottom=True)
     if branch.axis.log:
         panels[0].set_xscale("log")

@@ -109,9 +109,12 @@ def elasticities(
     if ax is not None:
         panels = [ax]
     else:
-        columns = style.panels_abreast(min(len(names), 3), width=1.9 if short else 3.2)
+        beside = max(style.text_size(row)[0] for row in rows) / style.letter_size()
+        most = min(len(names), 3 if beside < 2.0 else 2)
+        columns = style.panels_abreast(most, width=1.9 if short else 2.2 + beside)
         lines = -(-len(names) // columns)
-        width, height = max(3.9 * columns, 4.6), (1.3 + 0.2 * len(rows)) * lines
+        width, height = max(3.9, 2.2 + beside) * columns, (1.3 + 0.2 * len(rows)) * lines
+        width = max(width, 4.6)
         figure = style.new_figure(width, height, rows=True)
         panels = list(figure.subplots(lines, columns, squeeze=False).flat)
     found = [np.asarray(getattr(gait.elasticities, name)) for name in names]
@@ -119,7 +122,9 @@ def elasticities(
     ends = np.abs(np.nan_to_num(found, posinf=0.0, neginf=0.0)) + np.nan_to_num(errors)
     for each, name, values, bars in zip(panels, names, found, errors, strict=False):
         _panel(each, QUANTITIES[name].words, rows, values, bars)
-        _scale(each, float(np.max(ends)), short)
+    style.figure_of(panels[0]).draw_without_rendering()  # lays out, so that widths are known
+    for each in panels[: len(names)]:
+        _scale(each, float(np.max(ends)))
     spare = panels[len(names) :]
     for each in spare:
         each.set_axis_off()
@@ -167,15 +172,18 @@ def _panel(ax: Axes, title: str, names: list[str], values: np.ndarray, errors: n
     ax.tick_params(axis="y", length=0)
 
 
-def _scale(ax: Axes, largest: float, narrow: bool) -> None:
-    """The same reach on both sides; ticks at its largest power of ten and a hundredth of that, at
-    the largest alone in `narrow` axes."""
+def _scale(ax: Axes, largest: float) -> None:
+    """The same reach on both sides; ticks at its largest power of ten and, if there is room for
+    their labels, at a hundredth of that."""
     ax.set_xscale("symlog", linthresh=_LINEAR, linscale=0.5)
     reach = max(1.6 * largest, 10.0 * _LINEAR)
     ax.set_xlim(-reach, reach)
     top = math.floor(math.log10(reach) + 1e-9)
-    powers = [10.0**k for k in (top, top - 2)[: 1 if narrow else 2] if 10.0**k >= 10.0 * _LINEAR]
-    marks = {0.0: "0"}
-    for power in powers:
-        marks |= {-power: f"−{power:g}", power: f"{power:g}"}
+    marks, outer = {0.0: "0"}, np.inf
+    for power in (10.0**k for k in (top, top - 2) if 10.0**k >= 10.0 * _LINEAR):
+        own = {-power: f"−{power:g}", power: f"{power:g}"}
+        places = ax.transData.transform([(x, 0.0) for x in (-outer, -power, 0.0) if np.isfinite(x)])
+        gap = float(np.diff(places[:, 0]).min()) / style.figure_of(ax).dpi
+        if gap > style.text_size(own[-power])[0] + 0.05:
+            marks, outer = marks | own, power
     ax.set_xticks(list(marks), list(marks.values()), fontsize="small")

@@ -105,7 +105,7 @@ def gait_strobe(
     title = f"Gait from {start:.2f} s to {stop:.2f} s, a pose every {interval:.3g} ms"
     style.dress(ax, title, HORIZONTAL.on_axis(), HEIGHT.on_axis())
     handles = [
-        Line2D([], [], linewidth=2.0, label=part.label, **part.look.line) for part in skeleton.parts
+        Line2D([], [], linewidth=1.6, label=part.label, **part.look.line) for part in skeleton.parts
     ]
     handles.append(Line2D([], [], color=style.GROUND_COLOUR, label=f"slope {slope:.3g} rad"))
     extent, figure = ax.get_window_extent(), style.figure_of(ax)
@@ -248,6 +248,8 @@ class _Picture:
         self._clock = ax.text(0.02, 0.95, "", transform=ax.transAxes, va="top")
         ax.set_aspect("equal", adjustable="datalim")
         style.legend(ax, loc="upper right", handlelength=3.5)
+        for line in ax.legend_.get_lines()[: len(self._bodies)]:  # type: ignore[attr-defined]
+            line.set_linewidth(2.0)  # thinner than in the picture, to show all dashes
         ax.set_axis_off()
         self.draw(0)
 

@@ -94,19 +94,19 @@ def _paths(branch: Branch, ax: Axes | None) -> Figure:
     _draw_circle(ax)
     _frame(ax, min(_FARTHEST, max(1.0, float(np.max(np.abs(paths))))))
     scale = LogNorm if branch.axis.log else Normalize
-    norm = scale(values.min(), values.max() if np.ptp(values) else 1.001 * abs(values.max()) + 1e-9)
+    colours: dict[str, Any] = {"norm": scale(values.min(), values.max()), "cmap": "viridis"}
     places = np.stack([paths.real, paths.imag], axis=-1)
-    look: dict[str, Any] = {"norm": norm, "cmap": "viridis"}
     for path in np.swapaxes(places, 0, 1):
-        lines = LineCollection(np.stack([path[:-1], path[1:]], axis=1), linewidths=2.0, **look)
-        lines.set_array(0.5 * (values[:-1] + values[1:]))
+        parts: Any = np.stack([path[:-1], path[1:]], axis=1)
+        lines = LineCollection(parts, array=0.5 * (values[:-1] + values[1:]), **colours)
         ax.add_collection(lines, autolim=False)
-    dots = ax.scatter(*places.reshape(-1, 2).T, s=6, c=np.repeat(values, paths.shape[1]), **look)
+    each_value = np.repeat(values, paths.shape[1])
+    dots = ax.scatter(paths.real.ravel(), paths.imag.ravel(), 6, each_value, **colours)
     start, end = places[[0, -1]]
     black: dict[str, Any] = {"linestyle": "none", "color": "black"}
     ax.plot(*start.T, "o", label="start", markerfacecolor="white", markersize=7, **black)
     ax.plot(*end.T, "s", label="end", markersize=4, **black)
-    look = {"linestyle": "none", "color": style.LEG_COLOURS[1], "markersize": 6}
+    look: dict[str, Any] = {"linestyle": "none", "color": style.LEG_COLOURS[1], "markersize": 6}
     for event in branch.bifurcations:
         marker, words = EVENT_MARKS[event.kind]
         at = np.array([event.multiplier, np.conj(event.multiplier)])

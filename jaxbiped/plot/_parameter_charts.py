@@ -87,7 +87,7 @@ def branch(
     for each in given:
         for event in each.bifurcations:
             size = 6 * 0.75 ** counts.index(each.footsteps)
-            look = {"color": style.GROUND_COLOUR, "markersize": size, "zorder": 3}
+            look: dict[str, Any] = {"color": style.GROUND_COLOUR, "markersize": size, "zorder": 3}
             for height in _values(measure, each, event.point):
                 ax.plot(event.value, height, EVENT_MARKS[event.kind][0], **look)
     if given[0].axis.log:

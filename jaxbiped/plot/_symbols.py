@@ -82,11 +82,17 @@ def row_label(name: str | Quantity) -> str:
     return str(name) if quantity is None else quantity.in_row()
 
 
+_SCENE_PARTS = ("", "walker", "ground", "normal", "friction")
+"""Parts of a scene of which there is one: only other parts, such as bodies, are named in words."""
+
+
 def quantity_of(name: str | Quantity) -> Quantity | None:
-    """The entry of a name in the table, also for a name such as `part.name`."""
+    """The entry of a name in the table; for a name such as `part.name` it names the part."""
     if not isinstance(name, str):
         return name
-    return QUANTITIES.get(name.rpartition(".")[2]) or state_quantity(name)
+    part, _, last = name.rpartition(".")
+    quantity = QUANTITIES.get(last) or state_quantity(name)
+    return quantity if quantity is None or part in _SCENE_PARTS else quantity.of_part(part)
 
 
 def law_name(law: object) -> str:

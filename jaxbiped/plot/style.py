@@ -1,6 +1,5 @@
 """Style that all figures share: colours, markers, labels of axes, and where legends go."""
 
-import math
 import re
 from typing import Any, NamedTuple
 
@@ -8,12 +7,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
-from jaxbiped.basins._labels import Label
 from jaxbiped.plot._figure_style import has_titles as has_titles
 from jaxbiped.plot._figure_style import is_narrow as is_narrow
-from jaxbiped.plot._figure_style import letter_size, make_room
+from jaxbiped.plot._figure_style import letter_size as letter_size
+from jaxbiped.plot._figure_style import make_room
 from jaxbiped.plot._figure_style import new_figure as new_figure
 from jaxbiped.plot._figure_style import panels_abreast as panels_abreast
+from jaxbiped.plot._label_looks import GAIT_SUFFIX as GAIT_SUFFIX
+from jaxbiped.plot._label_looks import in_order as in_order
+from jaxbiped.plot._label_looks import label_colour as label_colour
+from jaxbiped.plot._label_looks import label_marker as label_marker
+from jaxbiped.plot._label_looks import walking_pattern as walking_pattern
 
 _GROUPS = (
     ("#0072B2", "#56B4E9"),
@@ -152,7 +156,12 @@ def label_point(
 
 
 def legend(ax: Axes, **options: Any) -> None:
-    """A legend in small letters without a frame. Default: within the axes."""
+    """A legend in small letters without a frame. Default: within the axes.
+
+    Its samples are long enough to show all dashes of a line, with which colours are distinguished.
+    """
+    lines = options.get("handles") or ax.get_legend_handles_labels()[0]
+    options = {"handlelength": _sample_length(lines)} | options
     ax.legend(**{"frameon": False, "fontsize": "small"} | options)
 
 
@@ -174,15 +183,22 @@ def legend_of_figure(figure: Figure, entries: list[Any]) -> None:
     """A legend under all axes of a figure, in three columns or as many as there is room for."""
     columns = _columns(figure, entries, 3)
     look: dict[str, Any] = {"frameon": False, "fontsize": "small", "ncols": columns}
+    look["handlelength"] = _sample_length(entries)
     figure.legend(handles=entries, loc="outside lower center", **look)
 
 
 def _columns(figure: Figure, entries: list[Any], most: int) -> int:
     """How many columns of a legend a figure has room for; it makes room for their rows."""
-    room = 0.95 * figure.get_figwidth() / letter_size()
+    room = 0.88 * figure.get_figwidth() / letter_size()
     columns = max(1, min(most, len(entries), int(room / max(_widths(entries), default=room))))
     make_room(figure, -(-len(entries) // columns))
     return columns
+
+
+def _sample_length(entries: list[Any]) -> float:
+    """Length of a legend's samples of lines, in its letters' size."""
+    dashes = [getattr(each, "_dash_pattern", (0.0, None))[1] or (0.0,) for each in entries]
+    return max(2.0, 1.3 * max(map(sum, dashes), default=0.0) / (8.33 * letter_size()))
 
 
 _TITLE_LETTER, _ENTRY_LETTER, _ENTRY_SAMPLE = 0.066, 0.06, 0.5
@@ -198,7 +214,8 @@ def _entries(ax: Axes, options: dict[str, Any]) -> list[Any]:
 def _widths(entries: list[Any]) -> list[float]:
     """Of a legend's entries [inches], of letters of the usual size."""
     letters = (_MATHEMATICS.sub("xx", str(each.get_label())) for each in entries)
-    return [_ENTRY_SAMPLE + _ENTRY_LETTER * len(text) for text in letters]
+    sample = _ENTRY_SAMPLE + 0.116 * (_sample_length(entries) - 2.0)
+    return [sample + _ENTRY_LETTER * len(text) for text in letters]
 
 
 def text_size(text: str) -> tuple[float, float]:
@@ -236,63 +253,3 @@ def legend_right(ax: Axes, **options: Any) -> None:
         legend_below(ax, columns=len(entries), handles=entries)
         return
     legend(ax, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **options)
-
-
-_LABEL_COLOURS = {
-    str(Label.FELL_FORWARD): "#D55E00",
-    str(Label.FELL_BACK): "#F9C653",
-    str(Label.STOPPED): "#2CC596",
-    str(Label.STUMBLED): "#EAAACE",
-    str(Label.SLID): "#F2E850",
-    str(Label.OUT_OF_STEPS): "#484848",
-    str(Label.SOLVER_FAILED): "#000000",
-    str(Label.UNRESOLVED): "#2A2A2A",
-    str(Label.TIMED_OUT): "#9A9A9A",
-    str(Label.PENDING): "#F2F2F2",
-}
-"""Okabe and Ito's colours, greys where nothing is known, all of different lightness: they can be
-distinguished by colour-blind readers, and in print without colour."""
-_BLUES = ("#0072B2", "#56B4E9", "#0B3C5D", "#A6D8F5", "#1F5E96", "#1E90FF")
-"""Walking: shades by gait, or else by the cycle's length; they repeat after six."""
-_WALKING_MARKERS = "os8hpH"
-_WALKING_PATTERNS = ("", "....", "ooo", "xxx", "+++", "***")
-_MARKERS = "D^vPX*<>d."
-_ORDER = list(_LABEL_COLOURS)
-GAIT_SUFFIX = ", gait {gait}"
-"""What follows the word for walking if several gaits are distinguished."""
-
-
-def label_colour(name: str) -> str:
-    """The colour of a label's name (`label_name`); grey for a name that is not known."""
-    ends, place = _kind(name)
-    return _LABEL_COLOURS.get(name, "#BBBBBB") if ends else _BLUES[place % len(_BLUES)]
-
-
-def in_order(names: set[str]) -> list[str]:
-    """Names in one order for all legends: walking, then the endings, pending last."""
-    kinds = {name: _kind(name) for name in names}
-    return sorted(names, key=lambda name: (kinds[name][0], math.prod(kinds[name]), name))
-
-
-def walking_pattern(name: str) -> str:
-    """The pattern over what walks in a further gait or a longer cycle; "" for all else.
-
-    Blues alone have other labels' lightness.
-    """
-    ends, place = _kind(name)
-    return "" if ends else _WALKING_PATTERNS[place % len(_WALKING_PATTERNS)]
-
-
-def label_marker(name: str) -> str:
-    """The marker of a label's name on a line, by which it is known without colour."""
-    ends, place = _kind(name)
-    markers = _MARKERS if ends else _WALKING_MARKERS
-    return markers[place % len(markers)]
-
-
-def _kind(name: str) -> tuple[bool, int]:
-    """Whether it is an ending, and its place among these; or that of its gait or cycle's length."""
-    if not name.startswith(str(Label.WALKING)):
-        return True, _ORDER.index(name) if name in _ORDER else len(_ORDER)
-    numbers = re.findall(r"\d+", name) or [1]
-    return False, int(numbers[-1]) - (len(numbers) == 1)

@@ -162,6 +162,46 @@ def test_a_doubled_gait_is_one_of_twice_the_footsteps(simplest_branch, cascade):
     assert abs(float(twice.theta_2 - state.theta_2)) < 1e-9
 
 
+def test_each_footstep_of_a_cycle_is_as_long_as_its_legs_reach(cascade, tmp_path):
+    """Legs of 1 m on points: a step is as long as twice the sine of the angle in which it ends."""
+    four = cascade.branches[2]
+    place = four.state_type._fields.index("theta_2") - 1
+    for point in four.points:
+        steps = point.footsteps
+        reach = 2.0 * np.sin(np.roll(steps.recurring[:, place], -1))
+        np.testing.assert_allclose(steps.step_length, reach, rtol=1e-9)
+        for name in ("period", "step_length"):
+            total = getattr(steps, name).sum()
+            assert total == pytest.approx(getattr(point, name), rel=1e-9)
+        assert steps.peak_normal.max() == pytest.approx(point.peak_normal, rel=1e-6)
+    point = four.points[-1]
+    gait = jb.find_gait(four.scene_at(point), four.state(point), footsteps=4, **PLAIN)
+    # The first length of a gait is that of the step with whose end it begins.
+    lengths = np.roll(point.footsteps.step_length, 1)
+    np.testing.assert_allclose(gait.step_lengths, lengths, rtol=1e-6)
+    four.to_dataset().to_netcdf(tmp_path / "four.nc")
+    again = open_branch(xarray.open_dataset(tmp_path / "four.nc"), four.scene)
+    for read, kept in zip(again.points, four.points, strict=True):
+        for name, values in kept.footsteps._asdict().items():
+            np.testing.assert_array_equal(getattr(read.footsteps, name), values)
+
+
+def test_the_fork_of_a_cascade_is_smooth_and_begins_at_its_doublings(cascade):
+    ax = jb.plot.branch(cascade, "period").axes[0]
+    ax.set_ylim(3.7, 4.0)
+    lines = [line for line in ax.lines if len(line.get_xdata()) > 1][-(2 + 4 + 8 + 16) :]
+    event = cascade.doublings[0]
+    for line in lines[:2]:
+        x, y = line.get_xydata()[0]
+        assert (x, y) == pytest.approx((event.value, event.point.period), rel=1e-12)
+        corners = np.diff(ax.transData.transform(line.get_xydata()), axis=0)
+        turns = np.diff(np.unwrap(np.arctan2(corners[:, 1], corners[:, 0])))
+        assert np.degrees(np.abs(turns)).max() < 15.0
+    for line in lines[2:6]:
+        assert line.get_xdata()[0] == cascade.values[1]
+        assert min(abs(cascade.doublings[1].point.footsteps.period - line.get_ydata()[0])) == 0.0
+
+
 def test_a_stored_branch_is_resumed(rigid, tmp_path):
     short = jb.continue_gait(
         rigid_seed(), "slope", bounds=(0.01, 0.11), accuracy="tight", max_points=20

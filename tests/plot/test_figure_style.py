@@ -2,8 +2,10 @@
 
 import re
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -91,6 +93,43 @@ def test_a_papers_letters_have_eight_points_also_of_ticks_made_as_it_is_drawn():
     assert ax.get_title(loc="left") == ""
     assert _law().axes[0].get_title(loc="left") == "Bengisu and Akay"
     assert _law().get_figwidth() == 6.4
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+def test_figures_made_by_hand_have_the_style_of_a_paper(columns, tmp_path):
+    with plot.figure_style("paper", columns=columns):
+        figure, ax = plt.subplots()
+        ax.plot([0.0, 1.0], [1000.0, 2000.0])
+        ax.set_ylabel("a label (m)")
+        ax.set_xlabel("another one (s)")
+        figure.savefig(tmp_path / "by_hand.pdf")
+        figure.savefig(tmp_path / "by_hand.png")
+    plt.close(figure)
+    assert figure.get_figwidth() == WIDTHS[columns]
+    assert ax.xaxis.label.get_fontsize() == 8.0
+    FigureCanvasAgg(figure)
+    assert_fits(figure)
+    written = (tmp_path / "by_hand.pdf").read_bytes()
+    assert b"/CIDFontType2" in written
+    assert b"/Type3" not in written
+    with Image.open(tmp_path / "by_hand.png") as image:
+        assert image.width == pytest.approx(300.0 * WIDTHS[columns], abs=1)
+    assert plt.rcParams["figure.figsize"] == plt.rcParamsDefault["figure.figsize"]
+
+
+def test_samples_of_a_legend_show_all_dashes_of_each_line():
+    """The torso's dash and dot looked like a line of one dash."""
+    for name in ("screen", "paper"):
+        with plot.figure_style(name):
+            ax = style.new_figure().add_subplot()
+            for k in range(6):
+                ax.plot([0.0, 1.0], label=str(k), linewidth=2.0, **style.line_of(k))
+            for draw in (style.legend, lambda own: style.legend_of_figure(own.figure, own.lines)):
+                draw(ax)
+        for legend in (ax.get_legend(), *ax.figure.legends):
+            for line in legend.get_lines():
+                length = np.ptp(line.get_xdata())
+                assert length > 1.2 * sum(line._dash_pattern[1] or (0.0,))
 
 
 def test_figures_below_the_context_have_their_own_style_again():

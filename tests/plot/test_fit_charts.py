@@ -10,8 +10,9 @@ from jaxbiped import plot
 from jaxbiped.optimise._objective_values import Evaluation
 from jaxbiped.optimise._optimality import Held, Optimality
 from jaxbiped.optimise._optimum import Iteration
-from tests.drawn import assert_is_drawn, points_of
+from tests.drawn import assert_is_drawn, assert_ticks_apart, points_of
 from tests.plot.test_figure_style import assert_fits
+from tests.plot.test_parameter_charts import branch_point, make_branch
 
 
 def _fit(**changes):
@@ -52,6 +53,73 @@ def test_intervals_are_parts_of_the_estimates_in_percent():
     )  # fmt: skip
     assert "5.25" in lower.get_title(loc="left")
     assert_is_drawn(figure)
+
+
+def test_measured_gaits_lie_beside_the_model_of_the_fit():
+    points = [branch_point(0.02 * k, 0.5 - k, length=0.1 * k) for k in (1, 2, 3)]  # 3 is unstable
+    branch = make_branch(points)
+    seen = [
+        jb.identify.MeasuredGait(
+            {"step_length": (0.1 + 5.0 * (slope - 0.02), 0.01)}
+            | ({"period": (0.41, 0.02)} if slope > 0.03 else {}),
+            conditions={"slope": slope},
+        )
+        for slope in (0.02, 0.04)
+    ]
+    own = jb.parameter_values(branch.scene)
+    fitted = _fit(estimates={"J": float(own["J"])})
+    for columns in (0, 1, 2):
+        with plot.figure_style("paper" if columns else "screen", columns=columns or 1):
+            figure = plot.fit_data(fitted, seen, branch)
+        assert_is_drawn(figure)
+        assert_fits(figure)
+        assert_ticks_apart(figure)
+    period, length = figure.axes
+    assert [ax.get_ylabel() for ax in figure.axes] == ["period, $T$ (s)", "step length, $L$ (m)"]
+    assert "slope" in length.get_xlabel()
+    np.testing.assert_allclose(points_of(length)[0], [[0.02, 0.1], [0.04, 0.2], [0.06, 0.3]])
+    stable = points_of(length, "model")[0]
+    assert np.isfinite(stable[:, 1]).tolist() == [True, False, False]
+    for ax, rows in (
+        (length, [(0.02, 0.1, 0.01), (0.04, 0.2, 0.01)]),
+        (period, [(0.04, 0.41, 0.02)]),
+    ):
+        line, _, (bars,) = ax.containers[0].lines
+        np.testing.assert_allclose(line.get_xydata(), [row[:2] for row in rows])
+        ends = [segment[:, 1] for segment in bars.get_segments()]
+        np.testing.assert_allclose(ends, [(y - bar, y + bar) for _, y, bar in rows])
+
+
+def test_only_the_fitted_walkers_branch_is_drawn_beside_its_data():
+    branch = make_branch([branch_point(0.02, 0.5)])
+    own = float(jb.parameter_values(branch.scene)["J"])
+    seen = jb.identify.MeasuredGait({"period": (0.4, 0.01)}, conditions={"slope": 0.02})
+    angles = jb.identify.MeasuredAngles([0.0, 0.1], 0.01, theta_1=[0.1, 0.2])
+    for fitted, measured, words in (
+        ({"J": 1.1 * own}, seen, r"branch is not allowed: its J is 0\.0096"),
+        ({"J": own}, dataclasses.replace(seen, conditions={"K": 1e5}), "its K is None"),
+        ({"J": own}, dataclasses.replace(seen, footsteps=2), "its cycles have 1 footsteps"),
+        ({"J": own}, jb.identify.MeasuredGait({}, angles=angles), "at least one measure"),
+    ):
+        with pytest.raises(jb.ArgumentError, match=words):
+            plot.fit_data(_fit(estimates=fitted), measured, branch)
+
+
+def test_parameters_of_two_bodies_have_two_labels_and_their_own_units():
+    names = {"torso.mass": "kg", "K": "N/m^1.5", "shank.stop.K": "N m/rad"}
+    known = dict(
+        estimates=dict.fromkeys(names, 2.0),
+        standard_errors=dict.fromkeys(names, 0.1),
+        intervals=dict.fromkeys(names, (1.8, 2.2)),
+        undetermined=(),
+        units=names,
+    )
+    with plot.figure_style("paper"):
+        upper = plot.fit(_fit(**known)).axes[0]
+    labels = [text.get_text() for text in upper.get_yticklabels()]
+    assert len(set(labels)) == 3
+    assert "shank.stop" in labels[2]
+    assert "N m/rad" in upper.texts[2].get_text()
 
 
 def _optimum(history=5, excess=(0.1, 0.0, 0.0, 0.0, 0.0), bound=0.19, scene=None):

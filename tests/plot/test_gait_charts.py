@@ -5,14 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 import jaxbiped as jb
 from jaxbiped.plot import elasticities, gait_orbit, multipliers
 from jaxbiped.plot._gait_charts import elasticity_errors
-from tests.drawn import assert_is_drawn, points_of
-from tests.plot.test_parameter_charts import branch_point
+from tests.drawn import assert_is_drawn, assert_ticks_apart, points_of
+from tests.plot.test_figure_style import assert_fits
+from tests.plot.test_parameter_charts import branch_point, make_branch
 
 PARAMETERS = ("K", "c", "l", "hip_mass")
 FIGURES = [multipliers, elasticities, gait_orbit]
@@ -148,6 +150,53 @@ def test_multipliers_of_a_branchs_point():
     assert points_of(ax, "multipliers")[0][0] == pytest.approx((-1.6, 0.0))
     assert "not stable" in ax.get_title(loc="left")
     assert "undecided" in multipliers(branch_point(0.02, 0.95, error=0.1)).axes[0].get_title("left")
+
+
+@pytest.mark.parametrize("columns", [0, 1, 2])
+def test_multipliers_along_a_branch_are_paths(columns):
+    """Of a pair that meets on the real axis and parts there, and of a real one that stays."""
+    values = np.array([
+        [0.5j, -0.5j, 0.1], [-0.4 + 0.3j, -0.4 - 0.3j, 0.1], [-0.8, 0.1, -0.3], [-1.2, -0.2, 0.1]
+    ])  # fmt: skip
+    slopes = [0.02, 0.04, 0.06, 0.08]
+    points = [
+        branch_point(slope, 0.0)._replace(multipliers=row.astype(complex))
+        for slope, row in zip(slopes, values, strict=True)
+    ]
+    kind = jb.continuation.BranchEvent.PERIOD_DOUBLING
+    event = jb.continuation.BifurcationPoint(kind, points[3], -1.0 + 0j, 1e-9)
+    with jb.plot.figure_style("paper" if columns else "screen", columns=columns or 1):
+        figure = multipliers(make_branch(points, [event]))
+    assert_is_drawn(figure)
+    assert_fits(figure)
+    assert_ticks_apart(figure)
+    ax, bar = figure.axes
+    assert r"slope, $\alpha$ (rad)" in (bar.get_ylabel(), bar.get_xlabel())
+    lines = [each for each in ax.collections if isinstance(each, LineCollection)]
+    ends = sorted(tuple(each.get_segments()[-1][-1]) for each in lines)
+    assert ends == [(-1.2, 0.0), (-0.2, 0.0), (0.1, 0.0)]
+    for each in lines:
+        np.testing.assert_allclose(each.get_array(), [0.03, 0.05, 0.07])
+        stays = tuple(each.get_segments()[0][0]) == (0.1, 0.0)
+        assert stays == (tuple(each.get_segments()[-1][-1]) == (0.1, 0.0))
+    starts = points_of(ax, "start")[0]
+    np.testing.assert_allclose(sorted(map(tuple, starts)), [(0.0, -0.5), (0.0, 0.5), (0.1, 0.0)])
+    assert points_of(ax, "period doubling")[0][0] == pytest.approx((-1.0, 0.0))
+    assert points_of(ax, "end")[0].shape == (3, 2)
+    with pytest.raises(jb.ArgumentError, match="branch without points"):
+        multipliers(make_branch([]))
+
+
+@pytest.mark.parametrize("columns", [0, 1, 2])
+def test_ticks_of_elasticities_with_long_names_are_apart(columns):
+    """Three panels abreast beside names of five links wrote −1 over −0.01."""
+    names = tuple(f"{name}, shank.stop of the second leg" for name in PARAMETERS)
+    quantities = tuple(jb.laws.Quantity(name) for name in names)
+    with jb.plot.figure_style("paper" if columns else "screen", columns=columns or 1):
+        figure = elasticities(_gait(quantities=quantities), ("period", "speed", "step_length"))
+    assert_ticks_apart(figure)
+    ax = figure.axes[0]
+    assert [text.get_text() for text in ax.get_xticklabels()][:3][0] == "0"
 
 
 def _segments_of_bars(ax):

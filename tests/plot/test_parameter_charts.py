@@ -1,5 +1,7 @@
 """Figures of branches, against branches made by hand: nothing is compiled."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,9 @@ from jaxbiped.continuation import (
     BranchEvent,
     BranchPoint,
     BranchStop,
+    DoublingCascade,
 )
+from jaxbiped.continuation._branch_point import CycleFootsteps
 from jaxbiped.plot import bifurcation_curves, branch
 from tests.drawn import assert_is_drawn, legend_of, points_of
 
@@ -36,7 +40,7 @@ def branch_point(value, leading, error=1e-9, length=None):
     )
 
 
-def _branch(points, events=(), footsteps=1, name="slope", log=False):
+def make_branch(points, events=(), footsteps=1, name="slope", log=False):
     return Branch(
         scene=jb.ladder()["rigid"],
         points=tuple(points),
@@ -57,7 +61,7 @@ DOUBLING = BifurcationPoint(BranchEvent.PERIOD_DOUBLING, POINTS[2], -1.0 + 0j, 1
 
 
 def test_stability_is_told_by_the_kind_of_line():
-    figure = branch(_branch(POINTS, [DOUBLING]))
+    figure = branch(make_branch(POINTS, [DOUBLING]))
     assert_is_drawn(figure)
     (ax,) = figure.axes
     stable, unstable, undecided, mark = ax.lines
@@ -73,18 +77,39 @@ def test_stability_is_told_by_the_kind_of_line():
     assert ax.get_ylabel() == "step length, $L$ (m)"
 
 
-def test_a_longer_cycle_is_drawn_by_its_footsteps():
-    ends = branch_point(0.05, 0.9, length=0.2), branch_point(0.06, -1.0, length=0.4)
-    again = BifurcationPoint(BranchEvent.PERIOD_DOUBLING, ends[1], -1.0 + 0j, 1e-9)
-    two = _branch(ends, [again], footsteps=2)
-    figure = branch([_branch(POINTS, [DOUBLING]), two])
-    assert_is_drawn(figure)
-    (ax,) = figure.axes
-    assert points_of(ax)[3][:, 1].tolist() == [0.1, 0.2]
+def _doubled(bifurcations=()):
+    """Two footsteps that part at the doubling of `POINTS`, and their bifurcations."""
+    points = []
+    for value, apart in ((0.06, 0.01), (0.07, 0.02)):
+        lengths = np.array([value + apart, value - apart])
+        states = np.stack([POINTS[0].recurring, POINTS[0].recurring + 1.0])
+        steps = CycleFootsteps(states, np.array([0.5, 0.3]), lengths, np.array([20.0, 30.0]))
+        point = branch_point(value, 0.9, length=lengths.sum())
+        points.append(point._replace(footsteps=steps, period=0.8))
+    events = [BifurcationPoint(kind, points[-1], -1.0 + 0j, 1e-9) for kind in bifurcations]
+    begins = BranchStop(jb.gait.BranchEnd.BRANCHES_OFF, "a branch doubles", DOUBLING.value)
+    two = make_branch(points, events, footsteps=2)
+    return dataclasses.replace(two, stops=(begins, STOP))
+
+
+def test_every_footstep_of_a_doubled_cycle_is_drawn_from_the_doubling_on():
+    one, two = make_branch(POINTS, [DOUBLING]), _doubled([BranchEvent.PERIOD_DOUBLING])
+    cascade = DoublingCascade((one, two), (DOUBLING,), np.array([0.05]), np.zeros(0))
+    (ax,) = branch(cascade).axes
+    *_, upper, lower = (line for line in ax.lines if len(line.get_xdata()) > 1)
+    np.testing.assert_allclose(upper.get_xydata(), [[0.05, 0.05], [0.06, 0.07], [0.07, 0.09]])
+    np.testing.assert_allclose(lower.get_xydata(), [[0.05, 0.05], [0.06, 0.05], [0.07, 0.05]])
+    assert upper.get_linestyle() == lower.get_linestyle() == "-"
     assert {"1 footstep", "2 footsteps"} <= set(legend_of(ax))
-    assert len({line.get_linewidth() for line in ax.lines if len(line.get_xdata()) > 1}) == 2
-    marks = [line.get_xdata()[0] for line in ax.lines if line.get_marker() == "D"]
-    assert marks == [0.05, 0.06]
+    marks = [tuple(line.get_xydata()[0]) for line in ax.lines if line.get_marker() == "D"]
+    np.testing.assert_allclose(sorted(marks), [(0.05, 0.05), (0.07, 0.05), (0.07, 0.09)])
+    assert len(branch(cascade.branches).axes[0].lines) == len(ax.lines)
+    heights = {"period": (0.5, 0.3), "speed": (0.14, 1 / 6), "peak_normal": (20, 30),
+               "omega_1": (-1, 0), "spectral_radius": (0.9,)}  # fmt: skip
+    for name, values in heights.items():
+        (ax,) = branch(two, name).axes  # without its parent: from its first point
+        lines = [line for line in ax.lines if len(line.get_xdata()) > 1][: len(values)]
+        assert [line.get_ydata()[0] for line in lines] == pytest.approx(list(values)), name
 
 
 def test_curves_of_bifurcations():
@@ -104,16 +129,16 @@ def test_curves_of_bifurcations():
 
 def test_what_cannot_be_drawn():
     with pytest.raises(jb.ArgumentError, match="must have a point"):
-        branch(_branch([]))
+        branch(make_branch([]))
     with pytest.raises(jb.ArgumentError, match="one parameter"):
-        branch([_branch(POINTS), _branch(POINTS, name="m")])
+        branch([make_branch(POINTS), make_branch(POINTS, name="m")])
     with pytest.raises(jb.ArgumentError, match="measure = 'hip_z' is not known"):
-        branch(_branch(POINTS), "hip_z")
+        branch(make_branch(POINTS), "hip_z")
 
 
 def test_measures_are_of_a_footstep_and_have_their_units():
     """Here on a logarithmic axis."""
-    found = _branch([branch_point(0.02, 0.5, length=0.3)], footsteps=2, name="m", log=True)
+    found = make_branch([branch_point(0.02, 0.5, length=0.3)], footsteps=2, name="m", log=True)
     measures = {"speed": 0.3 / 0.4, "period": 0.2, "step_length": 0.15, "peak_normal": 20.0,
                 "spectral_radius": 0.5, "omega_1": -1.0}  # fmt: skip
     for name, value in measures.items():
@@ -125,7 +150,7 @@ def test_measures_are_of_a_footstep_and_have_their_units():
 
 def test_the_radius_has_its_errors_and_the_line_of_one():
     points = [branch_point(0.02 * k, 0.3 * k, error=0.01 * k) for k in (1, 2, 3)]
-    (ax,) = branch(_branch(points), "spectral_radius").axes
+    (ax,) = branch(make_branch(points), "spectral_radius").axes
     (band,) = ax.collections
     corners = band.get_paths()[0].vertices
     for k in (1, 2, 3):
@@ -136,5 +161,7 @@ def test_the_radius_has_its_errors_and_the_line_of_one():
     assert ax.get_ylim()[1] > 1.0
     assert "radius 1" in legend_of(ax)
     # An error that is not known, where the gait grazes, has no band.
-    grazing = branch(_branch([branch_point(0.02, 0.3, error=np.inf), *points]), "spectral_radius")
+    grazing = branch(
+        make_branch([branch_point(0.02, 0.3, error=np.inf), *points]), "spectral_radius"
+    )
     assert np.isfinite(grazing.axes[0].get_ylim()).all()

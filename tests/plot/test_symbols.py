@@ -56,6 +56,35 @@ def test_axes_say_words_symbol_and_unit(said, label):
     assert axis_label(*said) == label
 
 
+def test_parameters_of_one_symbol_name_their_part():
+    """Of bodies and of their stops; parameters of one symbol alone keep it."""
+    legs = [
+        jb.Body(f"{name}_{i}", mass=0.2, inertia=1e-3, centre=0.1, **place)
+        for i in (1, 2)
+        for name, place in (("thigh", {}), ("shank", {"parent": f"thigh_{i}", "at": 0.2}))
+    ]
+    walker = jb.Mechanism(
+        root="hip",
+        root_mass=1.0,
+        bodies=tuple(legs),
+        feet=tuple(jb.Foot(f"shank_{i}", centre=0.1, radius=0.1) for i in (1, 2)),
+        joints=tuple(
+            jb.Stop(f"shank_{i}", upper=0.2, law=jb.laws.RistowSchafer(K=3e2, c=3e3, n=1.0))
+            for i in (1, 2)
+        ),
+        mirror=(("thigh_1", "thigh_2"), ("shank_1", "shank_2")),
+    )
+    known = jb.parameter_quantities(dataclasses.replace(jb.seed_scene(), walker=walker))
+    symbols = {name: each.symbol for name, each in known.items() if each.symbol}
+    assert len(set(symbols.values())) == len(symbols), symbols
+    assert symbols["thigh.mass"] == r"$m_{\mathrm{thigh}}$"
+    assert symbols["slope"] == r"$\alpha$"
+    label = Figure().text(0.0, 0.0, " ".join(symbols.values()))
+    label.figure.canvas.draw()
+    quantity = jb.laws.Quantity("gain", r"$k_\mathrm{p}$").of_part("hip_1")
+    assert quantity == ("gain, hip_1", r"$k_{\mathrm{p},\mathrm{hip\_1}}$", "")
+
+
 def test_rows_and_titles():
     assert row_label("friction.mu_static") == r"static friction, $\mu_0$"
     assert row_label("strangeness") == "strangeness"
