@@ -1,12 +1,15 @@
-"""Summary of a result in a line: how it ended, its shape, precision and memory, and what ran it.
+"""Summary of a result in a line, and texts of modules and named tuples with their numbers.
 
 And what a notebook shows of it, which `jaxbiped.plot` draws: through the public name, when it is
 first asked for, as this lies below all that draws.
 """
 
 import collections
+import dataclasses
 import enum
 import importlib
+from collections.abc import Mapping
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -16,6 +19,8 @@ from jaxtyping import ArrayLike, PyTree
 
 from jaxbiped._types import Numbers
 
+_WIDTH = 88
+"""Characters of a line of a text; a longer call has a line for each argument."""
 _UNITS = ("B", "kB", "MB", "GB", "TB")
 
 
@@ -36,6 +41,43 @@ def summary(
         f"{type(result).__name__}({_outcomes(code, names)}, engine={engine}, "
         f"shape={tuple(like.shape)}, dtype={like.dtype}, {_memory(size)})"
     )
+
+
+def in_short(shown: Any) -> str:
+    """A module or a named tuple as a call that makes it, with its numbers to six digits."""
+    if hasattr(shown, "_asdict"):
+        return call_text(type(shown).__name__, shown._asdict())
+    own = (field.name for field in dataclasses.fields(shown))
+    return call_text(type(shown).__name__, {name: vars(shown).get(name) for name in own})
+
+
+def call_text(kind: str, arguments: Mapping[str, Any]) -> str:
+    """A call with these arguments, those that are None or empty left out; on lines if it is long.
+
+    An array is told by its type and shape.
+    """
+    told = {name: value for name, value in arguments.items() if value is not None}
+    parts = [f"{name}={_short(value)}" for name, value in told.items()]
+    return _joined(kind, [part for part in parts if not part.endswith("=()")])
+
+
+def _joined(kind: str, parts: list[str]) -> str:
+    line = f"{kind}({', '.join(parts)})"
+    if len(line) <= _WIDTH:
+        return line
+    inner = ",\n".join(parts).replace("\n", "\n  ")
+    return f"{kind}(\n  {inner}\n)"
+
+
+def _short(value: Any) -> str:
+    if hasattr(value, "_asdict") or type(value).__repr__ is eqx.Module.__repr__:
+        return in_short(value)
+    if isinstance(value, tuple | list):
+        return _joined("", list(map(_short, value)))
+    if hasattr(value, "dtype"):
+        is_number = not np.ndim(value) and not isinstance(value, jax.core.Tracer)
+        return f"{value:.6g}" if is_number else f"{value.dtype}{list(value.shape)}"
+    return repr(value)
 
 
 def notebook_html(shown: object) -> str:

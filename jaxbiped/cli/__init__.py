@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import tyro
 from tyro.conf import subcommand
 
+import jaxbiped
 from jaxbiped._checks import ArgumentError, ResourceError
 from jaxbiped._files import check_environment, user_path
 from jaxbiped._progress import tell_stages
@@ -95,9 +96,7 @@ def _run(given: list[str]) -> None:
         sys.exit(2)
     command = None if given == ["--version"] else _parse(given)
     if command is None:
-        from importlib.metadata import version
-
-        print(version("jaxbiped"))
+        print(jaxbiped.__version__)
         return
     tell_stages()
     usual, warnings.formatwarning = warnings.formatwarning, _one_line
