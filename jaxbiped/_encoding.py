@@ -75,7 +75,7 @@ class Encoder:
         if isinstance(value, np.ma.MaskedArray):
             parts = (np.asarray(value.data), value.mask, value.fill_value)
             return {"masked": [self.encode(part, where) for part in parts]}
-        if jax.dtypes.issubdtype(value.dtype, jax.dtypes.extended):
+        if isinstance(value, jax.Array) and hasattr(value.dtype, "_impl"):
             raise ArgumentError(f"{where} is not allowed: {value.dtype} cannot be saved.")
         array, small = np.asarray(value), {}
         if array.dtype.type.__module__ == "ml_dtypes":  # such as bfloat16: a file holds its bits

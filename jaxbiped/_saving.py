@@ -50,7 +50,7 @@ def save(path: str | Path, value: Any) -> None:
     try:
         tree = written.encode(value, "value")
     except RecursionError:
-        raise ArgumentError("value is not allowed: it is nested too deeply, or in itself.") from None
+        raise ArgumentError("value is not allowed: it is nested too deeply.") from None
     own = {**provenance(), "user_code": source_digests(written.found.values())}
     contents = {"jaxbiped": FORMAT, "written_by": own, "value": tree}
     half = file.with_name(f".{file.name}.unfinished")

@@ -46,38 +46,37 @@ def summary(
 def in_short(shown: Any) -> str:
     """A module or a named tuple as a call that makes it, with its numbers to six digits."""
     if hasattr(shown, "_asdict"):
-        return call_text(type(shown).__name__, shown._asdict())
-    own = (field.name for field in dataclasses.fields(shown))
-    return call_text(type(shown).__name__, {name: vars(shown).get(name) for name in own})
+        given = shown._asdict()
+    elif hasattr(shown, "arguments"):
+        given = shown.arguments()
+    else:
+        given = {field.name: vars(shown).get(field.name) for field in dataclasses.fields(shown)}
+    return call_text(type(shown).__name__, given)
 
 
 def call_text(kind: str, arguments: Mapping[str, Any]) -> str:
-    """A call with these arguments, those that are None or empty left out; on lines if it is long.
-
-    An array is told by its type and shape.
-    """
-    told = {name: value for name, value in arguments.items() if value is not None}
-    parts = [f"{name}={_short(value)}" for name, value in told.items()]
+    """A call with these arguments, without those that are None or empty; on lines if it is long."""
+    given = {name: value for name, value in arguments.items() if value is not None}
+    parts = [f"{name}={_short(value)}" for name, value in given.items()]
     return _joined(kind, [part for part in parts if not part.endswith("=()")])
 
 
 def _joined(kind: str, parts: list[str]) -> str:
-    line = f"{kind}({', '.join(parts)})"
-    if len(line) <= _WIDTH:
-        return line
     inner = ",\n".join(parts).replace("\n", "\n  ")
-    return f"{kind}(\n  {inner}\n)"
+    line = f"{kind}({', '.join(parts)})"
+    return line if len(line) <= _WIDTH else f"{kind}(\n  {inner}\n)"
 
 
 def _short(value: Any) -> str:
-    if hasattr(value, "_asdict") or type(value).__repr__ is eqx.Module.__repr__:
+    kind: Any = type(value)
+    if hasattr(value, "_asdict") or kind.__repr__ is eqx.Module.__repr__:
         return in_short(value)
     if isinstance(value, tuple | list):
         return _joined("", list(map(_short, value)))
-    if hasattr(value, "dtype"):
-        is_number = not np.ndim(value) and not isinstance(value, jax.core.Tracer)
-        return f"{value:.6g}" if is_number else f"{value.dtype}{list(value.shape)}"
-    return repr(value)
+    if not hasattr(value, "dtype"):
+        return repr(value)
+    is_known = not np.ndim(value) and not isinstance(value, jax.core.Tracer)
+    return f"{value:.6g}" if is_known else f"{value.dtype}{list(value.shape)}"
 
 
 def notebook_html(shown: object) -> str:

@@ -173,7 +173,7 @@ class Whole(int):
     """A number with a type of its own."""
 
 
-Renamed = collections.namedtuple("Other", "x")  # noqa: PYI024
+Renamed = collections.namedtuple("Other", "x")
 LOOP = []
 LOOP.append(LOOP)
 

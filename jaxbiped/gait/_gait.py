@@ -12,7 +12,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import check_unbatched
 from jaxbiped._ending import Ending
 from jaxbiped._quantity import Quantity
-from jaxbiped._summary import in_short, notebook_html, summary
+from jaxbiped._summary import call_text, in_short, notebook_html, summary
 from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped._types import Scalar, by_numpy, is_traced
 from jaxbiped.dynamics._state import recurring_names, state_quantity
@@ -146,17 +146,14 @@ class Gait(eqx.Module, Tabular):
     _repr_html_ = notebook_html
 
     def __repr__(self) -> str:
-        like, code, radius = self.measures.period, self.ending, self.measures.spectral_radius
+        like, code = self.measures.period, self.ending
         if is_traced(self) or np.ndim(code):
             return summary(self, like=like, code=code, names=Search, engine=self.engine)
-        told = f"residual {float(self.residual):.1e}"
+        known: dict[str, Any] = {"outcome": str(self.outcome), "residual": self.residual}
         if self.outcome is Search.FOUND:
-            told = f"period {float(like):.6g} s, step length {float(self.measures.step_length):.6g} m"
-            if radius is not None:
-                held = "stable" if bool(self.stable) else "not stable"
-                told += f", spectral radius {float(radius):.6g} ({held})"
-        footsteps = len(self.step_lengths)
-        return f"Gait({self.outcome}: {told}, footsteps={footsteps}, engine={self.engine})"
+            known |= {name: getattr(self.measures, name) for name in QUANTITIES}
+            known["stable"] = bool(self.stable)
+        return call_text("Gait", known | {"cycle": self.cycle, "engine": self.engine})
 
     @property
     def state(self) -> PyTree:

@@ -12,7 +12,7 @@ import jax
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._jax_versions import current_trace
 from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
-from jaxbiped._summary import call_text
+from jaxbiped._summary import in_short
 from jaxbiped._types import Parameter, Scalar, by_numpy, is_traced
 from jaxbiped.caching._caches import OfObjects
 from jaxbiped.scene._bodies import Body, Foot
@@ -79,6 +79,7 @@ class Mechanism(eqx.Module):
     )
     pieces: tuple[Body | Foot | AbstractJointPart, ...] = eqx.field(kw_only=True)
     structure: Structure = eqx.field(static=True, kw_only=True)
+    __repr__ = in_short
 
     def __init__(
         self,
@@ -202,9 +203,6 @@ class Mechanism(eqx.Module):
             "mirror": tuple((s.bodies[i], s.bodies[j]) for i, j in mirrored),
             "turn": None if s.turn is None else {s.bodies[s.turn.body]: s.turn.order},
         }
-
-    def __repr__(self) -> str:
-        return call_text("Mechanism", self.arguments())
 
     def untied(self) -> "Mechanism":
         """The mechanism without its mirror: each side has its own parameters, initially equal."""

@@ -5,7 +5,6 @@ either side. So each start is solved three times, and again more tightly where t
 """
 
 from collections.abc import Callable, Mapping
-from itertools import islice
 from typing import Any
 
 import equinox as eqx
@@ -39,9 +38,6 @@ _LEAST = 2.0
 """How many times looser the looser tolerance is at least."""
 _STEPS = 2
 """How many times more steps a finer tolerance may take."""
-
-_MOST_NAMED = 8
-"""Gaits that are named in a text, at most."""
 
 Follow = Callable[[np.ndarray, Effort], Labelled]
 """Labels of the starts with these numbers, by one solve of each."""
@@ -118,13 +114,8 @@ class Labelling(eqx.Module):
     effort: Effort = eqx.field(static=True)
 
     def __repr__(self) -> str:
-        seconds = (f"{gait.duration:.4g} s" for row in self.family.rows for gait in row)
-        gaits = ", ".join(islice(seconds, _MOST_NAMED)) or "none"
-        return (
-            f"Labelling({type(self.scene).__name__}, gaits by period: {gaits}, at most "
-            f"{self.effort.footsteps} footsteps, rtol={self.effort.rtol:.2g}, "
-            f"engine={self.effort.engine})"
-        )
+        kind, gaits = type(self.scene).__name__, sum(map(len, self.family.rows))
+        return f"Labelling({kind}, {gaits} gaits, engine={self.effort.engine})"
 
     def __call__(
         self, states: PyTree, *, parameters: Mapping[str, np.ndarray] | None = None
