@@ -58,6 +58,8 @@ _sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> _Any:
+    if name == "__version__":
+        return _importlib.import_module("importlib.metadata").version(__name__)
     home = _HOMES.get(name)
     if home is None:
         for space, names in _MOVED.items():

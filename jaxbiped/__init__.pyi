@@ -97,3 +97,5 @@ from jaxbiped.sweep._sweep import sweep as sweep
 
 # Optimisation.
 from jaxbiped.optimise._optimise_gait import optimise_gait as optimise_gait
+
+__version__: str

@@ -9,17 +9,7 @@ from typing import Any
 
 def main() -> None:
     """Runs a command and exits; Ctrl-C ends it in one line also while the package is imported."""
-    usual = sys.unraisablehook
-
-    def repeat_interrupt(lost: Any) -> None:
-        """Repeats a Ctrl-C that came in a callback, such as the garbage collector's, which cannot
-        raise it."""
-        if lost.exc_type is KeyboardInterrupt:
-            threading.Timer(0.05, _thread.interrupt_main).start()
-        else:
-            usual(lost)
-
-    sys.unraisablehook = repeat_interrupt
+    sys.unraisablehook = _repeat_interrupt
     try:
         from jaxbiped.cli import main as run_command
 
@@ -29,6 +19,14 @@ def main() -> None:
         sys.exit(130)
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is written, and the process only ends
+
+
+def _repeat_interrupt(lost: Any) -> None:
+    """Repeats a Ctrl-C that came in a callback, as of a garbage collector, which cannot raise."""
+    if lost.exc_type is KeyboardInterrupt:
+        threading.Timer(0.05, _thread.interrupt_main).start()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 if __name__ == "__main__":

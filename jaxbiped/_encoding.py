@@ -4,6 +4,7 @@ Classes and functions stand there by their import paths, the instances of classe
 their fields.
 """
 
+import contextlib
 import dataclasses
 import enum
 import functools
@@ -20,6 +21,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._identity import provenance
 from jaxbiped._types import JsonObject, as_array
 
+_ARRAYS = (np.ndarray, np.ma.MaskedArray)
 _NOWHERE = ("<locals>", "<lambda>")
 """In the names of functions and classes that nobody can import."""
 
@@ -40,17 +42,17 @@ class Encoder:
             }
         if isinstance(value, jax.core.Tracer):
             raise ArgumentError(f"{where} is traced: save what a transformed function returns.")
-        if hasattr(value, "__array__") and not _is_dataset(value):
+        if type(value) in _ARRAYS or isinstance(value, np.generic | jax.Array):
             return self._array(value, where)
-        if value is None or isinstance(value, bool | int | str):
+        if value is None or type(value) in (bool, int, str):
             return value
-        if isinstance(value, float):
+        if type(value) is float:
             return value if math.isfinite(value) else {"float": str(value)}
-        if isinstance(value, complex):
+        if type(value) is complex:
             return {"complex": [self.encode(part, where) for part in (value.real, value.imag)]}
         if hasattr(value, "_asdict") and not isinstance(value, type):
             return self._fields(value, value._asdict(), where)
-        if isinstance(value, list | tuple):
+        if type(value) in (list, tuple):
             items = [self.encode(each, f"{where}[{k}]") for k, each in enumerate(value)]
             return items if isinstance(value, list) else {"tuple": items}
         if type(value) is dict:
@@ -71,15 +73,21 @@ class Encoder:
 
     def _array(self, value: Any, where: str) -> JsonObject:
         if isinstance(value, np.ma.MaskedArray):
-            parts = (np.asarray(value.data), np.ma.getmaskarray(value))
+            parts = (np.asarray(value.data), value.mask, value.fill_value)
             return {"masked": [self.encode(part, where) for part in parts]}
-        array = np.asarray(value)
+        if isinstance(value, jax.Array) and hasattr(value.dtype, "_impl"):
+            raise ArgumentError(f"{where} is not allowed: {value.dtype} cannot be saved.")
+        array, small = np.asarray(value), {}
+        if array.dtype.type.__module__ == "ml_dtypes":  # such as bfloat16: a file holds its bits
+            array, small = array.view(f"u{array.itemsize}"), {"dtype": array.dtype.name}
         if array.dtype == object:
             items = [self.encode(each, where) for each in array.ravel().tolist()]
             return {"objects": items, "shape": list(array.shape)}
+        if not _is_kept(array.dtype):
+            raise ArgumentError(f"{where} is not allowed: {array.dtype} cannot be saved.")
         self.arrays.append(array)
         kind = "scalar" if isinstance(value, np.generic) else "numpy"
-        return {"jax" if isinstance(value, jax.Array) else kind: len(self.arrays) - 1}
+        return {"jax" if isinstance(value, jax.Array) else kind: len(self.arrays) - 1} | small
 
     def _fields(self, value: Any, fields: Mapping[str, Any], where: str) -> JsonObject:
         own = {name: self.encode(each, f"{where}.{name}") for name, each in fields.items()}
@@ -96,7 +104,8 @@ class Encoder:
 
     def _path(self, thing: Any, where: str) -> str:
         name = f"{_home(thing)}:{thing.__qualname__}"
-        if any(each in name for each in _NOWHERE):
+        nowhere = any(part in name for part in _NOWHERE)
+        if nowhere or _imported(*name.split(":")) is not thing:
             raise ArgumentError(
                 f"{where} is not allowed: {thing.__qualname__} has no import path; define it at "
                 "the top of a module."
@@ -107,12 +116,20 @@ class Encoder:
 
 def _home(thing: Any) -> str:
     """The outermost package that exports a class or function, else its module, which may move."""
-    parts, name = thing.__module__.split("."), thing.__qualname__
+    parts, name = str(thing.__module__).split("."), thing.__qualname__
     for depth in range(1, len(parts)):
         package = sys.modules[".".join(parts[:depth])]
         if name in dir(package) and getattr(package, name) is thing:
             return package.__name__
     return str(thing.__module__)
+
+
+def _is_kept(dtype: np.dtype) -> bool:
+    """Whether a `.npy` file holds arrays of a type, without pickled objects."""
+    form: Any = np.lib.format
+    with contextlib.suppress(TypeError, ValueError):
+        return not dtype.hasobject and form.descr_to_dtype(form.dtype_to_descr(dtype)) == dtype
+    return False
 
 
 def _is_dataset(value: Any) -> bool:
@@ -140,10 +157,10 @@ class Decoder:
             "complex": lambda: complex(*self.decode(held)),
             "tuple": lambda: tuple(self.decode(held)),
             "dict": lambda: {self.decode(key): self.decode(each) for key, each in held},
-            "numpy": lambda: self._array(held),
-            "scalar": lambda: self._array(held)[()],
-            "jax": lambda: as_array(self._array(held)),
-            "masked": lambda: np.ma.MaskedArray(*self.decode(held)),
+            "numpy": lambda: self._array_of(tree, held),
+            "scalar": lambda: self._array_of(tree, held)[()],
+            "jax": lambda: as_array(self._array_of(tree, held)),
+            "masked": lambda: self._masked(*self.decode(held)),
             "objects": lambda: self._objects(held, tree["shape"]),
             "enum": lambda: self._import(held, enum.Enum)(self.decode(tree["value"])),
             "import": lambda: self._import(held),
@@ -152,9 +169,17 @@ class Decoder:
         }
         return decoders[kind]()
 
+    def _array_of(self, tree: JsonObject, number: int) -> np.ndarray:
+        array = self._array(number)
+        return array.view(jax.numpy.dtype(tree["dtype"])) if "dtype" in tree else array
+
+    def _masked(self, values: np.ndarray, mask: np.ndarray, fill: Any = None) -> np.ndarray:
+        return np.ma.MaskedArray(values, mask, fill_value=fill)
+
     def _objects(self, items: list[Any], shape: list[int]) -> np.ndarray:
         array = np.empty(len(items), object)
-        array[:] = self.decode(items)
+        for place, item in enumerate(items):  # an item may be an array itself
+            array[place] = self.decode(item)
         return array.reshape(shape)
 
     def _dataset(self, tree: JsonObject) -> Any:

@@ -4,6 +4,7 @@ import errno
 import json
 import math
 import os
+import urllib.parse
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -39,12 +40,18 @@ def failure_kind(error: OSError) -> type[ArgumentError] | type[ResourceError]:
 
 
 def user_path(path: str | Path, name: str = "path") -> Path:
-    """A path as the user means it: "~" is the home folder.
+    """A path as the user means it: "~" is the home folder, and file:///FOLDER an address of it.
 
     Raises:
-        ArgumentError: no path, or a home folder that is not known.
+        ArgumentError: no path, a home folder that is not known, or a file of another machine.
     """
     try:
+        text = os.fspath(path)
+        if text[:5] == "file:":
+            address = text[5:].removeprefix("//localhost").removeprefix("//")
+            if text[5:7] == "//" and address[:1] != "/":
+                raise RuntimeError("an address of a file begins with file:///")
+            return Path(urllib.parse.unquote(address))
         return Path(path).expanduser()
     except (TypeError, RuntimeError) as error:
         raise ArgumentError(f"{name} = {path!r} is not allowed: {error}.") from None
@@ -71,34 +78,28 @@ def read_json(name: str, path: str | Path) -> Any:
 
 
 def read_csv(name: str, path: str | Path) -> list[tuple[int, list[str]]]:
-    """Rows of a CSV file, the header first: the line of each and its stripped cells.
+    """Rows of a CSV file, the header first: the line of each and its cells.
 
-    Lines that begin with # and rows of empty cells are left out, and so are columns without a name
-    and without cells, as spreadsheets write them.
-
-    Raises:
-        ArgumentError: the file cannot be read, has no row below its header, or has a row with
-            another number of cells.
+    Lines that begin with # are left out, and so are rows of empty cells, and empty columns without
+    a name. Raises `ArgumentError` for a file that is none, by the line.
     """
     import csv
 
     file = f"{name} = {str(path)!r}"
     lines = read_text(name, path).splitlines()
     reader = csv.reader("" if line.lstrip().startswith("#") else line for line in lines)
-    rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
-    rows = [(line, cells) for line, cells in rows if any(cells)]
+    table = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader]
+    rows = [(line, cells) for line, cells in table if any(cells)]
     if len(rows) < 2:
         raise ArgumentError(f"{file} is not allowed: it must have a header and at least one row.")
     header = rows[0][1]
     named = [k for k, cell in enumerate(header) if cell]
-    remedy = "separate them by commas, and write numbers with a point"
     for line, cells in rows:
-        if len(named) == 1 and any(mark in header[named[0]] for mark in ";\t"):
-            raise ArgumentError(f"{file}, line {line}: its cells have no commas: {remedy}.")
-        if len(cells) <= named[-1] or any(x for k, x in enumerate(cells) if k not in named):
+        unlike = len(cells) <= named[-1] or any(x for k, x in enumerate(cells) if k not in named)
+        if unlike or (len(named) == 1 and {";", "\t"} & set(header[named[0]])):
             raise ArgumentError(
                 f"{file}: line {line} has {len(cells)} cells, and the header {len(header)}: "
-                f"{remedy}."
+                "separate them by commas, and write numbers with a point."
             )
     return [(line, [cells[k] for k in named]) for line, cells in rows]
 

@@ -12,6 +12,7 @@ import equinox as eqx
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._quantity import ParameterInfo, Quantity
+from jaxbiped._summary import in_short
 from jaxbiped._types import Parameter, Scalar, as_float
 
 _KEY = "parameter"
@@ -98,6 +99,8 @@ def with_fields(piece: Any, **fields: object) -> Any:
 
 class AbstractPart(eqx.Module):
     """A part of a scene, whose parameters are checked when it is made."""
+
+    __repr__ = in_short
 
     def __check_init__(self) -> None:
         check_parameters(self)

@@ -36,12 +36,7 @@ _WITH_UNIT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*)")
 
 
 def unit_scales(unit: str | None, given: str = "") -> dict[str, float]:
-    """The units in which a quantity may be written, and how many SI units each of them is.
-
-    Args:
-        unit: the quantity's SI unit; None if it is not known yet.
-        given: the unit that is given, which then tells the others of its kind.
-    """
+    """The units for numbers of an SI unit, or of the kind of a `given` one, in SI units."""
     if unit is not None:
         return _SCALES.get(unit, {unit: 1.0})
     return next((scales for scales in _SCALES.values() if given in scales), {given: 1.0})
@@ -56,14 +51,10 @@ def si_number(text: str, unit: str | None = None) -> float:
     with contextlib.suppress(ValueError):
         return float(text)
     found = _WITH_UNIT.fullmatch(text.strip())
-    if found is None:
-        raise ValueError(f"{text!r} is not a number")
-    scales = unit_scales(unit, found[2])
-    if found[2] not in scales:
+    scales = unit_scales(unit, found[2]) if found else {}
+    if found is None or found[2] not in scales:
         allowed = ", ".join(filter(None, scales))
-        raise ValueError(
-            f"{text!r} is not a number" + (f" in {allowed}" if allowed else ": it has no unit")
-        )
+        raise ValueError(f"{text!r} is not a number" + (f" in {allowed}" if allowed else ""))
     return float(found[1]) * scales[found[2]]
 
 

@@ -47,13 +47,16 @@ def save(path: str | Path, value: Any) -> None:
     """
     file = check_writable_file("path", path)
     written = Encoder()
-    tree = written.encode(value, "value")
+    try:
+        tree = written.encode(value, "value")
+    except RecursionError:
+        raise ArgumentError("value is not allowed: it is nested too deeply.") from None
     own = {**provenance(), "user_code": source_digests(written.found.values())}
     contents = {"jaxbiped": FORMAT, "written_by": own, "value": tree}
     half = file.with_name(f".{file.name}.unfinished")
     try:
         with zipfile.ZipFile(half, "w", compresslevel=1) as archive:
-            text = json.dumps(contents, ensure_ascii=False, allow_nan=False, indent=1)
+            text = json.dumps(contents, allow_nan=False, indent=1)
             archive.writestr(_entry(_CONTENTS), text)
             for number, array in enumerate(written.arrays):
                 bytes_ = io.BytesIO()

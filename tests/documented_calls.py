@@ -14,7 +14,10 @@ def mechanism() -> jb.Mechanism:
         jb.Body("torso", mass=0.5, inertia=0.01, centre=-0.1),
         jb.Body("head", mass=0.1, inertia=0.001, centre=-0.1, parent="torso", at=-0.3),
     ]
-    feet = [jb.Foot("leg_1", centre=0.3, radius=0.1), jb.Foot("leg_2", centre=(0.3, 0.0), radius=0.1)]
+    feet = [
+        jb.Foot("leg_1", centre=0.3, radius=0.1),
+        jb.Foot("leg_2", centre=(0.3, 0.0), radius=0.1),
+    ]
     between = {"leg_1": 1, "leg_2": -1}
     joints = [
         jb.Spring(between, stiffness=1.0),

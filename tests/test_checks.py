@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._files import check_writable_directory
+from jaxbiped._files import check_writable_directory, user_path
 
 
 @pytest.mark.parametrize(
@@ -116,3 +116,20 @@ def test_a_path_is_to_blame_for_itself_and_not_for_its_disk(tmp_path, monkeypatc
     monkeypatch.setattr(Path, "mkdir", refuse)
     with pytest.raises(kind, match=rf"out = .* is not allowed \({os.strerror(code).lower()}\)"):
         check_writable_directory("out", tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("address", "path"),
+    [
+        ("file:///a%20b/c#d?e", "/a b/c#d?e"), ("file://localhost/a", "/a"), ("file:/a", "/a"),
+        ("file:a/b", "a/b"), (Path("file:///a"), "/a"), ("a/b", "a/b"),
+    ],
+)  # fmt: skip
+def test_an_address_of_a_file_is_its_path(address, path):
+    assert user_path(address) == Path(path)
+
+
+@pytest.mark.parametrize("address", ["file://machine/a", "file://a", 3, None])
+def test_a_file_of_another_machine_is_refused(address):
+    with pytest.raises(jb.ArgumentError, match="is not allowed"):
+        user_path(address)

@@ -1,6 +1,7 @@
-"""Types of the lessons as a user's scripts, against what pyright says of them."""
+"""Types of the lessons and of documented calls, against what pyright and mypy say of them."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -9,6 +10,9 @@ from pathlib import Path
 
 import nbformat
 import pytest
+
+import jaxbiped as jb
+from tests import documented_calls
 
 ROOT = Path(__file__).parents[1]
 
@@ -27,4 +31,27 @@ def test_each_lesson_passes_pyright_as_a_script(tmp_path):
     (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings))
     command = [checker, "--project", str(tmp_path), "--pythonpath", sys.executable]
     ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stdout
+
+
+def test_documented_calls_do_what_they_say():
+    """mypy reads them with the package (`make check`); here they are made."""
+    mechanism = documented_calls.mechanism()
+    first, second, _, head = mechanism.bodies
+    assert float(first.centre.along) == float(second.centre.along) == 0.1
+    assert float(head.at.along) == -0.3
+    assert mechanism.joints[0].angle == (("leg_1", 1.0), ("leg_2", -1.0))
+    rigid, driven, one_leg, redundant = documented_calls.scenes()
+    assert (len(rigid.actuation), len(driven.actuation)) == (1, 2)
+    assert one_leg.clearance.leg == "1"
+    assert isinstance(redundant.method, jb.constraints.CONSTRAINT_METHODS["baumgarte"])
+
+
+@pytest.mark.nightly
+def test_documented_calls_pass_mypy_as_a_script(tmp_path):
+    path = tmp_path / "script.py"
+    path.write_text(Path(documented_calls.__file__).read_text())
+    command = [sys.executable, "-m", "mypy", "--cache-dir", str(tmp_path), str(path)]
+    environment = os.environ | {"MYPYPATH": str(ROOT)}
+    ended = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stdout

@@ -1,6 +1,7 @@
 """Parameters with words, unit and range, against checks, docstrings and the laws' powers."""
 
 import inspect
+import math
 import re
 
 import jax.numpy as jnp
@@ -10,7 +11,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._parameter_declaration import parameter_infos
-from jaxbiped._quantity import Quantity
+from jaxbiped._quantity import Quantity, si_number
 
 SEED = jb.seed_scene()
 NORMALS = {
@@ -192,3 +193,30 @@ def test_of_a_plain_field_the_name_is_known():
     quantities = jb.parameter_quantities(scene)
     assert quantities["k"] == Quantity("k")
     assert set(quantities) == set(jb.parameter_names(scene))
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "number"),
+    [
+        ("0.02", "rad", 0.02), ("-1e-6", "rad", -1e-6), ("2deg", "rad", math.radians(2.0)),
+        ("-.5 °", "rad", math.radians(-0.5)), ("1e3mrad", "rad", 1.0),
+        ("90deg/s", "rad/s", math.pi / 2),
+        ("12.5cm", "m", 0.125), ("3.6km/h", "m/s", 1.0), ("500 ms", "s", 0.5), ("250g", "kg", 0.25),
+        ("2 N/m^n", "N/m^n", 2.0), ("inf", "s", math.inf), ("20mm", None, 0.02),
+    ],
+)  # fmt: skip
+def test_a_number_may_have_a_unit(text, unit, number):
+    assert si_number(text, unit) == pytest.approx(number, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "said"),
+    [
+        ("abc", "rad", "'abc' is not a number"), ("", "s", "'' is not a number"),
+        ("2cm", "rad", "'2cm' is not a number in rad, mrad, deg, °"),
+        ("0,5", "m", "'0,5' is not a number in m, cm, mm"), ("2deg", "", "'2deg' is not a number"),
+    ],
+)  # fmt: skip
+def test_a_number_of_another_unit_is_none(text, unit, said):
+    with pytest.raises(ValueError, match=re.escape(said) + "$"):
+        si_number(text, unit)

@@ -1,7 +1,11 @@
 """Saved scenes and results, against what was saved, bit by bit."""
 
+import collections
 import dataclasses
+import datetime
+import functools
 import json
+import math
 import subprocess
 import sys
 import zipfile
@@ -9,7 +13,9 @@ import zipfile
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pandas as pd
 import pytest
+import xarray
 
 import jaxbiped as jb
 from jaxbiped.models._catalogue import MODELS
@@ -124,6 +130,69 @@ def test_what_else_values_are_made_of(tmp_path):
     masked = again(tmp_path, np.ma.array([1.0, 2.0], mask=[True, False]))
     assert masked.mask.tolist() == [True, False]
     assert masked[1] == 2.0
+
+
+ARRAYS = {
+    **{name: jnp.asarray([1, 2], name) for name in ("bfloat16", "float8_e4m3fn", "int4", "uint2")},
+    "one of bfloat16": jnp.asarray(1.5, jnp.bfloat16),
+    "scalar of bfloat16": np.asarray(jnp.asarray(1.5, jnp.bfloat16))[()],
+    "turned": np.asarray(jnp.ones((2, 3), jnp.bfloat16)).T,
+    "big-endian": np.arange(3, dtype=">f8"),
+    "complex": np.array([1 + 2j, np.nan], ">c16"),
+    "dates": np.array(["2020-01-01", "NaT"], "M8[ns]"),
+    "duration": np.timedelta64(3, "s"),
+    "fields": np.array([(1, [2.0, 3.0])], dtype=[("a", "i4"), ("b", "f8", (2,))]),
+    "bytes": np.array([b"x"]),
+    "nothing": np.zeros((0, 3), np.float16),
+    "columns": np.asfortranarray(np.arange(6.0).reshape(2, 3)),
+    "masked": np.ma.array([1.0, 2.0], mask=[True, False], fill_value=7.0),
+    "masked nowhere": np.ma.array([1, 2]),
+}
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_an_array_of_any_type_is_the_same(tmp_path, name):
+    array = ARRAYS[name]
+    held = again(tmp_path, array)
+    assert type(held) is type(array)
+    assert (held.dtype, held.shape) == (array.dtype, array.shape)
+    assert np.asarray(held).tobytes() == np.asarray(array).tobytes()
+    assert repr(held) == repr(array)
+
+
+def test_arrays_within_an_array_and_words_that_are_no_text_are_the_same(tmp_path):
+    parts = np.empty(2, object)
+    parts[0], parts[1] = np.arange(3), np.arange(3)
+    held = again(tmp_path, {"parts": parts, "half a pair": "\ud800"})
+    assert held["parts"].shape == (2,)
+    np.testing.assert_array_equal(held["parts"][1], np.arange(3))
+    assert held["half a pair"] == "\ud800"
+
+
+class Whole(int):
+    """A number with a type of its own."""
+
+
+Renamed = collections.namedtuple("Other", "x")
+LOOP = []
+LOOP.append(LOOP)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        np.array([(1, None)], dtype=[("a", "i4"), ("b", object)]),
+        np.rec.array([(1, 2.0)], dtype=[("a", int), ("b", float)]),
+        jax.random.key(0), Whole(3), collections.OrderedDict(a=1), Renamed(1), math.sin, len, int,
+        datetime.datetime(2020, 1, 1), b"x", xarray.DataArray([1.0]), pd.Series([1.0]),
+        functools.partial(len), collections.Counter().update, LOOP,
+    ],
+    ids=lambda value: type(value).__name__,
+)  # fmt: skip
+def test_what_could_not_be_read_back_is_not_written(tmp_path, value):
+    with pytest.raises(jb.ArgumentError, match=r"^value(\[0\])? is not allowed: "):
+        jb.save(tmp_path / "it.npz", [value] if value is not LOOP else value)
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_arrays_are_open_to_numpy_and_equal_contents_are_equal_files(tmp_path):

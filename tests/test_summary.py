@@ -1,5 +1,7 @@
 """Summaries, against the walks, batches and sizes that they tell of."""
 
+import importlib.metadata
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -43,3 +45,56 @@ def test_what_is_traced_prints_as_well():
 )
 def test_memory_in_powers_of_a_thousand(size, said):
     assert _memory(size) == said
+
+
+def test_a_scene_and_its_parts_tell_their_numbers():
+    scene = jb.with_parameters(jb.seed_scene(), {"slope": 0.0123456789})
+    assert repr(scene.ground) == "Ground(slope=0.0123457, g=9.8)"
+    said = repr(scene)
+    assert said.startswith(
+        "Scene(\n  walker=Walker(m=1, J=0.0096, l=0.4, d=0.1, r=0.08, hip_mass=0)"
+    )
+    assert "normal=RistowSchafer(K=1e+06, c=1e+07, n=1.5),\n" in said
+    assert "ground=Ground(slope=0.0123457, g=9.8)" in said
+    assert "actuation" not in said
+    batch = jb.with_parameters(scene, {"slope": np.array([0.01, 0.02])})
+    assert repr(batch.ground) == "Ground(slope=float64[2], g=9.8)"
+    told = []
+    jax.jit(lambda held: told.append(repr(held)))(scene.ground)
+    assert told == ["Ground(slope=float64[], g=float64[])"]
+
+
+def test_a_mechanism_tells_its_pieces_as_they_are_written():
+    said = repr(jb.seed_scene().mechanism)
+    assert said.startswith(
+        "Mechanism(\n  root='hip',\n  root_mass=0,\n  bodies=(\n    Body(name='1'"
+    )
+    assert "Foot(body='2', centre=Point(along=0.32), radius=0.08, name='foot', leg='2')" in said
+    assert "mirror=(('1', '2'))" in said
+    assert "Structure" not in said
+    assert repr(jb.Spring({"a": 1, "b": -1}, stiffness=2.0)) == (
+        "Spring(angle=(('a', 1.0), ('b', -1.0)), stiffness=2)"
+    )
+
+
+@pytest.mark.slow
+def test_a_gait_tells_its_measures_and_a_lost_one_no_more_than_it_knows():
+    scene = jb.ladder()["rigid"]
+    gait = jb.find_gait(scene)
+    said = repr(gait)
+    measures = gait.measures
+    assert f"period={float(measures.period):.6g},\n" in said
+    assert f"spectral_radius={float(measures.spectral_radius):.6g}" in said
+    assert "outcome='found'" in said
+    assert "stable=True" in said
+    assert repr(measures).startswith("Measures(\n  period=0.44378,")
+    assert gait.state is measures.state
+    lost = repr(jb.find_gait(jb.with_parameters(scene, {"slope": -0.02})))
+    assert "outcome='not converged'" in lost
+    assert "period" not in lost
+    assert "nan" not in lost
+    assert repr(jb.labelling(scene)) == "Labelling(RigidScene, 1 gaits, engine=lanes)"
+
+
+def test_the_version_is_the_installed_one():
+    assert jb.__version__ == importlib.metadata.version("jaxbiped")

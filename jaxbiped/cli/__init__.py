@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import tyro
 from tyro.conf import subcommand
 
+import jaxbiped
 from jaxbiped._checks import ArgumentError, ResourceError
 from jaxbiped._files import check_environment, user_path
 from jaxbiped._progress import tell_stages
@@ -23,10 +24,11 @@ from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._continue import ContinueGait
 from jaxbiped.cli._doctor import Cache, Doctor
+from jaxbiped.cli._fit import Fit
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
+from jaxbiped.cli._optimise import Optimise
 from jaxbiped.cli._options import Command
-from jaxbiped.cli._parameter_search import Fit, Optimise
 from jaxbiped.cli._report import Report as Report
 from jaxbiped.cli._trade import Trade
 from jaxbiped.cli._walk import Walk
@@ -95,9 +97,7 @@ def _run(given: list[str]) -> None:
         sys.exit(2)
     command = None if given == ["--version"] else _parse(given)
     if command is None:
-        from importlib.metadata import version
-
-        print(version("jaxbiped"))
+        print(jaxbiped.__version__)
         return
     tell_stages()
     usual, warnings.formatwarning = warnings.formatwarning, _one_line

@@ -11,8 +11,9 @@ import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_finite
 from jaxbiped._files import JsonObject
 from jaxbiped.cli import _options as options
+from jaxbiped.cli._named_numbers import numbers_in, units_of
 from jaxbiped.cli._report import Report, columns, records, table, wall_times
-from jaxbiped.cli._scene_options import SceneOptions, numbers_in, units_of
+from jaxbiped.cli._scene_options import SceneOptions
 from jaxbiped.cli._start_options import StartOptions
 
 _MOST_ROWS = 24

@@ -9,8 +9,8 @@ from tyro.conf import arg
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice, check_pair
-from jaxbiped._quantity import Quantity, si_number
 from jaxbiped.cli._declarations import Argument, fields, registered, signature
+from jaxbiped.cli._named_numbers import named_text, numbers_in, units_of
 from jaxbiped.cli._options import Check, Field, Options, among, one_of
 from jaxbiped.cli._walkers import SEED as SEED_WALKER
 from jaxbiped.cli._walkers import WALKERS, check_walker, walker_of
@@ -66,28 +66,6 @@ def _actuator_fields() -> Iterator[tuple[str, Field]]:
         yield name.replace("-", "_"), Field(checked, ())
 
 
-def named_text(option: str, text: str, example: str = "") -> tuple[str, str]:
-    """Name and value of name=value; raises `ArgumentError`."""
-    name, given, value = (part.strip() for part in text.partition("="))
-    if not name or not given:
-        raise ArgumentError(
-            f"{option.replace('_', '-')} = {text!r} is not allowed: write name=value{example}."
-        )
-    return name, value
-
-
-def numbers_in(
-    option: str, name: str, text: str, unit: str | None, mark: str | None = None
-) -> list[float]:
-    """The numbers of name=text in SI units, between marks; raises `ArgumentError`."""
-    try:
-        return [si_number(part, unit) for part in (text.split(mark) if mark else [text])]
-    except ValueError as error:
-        raise ArgumentError(
-            f"{option} = '{name}={text}' is not allowed: {name} must be a number, and {error}."
-        ) from None
-
-
 class ActuationOptions(Options, made=dict(_actuator_fields())):
     """What drives the walker beside gravity, each by its numbers as name=value (SI units)."""
 
@@ -119,7 +97,7 @@ def _actuator_values(option: str, home: str, texts: tuple[str, ...]) -> dict[str
         check_choice(f"{option}'s name", name, known)
         values[name] = value
         if info := known[name].info:
-            numbers = numbers_in(option, name, value, info.quantity.unit, ",")
+            numbers = numbers_in(option, name, value, info.quantity.unit, count=0)
             for number in numbers:
                 info.check(name, number)
             values[name] = numbers if len(numbers) > 1 else numbers[0]
@@ -127,11 +105,6 @@ def _actuator_values(option: str, home: str, texts: tuple[str, ...]) -> dict[str
         if default is None and info is not None and name not in values:
             raise ArgumentError(f"{option} needs {name}=value, its {info.quantity.words}.")
     return values
-
-
-def units_of(quantities: Mapping[str, Quantity]) -> dict[str, str]:
-    """The unit of each quantity, by its name."""
-    return {name: quantity.unit for name, quantity in quantities.items()}
 
 
 class SceneOptions(Options, made=dict(_parameter_fields())):

@@ -4,17 +4,22 @@ The starts of a basin lie on a grid, are samples, or those of a file.
 """
 
 import math
-import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
-from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
+from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped._files import read_csv
-from jaxbiped._quantity import si_number
+from jaxbiped.cli._named_numbers import (
+    LEG_SCALARS,
+    named_text,
+    numbers_in,
+    parse_axis,
+    unit_of_scalar,
+    units_of,
+)
 from jaxbiped.cli._options import Check, Count, Options, one_of
-from jaxbiped.cli._scene_options import SceneOptions, named_text, numbers_in, units_of
+from jaxbiped.cli._scene_options import SceneOptions
 from jaxbiped.cli._walkers import SEED as SEED_WALKER
 from jaxbiped.cli._walkers import usual_start
 
@@ -29,8 +34,6 @@ _STEP = 1.01
 _ROUNDS = 8
 _USUAL = ("theta_{swing}=-0.5:0.3:100", "omega_{swing}=-2:4:100")
 """Axes of a basin that nobody chose, and as many starts on each."""
-_OTHER_NAMES = ("theta_stance", "theta_swing", "omega_stance", "omega_swing")
-"""Names of the legs' angles and rates by what the legs do where a cycle begins."""
 _USUAL_RIGID = ("theta_{stance}=0:0.5:100", "omega_{stance}=-2.5:0:100")
 
 
@@ -67,7 +70,7 @@ class StartOptions(Options):
             name, value = named_text("state", text)
             if name in own:
                 raise ArgumentError(f"state = {text!r} is not allowed: {name} is given twice.")
-            own[name] = numbers_in("state", name, value, _unit_of(name))[0]
+            own[name] = numbers_in("state", name, value, unit_of_scalar(name))[0]
         return own
 
     def check_names(self, scene: SceneOptions) -> None:
@@ -127,12 +130,6 @@ class StartOptions(Options):
 
 _SCALARS = tuple(name for name in vars(StartOptions()) if name not in ("state", "standing"))
 """Scalars of the state of the seed's walker."""
-_UNITS = {"theta_": "rad", "omega_": "rad/s", "_v": "m/s", "_x": "m", "_z": "m"}
-
-
-def _unit_of(name: str) -> str:
-    """The unit of a scalar of a state, which its name tells."""
-    return next((unit for part, unit in _UNITS.items() if part in name), "")
 
 
 def default_start(scene: Any) -> Any:
@@ -181,32 +178,6 @@ def _depth(law: Any, own: Any, depth: "Scalar", load: "Scalar") -> "Scalar":
     return found
 
 
-def parse_axis(
-    text: str, unit: Callable[[str], str | None] = lambda _: None
-) -> tuple[str, tuple[float, float, int]]:
-    """Name, first, last and count of an axis, from name=first:last:count; `unit` is by name."""
-    match = re.fullmatch(r"([\w.-]+)=([^:]+):([^:]+):([^:]+)", text.strip())
-    try:
-        if match is None:
-            raise ValueError
-        name = match[1].replace("-", "_")
-        first, last = (si_number(match[k], unit(name)) for k in (2, 3))
-        count = int(match[4])
-    except ArgumentError:
-        raise
-    except ValueError:
-        raise ArgumentError(
-            f"axis {text!r} is not allowed: write name=first:last:count, such as "
-            "theta_swing=-0.5:0.1:200 or theta_swing=-30deg:5deg:200."
-        ) from None
-    check_positive(f"count of axis {text!r}", count)
-    if not first < last:
-        raise ArgumentError(
-            f"axis {text!r} is empty: its first value must be finite and less than its last."
-        )
-    return name, (first, last, count)
-
-
 _IS_AXIS = Check(lambda _, text: parse_axis(text))
 Axis = Annotated[str | None, _IS_AXIS]
 
@@ -253,9 +224,9 @@ class StartsOptions(Options, of=("starts.sample", "starts.grid")):
         """Raises `ArgumentError` for axes along which no starts of the seed's walker differ."""
 
         def unit(name: str) -> str | None:
-            if name in (*_SCALARS, *_OTHER_NAMES) or name.startswith("bristle"):
-                return _unit_of(name)
-            return scene.check_parameter("coordinate", name, *_OTHER_NAMES, *_SCALARS)
+            if name in (*_SCALARS, *LEG_SCALARS) or name.startswith("bristle"):
+                return unit_of_scalar(name)
+            return scene.check_parameter("coordinate", name, *LEG_SCALARS, *_SCALARS)
 
         for text in self.axes if scene.walker == SEED_WALKER else ():
             parse_axis(text, unit)
@@ -312,10 +283,10 @@ def read_starts(path: Path, scene: "jb.Scene | jb.RigidScene") -> object:
 
     structure = scene.mechanism.structure
     named, names = f"starts = {str(path)!r}", [*structure.coordinates, *structure.rates]
-    wanted = ",".join(names)
     (_, header), *rows = read_csv("starts", path)
     if header != names:
-        raise ArgumentError(f"{named} has the header {','.join(header)!r}: it must be {wanted}.")
+        told = f"{named} has the header {','.join(header)!r}"
+        raise ArgumentError(f"{told}: it must be {','.join(names)}.")
     numbers = []
     for line, row in rows:
         try:

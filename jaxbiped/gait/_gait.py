@@ -12,9 +12,9 @@ from jaxtyping import PyTree
 from jaxbiped._checks import check_unbatched
 from jaxbiped._ending import Ending
 from jaxbiped._quantity import Quantity
-from jaxbiped._summary import notebook_html, summary
+from jaxbiped._summary import call_text, in_short, notebook_html, summary
 from jaxbiped._tables import Entry, Tabular, variables_of
-from jaxbiped._types import Scalar, by_numpy
+from jaxbiped._types import Scalar, by_numpy, is_traced
 from jaxbiped.dynamics._state import recurring_names, state_quantity
 from jaxbiped.gait._fixed_point_search import (
     Search,
@@ -58,6 +58,9 @@ class Measures(NamedTuple):
     peak_normal: PyTree
     spectral_radius: PyTree
     state: PyTree
+
+    def __repr__(self) -> str:
+        return in_short(self)
 
 
 class Gait(eqx.Module, Tabular):
@@ -146,7 +149,18 @@ class Gait(eqx.Module, Tabular):
 
     def __repr__(self) -> str:
         like, code = self.measures.period, self.ending
-        return summary(self, like=like, code=code, names=Search, engine=self.engine)
+        if is_traced(self) or np.ndim(code):
+            return summary(self, like=like, code=code, names=Search, engine=self.engine)
+        known: dict[str, Any] = {"outcome": str(self.outcome), "residual": self.residual}
+        if self.outcome is Search.FOUND:
+            known |= {name: getattr(self.measures, name) for name in QUANTITIES}
+            known["stable"] = bool(self.stable)
+        return call_text("Gait", known | {"cycle": self.cycle, "engine": self.engine})
+
+    @property
+    def state(self) -> PyTree:
+        """The state on the section, `measures.state`."""
+        return self.measures.state
 
     @property
     def outcome(self) -> Search:

@@ -101,6 +101,11 @@ class Optimum(Tabular):
     lost: int
     unmeasured: int
 
+    @property
+    def measures(self) -> dict[str, float]:
+        """Measures in the objective and the requirements, and those of its gait, by name."""
+        return dict(self.known.values)
+
     def __repr__(self) -> str:
         variables = ", ".join(f"{name}={value:.6g}" for name, value in self.variables.items())
         return (

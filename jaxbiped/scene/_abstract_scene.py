@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import equinox as eqx
 from equinox import AbstractVar
 
-from jaxbiped._summary import notebook_html
+from jaxbiped._summary import in_short, notebook_html
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._mechanism import Mechanism, mechanism_of
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
@@ -30,6 +30,7 @@ class AbstractScene(eqx.Module):
     compliant: AbstractClassVar[bool]
     redundant: AbstractClassVar[bool]
 
+    __repr__ = in_short
     _repr_html_ = notebook_html
 
     @property

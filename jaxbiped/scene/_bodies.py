@@ -8,6 +8,7 @@ import equinox as eqx
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._parameter_declaration import AbstractPart, check_parameters, parameter
+from jaxbiped._summary import in_short
 from jaxbiped._types import Parameter
 
 _NAME = re.compile(r"[A-Za-z0-9_]+")
@@ -107,6 +108,7 @@ class Body(eqx.Module):
     centre: Place = eqx.field(converter=point_of)
     parent: str | None = eqx.field(static=True, default=None)
     at: Place | None = eqx.field(converter=point_of, default=None)
+    __repr__ = in_short
 
     def __check_init__(self) -> None:
         check_name("name", self.name)
@@ -142,6 +144,7 @@ class Foot(eqx.Module):
     radius: Parameter | None = parameter("foot radius", "$r$", "m", minimum=0.0, default=None)
     name: str | None = eqx.field(static=True, default=None)
     leg: str | None = eqx.field(static=True, default=None)
+    __repr__ = in_short
 
     def __check_init__(self) -> None:
         for argument in ("name", "leg"):

@@ -11,6 +11,7 @@ import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type, holds_somewhere, is_number
 from jaxbiped._parameter_declaration import check_parameters, parameter
+from jaxbiped._summary import in_short
 from jaxbiped._types import Parameter
 from jaxbiped.scene._bodies import check_name
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
@@ -60,6 +61,7 @@ class AbstractJointPart(eqx.Module):
     kind: ClassVar[str]
     angle: eqx.AbstractVar[Angle]
     name: eqx.AbstractVar[str | None]
+    __repr__ = in_short
 
     def __check_init__(self) -> None:
         if self.name is not None:

@@ -12,6 +12,7 @@ import jax
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._jax_versions import current_trace
 from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
+from jaxbiped._summary import in_short
 from jaxbiped._types import Parameter, Scalar, by_numpy, is_traced
 from jaxbiped.caching._caches import OfObjects, versions_in
 from jaxbiped.scene._bodies import Body, Foot
@@ -79,6 +80,7 @@ class Mechanism(eqx.Module):
     )
     pieces: tuple[Body | Foot | AbstractJointPart, ...] = eqx.field(kw_only=True)
     structure: Structure = eqx.field(static=True, kw_only=True)
+    __repr__ = in_short
 
     def __init__(
         self,

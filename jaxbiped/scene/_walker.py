@@ -7,6 +7,7 @@ import equinox as eqx
 
 from jaxbiped._checks import ArgumentError, are_zero_together, check_choice, check_pair, check_type
 from jaxbiped._parameter_declaration import check_parameters, parameter
+from jaxbiped._summary import in_short
 from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene._bodies import Body, Foot, Point
 from jaxbiped.scene._ground import AbstractClearance, StanceRotation
@@ -40,6 +41,7 @@ class Walker(eqx.Module):
     d: Parameter = parameter("hip to mass centre", "$d$", "m", minimum=0.0)
     r: Parameter = parameter("foot radius", "$r$", "m", minimum=0.0)
     hip_mass: Parameter = parameter("hip mass", "$m_S$", "kg", minimum=0.0, default=0.0)
+    __repr__ = in_short
 
     def __check_init__(self) -> None:
         check_parameters(self)

@@ -113,6 +113,10 @@ class Labelling(eqx.Module):
     family: Family
     effort: Effort = eqx.field(static=True)
 
+    def __repr__(self) -> str:
+        kind, gaits = type(self.scene).__name__, sum(map(len, self.family.rows))
+        return f"Labelling({kind}, {gaits} gaits, engine={self.effort.engine})"
+
     def __call__(
         self, states: PyTree, *, parameters: Mapping[str, np.ndarray] | None = None
     ) -> Labelled:

@@ -249,7 +249,7 @@ def store_address(store: str | Path) -> Path:
         ResourceError: a package that is missing for it.
     """
     text = str(store)
-    if "://" not in text:
+    if "://" not in text or text.startswith("file:"):
         return user_path(store, "store").absolute()
     try:
         from upath import UPath

@@ -6,6 +6,7 @@ import itertools
 import multiprocessing
 import os
 import pickle
+import sys
 from collections.abc import Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -17,6 +18,7 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -82,9 +84,12 @@ def local_executor(workers: int) -> ProcessPoolExecutor:
         The executor; `shutdown` ends the processes.
 
     Raises:
-        ArgumentError: `workers` is not a whole number of at least 1.
+        ArgumentError: `workers` is not a whole number of at least 1; or the script that is run has
+            no main guard, so that its workers, which import it, would begin workers of their own.
     """
     check_count("workers", workers)
+    if _is_unguarded():
+        raise ArgumentError(f"workers = {workers} is not allowed here: {_GUARD}.")
     return ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
@@ -168,11 +173,23 @@ def _told_if_lost(executor: Executor, *signs: type[Exception]) -> Iterator[None]
         of_cluster = type(error).__module__.split(".")[0] == "distributed"
         if not of_cluster and not isinstance(error, signs):
             raise
-        what = " ".join(str(error).split()) or type(error).__name__
+        what = " ".join(str(error).split()).partition(". ")[0] or type(error).__name__
+        remedy = _GUARD if _is_unguarded() else "restart it and run again"
         raise ResourceError(
-            f"executor = {type(executor).__name__} lost its workers ({what[:200].rstrip('.')}): "
-            "restart it and run again; complete chunks remain in the store."
+            f"executor = {type(executor).__name__} lost its workers ({what.rstrip('.')}): "
+            f"{remedy}; complete chunks remain in the store."
         ) from None
+
+
+_GUARD = (
+    'workers import the script that makes them, which must do so below if __name__ == "__main__"'
+)
+
+
+def _is_unguarded() -> bool:
+    """Whether a script is run that has no main guard."""
+    script = Path(getattr(sys.modules["__main__"], "__file__", None) or __file__)
+    return script.is_file() and "__main__" not in script.read_text("utf-8", "replace")
 
 
 def _check_sent(executor: Executor, labelling: Labelling, layout: Layout) -> None:

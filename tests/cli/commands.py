@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from jaxbiped._progress import Stage
 from jaxbiped.cli import main
 from tests.drawn import saved_figures
 
@@ -50,3 +51,24 @@ def refused(command, capsys):
     assert line.startswith("jaxbiped: ")
     assert not set("│╭╮╰╯─") & set(line)
     return line
+
+
+def interrupt_after(monkeypatch, count):
+    """Lets Ctrl-C come when stages have counted or told so often what was found."""
+    told = iter(range(count))
+    update = Stage.update
+
+    def interrupted(stage, *given, **found):
+        update(stage, *given, **found)
+        if next(told, None) is None:
+            monkeypatch.undo()
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Stage, "update", interrupted)
+
+
+def one_line(capsys):
+    """What an interrupted command prints, and its one line on stderr."""
+    printed = capsys.readouterr()
+    (line,) = [line for line in printed.err.splitlines() if line.startswith("jaxbiped: ")]
+    return printed.out, line

@@ -141,3 +141,9 @@ def test_axes_that_nobody_chose():
     for name, body in chosen.items():
         starts = StartsOptions(seed=0).chosen(scene_of(name))
         assert list(starts.axes) == [f"omega_{body}_1", f"theta_{body}_1"]
+
+
+def test_many_starts_without_an_outcome_are_told_by_the_code(capsys):
+    axes = ("--x", "theta_stance=0.2rad:15deg:4", "--y", "omega_stance=-1.7:-60deg/s:4")
+    assert run("basin", "--model", "rigid", *axes, "--footsteps", 1) == 1
+    assert "unresolved" in capsys.readouterr().out

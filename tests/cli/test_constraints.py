@@ -8,7 +8,7 @@ import pytest
 from jaxbiped import _progress
 from jaxbiped.cli import _constraints as command
 from jaxbiped.cli._constraints import ConstraintRun, time_run
-from tests.cli.commands import outputs_of, run
+from tests.cli.commands import one_line, outputs_of, run
 from tests.drawn import assert_is_drawn, points_of
 
 
@@ -59,13 +59,13 @@ def test_rows_come_as_they_are_done_and_ctrl_c_keeps_them(monkeypatch, capsys, t
 
     monkeypatch.setattr(command, "compare_constraints", compared)
     written = tmp_path / "constraints.json"
-    assert run("constraints", "--json", str(written)) == 1
+    assert run("constraints", "--json", str(written)) == 130
     head, standard = shown[0].out.splitlines()
     (baumgarte,) = shown[1].out.splitlines()
     assert len(head) == len(standard) == len(baumgarte)
     assert standard.split()[0] == "standard"
     assert baumgarte.split()[-2:] == ["0.750", "1.50"]
-    assert "stopped by Ctrl-C after 2 of 21 runs" in capsys.readouterr().out
+    assert one_line(capsys)[1] == "jaxbiped: Interrupted: 2 of 21 runs are done."
     told = json.loads(written.read_text())
     assert not told["complete"]
     assert [run["method"] for run in told["runs"]] == ["standard", "baumgarte"]

@@ -5,7 +5,7 @@ import xarray
 
 import jaxbiped as jb
 from jaxbiped import _progress
-from tests.cli.commands import numbers_of, outputs_of, run
+from tests.cli.commands import interrupt_after, numbers_of, one_line, outputs_of, run
 from tests.drawn import assert_is_drawn
 
 pytestmark = pytest.mark.slow
@@ -65,3 +65,40 @@ def test_no_gait_is_exit_code_1(capsys):
     level = ("--model", "rigid", "--slope", "0", "--from", "-0.001", "--to", "0")
     assert run("continue", *level) == 1
     assert capsys.readouterr().out.startswith("no gait")
+
+
+BRIEF = ("continue", "--model", "rigid", "--from", "0.018", "--to", "0.022")
+
+
+@pytest.mark.parametrize(("count", "before"), [(5, 5), (40, None)])
+def test_ctrl_c_keeps_the_gaits_so_far_and_tells_where_they_end(
+    count, before, tmp_path, monkeypatch, capsys
+):
+    interrupt_after(monkeypatch, count)
+    outputs = outputs_of(tmp_path, *BRIEF)
+    printed, line = one_line(capsys)
+    values = [point["value"] for point in outputs.numbers["points"]]
+    first, last = outputs.numbers["ends"]
+    assert outputs.code == 130
+    assert line.startswith(f"jaxbiped: Interrupted: the branch has the {len(values)} gaits so far")
+    assert (first["value"], last["value"]) == (values[0], values[-1])
+    assert last["end"] == "interrupted"
+    assert f"last end at slope = {values[-1]:.8g}: interrupted" in printed
+    assert (outputs.folder / "branch.nc").is_file()
+    if before is None:  # the way down was done
+        assert (first["end"], first["value"]) == ("reached", pytest.approx(0.018, abs=1e-12))
+        assert 0.02 < values[-1] < 0.022
+    else:  # nothing above the first gait was followed
+        assert first["end"] == "interrupted"
+        assert values[-1] == pytest.approx(0.02, abs=1e-12)
+        assert 0.018 < values[0] < 0.02
+
+
+def test_a_branch_that_is_cut_off_by_its_points_says_so_by_its_code(capsys):
+    assert run(*BRIEF, "--max-points", 2) == 1
+    assert "unfinished (2 points were followed)" in capsys.readouterr().out
+
+
+def test_a_range_may_have_a_unit(capsys):
+    told = numbers_of(capsys, *BRIEF[:4], "18mrad", *BRIEF[5:])
+    assert told["points"][0]["value"] == pytest.approx(0.018, abs=1e-12)

@@ -45,7 +45,7 @@ HEAD = "hip_x,hip_z,theta_1,theta_2,hip_vx,hip_vz,omega_1,omega_2"
     ("text", "said"),
     [
         ("", "it must have a header and at least one row"),
-        ("hip_x;hip_z\n1;2\n", "line 1: its cells have no commas: separate them by commas"),
+        ("hip_x;hip_z\n1;2\n", "line 1 has 1 cells, and the header 1: separate them by commas"),
         ("hip_x,hip_z\n1,2\n", "has the header 'hip_x,hip_z'"),
         (f"{HEAD}\n", "a header and at least one row"),
         (f"{HEAD}\n1,2,3,4,5,6,7,8\n1,2,3,4,5,6,7\n", "line 3 has 7 cells, and the header 8"),

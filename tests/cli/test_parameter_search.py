@@ -5,8 +5,8 @@ import json
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._parameter_search import _bounds
-from tests.cli.commands import numbers_of, outputs_of, run
+from jaxbiped.cli._optimise import _bounds
+from tests.cli.commands import interrupt_after, numbers_of, one_line, outputs_of, run
 from tests.drawn import assert_is_drawn, points_of
 
 pytestmark = pytest.mark.slow
@@ -72,6 +72,19 @@ def test_a_table_of_a_fit_and_its_numbers(file, tmp_path, capsys):
     assert held["p_value"] is None  # as many numbers as parameters
     assert "kg m^2" in shown
     assert "converged" in shown
+
+
+def test_ctrl_c_keeps_the_best_estimates(file, tmp_path, monkeypatch, capsys):
+    interrupt_after(monkeypatch, 1)
+    numbers = tmp_path / "fit.json"
+    words = ("--model", "rigid", "--J", "0.011", "--vary", "J,d", "--json", numbers)
+    assert run("fit", file, *words) == 130
+    printed, line = one_line(capsys)
+    assert line == "jaxbiped: Interrupted: the best estimates so far are what is reported."
+    held = json.loads(numbers.read_text())
+    assert held["ending"] == "interrupted"
+    assert held["estimates"]["J"] == pytest.approx(0.011, rel=0.3)
+    assert "interrupted after" in printed
 
 
 def test_figures_of_a_fit_in_all_formats(file, tmp_path):

@@ -1,8 +1,12 @@
 """`jaxbiped trade`, against errors that fall with the tolerance."""
 
+import json
+
 import pytest
 
-from tests.cli.commands import outputs_of
+from jaxbiped import trade
+from jaxbiped.trade import Row, Truth
+from tests.cli.commands import one_line, outputs_of, run
 from tests.drawn import assert_is_drawn
 
 
@@ -28,3 +32,46 @@ def test_errors_and_costs_of_the_named_accuracies(tmp_path):
         assert draft["errors"][axis] > balanced["errors"][axis] > tight["errors"][axis]
     best = numbers["cheapest"]["walk"]["state"]
     assert best["1e-08"]["setting"] == "tight"
+
+
+class _Walk:
+    """A trade whose third row is interrupted, or that has no truth."""
+
+    def __init__(self, scene, *_):
+        self.scene, self.rows = scene, 0
+
+    def truth(self):
+        return Truth({}, {}, {"state": 1e-12})
+
+    def row(self, way, truth):
+        self.rows += 1
+        if self.rows == 3:
+            raise KeyboardInterrupt
+        return Row(
+            f"{way.solver} ({way.engine})", way.setting, "ok", {"state": 1e-6}, 1.0, 1.0, 1.0
+        )
+
+
+class _NoGait(_Walk):
+    def truth(self):
+        return None
+
+
+def test_ctrl_c_keeps_the_rows_that_are_measured(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(trade, "WalkTrade", _Walk)
+    numbers = tmp_path / "trade.json"
+    assert run("trade", "--json", numbers) == 130
+    printed, line = one_line(capsys)
+    assert line == "jaxbiped: Interrupted: 2 settings are measured."
+    assert [row["setting"] for row in json.loads(numbers.read_text())["rows"]] == [
+        "draft",
+        "balanced",
+    ]
+    assert "rodas4p (lanes)" in printed
+
+
+def test_a_scene_without_a_gait_is_told_by_the_code(monkeypatch, capsys):
+    monkeypatch.setattr(trade, "WalkTrade", _NoGait)
+    monkeypatch.setattr(trade, "GaitTrade", _NoGait)
+    assert run("trade") == 1
+    assert "gait: the references found none" in capsys.readouterr().out

@@ -97,3 +97,15 @@ def test_a_missing_package_and_an_unknown_address_are_one_sentence(monkeypatch):
     pytest.importorskip("upath", reason="universal-pathlib is not installed")
     with pytest.raises(jb.ArgumentError, match="must be a directory, or an address"):
         store_address("nothing://walks/basin.zarr")
+
+
+def test_a_store_at_a_file_address_is_the_one_at_its_path(tmp_path, by_formula):
+    address = (tmp_path / "a folder" / "store.zarr").as_uri()
+    assert "%20" in address
+    found = swept(address)
+    same_results(found, swept())
+    assert (tmp_path / "a folder" / "store.zarr" / "zarr.json").is_file()
+    again = swept(tmp_path / "a folder" / "store.zarr")
+    assert again.attrs["labelled_in_this_run"] == 0
+    with pytest.raises(jb.ArgumentError, match="an address of a file begins with file:///"):
+        swept("file://machine/store.zarr")

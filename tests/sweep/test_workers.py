@@ -17,7 +17,7 @@ import jaxbiped as jb
 from jaxbiped._files import THREADS_VARIABLE
 from jaxbiped.compiler import default_threads
 from jaxbiped.sweep._store import Layout
-from jaxbiped.sweep._workers import _AHEAD, compute_chunks
+from jaxbiped.sweep._workers import _AHEAD, _told_if_lost, compute_chunks
 from tests.compiler.fake_driver import install
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same, same_results, simplest_grid, with_attractor
@@ -97,6 +97,26 @@ def test_what_cannot_be_sent_to_processes_is_refused():
         pytest.raises(jb.ArgumentError, match="must be a module's own"),
     ):
         _swept(starts=starts, executor=pool)
+
+
+def test_a_script_without_a_main_guard_is_refused_in_one_whole_sentence(tmp_path, monkeypatch):
+    script = tmp_path / "script.py"
+    script.write_text("import jaxbiped")
+    monkeypatch.setattr(sys.modules["__main__"], "__file__", str(script), raising=False)
+    below = 'below if __name__ == "__main__"'
+    guard = f"workers import the script that makes them, which must do so {below}"
+    with pytest.raises(jb.ArgumentError) as refused:
+        jb.local_executor(2)
+    assert str(refused.value) == f"workers = 2 is not allowed here: {guard}."
+    pool = concurrent.futures.Executor()
+    with pytest.raises(jb.ResourceError) as lost, _told_if_lost(pool, OSError):
+        raise OSError("a process ended abruptly. " + 300 * "More. ")
+    assert str(lost.value) == (
+        f"executor = Executor lost its workers (a process ended abruptly): {guard}; complete "
+        "chunks remain in the store."
+    )
+    script.write_text('if __name__ == "__main__":\n    pass')
+    jb.local_executor(1).shutdown()
 
 
 @pytest.mark.parametrize("workers", [0, 1.5, None])

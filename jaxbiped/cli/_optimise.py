@@ -1,4 +1,4 @@
-"""Searches for parameters: `jaxbiped optimise` for the best gait, `fit` for the measured ones."""
+"""`jaxbiped optimise`: the parameters of the best gait, and their certificate."""
 
 import dataclasses
 import math
@@ -7,16 +7,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
-from tyro.conf import Positional
-
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._files import JsonObject, read_json, read_text
+from jaxbiped._files import JsonObject
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._declarations import names
 from jaxbiped.cli._gait import gait_figures
+from jaxbiped.cli._named_numbers import numbers_in, units_of
 from jaxbiped.cli._report import Report, columns, records
-from jaxbiped.cli._scene_options import SceneOptions, minimal, numbers_in, units_of
+from jaxbiped.cli._scene_options import SceneOptions, minimal
 
 _MEASURE = re.compile(r"\s*(\w+)")
 _USUAL_RANGE = (0.5, 2.0)
@@ -25,18 +24,6 @@ _STABLE = {True: "stable", False: "NOT STABLE", None: "undecided within the erro
 _REDUNDANT = (
     "formulation = redundant is not allowed here: how the hip is held makes no difference to a "
     "gait; choose minimal."
-)
-_ESTIMATE = {
-    "parameter": "{0[0]}",
-    "unit": "{0[1].unit}",
-    "estimate": "{0[2]:.6g}",
-    "standard error": "{0[3]:.6g}",
-    "95 % from": "{0[4][0]:.6g}",
-    "to": "{0[4][1]:.6g}",
-}
-_REDUNDANT_FIT = 'formulation = "redundant" is not allowed here: it must be "minimal".'
-_IS_MEASURED = options.Check(
-    lambda name, path: (read_text if path.suffix.lower() == ".csv" else read_json)(name, path)
 )
 
 
@@ -75,17 +62,17 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
 
     def check_names(self, scene: SceneOptions) -> None:
         """Raises `ArgumentError` for parameters and measures that the scene lacks."""
-        for name, bounds in _varied(self.vary):
+        for name, bounds in _parts(self.vary).items():
             unit = scene.check_parameter("vary", name)
             if bounds:
-                _range(name, bounds, unit)
-        for name in _names(self.bifurcations):
+                numbers_in("vary", name, bounds, unit, ":", 2)
+        for name in _parts(self.bifurcations):
             scene.check_parameter("bifurcations", name)
-        bounded = [("subject_to", text) for text in self.subject_to]
-        for option, text in (*bounded, ("maximise", self.maximise), ("minimise", self.minimise)):
-            measure = _MEASURE.match(text or "")
-            if measure and measure[1] != "fatal_push":  # the search itself says why not that
-                check_choice(option, measure[1], names("optimise.OBJECTIVES"))
+        goals = {"maximise": (self.maximise,), "minimise": (self.minimise,)}
+        for option, texts in (goals | {"subject_to": self.subject_to}).items():
+            for measure in (_MEASURE.match(text or "fatal_push") for text in texts):
+                if measure and measure[1] != "fatal_push":  # the search says why it cannot be one
+                    check_choice(option, measure[1], names("optimise.OBJECTIVES"))
 
     def run(self) -> int:
         from jaxbiped.continuation._critical_values import range_of
@@ -93,7 +80,7 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         scene = self.scene.scene()
         assert not isinstance(scene, jb.RedundantScene)
         self.output.make_folder()
-        along = _names(self.bifurcations)
+        along = list(_parts(self.bifurcations))
         for name in along:
             check_choice("bifurcations", name, jb.parameter_names(scene))
             range_of(scene, name)
@@ -120,30 +107,16 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         figures = {"optimisation": lambda: jb.plot.optimisation(found)}
         report.finish(_optimum_numbers(found, certificate, goal, sense), found.to_csv)
         report.wrote(self.output.draw(figures | gait_figures(found.gait)))
-        ended = jb.optimise.Outcome
         if found.outcome is ended.INTERRUPTED or "interrupted" in certificate.failed.values():
             raise options.interrupted("the best design so far is what is reported")
         return int(found.outcome in (ended.UNFINISHED, ended.INFEASIBLE))
 
 
-def _names(text: str) -> list[str]:
-    """The names of a list that commas separate; none for "none"."""
-    names = map(str.strip, text.split(","))
-    return [name for name in names if name not in ("", "none")]
-
-
-def _varied(text: str) -> list[tuple[str, str]]:
-    """Names and bounds, which may be empty, from d=0.05:0.2,r,J."""
-    parts = (part.partition("=") for part in text.split(","))
-    return [(name.strip(), bounds.strip()) for name, _, bounds in parts]
-
-
-def _range(name: str, text: str, unit: str | None) -> tuple[float, float]:
-    """Bounds in SI units from low:high; raises `ArgumentError`."""
-    bounds = numbers_in("vary", name, text, unit, ":")
-    if len(bounds) != 2:
-        raise ArgumentError(f"vary = '{name}={text}' is not understood: write {name}=low:high.")
-    return bounds[0], bounds[1]
+def _parts(text: str) -> dict[str, str]:
+    """Names and bounds, which may be empty, from d=0.05:0.2,r,J; none from "none"."""
+    pairs = (part.partition("=") for part in text.split(","))
+    bounds = {name.strip(): bounds.strip() for name, _, bounds in pairs}
+    return {name: each for name, each in bounds.items() if name not in ("", "none")}
 
 
 def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[float, float]]:
@@ -152,10 +125,10 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
 
     own, found = jb.parameter_values(scene), {}
     units = units_of(jb.parameter_quantities(scene))
-    for name, bounds in _varied(text):
+    for name, bounds in _parts(text).items():
         check_choice("vary", name, units)
         if bounds:
-            low, high = _range(name, bounds, units[name])
+            low, high = numbers_in("vary", name, bounds, units[name], ":", 2)
         elif (value := float(own[name])) != 0.0:
             low, high = sorted(farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
         else:
@@ -292,51 +265,3 @@ def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
             f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "
             f"{other.length_difference:.1e}, spectral radius by {other.radius_difference:.1e}"
         )
-
-
-class Fit(options.Command, of=("fit_gait",)):
-    """Fit parameters to measured gaits; print estimates, errors and undetermined parameters."""
-
-    file: Annotated[Positional[Path], _IS_MEASURED]
-    """File of measured gaits, CSV or JSON (see jaxbiped.identify.read_measured)."""
-    vary: str
-    """Names of the parameters to fit, separated by commas: K,c,mu_kinetic."""
-    scene: Annotated[SceneOptions, minimal(_REDUNDANT_FIT)]
-    accuracy: options.GaitAccuracy
-    engine: options.Engine
-    max_evaluations: options.Count
-    output: options.OutputOptions
-
-    def check_names(self, scene: SceneOptions) -> None:
-        """Raises `ArgumentError` for parameters that the scene lacks."""
-        for name in _names(self.vary):
-            scene.check_parameter("vary", name)
-
-    def run(self) -> int:
-        scene = self.scene.scene()
-        assert not isinstance(scene, jb.RedundantScene)
-        self.output.make_folder()
-        fitted = tuple(_names(self.vary))
-        measured, how = jb.identify.read_measured(self.file, scene), self.arguments("fit_gait")
-        fit = jb.fit_gait(scene, fitted, measured, **how)
-        report = Report(self.output.json, self.output.csv)
-        parts = (jb.parameter_quantities(scene), fit.estimates, fit.standard_errors, fit.intervals)
-        report.say(columns(_ESTIMATE, [(name, *(part[name] for part in parts)) for name in fitted]))
-        report.say(
-            f"{fit.ending} after {fit.evaluations} scenes; chi squared {fit.chi_squared:.3g} at "
-            f"{fit.freedom} degrees of freedom (p = {fit.p_value:.2g})"
-        )
-        if fit.undetermined:
-            report.say(f"these data do not determine {', '.join(fit.undetermined)}")
-        if fit.one_sided:
-            report.say(f"limited on one side only: {', '.join(fit.one_sided)}")
-        if fit.at_bounds:
-            report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
-        numbers = vars(fit) | {"ending": str(fit.ending), "intervals_95": fit.intervals}
-        del numbers["intervals"]
-        also = {"chi_squared": fit.chi_squared, "p_value": fit.p_value}
-        report.finish(numbers | also, fit.to_csv)
-        report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
-        if fit.ending is jb.identify.FitEnding.INTERRUPTED:
-            raise options.interrupted("the best estimates so far are what is reported")
-        return 0 if fit.ending is jb.identify.FitEnding.CONVERGED else 1
