@@ -18,7 +18,7 @@ def failures(seed, count, doors, seconds=None, only=None):
 
 @pytest.mark.slow
 def test_fields_of_features_drawn_together():
-    assert failures(7, 6, ("field",)) == []
+    assert failures(7, 4, ("field",)) == []
 
 
 @pytest.mark.nightly

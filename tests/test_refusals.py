@@ -34,6 +34,14 @@ CASES = {
     ),
     "save's class": (lambda: _short(save=jb.HeelStrike), "save = <class"),
     "watch in words": (lambda: _short(watch="fall"), "watch = 'fall'"),
+    "footsteps without gravity": (
+        lambda: jb.simulate(jb.with_parameters(RIGID, {"g": 0.0}), ROLLING, footsteps=1),
+        "g = 0 is not allowed here",
+    ),
+    "gait without gravity": (
+        lambda: jb.find_gait(jb.with_parameters(RIGID, {"g": 0.0}), ROLLING),
+        "g = 0 is not allowed here",
+    ),
     "rigid scene": (lambda: jb.footsteps(RIGID, CUT), "it must be a Scene or a RedundantScene"),
     "another scene": (lambda: jb.footsteps(jb.seed_scene(slope=0.03), CUT), "with another one"),
     "no scene": (lambda: jb.footsteps(None, CUT), "scene = None"),

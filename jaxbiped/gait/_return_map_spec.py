@@ -14,6 +14,7 @@ from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.caching._caches import versions_in
 from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._scene import RedundantScene, is_rigid
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
@@ -209,6 +210,7 @@ def arrivals_of(args: PyTree, footsteps: int | None) -> int:
 
 def patience_of(scene: AbstractWalkerScene) -> Scalar:
     """Time that a walker's next arrival may take [s]."""
+    check_pulls(scene.ground)
     found: Scalar = by_numpy(
         lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.mechanism.height, scene.ground.g
     )

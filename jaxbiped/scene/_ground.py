@@ -8,7 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._checks import warn
+from jaxbiped._checks import ArgumentError, are_zero_together, warn
 from jaxbiped._parameter_declaration import AbstractPart, parameter
 from jaxbiped._types import Parameter, Scalar, is_traced
 from jaxbiped.scene._bodies import check_name
@@ -27,6 +27,15 @@ class Ground(AbstractPart):
 
     slope: Parameter = parameter("slope", r"$\alpha$", "rad", size_below=math.pi / 2)
     g: Parameter = parameter("gravity", "$g$", "m/s^2", minimum=0.0, default=9.8)
+
+
+def check_pulls(ground: Any) -> None:
+    """Raises `ArgumentError` where g is known to be 0, for what waits in units of √(l/g)."""
+    if are_zero_together(ground.g, 0.0):
+        raise ArgumentError(
+            "g = 0 is not allowed here: footsteps are waited for in units of √(l/g), which has no "
+            "end; give g above 0, or for a walk a duration."
+        )
 
 
 def gravity_on(ground: Any) -> tuple[Scalar, Scalar]:

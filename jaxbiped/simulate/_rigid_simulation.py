@@ -23,6 +23,7 @@ from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import BY_NAME, Program, Request
 from jaxbiped.dynamics._state import check_state, state_type, without_whole_turns
 from jaxbiped.dynamics._surfaces import HeelStrike
+from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._rigid_feet import check_mode, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
@@ -103,7 +104,9 @@ class RigidSimulation(eqx.Module):
             check_unbatched("state", state, "one start")
             if (modes := rigid_modes(scene.mechanism)).any:
                 check_mode(scene.mechanism, modes, scene.ground.slope, state)
-            if duration is not None:
+            if duration is None:
+                check_pulls(scene.ground)
+            else:
                 check_positive("duration", duration, "s")
             usual = ACCURACIES[asked.accuracy].rigid_walk
             tolerance = usual if asked.rtol is None else asked.rtol
