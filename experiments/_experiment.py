@@ -21,6 +21,21 @@ from jaxbiped.cli import Report
 from jaxbiped.plot import figure_style, save_figure
 from jaxbiped.plot.style import COLOURS, MARKERS
 
+LOOK: dict[str, Any] = {
+    "axes.prop_cycle": plt.cycler(color=COLOURS),
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#E6E6E6",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": "small",
+    "axes.titlelocation": "left",
+    "axes.titlesize": "medium",
+}
+"""Settings of matplotlib with which pictures made by hand look like those of `jaxbiped.plot`."""
+
 MOST = 4
 """Numbers of a list that are printed; of a longer one it is said how many there are."""
 
@@ -107,7 +122,7 @@ def experiment(measured: Callable[[Any], dict[str, Any]]) -> Callable[[], None]:
         kind = typing.get_type_hints(measured)["options"]
         options = tyro.cli(kind, description=measured.__globals__["__doc__"])
         began, report = time.perf_counter(), Report(options.json)
-        with figure_style(options.style, columns=options.columns):
+        with figure_style(options.style, columns=options.columns), plt.rc_context(LOOK):
             numbers = measured(options)
         report.say(*tables(numbers), f"\nin {time.perf_counter() - began:.0f} s")
         report.finish(numbers)

@@ -1,6 +1,6 @@
 """Every capability on eight mechanisms: in each cell a number, or the sentence that refuses it.
 
-Writes mechanism_matrix.md, the table of docs/mechanisms.md, and mechanism_matrix.png, the walkers.
+Writes mechanism_matrix.md, the table of docs/testing.md, and mechanism_matrix.png, the walkers.
 Cells are kept in mechanism_matrix.jsonl: a run that was cut off goes on. `--quick` tries a few
 capabilities on two of the mechanisms.
 """

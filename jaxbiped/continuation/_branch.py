@@ -14,7 +14,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._summary import notebook_html
 from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
-from jaxbiped.continuation._branch_point import Axis, BranchPoint, CycleFootsteps
+from jaxbiped.continuation._branch_point import Axis, BranchPoint, footstep_columns, footsteps_of
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
 from jaxbiped.gait._branch_along import state_at
@@ -164,9 +164,8 @@ def _branch_dataset(branch: Branch) -> "xarray.Dataset":
         "accuracy": branch.accuracy,
         "engine": branch.engine,
     }
-    return xarray.Dataset(
-        variables_of(entries), attrs={"branch": strict_json(settings, unknown=str)}
-    )
+    attributes = {"branch": strict_json(settings, unknown=str)}
+    return xarray.Dataset(variables_of(entries), attrs=attributes)
 
 
 def _entries(
@@ -212,14 +211,8 @@ def _entries(
     for name in ("place", "tangent"):
         words = Quantity(f"{name} on the curve of gaits", unit="scaled")
         entries[name] = Entry((along, "component"), table(name, m + 1, float), words)
-    steps = [point.footsteps for point in points if point.footsteps is not None]
-    if steps:
-        begins, *columns = map(np.stack, zip(*steps, strict=True))
-        named = zip(CycleFootsteps._fields[1:], columns, strict=True)
-        states = zip(names, np.moveaxis(begins, -1, 0), strict=True)
-        for name, values in (*named, *((f"state_{name}", x) for name, x in states)):
-            quantity = entries[name].quantity
-            entries[f"footstep_{name}"] = Entry((along, "footstep"), values, quantity)
+    for name, each in footstep_columns(points, names).items():
+        entries[f"footstep_{name}"] = Entry((along, "footstep"), each, entries[name].quantity)
     return {before + name: entry for name, entry in entries.items()}
 
 
@@ -287,11 +280,8 @@ def _points(dataset: "xarray.Dataset", kind: Any, along: str, before: str) -> li
     errors, codes = column("multipliers_error"), column("bifurcation")
     numbers = {name: column(name) for name in _NUMBERS}
     value, place, tangent = column(along), column("place"), column("tangent")
-    steps: list[CycleFootsteps | None] = [None] * len(value)
-    if f"{before}footstep_period" in dataset.variables:
-        begins = [column(f"footstep_state_{name}") for name in recurring_names(kind)]
-        columns = (column(f"footstep_{name}") for name in CycleFootsteps._fields[1:])
-        steps = [*map(CycleFootsteps, np.stack(begins, axis=-1), *columns)]
+    several = f"{before}footstep_period" in dataset.variables
+    steps = footsteps_of(column, recurring_names(kind)) if several else [None] * len(value)
     return [
         BranchPoint(
             value=float(value[k]),

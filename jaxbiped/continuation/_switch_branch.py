@@ -122,7 +122,8 @@ def doubling_cascade(
         if after is None:
             break
         found.append(after)
-        length = np.linalg.norm(branches[-1].points[-1].place - branches[-1].points[0].place)
+        places = [point.place for point in branches[-1].points]
+        length = np.linalg.norm(places[-1] - places[min(len(_BESIDE), len(places) - 2)])
         step = min(step, float(length) / _FINER)
         near = min(near, abs(found[-1].point.place[-1] - found[-2].point.place[-1]) / _NEARER)
     values = np.array([each.value for each in found])

@@ -248,7 +248,8 @@ class _Picture:
         self._clock = ax.text(0.02, 0.95, "", transform=ax.transAxes, va="top")
         ax.set_aspect("equal", adjustable="datalim")
         style.legend(ax, loc="upper right", handlelength=3.5)
-        for line in ax.legend_.get_lines()[: len(self._bodies)]:  # type: ignore[attr-defined]
+        samples: Any = ax.get_legend()
+        for line in samples.get_lines()[: len(self._bodies)]:
             line.set_linewidth(2.0)  # thinner than in the picture, to show all dashes
         ax.set_axis_off()
         self.draw(0)
