@@ -1,6 +1,5 @@
 """`python -m jaxbiped` is `jaxbiped`."""
 
-import _thread
 import signal
 import sys
 import threading
@@ -24,7 +23,8 @@ def main() -> None:
 def _repeat_interrupt(lost: Any) -> None:
     """Repeats a Ctrl-C that came in a callback, as of a garbage collector, which cannot raise."""
     if lost.exc_type is KeyboardInterrupt:
-        threading.Timer(0.05, _thread.interrupt_main).start()
+        main_thread = threading.main_thread().ident
+        threading.Timer(0.05, signal.pthread_kill, (main_thread, signal.SIGINT)).start()
     else:
         sys.__unraisablehook__(lost)
 

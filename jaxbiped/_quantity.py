@@ -50,12 +50,12 @@ def si_number(text: str, unit: str | None = None) -> float:
     """
     with contextlib.suppress(ValueError):
         return float(text)
-    found = _WITH_UNIT.fullmatch(text.strip())
-    scales = unit_scales(unit, found[2]) if found else {}
-    if found is None or found[2] not in scales:
+    match = _WITH_UNIT.fullmatch(text.strip())
+    scales = unit_scales(unit, match[2]) if match else {}
+    if match is None or match[2] not in scales:
         allowed = ", ".join(filter(None, scales))
         raise ValueError(f"{text!r} is not a number" + (f" in {allowed}" if allowed else ""))
-    return float(found[1]) * scales[found[2]]
+    return float(match[1]) * scales[match[2]]
 
 
 class Quantity(NamedTuple):

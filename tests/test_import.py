@@ -68,7 +68,8 @@ def test_64_bits_in_any_order_of_imports(lines):
 
 def test_the_map_is_the_stub_line_by_line():
     stub = ast.parse(Path(jb.__file__).with_suffix(".pyi").read_text())
-    lines = [node for node in stub.body if not isinstance(node, ast.Expr)]
+    *lines, version = [node for node in stub.body if not isinstance(node, ast.Expr)]
+    assert ast.unparse(version) == "__version__: str"
     assert all(isinstance(node, ast.ImportFrom) and len(node.names) == 1 for node in lines)
     names = [node.names[0] for node in lines]
     assert all(each.name == each.asname for each in names)

@@ -24,13 +24,13 @@ def numbers_in(
 
     A unit that is None is not known yet. Raises `ArgumentError`.
     """
-    told = f"{option} = '{name}={text}' is not allowed"
+    refused = f"{option} = '{name}={text}' is not allowed"
     try:
         numbers = [si_number(part, unit) for part in text.split(mark)]
     except ValueError as error:
-        raise ArgumentError(f"{told}: {name} must be a number, and {error}.") from None
+        raise ArgumentError(f"{refused}: {name} must be a number, and {error}.") from None
     if count and len(numbers) != count:
-        raise ArgumentError(f"{told}: write {name}={'low:high' if count == 2 else 'value'}.")
+        raise ArgumentError(f"{refused}: write {name}={'low:high' if count == 2 else 'value'}.")
     return numbers
 
 

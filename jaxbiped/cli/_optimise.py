@@ -116,7 +116,7 @@ def _parts(text: str) -> dict[str, str]:
     """Names and bounds, which may be empty, from d=0.05:0.2,r,J; none from "none"."""
     pairs = (part.partition("=") for part in text.split(","))
     bounds = {name.strip(): bounds.strip() for name, _, bounds in pairs}
-    return {name: each for name, each in bounds.items() if name not in ("", "none")}
+    return {name: text for name, text in bounds.items() if name not in ("", "none")}
 
 
 def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[float, float]]:

@@ -91,17 +91,17 @@ class ActuationOptions(Options, made=dict(_actuator_fields())):
 
 def _actuator_values(option: str, home: str, texts: tuple[str, ...]) -> dict[str, Any]:
     values: dict[str, Any] = {}
-    known = fields(home)
+    declared = fields(home)
     for text in texts:
         name, value = named_text(option, text)
-        check_choice(f"{option}'s name", name, known)
+        check_choice(f"{option}'s name", name, declared)
         values[name] = value
-        if info := known[name].info:
+        if info := declared[name].info:
             numbers = numbers_in(option, name, value, info.quantity.unit, count=0)
             for number in numbers:
                 info.check(name, number)
             values[name] = numbers if len(numbers) > 1 else numbers[0]
-    for name, (default, _, info) in known.items():
+    for name, (default, _, info) in declared.items():
         if default is None and info is not None and name not in values:
             raise ArgumentError(f"{option} needs {name}=value, its {info.quantity.words}.")
     return values
@@ -168,12 +168,12 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         parts = ["Walker", "Ground", *map(registered("actuation").get, self.driven.given)]
         if not self.rolls:
             parts += [registered("laws", kind)[getattr(self, kind)] for kind in MATCHED]
-        infos = {own: entry.info for part in parts for own, entry in fields(str(part)).items()}
-        units = {own: info.quantity.unit for own, info in infos.items() if info}
-        own = name.rpartition(".")[2]
-        if own not in units and _NUMBERED.sub("", own) not in units:
+        infos = {base: entry.info for part in parts for base, entry in fields(str(part)).items()}
+        units = {base: info.quantity.unit for base, info in infos.items() if info}
+        base = name.rpartition(".")[2]
+        if base not in units and _NUMBERED.sub("", base) not in units:
             check_choice(option, name, (*others, *units))
-        return units.get(own, units.get(_NUMBERED.sub("", own)))
+        return units.get(base, units.get(_NUMBERED.sub("", base)))
 
     @property
     def rolls(self) -> bool:

@@ -285,8 +285,8 @@ def read_starts(path: Path, scene: "jb.Scene | jb.RigidScene") -> object:
     named, names = f"starts = {str(path)!r}", [*structure.coordinates, *structure.rates]
     (_, header), *rows = read_csv("starts", path)
     if header != names:
-        told = f"{named} has the header {','.join(header)!r}"
-        raise ArgumentError(f"{told}: it must be {','.join(names)}.")
+        refused = f"{named} has the header {','.join(header)!r}"
+        raise ArgumentError(f"{refused}: it must be {','.join(names)}.")
     numbers = []
     for line, row in rows:
         try:

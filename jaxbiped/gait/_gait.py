@@ -151,11 +151,11 @@ class Gait(eqx.Module, Tabular):
         like, code = self.measures.period, self.ending
         if is_traced(self) or np.ndim(code):
             return summary(self, like=like, code=code, names=Search, engine=self.engine)
-        known: dict[str, Any] = {"outcome": str(self.outcome), "residual": self.residual}
+        numbers: dict[str, Any] = {"outcome": str(self.outcome), "residual": self.residual}
         if self.outcome is Search.FOUND:
-            known |= {name: getattr(self.measures, name) for name in QUANTITIES}
-            known["stable"] = bool(self.stable)
-        return call_text("Gait", known | {"cycle": self.cycle, "engine": self.engine})
+            numbers |= {name: getattr(self.measures, name) for name in QUANTITIES}
+            numbers["stable"] = bool(self.stable)
+        return call_text("Gait", numbers | {"cycle": self.cycle, "engine": self.engine})
 
     @property
     def state(self) -> PyTree:
