@@ -1,5 +1,8 @@
-"""Accounts of the mechanisms' walkers on both kinds of feet: energies are conserved, objectives are
-what is measured along a walk, and what nothing drives costs the slope's sine."""
+"""Accounts of walkers on both kinds of feet, against conservation, walks and the slope's sine.
+
+Of each mechanism of the matrix, energies are conserved, objectives are what is measured along a
+walk, and what nothing drives costs the sine of the slope.
+"""
 
 import dataclasses
 

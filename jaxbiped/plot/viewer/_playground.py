@@ -80,9 +80,8 @@ def _shown_numbers(scene: Any, state: Any) -> list[Scalar]:
     ]
     touching = [jnp.where(touches, 1.0, 0.0) for touches in found.touching]
     places = [foot.x for foot in found.feet]
-    power, driving = (), powers(scene, state).actuation
-    if driving is not None:
-        power = (driving,)
+    driving = powers(scene, state).actuation
+    power = () if driving is None else (driving,)
     rest = (*normal, *tangential, *energies(scene, state), *power, *touching, *places)
     return [*named, *(zero + value for value in rest)]
 

@@ -1,5 +1,6 @@
 """The playground, against what lanes simulate."""
 
+import dataclasses
 import re
 
 import jax
@@ -138,3 +139,21 @@ def test_a_mechanism_s_page_records_the_walk_that_lanes_make():
     page = jb.plot.playground(scene, state, footsteps=FOOTSTEPS)
     words = [slider["words"] for slider in page.sliders]
     assert words[-2:] == ["Angle of leg_1", "Rate of leg_1"]
+
+
+def test_a_driven_page_records_the_power_of_what_drives():
+    """Its integral by trapezoids is the page's line of the motors' work."""
+    scene = dataclasses.replace(
+        jb.seed_scene(slope=0.02), actuation=(jb.actuation.HipTorque(0.05),)
+    )
+    state = jb.seed_state()
+    request = played_request(scene, state, FOOTSTEPS)
+    inputs = np.array([float(leaf) for leaf in jax.tree.leaves(request.inputs)])
+    _, recorded = LANES.compile(request).run_table(InputTable.of_rows(inputs[None]), room=STEPS)
+    rows = recorded.values[0, : int(recorded.counts[0])]
+    named = dict(zip(recorded_names(scene), rows.T, strict=True))
+    walk = jb.simulate(scene, state, footsteps=FOOTSTEPS, engine="lanes")
+    work = float(jb.measure.energy_ledger(scene, walk).actuation_work[0])
+    power, t = named["power"], named["t"]
+    assert 0.5 * np.diff(t) @ (power[1:] + power[:-1]) == pytest.approx(work, rel=1e-2)
+    assert "power" not in recorded_names(jb.seed_scene())
