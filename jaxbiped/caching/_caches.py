@@ -130,11 +130,16 @@ class OfObjects(Generic[_T]):
         return known[1]
 
 
-def versions_in(tree: Any) -> tuple[int, ...]:
-    """The versions of the user's code in the structure of a tree; see `versions_of`."""
+def code_in(tree: Any) -> tuple[Hashable, ...]:
+    """Finds the user's code in the structure of a tree."""
     import jax
 
-    return versions_of(_code_in(jax.tree.structure(tree)))
+    return _code_in(jax.tree.structure(tree))
+
+
+def versions_in(tree: Any) -> tuple[int, ...]:
+    """Gives the versions of the user's code in the structure of a tree; see `versions_of`."""
+    return versions_of(code_in(tree))
 
 
 _code_in = functools.lru_cache(PROGRAMS)(users_code)
