@@ -23,7 +23,7 @@ from jaxbiped._checks import LIBRARIES, ArgumentError
 _NOT_READ = {"__dict__", "__weakref__", "__doc__", "__dataclass_fields__", "_abc_impl"}
 _BY_ANY_NAME = {"getattr", "vars", "__dict__", "attrgetter", "asdict", "astuple", "fields"}
 """Names by which a function may read attributes that its code does not mention."""
-_PLAIN = (dict, list, tuple, set, frozenset, bytes, bool, int, float, complex, str)
+_PLAIN: tuple[Any, ...] = (dict, list, tuple, set, frozenset, bytes, bool, int, float, complex, str)
 _MOST_READINGS = 256
 
 
@@ -32,13 +32,13 @@ class _Reading(NamedTuple):
 
     Attributes:
         content: all of it, written down.
-        names: which the code mentions.
+        names: all that its functions mention, by their codes.
         kept: objects that are told apart by their identity, so that no other gets the same.
         version: a number that no other content had.
     """
 
     content: bytes
-    names: set[str]
+    names: dict[types.CodeType, frozenset[str]]
     kept: list[object]
     version: int
 
@@ -67,16 +67,16 @@ def versions_of(code: tuple[Hashable, ...]) -> tuple[int, ...]:
 
 def _version(piece: Hashable) -> int:
     last = _READINGS.get(piece)
-    names, size = set[str]() if last is None else last.names, -1
-    while size < len(names):  # what is read may mention more names
+    names, size = {} if last is None else last.names, -1
+    while size < len(names):  # what is read may be more functions, which mention more
         size, reader = len(names), _Reader(piece, names)
         reader.dump(piece)
     content = reader.file.getvalue()
     if last is not None and last.content == content:
         return last.version
-    if len(_READINGS) >= _MOST_READINGS:
-        _READINGS.clear()
-    if last is not None or not _READINGS:
+    if last is not None or len(_READINGS) >= _MOST_READINGS:
+        if last is None:
+            _READINGS.clear()
         sys.modules["jax"].clear_caches()  # what it traced of this and of equal functions
     _READINGS[piece] = _Reading(content, names, reader.kept, next(_VERSIONS))
     return _READINGS[piece].version
@@ -89,10 +89,13 @@ def _made(*parts: object) -> None:
 class _Reader(pickle.Pickler):
     """It writes down all that a piece of code reads; without a piece, it finds those in a thing."""
 
-    def __init__(self, piece: object, names: set[str] | None = None) -> None:
+    def __init__(
+        self, piece: object, names: dict[types.CodeType, frozenset[str]] | None = None
+    ) -> None:
         self.file, self.piece, self.kept = io.BytesIO(), piece, list[object]()
-        self.finds, self.names = names is None, set[str]() if names is None else names
-        self.code = dict[Any, None]()
+        self.code, self.finds = dict[Any, None](), names is None
+        self.by_code = {} if names is None else names
+        self.names = set[str]().union(*self.by_code.values())
         super().__init__(self.file, protocol=5)
 
     def reducer_override(self, thing: Any) -> Any:
@@ -119,13 +122,11 @@ class _Reader(pickle.Pickler):
 
     def _parts(self, thing: Any, kind: Any, users: bool) -> Iterator[object]:
         if isinstance(thing, types.ModuleType):
-            read = self._named(vars(thing))
-            users = _is_users(thing)
-            yield thing.__name__, [(n, read[n]) for n in read if users or not callable(read[n])]
+            items, users = self._named(vars(thing)).items(), _is_users(thing)
+            yield thing.__name__, [(n, x) for n, x in items if users or not callable(x)]
         elif isinstance(thing, types.FunctionType):
             yield thing.__code__, thing.__defaults__, thing.__kwdefaults__, thing.__closure__
-            read = _names(thing.__code__) if users else frozenset[str]()
-            self.names.update(read)
+            read = self._names_of(thing.__code__) if users else frozenset[str]()
             yield {name: thing.__globals__.get(name) for name in sorted(read)}, vars(thing)
         elif isinstance(thing, types.CodeType):
             yield from code_members(thing)
@@ -142,7 +143,7 @@ class _Reader(pickle.Pickler):
                 yield thing.__bases__, members
         elif users and kind is not functools.partial:
             yield kind, [plain(thing) for plain in _PLAIN if isinstance(thing, plain)]
-            state = object.__getstate__(thing)  # type: ignore[attr-defined]
+            state = object.__getstate__(thing)
             for part in state if isinstance(state, tuple) else (state,):
                 yield part if self.finds else self._named(part or {})
         elif isinstance(thing, sys.modules["jax"].tree_util.PyTreeDef):
@@ -162,6 +163,12 @@ class _Reader(pickle.Pickler):
             values = [getattr(thing, name, None) for name in sorted(self.names)]
             yield [value for value in values if isinstance(value, _PLAIN)]
             yield id(thing), getattr(thing, "__wrapped__", None), getattr(thing, "fget", None)
+
+    def _names_of(self, code: types.CodeType) -> frozenset[str]:
+        if code not in self.by_code:
+            self.by_code[code] = frozenset(_names(code))
+            self.names |= self.by_code[code]
+        return self.by_code[code]
 
     def _named(self, attributes: dict[str, object]) -> dict[str, object]:
         """The attributes that the code may read."""
@@ -203,20 +210,17 @@ def _content(cell: types.CellType) -> object:
         return None
 
 
-@functools.lru_cache(_MOST_READINGS)
-def _names(code: types.CodeType) -> frozenset[str]:
-    """Collects what a function's code mentions: names, and texts that may be used as such."""
-    names = {
-        step.argval
-        for step in dis.get_instructions(code)
-        if step.opcode in dis.hasname and step.opname != "STORE_ATTR"
-    }
+def _names(code: types.CodeType) -> Iterator[str]:
+    """Yields what a function's code mentions: names, and texts that may be used as such."""
+    for step in dis.get_instructions(code):
+        if step.opcode in dis.hasname and step.opname != "STORE_ATTR":
+            yield step.argval
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            names |= _names(constant)
-        texts = constant if isinstance(constant, tuple) else (constant,)
-        names.update(text for text in texts if isinstance(text, str))
-    return frozenset(names)
+            yield from _names(constant)
+        for text in constant if isinstance(constant, tuple) else (constant,):
+            if isinstance(text, str):
+                yield text
 
 
 def code_members(code: types.CodeType) -> Iterator[object]:

@@ -272,8 +272,7 @@ def mechanism_of(walker: Any) -> Mechanism:
             "mechanism() that makes one."
         )
     # What is made within one trace means nothing in another.
-    traced = is_traced(walker)
-    code, made = _MADE(walker, lambda: (code_in(walker), {}))
+    traced, (code, made) = is_traced(walker), _MADE(walker, lambda: (code_in(walker), {}))
     trace = versions_of(code), current_trace() if traced else None
     if trace not in made:
         # The walker's own rules first: they name its fields, and its leaves may be new to them.
@@ -282,8 +281,7 @@ def mechanism_of(walker: Any) -> Mechanism:
             mechanism = makes()
         check_type(f"{type(walker).__name__}.mechanism()", mechanism, Mechanism)
         made[trace] = mechanism
-    found: Mechanism = made[trace]
-    return found
+    return made[trace]
 
 
 _MADE = OfObjects[tuple[tuple[Hashable, ...], dict[Any, Mechanism]]]()

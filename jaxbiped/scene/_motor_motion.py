@@ -136,7 +136,7 @@ def check_legs_alike(actuation: Any) -> None:
     draw = np.random.default_rng(0).uniform
     for part in actuation or ():
         for load in (tuple(draw(0.0, 0.5, (2, 100))), (None, np.ones(100))):
-            hip = HipMotion(*map(tuple, draw(-1.0, 1.0, (2, 2, 100))), load)
+            hip = HipMotion._make([*map(tuple, draw(-1.0, 1.0, (2, 2, 100))), load])
             torques: Any = None
             users = type(part).__module__.partition(".")[0] not in LIBRARIES
             if users and isinstance(part, AbstractHipActuator) and not is_traced(part):
@@ -192,7 +192,7 @@ def _torques_of_legs(part: AbstractHipActuator, hip: HipMotion) -> Any:
     """Torques [N·m] at motions and, exchanged back, at those of the other leg, shape (n, 2, 2)."""
 
     def torques(hip: HipMotion) -> Any:
-        exchanged = part.torques(HipMotion(*(pair[::-1] for pair in hip)))[::-1]
+        exchanged = part.torques(HipMotion._make(pair[::-1] for pair in hip))[::-1]
         return jnp.asarray([part.torques(hip), exchanged])
 
     return jax.vmap(torques)(hip)

@@ -1,4 +1,4 @@
-"""Laws of motors and actuators that tell apart what a mechanism's symmetry takes for alike."""
+"""Laws of motors and actuators at random motions against themselves at mirror images of these."""
 
 import dataclasses
 
