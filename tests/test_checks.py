@@ -1,15 +1,20 @@
 """Bad arguments, against one clear sentence: the argument, its value and what is allowed."""
 
+import contextlib
 import errno
+import functools
 import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped._checks import warn
 from jaxbiped._files import check_writable_directory, user_path
 
 
@@ -133,3 +138,58 @@ def test_an_address_of_a_file_is_its_path(address, path):
 def test_a_file_of_another_machine_is_refused(address):
     with pytest.raises(jb.ArgumentError, match="is not allowed"):
         user_path(address)
+
+
+def test_a_warning_names_the_callers_line_through_decorators_and_threads():
+    """Between the package and its caller may lie Python's library and JAX."""
+    names = {"__name__": "jaxbiped.somewhere", "warn": warn, "contextlib": contextlib}
+    exec(
+        "@contextlib.contextmanager\n"
+        "def within():\n"
+        "    yield\n"
+        "@within()\n"
+        "def door(x):\n"
+        "    warn('look here')\n"
+        "    return x\n",
+        names,
+    )
+    door = names["door"]
+    calls = (
+        lambda: door(1.0),
+        lambda: functools.partial(door, 1.0)(),
+        lambda: jax.jit(door)(1.0),
+        lambda: jax.vmap(door)(jnp.ones(2)),
+    )
+
+    def call_all():
+        with ThreadPoolExecutor(1) as pool:
+            for call in calls:
+                call()
+                pool.submit(call).result()
+
+    with pytest.warns(RuntimeWarning, match="look here") as caught:
+        call_all()
+    line = test_a_warning_names_the_callers_line_through_decorators_and_threads.__code__
+    assert {warning.filename for warning in caught} == {__file__}
+    assert all(warning.lineno > line.co_firstlineno for warning in caught)
+    assert len({warning.lineno for warning in caught}) == len(calls)
+
+
+def test_a_law_with_an_array_is_told_to_have_numbers():
+    class Weighted(eqx.Module):
+        """Weights as one array."""
+
+        weights: jax.Array
+
+        def __call__(self, motion):
+            return jnp.sum(self.weights) * motion.angle
+
+    walker = jb.Mechanism(
+        bodies=[jb.Body(f"leg_{i}", mass=1.0, inertia=0.01, centre=0.1) for i in (1, 2)],
+        feet=[jb.Foot(f"leg_{i}", centre=0.3, radius=0.05) for i in (1, 2)],
+        joints=[jb.Motor({"leg_1": 1, "leg_2": -1}, Weighted(jnp.ones(3)))],
+        mirror=(("leg_1", "leg_2"),),
+    )
+    scene = jb.RigidScene(walker, jb.Ground(slope=0.02))
+    with pytest.raises(jb.ArgumentError, match=r"law.weights has the shape .* a tuple of numbers"):
+        jb.rigid_walk(scene, scene.state(omega_leg_2=-1.0), duration=0.1)

@@ -105,13 +105,14 @@ class OncePerVersion(Generic[_T]):
     """A `Once` for the present version of the user's code in a key, with that version."""
 
     def __init__(self, key: object) -> None:
-        self._code, self._known = users_code(key), ((), Once[_T]())
+        self._code = users_code(key)
+        self._last: tuple[tuple[int, ...], Once[_T]] = (), Once()
 
     def __call__(self) -> tuple[tuple[int, ...], Once[_T]]:
         versions = versions_of(self._code)
-        if versions != self._known[0]:
-            self._known = versions, Once()
-        return self._known
+        if versions != self._last[0]:
+            self._last = versions, Once()
+        return self._last
 
 
 class OfObjects(Generic[_T]):
@@ -130,11 +131,16 @@ class OfObjects(Generic[_T]):
         return known[1]
 
 
-def versions_in(tree: Any) -> tuple[int, ...]:
-    """The versions of the user's code in the structure of a tree; see `versions_of`."""
+def code_in(tree: Any) -> tuple[Hashable, ...]:
+    """Finds the user's code in the structure of a tree."""
     import jax
 
-    return versions_of(_code_in(jax.tree.structure(tree)))
+    return _code_in(jax.tree.structure(tree))
+
+
+def versions_in(tree: Any) -> tuple[int, ...]:
+    """Gives the versions of the user's code in the structure of a tree; see `versions_of`."""
+    return versions_of(code_in(tree))
 
 
 _code_in = functools.lru_cache(PROGRAMS)(users_code)

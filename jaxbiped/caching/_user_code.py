@@ -23,7 +23,7 @@ from jaxbiped._checks import LIBRARIES, ArgumentError
 _NOT_READ = {"__dict__", "__weakref__", "__doc__", "__dataclass_fields__", "_abc_impl"}
 _BY_ANY_NAME = {"getattr", "vars", "__dict__", "attrgetter", "asdict", "astuple", "fields"}
 """Names by which a function may read attributes that its code does not mention."""
-_PLAIN = (dict, list, tuple, set, frozenset, bytes, bool, int, float, complex, str)
+_PLAIN: tuple[Any, ...] = (dict, list, tuple, set, frozenset, bytes, bool, int, float, complex, str)
 _MOST_READINGS = 256
 
 
@@ -32,13 +32,13 @@ class _Reading(NamedTuple):
 
     Attributes:
         content: all of it, written down.
-        names: which the code mentions.
+        names: all that its functions mention, by their codes.
         kept: objects that are told apart by their identity, so that no other gets the same.
         version: a number that no other content had.
     """
 
     content: bytes
-    names: set[str]
+    names: dict[types.CodeType, frozenset[str]]
     kept: list[object]
     version: int
 
@@ -49,14 +49,14 @@ _LOCK = threading.RLock()
 
 
 def users_code(*things: object) -> tuple[Hashable, ...]:
-    """The functions, classes and objects of the user's of which some things are made."""
+    """Finds the functions, classes and objects of the user's of which some things are made."""
     reader = _Reader(None)
     reader.dump(things)
     return tuple(reader.code)
 
 
 def versions_of(code: tuple[Hashable, ...]) -> tuple[int, ...]:
-    """The versions of pieces of code, which are other numbers once they read anything else.
+    """Gives the version of each piece of code: another number once it reads anything else.
 
     Raises:
         ArgumentError: one reads a value that is traced.
@@ -66,37 +66,42 @@ def versions_of(code: tuple[Hashable, ...]) -> tuple[int, ...]:
 
 
 def _version(piece: Hashable) -> int:
-    known = _READINGS.get(piece)
-    names, size = set[str]() if known is None else known.names, -1
-    while size < len(names):  # what is read may mention more names
+    last = _READINGS.get(piece)
+    names, size = {} if last is None else last.names, -1
+    while size < len(names):  # what is read may be more functions, which mention more
         size, reader = len(names), _Reader(piece, names)
         reader.dump(piece)
     content = reader.file.getvalue()
-    if known is not None and known.content == content:
-        return known.version
-    if known is not None or len(_READINGS) >= _MOST_READINGS:
-        _READINGS.clear()
+    if last is not None and last.content == content:
+        return last.version
+    if last is not None or len(_READINGS) >= _MOST_READINGS:
+        if last is None:
+            _READINGS.clear()
         sys.modules["jax"].clear_caches()  # what it traced of this and of equal functions
     _READINGS[piece] = _Reading(content, names, reader.kept, next(_VERSIONS))
     return _READINGS[piece].version
 
 
 def _made(*parts: object) -> None:
-    """Stands for the function that would make a thing again, which nobody does."""
+    """It stands for the function that would make a thing again, which nobody does."""
 
 
 class _Reader(pickle.Pickler):
-    """Writes down all that a piece of code reads, or without one, finds the pieces in a thing."""
+    """It writes down all that a piece of code reads; without a piece, it finds those in a thing."""
 
-    def __init__(self, piece: object, names: set[str] | None = None) -> None:
+    def __init__(
+        self, piece: object, names: dict[types.CodeType, frozenset[str]] | None = None
+    ) -> None:
         self.file, self.piece, self.kept = io.BytesIO(), piece, list[object]()
-        self.finds, self.names = names is None, set[str]() if names is None else names
-        self.code = dict[Any, None]()
+        self.code, self.finds = dict[Any, None](), names is None
+        self.by_code = {} if names is None else names
+        self.names = set[str]().union(*self.by_code.values())
         super().__init__(self.file, protocol=5)
 
     def reducer_override(self, thing: Any) -> Any:
         """See `pickle.Pickler`. What is read is a state, as only states may contain themselves."""
-        jax: Any = sys.modules["jax"]
+        import jax
+
         kind = thing if isinstance(thing, type | types.FunctionType) else type(thing)
         users = kind is functools.partial or _is_users(kind)
         if thing is _made:
@@ -109,20 +114,19 @@ class _Reader(pickle.Pickler):
                 "other function of the scene or args that it is called with."
             )
         # Of a node of JAX's trees, the package reads the parts, so that all of them count.
-        if users and self.finds and (thing is kind or jax.tree_util.all_leaves([thing])):
+        is_piece = thing is kind or jax.tree_util.all_leaves([thing])
+        if users and self.finds and is_piece and _has_hash(thing):
             self.code[thing] = None
             return _made, ()
         return _made, (getattr(kind, "__qualname__", ""),), tuple(self._parts(thing, kind, users))
 
     def _parts(self, thing: Any, kind: Any, users: bool) -> Iterator[object]:
         if isinstance(thing, types.ModuleType):
-            read = self._named(vars(thing))
-            known = set() if _is_users(thing) else {n for n in read if callable(read[n])}
-            yield thing.__name__, {n: read[n] for n in read.keys() - known}
+            items, users = self._named(vars(thing)).items(), _is_users(thing)
+            yield thing.__name__, [(n, x) for n, x in items if users or not callable(x)]
         elif isinstance(thing, types.FunctionType):
             yield thing.__code__, thing.__defaults__, thing.__kwdefaults__, thing.__closure__
-            read = _names(thing.__code__) if users else frozenset[str]()
-            self.names.update(read)
+            read = self._names_of(thing.__code__) if users else frozenset[str]()
             yield {name: thing.__globals__.get(name) for name in sorted(read)}, vars(thing)
         elif isinstance(thing, types.CodeType):
             yield from code_members(thing)
@@ -135,11 +139,11 @@ class _Reader(pickle.Pickler):
         elif thing is kind:
             yield thing.__module__
             if users:
-                own = {name: each for name, each in vars(thing).items() if name not in _NOT_READ}
-                yield thing.__bases__, own
+                members = {n: x for n, x in dict(vars(thing)).items() if n not in _NOT_READ}
+                yield thing.__bases__, members
         elif users and kind is not functools.partial:
-            yield kind, [each(thing) for each in _PLAIN if isinstance(thing, each)]
-            state = object.__getstate__(thing)  # type: ignore[attr-defined]
+            yield kind, [plain(thing) for plain in _PLAIN if isinstance(thing, plain)]
+            state = object.__getstate__(thing)
             for part in state if isinstance(state, tuple) else (state,):
                 yield part if self.finds else self._named(part or {})
         elif isinstance(thing, sys.modules["jax"].tree_util.PyTreeDef):
@@ -150,7 +154,7 @@ class _Reader(pickle.Pickler):
             yield from self._library_parts(thing)
 
     def _library_parts(self, thing: Any) -> Iterator[object]:
-        """What an object of a library's class holds, or its identity if the class does not tell."""
+        """Gives what an object of a library's class holds, or else its identity."""
         try:
             how = thing.__reduce_ex__(5)
             yield how if isinstance(how, str) else [*how[:3], *map(_listed, how[3:])]
@@ -160,10 +164,25 @@ class _Reader(pickle.Pickler):
             yield [value for value in values if isinstance(value, _PLAIN)]
             yield id(thing), getattr(thing, "__wrapped__", None), getattr(thing, "fget", None)
 
+    def _names_of(self, code: types.CodeType) -> frozenset[str]:
+        if code not in self.by_code:
+            self.by_code[code] = frozenset(_names(code))
+            self.names |= self.by_code[code]
+        return self.by_code[code]
+
     def _named(self, attributes: dict[str, object]) -> dict[str, object]:
         """The attributes that the code may read."""
-        by_any_name = self.names & _BY_ANY_NAME
-        return {n: each for n, each in attributes.items() if by_any_name or n in self.names}
+        if self.names & _BY_ANY_NAME:
+            return dict(attributes)
+        return {name: attributes[name] for name in sorted(self.names) if name in attributes}
+
+
+def _has_hash(thing: object) -> bool:
+    try:
+        hash(thing)
+    except TypeError:  # JAX takes no such thing for a program's
+        return False
+    return True
 
 
 def _listed(items: Any) -> object:
@@ -171,7 +190,7 @@ def _listed(items: Any) -> object:
 
 
 def _is_users(thing: Any) -> bool:
-    """Whether what a function, class or module reads is the user's to change."""
+    """Tells whether what a function, class or module reads is the user's to change."""
     module = thing.__module__ if isinstance(thing, type) else None
     name = module or getattr(thing, "__globals__", vars(thing)).get("__name__")
     if str(name).partition(".")[0] in LIBRARIES:
@@ -191,20 +210,17 @@ def _content(cell: types.CellType) -> object:
         return None
 
 
-@functools.lru_cache(_MOST_READINGS)
-def _names(code: types.CodeType) -> frozenset[str]:
-    """What a function's code mentions: names, and texts that may be used as such."""
-    found = {
-        step.argval
-        for step in dis.get_instructions(code)
-        if step.opcode in dis.hasname and step.opname != "STORE_ATTR"
-    }
+def _names(code: types.CodeType) -> Iterator[str]:
+    """Yields what a function's code mentions: names, and texts that may be used as such."""
+    for step in dis.get_instructions(code):
+        if step.opcode in dis.hasname and step.opname != "STORE_ATTR":
+            yield step.argval
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            found |= _names(constant)
-        texts = constant if isinstance(constant, tuple) else (constant,)
-        found.update(text for text in texts if isinstance(text, str))
-    return frozenset(found)
+            yield from _names(constant)
+        for text in constant if isinstance(constant, tuple) else (constant,):
+            if isinstance(text, str):
+                yield text
 
 
 def code_members(code: types.CodeType) -> Iterator[object]:

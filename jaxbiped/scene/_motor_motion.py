@@ -18,7 +18,8 @@ from jaxbiped.scene._mechanism_pieces import named_sum, with_fixed
 from jaxbiped.scene._structure import Angle, Indices, Structure
 from jaxbiped.scene.actuation._abstract_actuator import AbstractHipActuator, HipMotion
 
-_MOTIONS = 64
+_NUMBERS = 1000
+"""Numbers in random motions, as many as NumPy runs a function of."""
 _ROUNDING = 1e-9
 
 
@@ -117,8 +118,9 @@ def check_images(mechanism: Any) -> None:
     numbers = [k for k, part in enumerate(mechanism.joints) if _acts_by_side(part, s)]
     if not numbers or (twins is None and s.turn is None) or is_traced(mechanism.joints):
         return
-    draw, count = np.random.default_rng(0).uniform, len(s.bodies)
-    motions = draw(-1.0, 1.0, (_MOTIONS, 2 * count + 1)) * draw(0.0, 1.0, (_MOTIONS, 1))
+    count = _NUMBERS // (2 * len(s.bodies) + 1)
+    motions = np.random.default_rng(0).uniform(-1.0, 1.0, (count, 2 * len(s.bodies) + 1))
+    motions[::2] *= 0.1  # of every second one all angles are small
     torques: Any = None
     with contextlib.suppress(Exception), untraced():  # a law that fails is refused where it acts
         torques = np.asarray(_torques_at_images(mechanism, motions))
@@ -133,8 +135,8 @@ def check_legs_alike(actuation: Any) -> None:
     """Raises `ArgumentError` for an actuator at the hip that tells one leg from the other."""
     draw = np.random.default_rng(0).uniform
     for part in actuation or ():
-        for load in (tuple(draw(0.0, 0.5, (2, _MOTIONS))), (None, np.ones(_MOTIONS))):
-            hip = HipMotion(*map(tuple, draw(-1.0, 1.0, (2, 2, _MOTIONS))), load)
+        for load in (tuple(draw(0.0, 0.5, (2, 100))), (None, np.ones(100))):
+            hip = HipMotion._make([*map(tuple, draw(-1.0, 1.0, (2, 2, 100))), load])
             torques: Any = None
             users = type(part).__module__.partition(".")[0] not in LIBRARIES
             if users and isinstance(part, AbstractHipActuator) and not is_traced(part):
@@ -144,13 +146,13 @@ def check_legs_alike(actuation: Any) -> None:
                 _check_same(type(part).__name__, "mirror", *np.moveaxis(torques, 1, 0))
 
 
-def _check_same(words: str, symmetry: str, own: np.ndarray, image: np.ndarray) -> None:
-    off = np.nan_to_num(np.abs(own - image))
-    if np.max(off) > _ROUNDING * np.max(np.abs(own)):
+def _check_same(words: str, symmetry: str, torques: np.ndarray, images: np.ndarray) -> None:
+    off = np.nan_to_num(np.abs(torques - images))
+    if np.max(off) > _ROUNDING * np.max(np.abs(torques)):
         worst = np.unravel_index(np.argmax(off), off.shape)
         raise ArgumentError(
-            f"{words} gives {own[worst]:.4g} N m at a motion and {image[worst]:.4g} N m at its "
-            f"image by the {symmetry}, which is not allowed: treat both alike, or leave the "
+            f"{words} gives {torques[worst]:.4g} N m at a motion and {images[worst]:.4g} N m at "
+            f"its image by the {symmetry}, which is not allowed: treat both alike, or leave the "
             f"{symmetry} out."
         )
 
@@ -175,8 +177,8 @@ def _torques_at_images(mechanism: Any, motions: Any) -> Any:
         images = BodyAngles(angles, rates), BodyAngles(turned, [rates[j] for j in twin])
         return [
             [
-                jnp.asarray(part.law(MotorMotion(s, seen, slope, own, None)))
-                for part, own in zip(joints, s.joints, strict=True)
+                jnp.asarray(part.law(MotorMotion(s, seen, slope, angle, None)))
+                for part, angle in zip(joints, s.joints, strict=True)
                 if _acts_by_side(part, s)
             ]
             for seen in images
@@ -190,7 +192,7 @@ def _torques_of_legs(part: AbstractHipActuator, hip: HipMotion) -> Any:
     """Torques [N·m] at motions and, exchanged back, at those of the other leg, shape (n, 2, 2)."""
 
     def torques(hip: HipMotion) -> Any:
-        exchanged = part.torques(HipMotion(*(pair[::-1] for pair in hip)))[::-1]
+        exchanged = part.torques(HipMotion._make(pair[::-1] for pair in hip))[::-1]
         return jnp.asarray([part.torques(hip), exchanged])
 
     return jax.vmap(torques)(hip)

@@ -1,4 +1,4 @@
-"""What a function of the user's reads: after it changes, the next call has the new numbers."""
+"""What functions of the user's read, after it changed, against functions that never read others."""
 
 import dataclasses
 import functools
