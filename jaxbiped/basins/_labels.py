@@ -115,8 +115,7 @@ def check_label_grid(labels: npt.ArrayLike) -> np.ndarray:
     """Label codes on a grid of one or more dimensions, none of them pending.
 
     Raises:
-        ArgumentError: no entry, no axis, codes that are not whole numbers, or a pending one; or a
-            list of starts, which are no neighbours.
+        ArgumentError: no entry, no axis, no whole numbers, a pending code, or a list of starts.
     """
     check_no_dataset(labels)
     if _lists_starts(labels):

@@ -227,7 +227,7 @@ def _measures(found: "jb.optimise.Optimum") -> Iterator[tuple[object, ...]]:
 
 def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
     told, basin, walk = certificate.optimality, certificate.basin, certificate.walk
-    yield f"optimality: residual {told.residual:.1e}, requirements missed by {told.excess:.1e}"
+    yield "optimality: residual {:.1e} ± {:.1e}, requirements missed by {:.1e}".format(*told[:3])
     for each in (*told.requirements, *told.bounds):
         if each.active:
             yield (

@@ -100,9 +100,8 @@ class Gait(eqx.Module, Tabular):
             multipliers are those of one side, their errors are infinite, and sensitivities are NaN.
         cycle_footsteps: smallest number of footsteps after which the orbit closes, a divisor of the
             requested number.
-        sound: whether the orbit is a walk (boolean): no foot is deep underground, footsteps lead
-            downhill by 1 % of the walker's height in the mean, and more than a fraction of a swing
-            lies between crossings.
+        sound: whether the orbit is a walk (boolean), and not one of those that *no walk* of
+            `Search` describes.
         origin: how the search found the gait, which other gaits it found, and where the branch of
             the seed's gait ended on the way to this scene; see `found_by` and `others`.
         step_lengths: distance of each heel strike from the one before [m], shape (footsteps,).

@@ -6,7 +6,7 @@ import numpy as np
 import scipy  # its submodules are imported where they are first used
 
 from jaxbiped.optimise._design_functions import AnyRow, cluster_rows, rows_of
-from jaxbiped.optimise._design_problem import Design, DesignProblem
+from jaxbiped.optimise._design_problem import Design, DesignProblem, scale_of
 from jaxbiped.optimise._objective_values import Evaluation
 
 OPTIMAL = 1e-3
@@ -178,13 +178,16 @@ def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
 
 def doubt_of(problem: DesignProblem, design: Design) -> str:
     """Why a design does not count as an optimum, in a sentence; nothing where it does."""
-    found, allowance = optimality_of(problem, design), problem.allowance(design.known)
+    found = optimality_of(problem, design)
     if not found.residual <= OPTIMAL:
         return f"The derivatives do not balance: {found.residual:.1e} of the objective is left."
     if not found.error <= OPTIMAL:
         return f"The residual is known to within {found.error:.1e} of the objective only."
-    if not allowance <= OPTIMAL:
-        return f"Requirements are known to within {allowance:.1e} of their bounds only."
+    for each in found.requirements:
+        # Where multipliers meet, it is the conditions on them that are known, and kept too well.
+        by_cluster = problem.has_cluster and each.name == "spectral_radius"
+        if each.active and not (by_cluster or each.error <= OPTIMAL * scale_of(each.bound)):
+            return f"What holds it, {each.name}, is known to within {each.error:.1e} only."
     if not all(_explains(problem, design, e) for e in problem.asked if is_near(design, e)):
         return "Designs tried nearby differ from it by other amounts than the derivatives say."
     return ""
