@@ -203,7 +203,12 @@ def test_a_rimless_wheel_on_compliant_feet():
     gait = jb.find_gait(scene, **PLAIN)
     assert gait.found_by is jb.gait.FoundBy.START
     assert gait.cycle == "step"
-    assert float(gait.unit_multiplier_error) < 3e-5
+    # It varies with where steps fall: 2.5e-6 to 1.2e-5 over nine slopes within 2 % of this one.
+    slopes = (0.98 * rigid.ground.slope, 1.02 * rigid.ground.slope)
+    others = [jb.find_gait(jb.with_parameters(scene, {"slope": x}), **PLAIN) for x in slopes]
+    off = [float(each.unit_multiplier_error) for each in (gait, *others)]
+    assert np.median(off) < 1e-5
+    assert max(off) < 3e-5
     eta = (0.5 + np.cos(2.0 * np.pi / 8.0)) / 1.5
     assert float(gait.multipliers[0].real) == pytest.approx(eta**2, abs=2e-3)
     length = 2.0 * np.sin(np.pi / 8.0)

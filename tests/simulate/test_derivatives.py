@@ -167,11 +167,15 @@ def test_derivatives_of_a_rigid_walk(how):
     np.testing.assert_allclose(reverse, forward, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["kelvin-voigt", "tsuji"])
-def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name):
-    """Errors vary tenfold with where the steps fall.
+@pytest.mark.parametrize(
+    ("name", "draft"), [("kelvin-voigt", (5e-4, 3e-3)), ("tsuji", (2e-4, 3e-4))]
+)
+def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name, draft):
+    """Medians and largest errors over starts, for single ones vary tenfold with where steps fall.
 
-    The worst of nine starts within 2 % of this one: 2.1e-3, 2.5e-4 and 1.1e-6.
+    Of 17 starts within 2 % of the seed's, Kelvin and Voigt's law has 1.1e-4 and 2.0e-3 at draft,
+    1.2e-5 and 2.6e-4 at balanced, 3.5e-7 and 1.0e-6 at tight; Tsuji's 1.5e-4 and 2.3e-4, 1.7e-5 and
+    2.6e-4, 2.2e-7 and 3.4e-7.
     """
     law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
     scene = eqx.tree_at(lambda scene: scene.normal, jb.seed_scene(), law)
@@ -181,11 +185,14 @@ def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name):
         walk = jb.simulate(scene, state, duration=0.6, save="end", **how)
         return jnp.stack([walk.final.hip_x, walk.final.theta_1, walk.final.omega_1])
 
-    rate = jb.seed_state().omega_2
-    right = _central(partial(end, rtol=1e-12), rate, 1e-4)
-    for accuracy, error in (("draft", 4e-3), ("balanced", 4e-4), ("tight", 5e-6)):
-        told = jax.jacfwd(partial(end, accuracy=accuracy))(rate)
-        np.testing.assert_allclose(told, right, atol=error * np.max(np.abs(right)))
+    rates = jb.seed_state().omega_2 * (1.0 + jnp.linspace(-0.02, 0.02, 9))
+    right = _central(jax.vmap(partial(end, rtol=1e-12)), rates, 1e-4)
+    bounds = {"draft": draft, "balanced": (5e-5, 5e-4), "tight": (1e-6, 2e-6)}
+    for accuracy, (median, largest) in bounds.items():
+        told = jax.vmap(jax.jacfwd(partial(end, accuracy=accuracy)))(rates)
+        errors = np.max(np.abs(told - right), axis=1) / np.max(np.abs(right), axis=1)
+        assert np.median(errors) < median, accuracy
+        assert np.max(errors) < largest, accuracy
 
 
 def test_derivatives_at_a_touchdown_are_those_before_the_force_jumps():
@@ -233,10 +240,11 @@ def test_steep_friction_on_stiff_ground(numbers):
         walk = jb.simulate(moved, START, footsteps=1, save="end", **how)
         return jnp.concatenate([walk.t, *map(jnp.atleast_1d, walk.final)])
 
-    step = 1e-5 * jnp.eye(3)
-    ends = jax.vmap(partial(end, rtol=1e-12))(jnp.concatenate([1.0 + step, 1.0 - step]))
-    right = (ends[:3] - ends[3:]).T / 2e-5
-    for accuracy, error in (("balanced", 1e-3), ("tight", 6e-5)):
+    # Of order four, so that steps can be long: short ones enlarge the walks' own errors.
+    steps = jnp.concatenate([k * 1e-3 * jnp.eye(3) for k in (1.0, -1.0, 2.0, -2.0)])
+    near, back, far, farther = jax.vmap(partial(end, rtol=3e-13))(1.0 + steps).reshape(4, 3, -1)
+    right = (8.0 * (near - back) - (far - farther)).T / 12e-3
+    for accuracy, error in (("balanced", 1e-3), ("tight", 3e-6)):
         told = jax.jacfwd(partial(end, accuracy=accuracy))(jnp.ones(3))
         np.testing.assert_allclose(told, right, atol=error * np.max(np.abs(right)))
 

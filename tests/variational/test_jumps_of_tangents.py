@@ -18,6 +18,7 @@ from jaxbiped.variational._flow import (
     after_reset,
     jump_of,
     on_section,
+    sides_of,
     tangent_on_section,
 )
 from jaxbiped.variational._grazing import turns_of
@@ -180,6 +181,38 @@ def test_a_jump_of_the_jacobian_is_its_value_at_the_switch(power):
 @pytest.mark.parametrize("power", [-0.75, -0.5, -0.25])
 def test_a_jacobian_without_bound_at_a_switch_has_no_jump(power):
     assert np.all(np.isnan(jump_of(jnp.asarray(_beside_a_switch(power)))))
+
+
+class Braking(Plain):
+    """x' = v, v' = −a sin(v/v0), for v above v0 −a sin 1: a corner of friction under a load."""
+
+    def vector_field(self, t, y, args):
+        return y[1], -args[0] * jnp.sin(jnp.minimum(y[1] / SLOW, 1.0))
+
+    def switches(self, args, y):
+        return Switch(y[0], True), Switch(y[1] - SLOW, True, corner=True)
+
+
+SLOW = 5e-6
+"""Speed over which that friction builds up [m/s]."""
+
+
+def test_a_jump_at_a_corner_of_steep_friction_keeps_no_change_of_the_slip():
+    """A load that stops 1e4 m/s²: within 0.6 ns friction's slope is another one altogether."""
+    args = Seeded((jnp.asarray(1e4),), jnp.zeros((0, 3)), jnp.zeros(3), (0,))
+    flow = Flow(Braking(), section, Braking().vector_field, args, jax.tree.structure((0.0, 0.0)))
+    y, q = jnp.array([0.1, SLOW]), jnp.array([1e4])
+    velocity = lambda y: flow.velocity(jnp.concatenate([y, q]))
+
+    @jax.jit
+    def told(number):
+        states = y + sides_of(flow, y, number, q)[:, None] * velocity(y)
+        return jump_of(jax.lax.map(jax.jacfwd(velocity), states))[1, 1]
+
+    jump = -1e4 * np.cos(1.0) / SLOW
+    assert float(told(2.0)) == pytest.approx(jump, rel=1e-3)
+    # As far from it as penetrations need, it is off by a hundredth.
+    assert float(told(1.0)) != pytest.approx(jump, rel=5e-3)
 
 
 class Flight(Plain):

@@ -1,6 +1,5 @@
 """Form of a Rosenbrock method: the coefficients of its tableau."""
 
-import functools
 from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
@@ -52,7 +51,6 @@ def last_stage(tableau: RosenbrockTableau) -> Row:
     return (*[0.0] * (len(tableau.alpha) - 1), 1.0)
 
 
-@functools.lru_cache(maxsize=256)
 def direct_weights(tableau: RosenbrockTableau, row: Row) -> Row:
     """Weights of s_0, u_s1, u_s2 … in (Σ_j row_j u_j)/(γ h) of a component with the rate s.
 
