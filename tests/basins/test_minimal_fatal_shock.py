@@ -172,3 +172,20 @@ def test_directions_may_be_given():
     np.testing.assert_allclose(found.direction, np.sqrt([0.5, 0.5]))
     turned = _push(label_of, np.zeros(2), np.ones(2), directions=[[3.0, 3.0]])
     assert turned.distance == pytest.approx(0.5, abs=1.5 * TOLERANCE)
+
+
+def test_turns_that_never_help_are_given_up():
+    """A square whose gradient is that of its diagonal: the nearest point stays that of a side."""
+    points = []
+
+    def outside(x):
+        points.append(len(x))
+        return (np.max(np.abs(x - 0.1), axis=1) > 1.0).astype(int)
+
+    shock = jb.basins.minimal_fatal_shock(
+        outside, np.zeros(2), scales=np.ones(2), max_distance=3.0, tolerance=1e-6,
+        normal=lambda x: np.ones_like(x),
+    )  # fmt: skip
+    assert shock.distance == pytest.approx(0.9, abs=2e-6)
+    # Thirty rounds of turns, of the kind that is halved each time, would ask for 17,000.
+    assert sum(points) < 4000

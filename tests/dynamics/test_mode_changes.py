@@ -85,7 +85,8 @@ def test_held_limits_that_share_bodies_are_all_met_by_the_nearest_angles():
     feet = [Foot(f"shank_{i}", centre=0.2) for i in (1, 2)]
     scene = rigid(Mechanism(root_mass=1.0, bodies=bodies, feet=feet, joints=stops))
     angles = dict(theta_thigh_1=0.31, theta_thigh_2=-0.02, theta_shank_1=0.33, theta_shank_2=-0.01)
-    after = on_held(scene, in_mode(scene, scene.state(**angles, held=()), (0, 1, 2)))
+    upright = scene.state(**dict.fromkeys(angles, 0.0), held=())
+    after = on_held(scene, in_mode(scene, upright._replace(**angles), (0, 1, 2), (True, False)))
     found = [float(getattr(after, name)) for name in angles]
     np.testing.assert_allclose(found, [0.3025, 0.0025, 0.3025, 0.0025], atol=1e-14)
 

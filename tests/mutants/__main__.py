@@ -109,7 +109,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"{number:4} {drawn.title()}")
             return 0
         caught = drawn_mutants.run(
-            options.draw, options.seed, only=numbers, minutes=options.minutes
+            options.draw,
+            options.seed,
+            only=numbers,
+            near=options.near,
+            minutes=options.minutes,
         )
         return 0 if caught else 1
     every, only = mutations(), tuple(options.only)

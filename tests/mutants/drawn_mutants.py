@@ -51,7 +51,7 @@ class Verdict(NamedTuple):
     Attributes:
         number: of the mutation in the draw.
         place: `Drawn.place`, by which it is known again.
-        word: "caught", "survived" or "equivalent".
+        word: "caught", "survived", "open" or "equivalent".
         by: the test that failed, or the reason.
         seconds: that the tests ran.
     """
@@ -107,14 +107,18 @@ class Workshop:
         self.nearness = Nearness()
         self.executed = ExecutedBlocks(EXECUTED)
 
-    def verdict(self, number: int, drawn: Drawn) -> Verdict:
-        """Runs the tests near a mutation until one fails."""
+    def verdict(self, number: int, drawn: Drawn, *, near: bool) -> Verdict:
+        """Runs the tests near a mutation until one fails; the nearest quick ones alone if `near`.
+
+        Of these alone no mutation survives: it is "open".
+        """
         begin, source = time.perf_counter(), (PACKAGE / drawn.file).read_text()
         cache = self.cache
         if drawn.file.startswith(_OWN_CACHE):
             cache = Path(tempfile.mkdtemp(prefix="cache-", dir=self.folder.parent))
         caught: str | None = None
-        for stage in stages(drawn, self.nearness, self.executed):
+        every = stages(drawn, self.nearness, self.executed)
+        for stage in every[:1] if near else every:
             if not stage.paths:
                 continue
             self.checkout.write(drawn.file, drawn.mutated(source))
@@ -129,7 +133,7 @@ class Workshop:
                 self.checkout.write(drawn.file, source)
             if caught is not None:
                 break
-        word = "survived" if caught is None else "caught"
+        word = "caught" if caught is not None else "open" if near else "survived"
         return Verdict(number, drawn.place, word, caught or "", time.perf_counter() - begin)
 
     def _hang(self, test: str, drawn: Drawn, source: str, stage: Stage) -> str | None:
@@ -161,12 +165,20 @@ def interval(caught: int, of: int) -> tuple[float, float]:
     return (middle - half) / (1 + z * z / of), (middle + half) / (1 + z * z / of)
 
 
-def run(count: int, seed: int, *, only: Sequence[int] = (), minutes: float = math.inf) -> bool:
+def run(
+    count: int,
+    seed: int,
+    *,
+    only: Sequence[int] = (),
+    near: bool = False,
+    minutes: float = math.inf,
+) -> bool:
     """Tries a draw's mutations that have no verdict yet; whether nine tenths were caught.
 
     Args:
         count: how many are drawn, with `seed`.
         only: numbers of those to try, also where they have a verdict; all others where empty.
+        near: whether to run the nearest quick tests alone, and leave open what they do not catch.
         minutes: after which none is begun any more.
     """
     end = time.monotonic() + 60.0 * minutes
@@ -183,9 +195,10 @@ def run(count: int, seed: int, *, only: Sequence[int] = (), minutes: float = mat
         for number in waiting:
             if workshop is None or time.monotonic() > end:
                 break
-            verdict = workshop.verdict(number, drawn[number])
+            verdict = workshop.verdict(number, drawn[number], near=near)
             print(verdict.line(drawn[number]), flush=True)
-            kept.add(verdict)
+            if verdict.word != "open":
+                kept.add(verdict)
         failure = workshop.fail_without(kept.catching(waiting)) if workshop else None
     if failure is not None:
         print(f"Fails without any mutation as well: {failure}")
