@@ -115,8 +115,7 @@ class Mechanism(eqx.Module):
             bodies = with_turning_body(turns, bodies, feet, legs)
             shared[1] = turns.firsts
         pieces: list[Body | Foot | AbstractJointPart] = []
-        groups = zip((bodies, feet, joints), shared, strict=True)
-        places = [_share(group, pair, pieces) for group, pair in groups]
+        places = [_share(*g, pieces) for g in zip((bodies, feet, joints), shared, strict=True)]
         couplings = [(k, angles[k]) for k, part in enumerate(joints) if isinstance(part, Coupling)]
         unique_legs = tuple(dict.fromkeys(legs))
         self.root_mass = root_mass
@@ -291,11 +290,10 @@ _MADE = OfObjects[tuple[tuple[Hashable, ...], dict[Any, Mechanism]]]()
 
 def _share(group: Sequence[Any], twins: Indices | None, pieces: list[Any]) -> Indices:
     """Adds the pieces of a group that have parameters of their own; the number of each one's."""
-    found: list[int] = []
+    numbers: list[int] = []
     for k, piece in enumerate(group):
-        if twins is not None and twins[k] < k:
-            found.append(found[twins[k]])
-            continue
-        found.append(len(pieces))
-        pieces.append(piece)
-    return tuple(found)
+        first = k if twins is None else min(twins[k], k)
+        numbers.append(len(pieces) if first == k else numbers[first])
+        if first == k:
+            pieces.append(piece)
+    return tuple(numbers)
