@@ -19,9 +19,9 @@ def run(*arguments):
     return stopped.value.code
 
 
-def numbers_of(capsys, *arguments):
-    """What a command that ends well writes as JSON."""
-    assert run(*arguments, "--json", "-") == 0
+def numbers_of(capsys, *arguments, code=0):
+    """What a command that ends with this code writes as JSON; 0 where it ends well."""
+    assert run(*arguments, "--json", "-") == code
     return json.loads(capsys.readouterr().out)
 
 

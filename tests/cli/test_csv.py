@@ -45,7 +45,7 @@ def test_a_gait_a_branch_and_a_fit(capsys, tmp_path):
     told = numbers_of(capsys, *fit)
     assert float(first["estimate [SI]"]) == told["estimates"]["J"] == pytest.approx(0.0096)
     assert (second["parameter"], second["unit"]) == ("d", "m")
-    branch = ("continue", "--model", "rigid", "--from", 0.018, "--to", 0.022, "--max-points", 4)
+    branch = ("continue", "--model", "rigid", "--from", 0.018, "--to", 0.022)
     points = table_of(capsys, *branch)
     told = numbers_of(capsys, *branch)["points"]
     assert [float(each["slope [rad]"]) for each in points] == [each["slope"] for each in told]

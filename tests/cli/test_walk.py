@@ -116,7 +116,8 @@ def test_energy_left_open_is_a_warning_and_a_number(arguments, capsys):
 
 def test_a_cap_on_steps_bounds_a_walk_of_any_duration(capsys):
     """A duration of 1e9 s takes no more memory than the steps that are walked."""
-    numbers = numbers_of(capsys, "walk", "--duration", "1e9", "--max-solver-steps", "1500")
+    cut = ("walk", "--duration", "1e9", "--max-solver-steps", "1500")
+    numbers = numbers_of(capsys, *cut, code=1)
     assert numbers["ending"] == "out of steps"
     (warning,) = numbers["warnings"]
     assert "1500" in warning
