@@ -14,7 +14,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._summary import notebook_html
 from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
-from jaxbiped.continuation._branch_point import Axis, BranchPoint, footstep_columns, footsteps_of
+from jaxbiped.continuation._branch_point import Axis, BranchPoint, CycleFootsteps
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
 from jaxbiped.gait._branch_along import state_at
@@ -122,6 +122,7 @@ class Branch(eqx.Module, Tabular):
 
 _STABLE = {True: 1, False: 0, None: -1}
 _NUMBERS = ("period", "step_length", "peak_normal", "unit_multiplier_error", "residual")
+_HOW = ("footsteps", "accuracy", "engine")
 _EVENT_NUMBERS = ("multiplier_real", "multiplier_imag", "error", "value_error", "beyond")
 _OWN = {
     "unit_multiplier_error": Quantity("error of the unit multiplier"),
@@ -160,12 +161,10 @@ def _branch_dataset(branch: Branch) -> "xarray.Dataset":
         "axis": branch.axis._asdict(),
         "stops": [[int(each.end), each.cause, each.value] for each in branch.stops],
         **scene_identity(branch.scene),
-        "footsteps": branch.footsteps,
-        "accuracy": branch.accuracy,
-        "engine": branch.engine,
+        **{name: getattr(branch, name) for name in _HOW},
     }
-    attributes = {"branch": strict_json(settings, unknown=str)}
-    return xarray.Dataset(variables_of(entries), attrs=attributes)
+    text = strict_json(settings, unknown=str)
+    return xarray.Dataset(variables_of(entries), attrs={"branch": text})
 
 
 def _entries(
@@ -182,12 +181,9 @@ def _entries(
     values, errors = table("multipliers", m - 1, complex), table("multiplier_errors", m - 1, float)
     own = {name: np.array([getattr(each, name) for each in points], float) for name in _NUMBERS}
     own["speed"] = own["step_length"] / own["period"]
+    value = np.array([point.value for point in points], float)
     entries = {
-        branch.along: Entry(
-            (along,),
-            np.array([point.value for point in points], float),
-            parameter_quantities(branch.scene)[branch.along],
-        )
+        branch.along: Entry((along,), value, parameter_quantities(branch.scene)[branch.along])
     }
     for name, each in own.items():
         entries[name] = Entry((along,), each, _OWN.get(name) or QUANTITIES[name])
@@ -195,8 +191,7 @@ def _entries(
         (along,), np.abs(values[:, 0]), QUANTITIES["spectral_radius"], errors[:, 0]
     )
     for name, each in zip(names, table("recurring", m, float).T, strict=True):
-        quantity = state_quantity(name) or Quantity(name)
-        entries[f"state_{name}"] = Entry((along,), each, quantity)
+        entries[f"state_{name}"] = Entry((along,), each, state_quantity(name) or Quantity(name))
     each_of = (along, "multiplier")
     for word, part in (("real", values.real), ("imaginary", values.imag)):
         words, bars = Quantity(f"multiplier, {word}"), f"{before}multipliers_error"
@@ -211,8 +206,11 @@ def _entries(
     for name in ("place", "tangent"):
         words = Quantity(f"{name} on the curve of gaits", unit="scaled")
         entries[name] = Entry((along, "component"), table(name, m + 1, float), words)
-    for name, each in footstep_columns(points, names).items():
-        entries[f"footstep_{name}"] = Entry((along, "footstep"), each, entries[name].quantity)
+    if cycles := [point.footsteps for point in points if point.footsteps is not None]:
+        begins, *others = map(np.stack, zip(*cycles, strict=True))
+        columns = [*(f"state_{name}" for name in names), *CycleFootsteps._fields[1:]]
+        for name, rows in zip(columns, [*np.moveaxis(begins, -1, 0), *others], strict=True):
+            entries[f"footstep_{name}"] = Entry((along, "footstep"), rows, entries[name].quantity)
     return {before + name: entry for name, entry in entries.items()}
 
 
@@ -257,9 +255,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
         stops=(first, last),
         axis=Axis(**settings["axis"]),
         state_type=kind,
-        footsteps=settings["footsteps"],
-        accuracy=settings["accuracy"],
-        engine=settings["engine"],
+        **{name: settings[name] for name in _HOW},
     )
 
 
@@ -275,13 +271,18 @@ def _points(dataset: "xarray.Dataset", kind: Any, along: str, before: str) -> li
     def column(name: str) -> np.ndarray:
         return _column(dataset, before + name)
 
-    recurring = np.stack([column(f"state_{name}") for name in recurring_names(kind)], axis=1)
+    def states(of: str) -> np.ndarray:
+        return np.stack([column(f"{of}state_{name}") for name in recurring_names(kind)], axis=-1)
+
     values = column("multipliers_real") + 1j * column("multipliers_imag")
     errors, codes = column("multipliers_error"), column("bifurcation")
     numbers = {name: column(name) for name in _NUMBERS}
-    value, place, tangent = column(along), column("place"), column("tangent")
-    several = f"{before}footstep_period" in dataset.variables
-    steps = footsteps_of(column, recurring_names(kind)) if several else [None] * len(value)
+    value, recurring = column(along), states("")
+    place, tangent = column("place"), column("tangent")
+    steps: list[CycleFootsteps | None] = [None] * len(value)
+    if f"{before}footstep_period" in dataset.variables:
+        others = (column(f"footstep_{name}") for name in CycleFootsteps._fields[1:])
+        steps = [*map(CycleFootsteps, states("footstep_"), *others)]
     return [
         BranchPoint(
             value=float(value[k]),

@@ -1,6 +1,5 @@
 """Point of a branch: a gait at a place of the parameter's axis, and what decides its stability."""
 
-from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -142,26 +141,6 @@ class BranchPoint(NamedTuple):
         """Whether all multipliers lie inside the unit circle; None where their errors leave it
         open."""
         return is_stable(self.multipliers, self.multiplier_errors)
-
-
-def footstep_columns(points: Sequence[BranchPoint], names: Sequence[str]) -> dict[str, np.ndarray]:
-    """The footsteps of n points by the names of their numbers, shape (n, k), if there are several;
-    `names` are those of the components."""
-    rows = [point.footsteps for point in points if point.footsteps is not None]
-    if not rows:
-        return {}
-    begins, *others = map(np.stack, zip(*rows, strict=True))
-    states = {f"state_{name}": begins[..., k] for k, name in enumerate(names)}
-    return states | dict(zip(CycleFootsteps._fields[1:], others, strict=True))
-
-
-def footsteps_of(
-    column: Callable[[str], np.ndarray], names: Sequence[str]
-) -> list[CycleFootsteps | None]:
-    """The footsteps of points that a dataset holds, one entry for each point."""
-    begins = np.stack([column(f"footstep_state_{name}") for name in names], axis=-1)
-    others = (column(f"footstep_{name}") for name in CycleFootsteps._fields[1:])
-    return [*map(CycleFootsteps, begins, *others)]
 
 
 def is_stable(multipliers: np.ndarray, errors: np.ndarray) -> bool | None:

@@ -146,26 +146,26 @@ def _doubled_branch(
     near: float = _NEAR,
 ) -> Branch:
     setup = setup_of(branch, footsteps=2 * branch.footsteps)
-    first, begin = _doubled_cycles(setup, doubling, near)
-    if begin is None:
+    cycles = _doubled_cycles(setup, doubling, near)
+    if not cycles:
         raise ArgumentError(
             f"doubling at {branch.along} = {doubling.value:.6g} is not allowed: no gait of "
             f"{setup.footsteps} footsteps was found near it."
         )
-    beyond = setup.trace(begin, largest_step=largest_step, max_points=max_points, until=until)
+    beyond = setup.trace(cycles[-1], largest_step=largest_step, max_points=max_points, until=until)
     stop = BranchStop(
         BranchEnd.BRANCHES_OFF,
         f"a branch of {branch.footsteps} footsteps doubles its period",
         doubling.value,
     )
-    points = [*map(setup.point, first), beyond.points[0]]
+    points = [*map(setup.point, cycles[:-1]), beyond.points[0]]
     return setup.branch(Trace(points, [], stop), beyond)
 
 
 def _doubled_cycles(
     setup: ContinuationSetup, doubling: BifurcationPoint, near: float
-) -> tuple[list[CurvePoint], CurvePoint | None]:
-    """A cycle of doubled period beside a doubling, its tangent pointing away, and some before."""
+) -> list[CurvePoint]:
+    """Cycles of doubled period beside a doubling; the last one's tangent points away from it."""
     point, curve, undoubled = doubling.point, setup.curve, setup.arrivals // 2
     sizes = curve.sizes
     seen = setup.cycle(point.recurring, point.value, undoubled)
@@ -192,5 +192,5 @@ def _doubled_cycles(
     for amplitude in _AMPLITUDES:
         if begin := at(amplitude):
             before = (at(share * amplitude) for share in _BESIDE)
-            return [cycle for cycle in before if cycle is not None], begin
-    return [], None
+            return [*(cycle for cycle in before if cycle is not None), begin]
+    return []

@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit, information
-from jaxbiped.identify._interval_end import interval_end, linear_step, told_by_data
+from jaxbiped.identify._interval_end import AT_LIMIT, interval_end, linear_step
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
 from jaxbiped.scene._parameter_access import (
@@ -56,7 +56,7 @@ class Descent:
         limits = np.array(list(bounds.values())).T
         self.linear = np.isfinite(limits).all(axis=0) & (limits[0] <= 0.0) & (limits[1] >= 0.0)
         self.widths = np.where(self.linear, limits[1] - limits[0], 1.0)
-        self.limits = np.sort([self.variables(each) for each in limits], axis=0)
+        self.limits = np.sort([self.variables(ends) for ends in limits], axis=0)
         self.how = dict(accuracy=accuracy, engine=engine)
         self.values = np.concatenate([gait.values for gait in measured])
         self.deviations = np.concatenate([gait.deviations for gait in measured])
@@ -227,14 +227,14 @@ class Descent:
             free = information(slopes[:, ~held], errors[:, ~held])
             undetermined[held], undetermined[~held] = False, free.undetermined
             covariance[np.ix_(~held, ~held)] = free.covariance
-            clocks = sum(each.clocks for each in self.measured)
-            freedom = len(self.values) - free.rank - clocks
+            freedom = len(self.values) - free.rank - sum(each.clocks for each in self.measured)
             widest = np.nanmax(np.diag(told.covariance), initial=0.0)
             wide = bool(told.undetermined.any() or widest > _LINEAR**2)
             follow = wide and ending is FitEnding.CONVERGED
             self.searching = False  # a profile follows gaits from one to the next
             for which in np.flatnonzero(~held & (follow | ~undetermined)).tolist():
                 ends[:, which] = self._interval(best, which, follow)
+        ends = np.where(np.isclose(ends, self.limits, 0.0, AT_LIMIT), [[-np.inf], [np.inf]], ends)
         known = np.isfinite(ends)
         undetermined, lost = ~known.any(axis=0) & ~held, ~known.all(axis=0)
         covariance[lost] = covariance[:, lost] = np.nan
@@ -296,4 +296,4 @@ class Descent:
             end = sign * interval_end(self._model, at, here, square, which, sign, limits)
             return sign * max(end, *(sign * float(each[1][which]) for each in within))
 
-        return told_by_data((end(-1.0), end(1.0)), limits[:, which])
+        return end(-1.0), end(1.0)

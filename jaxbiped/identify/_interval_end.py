@@ -23,7 +23,7 @@ _FLAT = 0.05
 units along its direction change the sum of squares by 0.02."""
 _FAR = 3.0
 """How far from the fit a variable is followed: a factor of 20."""
-_AT_LIMIT = 1e-9
+AT_LIMIT = 1e-9
 """Distance of a variable from its limit that counts as none."""
 
 Model = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray] | None]
@@ -68,7 +68,7 @@ def interval_end(
         for _ in range(_HALVINGS):
             there = model(here + step)
             if there is not None:
-                is_limit = np.isclose(here + step, limits, rtol=0.0, atol=_AT_LIMIT)[:, which].any()
+                is_limit = np.isclose(here + step, limits, rtol=0.0, atol=AT_LIMIT)[:, which].any()
                 if is_limit and _excess(there, square) == 0.0:
                     return sign * np.inf
                 bend = _secant(bend, step, known, there)
@@ -80,13 +80,6 @@ def interval_end(
             break
         here, known = here + step, there
     return sign * np.inf
-
-
-def told_by_data(ends: tuple[float, float], limits: np.ndarray) -> tuple[float, float]:
-    """The ends, infinite at the variable's limits (2,), which the data did not set."""
-    is_limit = np.isclose(ends, limits, rtol=0.0, atol=_AT_LIMIT)
-    low, high = np.where(is_limit, [-np.inf, np.inf], ends).tolist()
-    return low, high
 
 
 def _bent(

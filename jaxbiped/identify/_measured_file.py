@@ -133,19 +133,17 @@ def _gaits_of_table(
             raise ArgumentError(
                 f"the column {name!r} is there {names.count(name)} times: give one."
             )
-    groups: dict[Any, list[dict[str, Any]]] = {}
-    first: dict[Any, int] = {}
+    groups: dict[Any, list[tuple[int, dict[str, Any]]]] = {}
     for number, (line, cells) in enumerate(lines):
         row = {c.name: _value(c, cell, line) for c, cell in zip(columns, cells, strict=True)}
         label = row.get("gait", "time" in row or number)
-        groups.setdefault(label, []).append(row)
-        first.setdefault(label, line)
+        groups.setdefault(label, []).append((line, row))
     gaits = []
-    for label, rows in groups.items():
+    for rows in groups.values():
         try:
-            gaits.append(_gait_of_rows(names, rows))
+            gaits.append(_gait_of_rows(names, [row for _, row in rows]))
         except ArgumentError as error:
-            raise ArgumentError(f"line {first[label]}: {error}") from None
+            raise ArgumentError(f"line {rows[0][0]}: {error}") from None
     return gaits
 
 

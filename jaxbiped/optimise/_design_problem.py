@@ -149,7 +149,7 @@ class DesignProblem:
 
     def _has_derivatives(self, known: Evaluation) -> bool:
         """Whether those that are used are finite: bounded from above, the radius's own are not."""
-        low = any(each.low is not None for each in self.requirements if each.name == CLUSTER[0])
+        low = any(r.low is not None for r in self.requirements if r.name == CLUSTER[0])
         is_smooth = self.has_cluster and not low and self.weights.get(CLUSTER[0], 1.0) > 0.0
         names = {*self.wanted, *CLUSTER[1:]} & {*known.slopes} - {*CLUSTER[:is_smooth]}
         return all(np.all(np.isfinite(known.slopes[n][self.variables.places])) for n in names)

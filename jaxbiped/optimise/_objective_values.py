@@ -181,21 +181,14 @@ def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, Functional]) -
     by_slope[parameter_names(scene).index("slope")] = np.cos(slope)
     if MOTOR_WORK not in rows:
         return Functional(np.sin(slope), 0.0, by_slope, np.zeros(len(by_slope)))
-    driven = _over_weight_and_length(scene, rows[MOTOR_WORK], length)
-    return driven._replace(value=driven.value + np.sin(slope), slopes=driven.slopes + by_slope)
-
-
-def _over_weight_and_length(
-    scene: Scene | RigidScene, work: Functional, length: Functional
-) -> Functional:
-    weight, by_parameters = map(np.asarray, _weight(scene))
+    work, (weight, by_parameters) = rows[MOTOR_WORK], map(np.asarray, _weight(scene))
     own = length.slopes / length.value + by_parameters / weight
     divisor = float(weight) * length.value
     cost = work.value / divisor
     return Functional(
-        value=cost,
+        value=cost + np.sin(slope),
         error=work.error / divisor + cost * length.error / length.value,
-        slopes=work.slopes / divisor - cost * own,
+        slopes=work.slopes / divisor - cost * own + by_slope,
         slope_errors=work.slope_errors / divisor + cost * length.slope_errors / length.value,
     )
 

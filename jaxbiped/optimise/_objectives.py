@@ -32,16 +32,12 @@ def _of_friction(scene: Scene | RigidScene) -> str | None:
 def _of_strike(scene: Scene | RigidScene) -> str | None:
     if isinstance(scene, Scene):
         return "its feet press into the ground for a while instead of striking at once"
-    if is_driven(scene) or any(_damps(part) for part in scene.mechanism.joints):
+    damps = any(getattr(part, "damping", None) is not None for part in scene.mechanism.joints)
+    if is_driven(scene) or damps:
         return "what drives or damps it changes volumes of phase space, too"
     if rigid_modes(scene.mechanism).any:
         return "its stops or flat feet strike, too"
     return None
-
-
-def _damps(part: object) -> bool:
-    """Whether a joint part has a damper."""
-    return getattr(part, "damping", None) is not None
 
 
 def _of_steps(scene: Scene | RigidScene) -> str | None:

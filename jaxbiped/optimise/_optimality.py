@@ -116,21 +116,22 @@ def _balance(problem: DesignProblem, design: Design, scale: float) -> _Balance:
     rows, normals = [rows[k] for k in large], [normals[k] for k in large]
     normals += [side * np.eye(len(gradient))[place] for place, side in _at_bounds(u)]
     matrix = np.reshape(normals, (-1, len(gradient))).T
-    error, least, found = np.zeros_like(matrix), np.zeros(len(normals)), np.zeros(len(normals))
+    error, least = np.zeros_like(matrix), np.zeros(len(normals))
+    multipliers = np.zeros(len(normals))
     for k, (row, _) in enumerate(rows):
         error[: len(u), k] = np.abs(problem.gradient(u, row.slope_errors(known)))
         least[k] = -np.inf if row.equality else 0.0
     if normals:
         limits = least, np.inf
-        found = scipy.optimize.lsq_linear(matrix, gradient, limits, method="bvls").x
-    errors += error @ np.abs(found)
+        multipliers = scipy.optimize.lsq_linear(matrix, gradient, limits, method="bvls").x
+    errors += error @ np.abs(multipliers)
     spreads = np.abs(np.linalg.pinv(matrix)) @ errors
     # What surely holds the design makes up for any error along its normal.
-    sure = matrix[:, (found > spreads) | (least < 0.0)]
+    sure = matrix[:, (multipliers > spreads) | (least < 0.0)]
     across = np.eye(len(gradient)) - sure @ np.linalg.pinv(sure)
     with np.errstate(invalid="ignore"):  # of errors without bound
         errors = np.abs(across) @ errors
-    return _Balance(gradient - matrix @ found, errors, rows, found, spreads)
+    return _Balance(gradient - matrix @ multipliers, errors, rows, multipliers, spreads)
 
 
 def lagrangian_change(
@@ -178,36 +179,37 @@ def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
 
 def doubt_of(problem: DesignProblem, design: Design) -> str:
     """Why a design does not count as an optimum, in a sentence; nothing where it does."""
-    found = optimality_of(problem, design)
-    if not found.residual <= OPTIMAL:
-        return f"The derivatives do not balance: {found.residual:.1e} of the objective is left."
-    if not found.error <= OPTIMAL:
-        return f"The residual is known to within {found.error:.1e} of the objective only."
-    for each in found.requirements:
+    optimality = optimality_of(problem, design)
+    residual, error = optimality.residual, optimality.error
+    if not residual <= OPTIMAL:
+        return f"The derivatives do not balance: {residual:.1e} of the objective is left."
+    if not error <= OPTIMAL:
+        return f"The residual is known to within {error:.1e} of the objective only."
+    for held in optimality.requirements:
         # Where multipliers meet, it is the conditions on them that are known, and kept too well.
-        by_cluster = problem.has_cluster and each.name == "spectral_radius"
-        if each.active and not (by_cluster or each.error <= OPTIMAL * scale_of(each.bound)):
-            return f"What holds it, {each.name}, is known to within {each.error:.1e} only."
+        by_cluster = problem.has_cluster and held.name == "spectral_radius"
+        if held.active and not (by_cluster or held.error <= OPTIMAL * scale_of(held.bound)):
+            return f"What holds it, {held.name}, is known to within {held.error:.1e} only."
     if not all(_explains(problem, design, e) for e in problem.asked if is_near(design, e)):
         return "Designs tried nearby differ from it by other amounts than the derivatives say."
     return ""
 
 
-def is_near(here: Design, there: Design) -> bool:
+def is_near(design: Design, other: Design) -> bool:
     """Whether the difference of two designs shows what their derivatives are."""
-    return bool(_NEAR[0] <= np.max(np.abs(there.u - here.u)) <= _NEAR[1])
+    return bool(_NEAR[0] <= np.max(np.abs(other.u - design.u)) <= _NEAR[1])
 
 
-def _explains(problem: DesignProblem, here: Design, there: Design) -> bool:
+def _explains(problem: DesignProblem, design: Design, other: Design) -> bool:
     """Whether derivatives explain the difference of the smooth sum of a design that is near."""
-    weights, _ = smooth_weights(problem)
-    move, scale = there.u - here.u, abs(problem.objective(here.known).value)
-    one, two = (problem.objective(each.known, weights) for each in (here, there))
-    first, second = (_smooth_gradient(problem, each) @ move for each in (here, there))
+    (weights, _), move, pair = smooth_weights(problem), other.u - design.u, (design, other)
+    one, two = (problem.objective(end.known, weights) for end in pair)
+    first, second = (_smooth_gradient(problem, end) @ move for end in pair)
     off = abs(two.value - one.value - 0.5 * (first + second))
-    spread = problem.gradient(here.u, one.slope_errors) @ np.abs(move)
+    spread = problem.gradient(design.u, one.slope_errors) @ np.abs(move)
     bar = one.error + two.error + abs(spread) + _BEND * abs(second - first)
-    return bool(off <= OPTIMAL * scale * np.max(np.abs(move)) + bar)
+    size = abs(problem.objective(design.known).value) * np.max(np.abs(move))
+    return bool(off <= OPTIMAL * size + bar)
 
 
 def is_untried(u: np.ndarray, begin: np.ndarray) -> bool:
@@ -217,13 +219,13 @@ def is_untried(u: np.ndarray, begin: np.ndarray) -> bool:
 
 def is_flat(problem: DesignProblem) -> bool:
     """Whether the objective changes nowhere that was tried, as far as its error bars show."""
-    slopes, bars = np.zeros(0), np.zeros(0)
-    for u, known in problem.asked:
-        total = problem.objective(known)
-        slopes = np.append(slopes, problem.gradient(u, total.slopes))
-        more = 3.0 * np.abs(problem.gradient(u, total.slope_errors))
-        bars = np.append(bars, _FLAT * abs(total.value) + more)
-    return len(problem.asked) > 1 and bool(np.all(np.abs(slopes) <= bars))
+
+    def is_level(design: Design) -> bool:
+        total = problem.objective(design.known)
+        slopes = problem.gradient(design.u, np.array([total.slopes, total.slope_errors]))
+        return bool(np.all(np.abs(slopes[0]) <= _FLAT * abs(total.value) + 3.0 * abs(slopes[1])))
+
+    return len(problem.asked) > 1 and all(map(is_level, problem.asked))
 
 
 def _at_bounds(u: np.ndarray) -> list[tuple[int, float]]:

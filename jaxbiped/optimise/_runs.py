@@ -87,7 +87,7 @@ class Runs:
                 f"{ended.message.rstrip('.')}. From there by trust-region: {on.message}",
             )
         best = self.best
-        if ended.converged and not any(is_near(best, each) for each in self.problem.asked):
+        if ended.converged and not any(is_near(best, design) for design in self.problem.asked):
             # Another design shows whether derivatives tell how designs differ.
             self.problem.at(best.u + np.where(best.u < 0.5, 0.01, -0.01))
         better = rank_of(self.problem, self.best) < rank_of(self.problem, before)

@@ -12,7 +12,6 @@ them as PNG, PDF and SVG with their fonts.
 
 from jaxbiped.plot._basin import basin as basin
 from jaxbiped.plot._basin import refined_basin as refined_basin
-from jaxbiped.plot._basin_fractions import basin_fractions as basin_fractions
 from jaxbiped.plot._contact_charts import contact_forces as contact_forces
 from jaxbiped.plot._contact_charts import penetrations as penetrations
 from jaxbiped.plot._figure_style import FIGURE_FORMATS as FIGURE_FORMATS
@@ -20,8 +19,8 @@ from jaxbiped.plot._figure_style import FIGURE_STYLES as FIGURE_STYLES
 from jaxbiped.plot._figure_style import figure_style as figure_style
 from jaxbiped.plot._figure_style import save_figure as save_figure
 from jaxbiped.plot._fit_charts import fit as fit
+from jaxbiped.plot._fit_charts import fit_data as fit_data
 from jaxbiped.plot._fit_charts import optimisation as optimisation
-from jaxbiped.plot._fit_data_chart import fit_data as fit_data
 from jaxbiped.plot._gait_charts import elasticities as elasticities
 from jaxbiped.plot._laws import bristle_law as bristle_law
 from jaxbiped.plot._laws import friction_law as friction_law
@@ -38,6 +37,7 @@ from jaxbiped.plot._motion_pictures import save_animation as save_animation
 from jaxbiped.plot._multiplier_charts import multipliers as multipliers
 from jaxbiped.plot._notebook import notebook_html as notebook_html
 from jaxbiped.plot._notebook import walker as walker
+from jaxbiped.plot._parameter_charts import basin_fractions as basin_fractions
 from jaxbiped.plot._parameter_charts import bifurcation_curves as bifurcation_curves
 from jaxbiped.plot._parameter_charts import branch as branch
 from jaxbiped.plot._work_precision import constraint_runs as constraint_runs

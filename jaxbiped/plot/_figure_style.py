@@ -80,8 +80,8 @@ class _Chosen(NamedTuple):
         if self.width is None:
             return {}
         size = self.width, self.width * (0.75 if self.columns == 1 else 0.5)
-        own = {"font.size": self.style.font, "figure.figsize": size, "savefig.dpi": self.style.dots}
-        return own | {"figure.constrained_layout.use": True} | _EMBEDDED | self.style.settings
+        new = {"font.size": self.style.font, "figure.figsize": size, "savefig.dpi": self.style.dots}
+        return new | {"figure.constrained_layout.use": True} | _EMBEDDED | self.style.settings
 
 
 _USUAL = _Chosen()

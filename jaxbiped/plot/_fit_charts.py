@@ -1,6 +1,7 @@
 """Charts of what a search for parameters came to: a fit to measured gaits, an optimisation."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,15 @@ from matplotlib.ticker import MaxNLocator
 
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._quantity import Quantity
+from jaxbiped.continuation._branch import Branch
+from jaxbiped.gait._gait import QUANTITIES
 from jaxbiped.identify._gait_fit import GaitFit
+from jaxbiped.identify._measured_gait import MEASURES, MeasuredGait
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import quantity_of
-from jaxbiped.scene._parameter_access import parameter_quantities
+from jaxbiped.scene._parameter_access import parameter_quantities, parameter_values
 
 _KEPT = 1e-6
 """Relative amount by which a requirement may be missed that counts as kept."""
@@ -53,9 +57,13 @@ def fit(fitted: GaitFit) -> Figure:
     lower.plot(count, fitted.residuals, "o", color=style.LEG_COLOURS[0], markersize=4)
     lower.xaxis.set_major_locator(MaxNLocator(integer=True))
     lower.margins(y=0.1)
-    numbers = rf"$\chi^2$ = {fitted.chi_squared:.3g}, {fitted.freedom} degrees of freedom"
-    style.dress(lower, numbers, "number measured, as given (–)", r"residual, in $\sigma$ (–)")
+    words = "number measured, as given (–)", r"residual, in $\sigma$ (–)"
+    style.dress(lower, _chi_squared(fitted), *words)
     return figure
+
+
+def _chi_squared(fitted: GaitFit) -> str:
+    return rf"$\chi^2$ = {fitted.chi_squared:.3g}, {fitted.freedom} degrees of freedom"
 
 
 def _draw_estimates(ax: Axes, fitted: GaitFit, names: list[str]) -> None:
@@ -106,8 +114,76 @@ def _with_error(value: float, error: float) -> str:
     if -4 <= exponent < 6:
         decimals = max(0, digits - 1 - exponent)
         return f"{value:.{decimals}f} ± {error:.{decimals}f}"
-    scale = 10.0**exponent
-    return rf"({mantissa} ± {error / scale:.{digits - 1}f}) $\times 10^{{{exponent}}}$"
+    return rf"({mantissa} ± {error / 10.0**exponent:.{digits - 1}f}) $\times 10^{{{exponent}}}$"
+
+
+def fit_data(
+    fitted: GaitFit, measured: MeasuredGait | Sequence[MeasuredGait], branch: Branch
+) -> Figure:
+    """Draws measured gaits over the condition under which they were measured, and the fitted model.
+
+    There is a panel for each measure. Error bars are one standard deviation; the line is the model,
+    dashed where its gaits are not stable. Angles over time are not drawn.
+
+    Args:
+        fitted: a fit from `fit_gait`.
+        measured: the measured gaits.
+        branch: gaits of the fitted walker along the condition, from `continue_gait` and the scene
+            with the estimates.
+
+    Returns:
+        A new figure.
+
+    Raises:
+        ArgumentError: no measure was given, or the branch has no points, is not that of the fitted
+            walker, or has another number of footsteps or other conditions than a measured gait.
+    """
+    check_type("fitted", fitted, GaitFit)
+    check_type("branch", branch, Branch)
+    gaits = [measured] if isinstance(measured, MeasuredGait) else list(measured)
+    pairs = [(_place_along(branch, fitted, gait), gait.measures) for gait in gaits]
+    names = [name for name in MEASURES if any(name in gait.measures for gait in gaits)]
+    if not names or not len(branch):
+        raise ArgumentError("measured and branch must hold at least one measure and one gait.")
+    columns = style.panels_abreast(min(len(names), 2), width=2.9)
+    figure = style.new_figure(max(4.2 * columns, 5.6), 0.6 + 2.6 * -(-len(names) // columns))
+    along = parameter_quantities(branch.scene)[branch.along]
+    panels = _panels(figure, len(names), columns, along.on_axis())
+    dataset, stable = branch.to_dataset(), [gait is not False for gait in branch.stable]
+    look: dict[str, Any] = {"color": style.LEG_COLOURS[1], "linewidth": 1.4}
+    bars: dict[str, Any] = {"color": style.LEG_COLOURS[0], "markersize": 4, "capsize": 2.5}
+    for ax, name in zip(panels, names, strict=True):
+        model = dataset[name].values
+        ax.plot(branch.values, model, linestyle=(0, (5, 2)), **look)
+        ax.plot(branch.values, np.where(stable, model, np.nan), label="model", **look)
+        x, y, errors = zip(*((at, *seen[name]) for at, seen in pairs if name in seen), strict=True)
+        ax.errorbar(x, y, errors, fmt="o", label="measured", zorder=3, **bars)
+        style.dress(ax, "", ax.get_xlabel(), QUANTITIES[name].on_axis())
+    if branch.axis.log:
+        panels[0].set_xscale("log")
+    style.set_title(panels[0], _chi_squared(fitted))
+    style.legend_of_figure(figure, panels[0].get_legend_handles_labels()[0])
+    return figure
+
+
+def _place_along(branch: Branch, fitted: GaitFit, gait: MeasuredGait) -> float:
+    """The value of a branch's parameter at which a gait was measured, if the branch is its own."""
+    check_type("measured", gait, MeasuredGait)
+    values = {name: float(x) for name, x in parameter_values(branch.scene).items()}
+    wanted = fitted.estimates | dict(gait.conditions)
+    place = wanted.pop(branch.along, values[branch.along])
+    for name, value in wanted.items():
+        if not math.isclose(value, values.get(name, math.nan), rel_tol=1e-9):
+            raise ArgumentError(
+                f"branch is not allowed: its {name} is {values.get(name)}, and that of the fit or "
+                f"of a measured gait is {value:.6g}."
+            )
+    if gait.footsteps not in (None, branch.footsteps):
+        raise ArgumentError(
+            f"branch is not allowed: its cycles have {branch.footsteps} footsteps, and a measured "
+            f"gait has {gait.footsteps}."
+        )
+    return place
 
 
 def optimisation(optimum: Optimum) -> Figure:
@@ -132,26 +208,33 @@ def optimisation(optimum: Optimum) -> Figure:
         raise ArgumentError("optimum has no history: there is no iterate to draw.")
     rows = _rows(optimum)
     columns = style.panels_abreast(1 if len(rows) < 4 else 2, width=2.9)
-    lines = -(-len(rows) // columns)
-    figure = style.new_figure(3.8 * max(columns, 1.6), 0.8 + 1.35 * lines, rows=True)
-    panels = list(figure.subplots(lines, columns, squeeze=False, sharex=True).flat)
+    tall = 0.8 + 1.35 * -(-len(rows) // columns)
+    figure = style.new_figure(3.8 * max(columns, 1.6), tall, rows=True)
+    panels = _panels(figure, len(rows), columns, "iterate (–)")
     kept = np.array([each.excess <= _KEPT for each in history])
     # The iterate that the optimum is, or the last one.
     same = [k for k, each in enumerate(history) if each.variables == optimum.variables]
     best = same[-1] if same else len(history) - 1
-    for ax, (quantity, values, value, error, bound) in zip(panels, rows, strict=False):
+    for ax, (quantity, values, value, error, bound) in zip(panels, rows, strict=True):
         _draw_row(ax, np.array(values), kept, best, (value, error), bound)
-        ax.set_ylabel(f"{quantity.symbol or quantity.words} ({quantity.unit_in_figure})")
-        style.set_title(ax, quantity.words, panel=True)
+        y_label = f"{quantity.symbol or quantity.words} ({quantity.unit_in_figure})"
+        style.dress(ax, quantity.words, ax.get_xlabel(), y_label, panel=True)
         ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=5))
-    for ax in panels[len(rows) :]:
-        ax.set_axis_off()
-    for ax in panels[max(len(rows) - columns, 0) : len(rows)]:
-        ax.set_xlabel("iterate (–)")
-        ax.tick_params(labelbottom=True)
     bounds = any(row[4] is not None for row in rows)
     style.legend_of_figure(figure, _legend(kept, bounds))
     return figure
+
+
+def _panels(figure: Figure, count: int, columns: int, label: str) -> list[Axes]:
+    """So many panels in columns that share an axis, whose label only the lowest ones have."""
+    lines = -(-count // columns)
+    panels = list(figure.subplots(lines, columns, squeeze=False, sharex=True).flat)
+    for ax in panels[count:]:
+        ax.set_axis_off()
+    for ax in panels[max(count - columns, 0) : count]:
+        ax.set_xlabel(label)
+        ax.tick_params(labelbottom=True)
+    return panels[:count]
 
 
 _Row = tuple[Quantity, list[float], float, float, float | None]
@@ -190,8 +273,7 @@ def _draw_row(
     told: tuple[float, float],
     bound: float | None,
 ) -> None:
-    numbers = np.arange(len(values))
-    colour = style.LEG_COLOURS[0]
+    numbers, colour = np.arange(len(values)), style.LEG_COLOURS[0]
     ax.plot(numbers, values, color=colour, linewidth=1.0)
     ax.plot(numbers[kept], values[kept], "o", color=colour, markersize=4)
     missed: dict[str, Any] = {"markerfacecolor": "white", "color": colour, "markersize": 4}
@@ -201,18 +283,14 @@ def _draw_row(
     if bound is not None:
         ax.axhline(bound, color=style.GROUND_COLOUR, linestyle=(0, (4, 2)), linewidth=0.9)
     ax.margins(y=0.15)
-    ax.grid(color="#E6E6E6", linewidth=0.6)
-    ax.set_axisbelow(True)
-    ax.spines[["top", "right"]].set_visible(False)
 
 
 def _legend(kept: np.ndarray, held: bool) -> list[Line2D]:
-    blue = style.LEG_COLOURS[0]
-    look: dict[str, Any] = {"color": blue, "marker": "o", "markersize": 4}
+    look: dict[str, Any] = {"color": style.LEG_COLOURS[0], "marker": "o", "markersize": 4}
     entries = [Line2D([], [], label="iterate", **look)]
     if not kept.all():
-        open_mark = look | {"markerfacecolor": "white"}
-        entries.append(Line2D([], [], label="misses a requirement", **open_mark))
+        look |= {"markerfacecolor": "white"}
+        entries.append(Line2D([], [], label="misses a requirement", **look))
     star: dict[str, Any] = {"color": style.LEG_COLOURS[1], "marker": "*", "linestyle": "none"}
     entries.append(Line2D([], [], label="optimum", markersize=9, **star))
     if held:

@@ -114,8 +114,7 @@ def elasticities(
         columns = style.panels_abreast(most, width=1.9 if short else 2.2 + beside)
         lines = -(-len(names) // columns)
         width, height = max(3.9, 2.2 + beside) * columns, (1.3 + 0.2 * len(rows)) * lines
-        width = max(width, 4.6)
-        figure = style.new_figure(width, height, rows=True)
+        figure = style.new_figure(max(width, 4.6), height, rows=True)
         panels = list(figure.subplots(lines, columns, squeeze=False).flat)
     found = [np.asarray(getattr(gait.elasticities, name)) for name in names]
     errors = [elasticity_errors(gait, name) for name in names]
@@ -123,8 +122,8 @@ def elasticities(
     for each, name, values, bars in zip(panels, names, found, errors, strict=False):
         _panel(each, QUANTITIES[name].words, rows, values, bars)
     style.figure_of(panels[0]).draw_without_rendering()  # lays out, so that widths are known
-    for each in panels[: len(names)]:
-        _scale(each, float(np.max(ends)))
+    for panel in panels[: len(names)]:
+        _scale(panel, float(np.max(ends)))
     spare = panels[len(names) :]
     for each in spare:
         each.set_axis_off()
@@ -181,9 +180,9 @@ def _scale(ax: Axes, largest: float) -> None:
     top = math.floor(math.log10(reach) + 1e-9)
     marks, outer = {0.0: "0"}, np.inf
     for power in (10.0**k for k in (top, top - 2) if 10.0**k >= 10.0 * _LINEAR):
-        own = {-power: f"−{power:g}", power: f"{power:g}"}
+        ticks = {-power: f"−{power:g}", power: f"{power:g}"}
         places = ax.transData.transform([(x, 0.0) for x in (-outer, -power, 0.0) if np.isfinite(x)])
         gap = float(np.diff(places[:, 0]).min()) / style.figure_of(ax).dpi
-        if gap > style.text_size(own[-power])[0] + 0.05:
-            marks, outer = marks | own, power
+        if gap > style.text_size(ticks[-power])[0] + 0.05:
+            marks, outer = marks | ticks, power
     ax.set_xticks(list(marks), list(marks.values()), fontsize="small")

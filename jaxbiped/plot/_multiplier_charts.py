@@ -59,18 +59,17 @@ def multipliers(gait: Gait | BranchPoint | Branch, *, ax: Axes | None = None) ->
         errors = np.asarray(error_bars(gait, "multipliers"))
         stable, critical = bool(gait.stable), gait.critical
     values = np.asarray(gait.multipliers)
+    bars = np.where(np.isfinite(errors), errors, np.nan)
     ax = style.axes_or_new(ax, 5.6, 5.6)
-    _draw_circle(ax)
+    _frame(ax, max(1.0, float(np.max(np.abs(values) + np.nan_to_num(bars)))))
     for value, error in zip(values, errors, strict=True):
         if _VISIBLE < error < np.inf:
             place = (value.real, value.imag)
             ax.add_patch(Circle(place, error, facecolor=style.LEG_COLOURS[1], alpha=0.25))
-    bars = np.where(np.isfinite(errors), errors, np.nan)
     look: dict[str, Any] = {"color": style.LEG_COLOURS[0], "elinewidth": 0.9, "capsize": 2.0}
     ax.errorbar(values.real, values.imag, bars, bars, fmt="none", **look)
     look = {"color": style.LEG_COLOURS[0], "markersize": 5}
     ax.plot(values.real, values.imag, "o", label="multipliers", **look)
-    _frame(ax, max(1.0, float(np.max(np.abs(values) + np.nan_to_num(bars)))))
     _name(ax, values)
     largest = float(np.max(errors))
     said = f"largest error {largest:.1e}" + ("" if largest > _VISIBLE else ": within the dots")
@@ -91,7 +90,6 @@ def _paths(branch: Branch, ax: Axes | None) -> Figure:
         raise ArgumentError("gait is a branch without points: there is nothing to draw.")
     paths, values = _followed(branch.multipliers), branch.values
     ax = style.axes_or_new(ax, 6.6, 5.6)
-    _draw_circle(ax)
     _frame(ax, min(_FARTHEST, max(1.0, float(np.max(np.abs(paths))))))
     scale = LogNorm if branch.axis.log else Normalize
     colours: dict[str, Any] = {"norm": scale(values.min(), values.max()), "cmap": "viridis"}
@@ -135,13 +133,10 @@ def _followed(multipliers: np.ndarray) -> np.ndarray:
     return np.array(paths)
 
 
-def _draw_circle(ax: Axes) -> None:
+def _frame(ax: Axes, reach: float) -> None:
+    """The unit circle, equal scales, both axes through zero, room for the names."""
     look: dict[str, Any] = {"edgecolor": style.GROUND_COLOUR, "zorder": 0, "label": "unit circle"}
     ax.add_patch(Circle((0.0, 0.0), 1.0, facecolor="#F6F6F6", **look))
-
-
-def _frame(ax: Axes, reach: float) -> None:
-    """Equal scales, both axes through zero, room for the names."""
     ax.axhline(0.0, color=style.SHADE_COLOUR, linewidth=0.8, zorder=0.5)
     ax.axvline(0.0, color=style.SHADE_COLOUR, linewidth=0.8, zorder=0.5)
     ax.set_aspect("equal")

@@ -1,16 +1,18 @@
-"""Charts of branches of gaits along a parameter, and of curves of bifurcations in two."""
+"""Along a parameter: branches of gaits and fractions of basins; in two, curves of bifurcations."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, pairwise
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from jaxbiped._checks import ArgumentError, check_choice, check_type
+from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive, check_type
 from jaxbiped._quantity import Quantity
+from jaxbiped.basins._label_statistics import Fraction, wilson_interval
 from jaxbiped.continuation._bifurcation_curve import BifurcationCurve
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch import Branch
@@ -19,7 +21,7 @@ from jaxbiped.continuation._switch_branch import DoublingCascade
 from jaxbiped.dynamics._state import recurring_names, state_quantity
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.plot import style
-from jaxbiped.plot._symbols import NORMAL_FORCE
+from jaxbiped.plot._symbols import NORMAL_FORCE, axis_label
 from jaxbiped.scene._parameter_access import parameter_quantities
 
 _MEASURES = {
@@ -70,7 +72,8 @@ def branch(
         ArgumentError: the measure is unknown, or branches are along several parameters or without
             points.
     """
-    given = _branches_of(branches)
+    given: Any = branches.branches if isinstance(branches, DoublingCascade) else branches
+    given = [*given] if isinstance(given, list | tuple) else [given]
     for each in given:
         check_type("branches", each, Branch)
     if not given or not all(len(each) for each in given):
@@ -82,14 +85,12 @@ def branch(
     ax = style.axes_or_new(ax, 6.8, 4.6)
     counts = sorted({each.footsteps for each in given})
     for each in given:
-        begin = _doubling_of(each, given, measure)
-        _draw_lines(ax, each, measure, begin, _look(counts.index(each.footsteps)))
-    for each in given:
+        k = counts.index(each.footsteps)
+        _draw_lines(ax, each, given, measure, _look(k))
+        look: dict[str, Any] = {"color": style.GROUND_COLOUR, "markersize": 6 * 0.75**k}
         for event in each.bifurcations:
-            size = 6 * 0.75 ** counts.index(each.footsteps)
-            look: dict[str, Any] = {"color": style.GROUND_COLOUR, "markersize": size, "zorder": 3}
             for height in _values(measure, each, event.point):
-                ax.plot(event.value, height, EVENT_MARKS[event.kind][0], **look)
+                ax.plot(event.value, height, EVENT_MARKS[event.kind][0], zorder=3, **look)
     if given[0].axis.log:
         ax.set_xscale("log")
     if measure == "spectral_radius":
@@ -137,12 +138,6 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
     return style.figure_of(ax)
 
 
-def _branches_of(branches: Any) -> list[Branch]:
-    if isinstance(branches, DoublingCascade):
-        branches = branches.branches
-    return [*branches] if isinstance(branches, list | tuple) else [branches]
-
-
 def _values(measure: str, each: Branch, point: BranchPoint) -> np.ndarray:
     """The measure of each footstep of a gait; the spectral radius is that of the cycle."""
     if measure == "spectral_radius":
@@ -151,25 +146,20 @@ def _values(measure: str, each: Branch, point: BranchPoint) -> np.ndarray:
     steps = point.footsteps or CycleFootsteps(*(np.array([value]) for value in whole))
     if measure == "speed":
         return steps.step_length / steps.period
-    if measure in ("period", "step_length"):
+    if measure in CycleFootsteps._fields:
         values: np.ndarray = getattr(steps, measure)
-        return values * len(values) / each.footsteps
-    if measure == "peak_normal":
-        return steps.peak_normal
+        return values if measure == "peak_normal" else values * len(values) / each.footsteps
     return steps.recurring[:, recurring_names(each.state_type).index(measure)]
 
 
-def _doubling_of(
-    child: Branch, given: list[Branch], measure: str
-) -> tuple[float, np.ndarray] | None:
-    """The parameter and the measure at the period doubling from which a branch comes."""
+def _doubling_of(child: Branch, given: list[Branch]) -> list[tuple[Branch, BranchPoint]]:
+    """The period doubling from which a branch comes, on its own branch, where that is drawn."""
     stop = child.stops[0]
-    for each in given:
-        for event in each.bifurcations:
-            is_parent = event.kind is BranchEvent.PERIOD_DOUBLING and event.value == stop.value
-            if is_parent and stop.end is BranchEnd.BRANCHES_OFF:
-                return event.value, _values(measure, each, event.point)
-    return None
+    if stop.end is not BranchEnd.BRANCHES_OFF:
+        return []
+    pairs = [(parent, event) for parent in given for event in parent.bifurcations]
+    here = BranchEvent.PERIOD_DOUBLING, stop.value
+    return [(parent, e.point) for parent, e in pairs if (e.kind, e.value) == here][:1]
 
 
 def _look(k: int) -> dict[str, Any]:
@@ -179,31 +169,22 @@ def _look(k: int) -> dict[str, Any]:
 
 def _draw_errors(ax: Axes, each: Branch, colour: str) -> None:
     """A band of the leading multiplier's errors, where they are known."""
-    values = np.array([point.value for point in each.points])
-    sizes = np.array([np.abs(point.multipliers[0]) for point in each.points])
+    sizes = np.abs(each.multipliers[:, 0])
     errors = np.array([point.multiplier_errors[0] for point in each.points])
-    errors = np.where(np.isfinite(errors), errors, np.nan)
     look: dict[str, Any] = {"color": colour, "alpha": 0.25, "linewidth": 0.0, "zorder": 0.8}
-    ax.fill_between(values, sizes - errors, sizes + errors, **look)
+    ax.fill_between(each.values, sizes - errors, sizes + errors, **look)
 
 
 def _draw_lines(
-    ax: Axes,
-    each: Branch,
-    measure: str,
-    begin: tuple[float, np.ndarray] | None,
-    look: dict[str, Any],
+    ax: Axes, each: Branch, given: list[Branch], measure: str, look: dict[str, Any]
 ) -> None:
     """Lines between neighbours; a bifurcation belongs to the gaits on either side of it."""
-    special = {point.point.value for point in each.bifurcations}
-    x = [point.value for point in each.points]
-    rows = [_values(measure, each, point) for point in each.points]
-    kinds = [
-        (there if here.value in special else here).stable for here, there in pairwise(each.points)
-    ]
-    if begin is not None:  # Footsteps of a doubled cycle follow those of the cycle twice over.
-        x, rows = [begin[0], *x], [np.resize(begin[1], len(rows[0])), *rows]
-        kinds = [each.points[0].stable, *kinds]
+    pairs = _doubling_of(each, given) + [(each, point) for point in each.points]
+    special = {event.value for one, _ in pairs for event in one.bifurcations}
+    x, rows = [point.value for _, point in pairs], [_values(measure, *pair) for pair in pairs]
+    # Footsteps of a doubled cycle follow those of the cycle twice over.
+    rows[0] = np.resize(rows[0], len(rows[-1]))
+    kinds = [(b if a.value in special else a).stable for (_, a), (_, b) in pairwise(pairs)]
     if not kinds:
         ax.plot(x * len(rows[0]), rows[0], "o", color=look["color"], markersize=4)
     for kind, group in groupby(range(len(kinds)), key=kinds.__getitem__):
@@ -215,22 +196,104 @@ def _draw_lines(
 
 def _entries(given: list[Branch], counts: list[int]) -> Iterator[Line2D]:
     """Of the legend: kinds of stability, footsteps of cycles where they differ, bifurcations."""
-    grey = style.GROUND_COLOUR
-    stable = {kind for each in given for kind in each.stable}
-    if None in stable and not any(map(_is_undecided, given)):
-        stable.remove(None)
+    grey, points = style.GROUND_COLOUR, [point for each in given for point in each.points]
+    events = [event for each in given for event in each.bifurcations]
+    # That gaits are undecided at bifurcations alone goes without saying.
+    special = {event.value for event in events}
+    stable = {p.stable for p in points if p.stable is not None or p.value not in special}
     for kind in (kind for kind in _WORDS if kind in stable):
         yield Line2D([], [], color=grey, linestyle=_STYLES[kind], label=_WORDS[kind])
     for k, count in enumerate(counts) if len(counts) > 1 else ():
         words = f"{count} footstep{'s' * (count > 1)}"
         yield Line2D([], [], label=words, **_look(k))
-    drawn = {event.kind for each in given for event in each.bifurcations}
+    drawn = {event.kind for event in events}
     for event, (marker, words) in EVENT_MARKS.items():
         if event in drawn:
             yield Line2D([], [], color=grey, marker=marker, linestyle="none", label=words)
 
 
-def _is_undecided(each: Branch) -> bool:
-    """Whether gaits besides bifurcations are undecided."""
-    special = {event.point.value for event in each.bifurcations}
-    return any(point.stable is None and point.value not in special for point in each.points)
+def basin_fractions(
+    values: npt.ArrayLike,
+    fractions: Sequence[Mapping[str, Fraction]],
+    *,
+    name: str | Quantity,
+    unit: str = "",
+    kind: str = "lines",
+    confidence: float = 0.95,
+    log: bool = False,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draws the fraction of starts with each label against a parameter.
+
+    The bands around the lines are Wilson's intervals of the counts (see `wilson_interval`). A label
+    that did not occur at a value has the fraction 0 there.
+
+    Args:
+        values: values of the parameter, increasing, shape (n,).
+        fractions: result of `jaxbiped.basins.fractions` at each value.
+        name, unit: name and unit of the parameter. A parameter's own name, such as "K", needs no
+            unit; nor does a `jaxbiped.laws.Quantity`.
+        kind: "lines", or "stacked": areas that add up to one, without bands.
+        confidence: confidence level of the bands.
+        log: whether the parameter's axis is logarithmic.
+        ax: axes to draw into. Default: a new figure.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
+
+    Raises:
+        ArgumentError: there is no value, the number of fractions differs, values do not increase or
+            are not above 0 on a logarithmic axis, there is only one value to stack, or nothing is
+            labelled at a value.
+    """
+    check_choice("kind", kind, ("lines", "stacked"))
+    along = _check(values, fractions, log)
+    if kind == "stacked" and along.size == 1:
+        raise ArgumentError("values has one entry: a stacked figure must have at least 2.")
+    labels = style.in_order({label for row in fractions for label in row})
+    rows = [[row[name].count if name in row else 0 for row in fractions] for name in labels]
+    counts = np.asarray(rows)
+    totals = counts.sum(axis=0)
+    parts, colours = counts / totals, [style.label_colour(label) for label in labels]
+    ax = style.axes_or_new(ax, 7.2, 4.0)
+    title, margin, order = "Fractions of the starts", 0.0, -1
+    if kind == "stacked":
+        ax.stackplot(along, parts, labels=labels, colors=colours, edgecolor="white", linewidth=0.4)
+    else:
+        title += f" (bands: {100.0 * confidence:.4g} % confidence)"
+        margin, order = 0.02, 1
+        bands = zip(*wilson_interval(counts, totals, confidence=confidence), strict=True)
+        for label, colour, part, band in zip(labels, colours, parts, bands, strict=True):
+            ax.fill_between(along, *band, color=colour, alpha=0.25, linewidth=0.0)
+            look: dict[str, Any] = {"marker": style.label_marker(label), "markersize": 4.0}
+            ax.plot(along, part, color=colour, label=label, clip_on=False, **look)
+    style.dress(ax, title, axis_label(name, unit), "fraction of the starts")
+    if log:
+        ax.set_xscale("log")
+    if along.size > 1:
+        ax.set_xlim(along[0], along[-1])
+    ax.set_ylim(-margin, 1.0 + margin)
+    style.legend_right(ax, handles=ax.get_legend_handles_labels()[0][::order])
+    return style.figure_of(ax)
+
+
+def _check(
+    values: npt.ArrayLike, fractions: Sequence[Mapping[str, Fraction]], log: bool
+) -> np.ndarray:
+    check_finite("values", values)
+    along = np.asarray(values, dtype=float)
+    if along.ndim != 1 or along.size == 0 or along.size != len(fractions):
+        raise ArgumentError(
+            f"values has shape {along.shape} and there are {len(fractions)} fractions: there must "
+            "be one for each value, and at least one."
+        )
+    if (np.diff(along) <= 0.0).any():
+        raise ArgumentError("values does not increase everywhere: it must.")
+    if log:
+        check_positive("values", along)
+    empty = [k for k, row in enumerate(fractions) if not row]
+    if empty:
+        raise ArgumentError(
+            f"fractions[{empty[0]}] is empty: at least one start must be labelled at each value."
+        )
+    return along

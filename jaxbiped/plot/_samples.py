@@ -11,10 +11,12 @@ import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import as_array, in_parts, rows_of
+from jaxbiped.dynamics._energy import powers
 from jaxbiped.dynamics._equivalent_states import whole_state
+from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.measure._footsteps import HeelStrikes, heel_strikes
-from jaxbiped.measure._samples import evaluate_along, states_after
+from jaxbiped.measure._samples import NODES, Samples, evaluate_along, states_after
 from jaxbiped.plot._skeleton import body_motion
 from jaxbiped.scene._rigid_feet import rigid_modes, standing_legs
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
@@ -29,7 +31,7 @@ _IN_A_STEP = 64
 """Evenly spaced times in each footstep of a rigid walk, however long the walk."""
 
 
-class Samples(NamedTuple):
+class SampledMotion(NamedTuple):
     """A motion at increasing times: `t` [s] of shape (n,), NumPy leaves of shape (n,)."""
 
     t: np.ndarray
@@ -49,7 +51,7 @@ def state_at(trajectory: Trajectory, t: npt.ArrayLike) -> State:
 
 def sample(
     trajectory: Trajectory, *, start: float | None = None, stop: float | None = None
-) -> Samples:
+) -> SampledMotion:
     """Every step of the solver between two times [s], and 2048 evenly spaced times.
 
     The steps crowd where the motion is fast (a heel strike lasts a millisecond), the even times
@@ -66,7 +68,7 @@ def sample(
     state = jtu.tree_map(
         lambda a, b: np.concatenate([a, np.asarray(b)[inside]])[order], filled, trajectory.state
     )
-    return Samples(t, state)
+    return SampledMotion(t, state)
 
 
 class DrawnMotion:
@@ -167,6 +169,17 @@ class RigidMotion:
         """Places, angles and rates of the root point and all bodies by name at times [s]."""
         return self.along(_whole_motion, t)
 
+    def driving_work(self, t: np.ndarray) -> np.ndarray:
+        """Work of all that drives since the first of the times [J], shape (n,).
+
+        The times increase and lie on both sides of all jumps; push-offs come at heel strikes.
+        """
+        pushes, strikes = np.zeros(len(t)), np.searchsorted(t, self.began[1:])
+        pushes[strikes] = self.along(_push_off, t[strikes - 1])["work"]
+        times = t[:-1, None] + 0.5 * np.diff(t)[:, None] * (1.0 + NODES)
+        power = self.along(_driving_power, times.ravel())["power"].reshape(times.shape)
+        return np.append(0.0, np.cumsum(Samples(t, None).integral(power))) + np.cumsum(pushes)
+
     def standing_legs(self) -> np.ndarray:
         """Number of the leg that stands in each footstep, from 0 on."""
         structure = self.scene.mechanism.structure
@@ -224,9 +237,9 @@ def _exchanged_back(
             own, other = (f"{word}_{structure.bodies[k]}" for k in (j, twin))
             if own in found:
                 changed[own] = np.where(odd, found[other], found[own])
-    name = "" if structure.turn is None else f"theta_{structure.bodies[structure.turn.body]}"
-    if structure.turn is not None and name in found:
-        changed[name] = found[name] - 2.0 * np.pi / structure.turn.order * rows
+    turn = structure.turn
+    if turn is not None and (name := f"theta_{structure.bodies[turn.body]}") in found:
+        changed[name] = found[name] - 2.0 * np.pi / turn.order * rows
     for word in ("normal", "tangential"):
         names = [f"{word}_{k + 1}" for k in range(len(structure.feet))]
         if names[0] in found:
@@ -240,6 +253,14 @@ def _exchanged_back(
 
 def _whole_motion(scene: RigidScene, state: Any) -> dict[str, Any]:
     return body_motion(scene, whole_state(scene, state))
+
+
+def _driving_power(scene: RigidScene, state: Any) -> dict[str, Any]:
+    return {"power": powers(scene, state).actuation}
+
+
+def _push_off(scene: RigidScene, state: Any) -> dict[str, Any]:
+    return {"work": push_off_work(scene, state)}
 
 
 def _states_of_walks(scene: RigidScene, starts: Any, durations: np.ndarray) -> Any:

@@ -197,7 +197,7 @@ def _columns(figure: Figure, entries: list[Any], most: int) -> int:
 
 def _sample_length(entries: list[Any]) -> float:
     """Length of a legend's samples of lines, in its letters' size."""
-    dashes = [getattr(each, "_dash_pattern", (0.0, None))[1] or (0.0,) for each in entries]
+    dashes = [getattr(entry, "_dash_pattern", (0.0, None))[1] or (0.0,) for entry in entries]
     return max(2.0, 1.3 * max(map(sum, dashes), default=0.0) / (8.33 * letter_size()))
 
 

@@ -13,27 +13,22 @@ import numpy.typing as npt
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject, Scalar
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.dynamics._energy import Energies, energies, is_driven
+from jaxbiped.dynamics._energy import Energies, energies, is_driven, powers
 from jaxbiped.dynamics._equivalent_states import whole_state
 from jaxbiped.dynamics._mode_changes import foot_loads
 from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.dynamics._stance_motion import ground_force, turning_of
 from jaxbiped.measure._footsteps import heel_strikes
-from jaxbiped.measure._samples import evaluate_along, places_of_standing
+from jaxbiped.measure._samples import evaluate_along, places_of_standing, sample
 from jaxbiped.plot._contact_charts import forces_in
 from jaxbiped.plot._samples import RigidMotion, end_time, rigid_motion, state_at
 from jaxbiped.plot._skeleton import Skeleton, body_motion, motion_names, names_by_foot, skeleton_of
-from jaxbiped.plot.viewer._energy_channels import (
-    ENERGIES,
-    driving_work,
-    energy_channels,
-    rigid_driving_work,
-)
 from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory
 
 _FORCES = ("normal", "tangential")
+_ENERGIES = ("kinetic", "elastic", "supplied", "driven", "lost")
 _FORCE, _ENERGY = 0.05, 5e-4
 """Errors allowed of forces, in weights, and of energies, in weights times the walker's height."""
 
@@ -135,7 +130,7 @@ def tolerances_for(scene: Any, exact: float) -> Tolerances:
     return Tolerances(
         cubic=dict(zip(names[:half], zip(names[half:], allowed, strict=True), strict=True)),
         linear=dict.fromkeys(names_by_foot(structure, *_FORCES), _FORCE * weight)
-        | dict.fromkeys(ENERGIES, _ENERGY * weight * height),
+        | dict.fromkeys(_ENERGIES, _ENERGY * weight * height),
         shortest=1e-4 * time_unit(scene),
     )
 
@@ -160,9 +155,10 @@ def record_walk(
         raise ArgumentError("trajectory ends where it begins: there is no motion to look at.")
     first = _first_times(scene, trajectory)
     started = evaluate_along(scene, state_at(trajectory, first[:1]), energies)
-    edges, work = np.union1d(first, np.asarray(trajectory.t)), None
+    edges, work = first, None
     if is_driven(scene) and not motion_only:
-        work = driving_work(scene, trajectory, edges)
+        flows = sample(scene, trajectory, powers, first)
+        edges, work = flows.edges, np.cumsum(flows.integral(flows.values.actuation))
 
     def evaluate(t: np.ndarray) -> Channels:
         states = state_at(trajectory, t)
@@ -171,16 +167,23 @@ def record_walk(
             return motion
         now = evaluate_along(scene, states, energies)
         forces = forces_in(evaluate_along(scene, states, contacts))
-        given = started.gravitational - now.gravitational
-        driven, held = None, started.kinetic + started.elastic
-        if work is not None:
-            driven = np.interp(t, edges, work)
-        return motion | forces | energy_channels(now.kinetic, given, now.elastic, driven, held)
+        driven = None if work is None else np.interp(t, edges, np.append(0.0, work))
+        return motion | forces | _energy_channels(now, started, driven)
 
     exact = _LOOKS_RIGHT if motion_only else _EXACT
     t, channels = adaptive_knots(evaluate, first, tolerances_for(scene, exact))
     prints = _footprints(scene, trajectory)
     return recording(scene, name, trajectory.outcome, t, channels, prints)
+
+
+def _energy_channels(now: Any, first: Any, driven: np.ndarray | None) -> Channels:
+    """What the chart of energies has [J], shape (n,): held, given by gravity and motors, and lost.
+
+    Of `Energies` along a walk, those at first, and the work of motors, None for a passive walker.
+    """
+    supplied, lost = first.gravitational - now.gravitational, first.total - now.total
+    curves = {"kinetic": now.kinetic, "elastic": now.elastic, "supplied": supplied, "lost": lost}
+    return curves if driven is None else curves | {"driven": driven, "lost": lost + driven}
 
 
 def _first_times(scene: Scene, trajectory: Trajectory) -> np.ndarray:
@@ -229,12 +232,11 @@ def record_rigid_walk(scene: RigidScene, walk: Trajectory[Any], name: str) -> Re
     motion = rigid_motion(scene, walk)
     t = _knot_times(motion, _EVEN * time_unit(scene))
     channels = motion.along(_quantities, t)
-    kinetic, height, elastic = (channels.pop(name) for name in Energies._fields)
-    driven, held = None, kinetic[0] + elastic[0]
-    if is_driven(scene):
-        driven = rigid_driving_work(motion, t)
-    channels |= energy_channels(kinetic, height[0] - height, elastic, driven, held)
-    if not elastic.any():
+    held: list[Any] = [channels.pop(name) for name in Energies._fields]
+    now, first = Energies(*held), Energies(*(values[0] for values in held))
+    driven = motion.driving_work(t) if is_driven(scene) else None
+    channels |= _energy_channels(now, first, driven)
+    if not now.elastic.any():
         del channels["elastic"]
     return recording(scene, name, walk.outcome, t, channels, _rigid_footprints(motion))
 

@@ -71,8 +71,8 @@ class Simulator {
     }
     channels.lost = total.map((value, k) => total[0] - value + (channels.driven?.[k] ?? 0));
     const footprints = heelStrikes(channels, skeleton);
-    const told = { name: "your walk", ending: endings[code], driven: Boolean(power) };
-    return { ...told, slope, skeleton, weight, t, channels, footprints };
+    const plain = { name: "your walk", ending: endings[code], driven: Boolean(power) };
+    return { ...plain, slope, skeleton, weight, t, channels, footprints };
   }
 }
 
