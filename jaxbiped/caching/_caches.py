@@ -131,27 +131,6 @@ class OfObjects(Generic[_T]):
         return known[1]
 
 
-def code_in(tree: Any) -> tuple[Hashable, ...]:
-    """Finds the user's code in the structure of a tree."""
-    import jax
-
-    return _code_in(jax.tree.structure(tree))
-
-
-def versions_in(tree: Any) -> tuple[int, ...]:
-    """Gives the versions of the user's code in the structure of a tree; see `versions_of`."""
-    return versions_of(code_in(tree))
-
-
-_code_in = functools.lru_cache(PROGRAMS)(users_code)
-register_cache(
-    "jaxbiped.users_code",
-    lambda: _code_in.cache_info().currsize,
-    lambda: PROGRAMS,
-    _code_in.cache_clear,
-)
-
-
 def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]]:
     """Decorator: keeps a function's last `bound` results by its hashable positional arguments.
 

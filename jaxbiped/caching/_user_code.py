@@ -5,6 +5,7 @@ attributes, arrays, cells, helpers. They may change while the function stays the
 every cache also compares the version of the code that a program was made of.
 """
 
+import contextlib
 import contextvars
 import dis
 import functools
@@ -28,7 +29,7 @@ _MOST_READINGS = 256
 
 
 class _Reading(NamedTuple):
-    """What a piece of code read.
+    """It says what a piece of code read last.
 
     Attributes:
         content: all of it, written down.
@@ -89,9 +90,7 @@ def _made(*parts: object) -> None:
 class _Reader(pickle.Pickler):
     """It writes down all that a piece of code reads; without a piece, it finds those in a thing."""
 
-    def __init__(
-        self, piece: object, names: dict[types.CodeType, frozenset[str]] | None = None
-    ) -> None:
+    def __init__(self, piece: object, names: dict[Any, frozenset[str]] | None = None) -> None:
         self.file, self.piece, self.kept = io.BytesIO(), piece, list[object]()
         self.code, self.finds = dict[Any, None](), names is None
         self.by_code = {} if names is None else names
@@ -115,9 +114,10 @@ class _Reader(pickle.Pickler):
             )
         # Of a node of JAX's trees, the package reads the parts, so that all of them count.
         is_piece = thing is kind or jax.tree_util.all_leaves([thing])
-        if users and self.finds and is_piece and _has_hash(thing):
-            self.code[thing] = None
-            return _made, ()
+        if users and self.finds and is_piece:
+            with contextlib.suppress(TypeError):  # JAX takes nothing without a hash for a program's
+                self.code[thing] = None
+                return _made, ()
         return _made, (getattr(kind, "__qualname__", ""),), tuple(self._parts(thing, kind, users))
 
     def _parts(self, thing: Any, kind: Any, users: bool) -> Iterator[object]:
@@ -126,12 +126,16 @@ class _Reader(pickle.Pickler):
             yield thing.__name__, [(n, x) for n, x in items if users or not callable(x)]
         elif isinstance(thing, types.FunctionType):
             yield thing.__code__, thing.__defaults__, thing.__kwdefaults__, thing.__closure__
-            read = self._names_of(thing.__code__) if users else frozenset[str]()
+            if users and thing.__code__ not in self.by_code:
+                self.by_code[thing.__code__] = _names(thing.__code__)
+                self.names |= self.by_code[thing.__code__]
+            read = self.by_code.get(thing.__code__, ())
             yield {name: thing.__globals__.get(name) for name in sorted(read)}, vars(thing)
         elif isinstance(thing, types.CodeType):
             yield from code_members(thing)
         elif isinstance(thing, types.CellType):
-            yield _content(thing)
+            with contextlib.suppress(ValueError):  # a name that is not defined yet
+                yield thing.cell_contents
         elif isinstance(thing, types.MethodType):
             yield thing.__func__, thing.__self__
         elif isinstance(thing, contextvars.ContextVar):
@@ -156,37 +160,18 @@ class _Reader(pickle.Pickler):
     def _library_parts(self, thing: Any) -> Iterator[object]:
         """Gives what an object of a library's class holds, or else its identity."""
         try:
-            how = thing.__reduce_ex__(5)
-            yield how if isinstance(how, str) else [*how[:3], *map(_listed, how[3:])]
+            yield [list(x) if isinstance(x, Iterator) else x for x in thing.__reduce_ex__(5)]
         except Exception:  # whatever a library's class raises
             self.kept.append(thing)
             values = [getattr(thing, name, None) for name in sorted(self.names)]
             yield [value for value in values if isinstance(value, _PLAIN)]
             yield id(thing), getattr(thing, "__wrapped__", None), getattr(thing, "fget", None)
 
-    def _names_of(self, code: types.CodeType) -> frozenset[str]:
-        if code not in self.by_code:
-            self.by_code[code] = frozenset(_names(code))
-            self.names |= self.by_code[code]
-        return self.by_code[code]
-
     def _named(self, attributes: dict[str, object]) -> dict[str, object]:
         """The attributes that the code may read."""
         if self.names & _BY_ANY_NAME:
             return dict(attributes)
         return {name: attributes[name] for name in sorted(self.names) if name in attributes}
-
-
-def _has_hash(thing: object) -> bool:
-    try:
-        hash(thing)
-    except TypeError:  # JAX takes no such thing for a program's
-        return False
-    return True
-
-
-def _listed(items: Any) -> object:
-    return None if items is None or callable(items) else list(items)
 
 
 def _is_users(thing: Any) -> bool:
@@ -203,24 +188,16 @@ def _is_users(thing: Any) -> bool:
     return module is None or extends or "site-packages" not in file
 
 
-def _content(cell: types.CellType) -> object:
-    try:
-        return (cell.cell_contents,)
-    except ValueError:  # a name that is not defined yet
-        return None
-
-
-def _names(code: types.CodeType) -> Iterator[str]:
-    """Yields what a function's code mentions: names, and texts that may be used as such."""
-    for step in dis.get_instructions(code):
-        if step.opcode in dis.hasname and step.opname != "STORE_ATTR":
-            yield step.argval
+def _names(code: types.CodeType) -> frozenset[str]:
+    """Finds what a function's code mentions: names, and texts that may be used as such."""
+    steps = (step for step in dis.get_instructions(code) if step.opcode in dis.hasname)
+    names = {step.argval for step in steps if step.opname != "STORE_ATTR"}
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            yield from _names(constant)
-        for text in constant if isinstance(constant, tuple) else (constant,):
-            if isinstance(text, str):
-                yield text
+            names |= _names(constant)
+        texts = constant if isinstance(constant, tuple) else (constant,)
+        names |= {text for text in texts if isinstance(text, str)}
+    return frozenset(names)
 
 
 def code_members(code: types.CodeType) -> Iterator[object]:
