@@ -176,16 +176,14 @@ class _Reader(pickle.Pickler):
 
 def _is_users(thing: Any) -> bool:
     """Tells whether what a function, class or module reads is the user's to change."""
-    module = thing.__module__ if isinstance(thing, type) else None
-    name = module or getattr(thing, "__globals__", vars(thing)).get("__name__")
-    if str(name).partition(".")[0] in LIBRARIES:
+    bases = [base.__module__ for base in getattr(thing, "__mro__", ())]
+    names = getattr(thing, "__globals__", vars(thing))
+    name = bases[0] if bases else str(names.get("__name__"))
+    if name.partition(".")[0] in LIBRARIES:
         return False
-    file = str(getattr(sys.modules.get(str(name)), "__file__", None))
     # Classes of installed packages are many and do not change, unless they extend this package.
-    extends = any(
-        base.__module__.startswith("jaxbiped.") for base in getattr(module and thing, "__mro__", ())
-    )
-    return module is None or extends or "site-packages" not in file
+    extends = not bases or any(base.startswith("jaxbiped.") for base in bases)
+    return extends or "site-packages" not in str(getattr(sys.modules.get(name), "__file__", None))
 
 
 def _names(code: types.CodeType) -> frozenset[str]:

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import jax.numpy as jnp
 
@@ -69,7 +69,8 @@ class Powers(NamedTuple):
         friction: power lost to friction, never negative.
         actuation: power of motors and actuators, including springs and dampers between the legs;
             None for a passive walker.
-        motors: power of each motor, as in `ActuatorPowers`; None for a passive walker.
+        motors: power of each motor: one for each actuator at the hip that has a motor, one for each
+            foot that has a preload, and one for each motor at a joint; None for a passive walker.
     """
 
     gravity: Scalar
@@ -80,18 +81,8 @@ class Powers(NamedTuple):
     motors: tuple[Scalar, ...] | None = None
 
 
-class ActuatorPowers(NamedTuple):
-    """Powers of all that drives a walker, leaves shaped as the state's.
-
-    Attributes:
-        total: power of all motors and actuators on the walker, including the springs and dampers
-            of the latter [W].
-        motors: power of each motor [W]: one for each actuator at the hip that has a motor, one for
-            each foot that has a preload, and one for each motor at a joint.
-    """
-
-    total: Scalar
-    motors: tuple[Scalar, ...]
+_Driving: TypeAlias = tuple[Scalar, tuple[Scalar, ...]]
+"""The last two of `Powers`."""
 
 
 @kept_alone
@@ -191,8 +182,7 @@ def powers(scene: AbstractWalkerScene, state: Any) -> Powers:
         indentation, damper = indentation + joints.taken, damper + joints.lost
     if not is_driven(scene):
         return Powers(gravity, indentation, damper, friction)
-    actuators = _actuator_powers(scene, state)
-    return Powers(gravity, indentation, damper, friction, actuators.total, actuators.motors)
+    return Powers(gravity, indentation, damper, friction, *_actuator_powers(scene, state))
 
 
 def is_driven(scene: AbstractWalkerScene) -> bool:
@@ -200,10 +190,10 @@ def is_driven(scene: AbstractWalkerScene) -> bool:
     return scene.mechanism.has_motors or getattr(scene, "actuation", None) is not None
 
 
-def _actuator_powers(scene: Any, state: Any) -> ActuatorPowers:
+def _actuator_powers(scene: Any, state: Any) -> _Driving:
     if not scene.compliant:
 
-        def standing(stance: Stance) -> ActuatorPowers:
+        def standing(stance: Stance) -> _Driving:
             hip = functools.partial(hip_motion_of, stance)
             return _driving(scene, stance.pose.motion, carriers_of(stance), hip)
 
@@ -226,7 +216,7 @@ def _driving(
     carriers: Carriers,
     hip: Callable[[], HipMotion],
     pressing: Sequence[Scalar] = (),
-) -> ActuatorPowers:
+) -> _Driving:
     """Powers of all that drives a walker on feet of either kind.
 
     Args:
@@ -244,7 +234,7 @@ def _driving(
         motors = [_power(torques, now) for torques in turning if torques is not None] + motors
         total = sum((_power(part.torques(now), now) for part in parts), total)
     joints = motor_powers(scene.mechanism, motion, scene.ground.slope, *carriers)
-    return ActuatorPowers(sum((*pressing, *joints), total), (*motors, *joints))
+    return sum((*pressing, *joints), total), (*motors, *joints)
 
 
 def _power(torques: LegTorques, hip: HipMotion) -> Scalar:
