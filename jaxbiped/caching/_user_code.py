@@ -17,7 +17,7 @@ import sys
 import threading
 import types
 from collections.abc import Hashable, Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 from jaxbiped._checks import LIBRARIES, ArgumentError
 
@@ -28,23 +28,7 @@ _PLAIN: tuple[Any, ...] = (dict, list, tuple, set, frozenset, bytes, bool, int, 
 _MOST_READINGS = 256
 
 
-class _Reading(NamedTuple):
-    """It says what a piece of code read last.
-
-    Attributes:
-        content: all of it, written down.
-        names: all that its functions mention, by their codes.
-        kept: objects that are told apart by their identity, so that no other gets the same.
-        version: a number that no other content had.
-    """
-
-    content: bytes
-    names: dict[types.CodeType, frozenset[str]]
-    kept: list[object]
-    version: int
-
-
-_READINGS: dict[Hashable, _Reading] = {}
+_READINGS: "dict[Hashable, _Reader]" = {}
 _VERSIONS = itertools.count()
 _LOCK = threading.RLock()
 
@@ -68,19 +52,19 @@ def versions_of(code: tuple[Hashable, ...]) -> tuple[int, ...]:
 
 def _version(piece: Hashable) -> int:
     last = _READINGS.get(piece)
-    names, size = {} if last is None else last.names, -1
+    names, size = {} if last is None else last.by_code, -1
     while size < len(names):  # what is read may be more functions, which mention more
         size, reader = len(names), _Reader(piece, names)
         reader.dump(piece)
-    content = reader.file.getvalue()
-    if last is not None and last.content == content:
+    if last is not None and last.file.getvalue() == reader.file.getvalue():
         return last.version
     if last is not None or len(_READINGS) >= _MOST_READINGS:
         if last is None:
             _READINGS.clear()
         sys.modules["jax"].clear_caches()  # what it traced of this and of equal functions
-    _READINGS[piece] = _Reading(content, names, reader.kept, next(_VERSIONS))
-    return _READINGS[piece].version
+    reader.clear_memo()
+    _READINGS[piece] = reader
+    return reader.version
 
 
 def _made(*parts: object) -> None:
@@ -88,11 +72,17 @@ def _made(*parts: object) -> None:
 
 
 class _Reader(pickle.Pickler):
-    """It writes down all that a piece of code reads; without a piece, it finds those in a thing."""
+    """It writes down all that a piece of code reads; without a piece, it finds those in a thing.
+
+    Attributes:
+        by_code: all that its functions mention, by their codes; `names` without these.
+        kept: objects that are told apart by their identity, so that no other gets the same.
+        version: a number that no other reader has.
+    """
 
     def __init__(self, piece: object, names: dict[Any, frozenset[str]] | None = None) -> None:
         self.file, self.piece, self.kept = io.BytesIO(), piece, list[object]()
-        self.code, self.finds = dict[Any, None](), names is None
+        self.code, self.finds, self.version = dict[Any, None](), names is None, next(_VERSIONS)
         self.by_code = {} if names is None else names
         self.names = set[str]().union(*self.by_code.values())
         super().__init__(self.file, protocol=5)
