@@ -151,9 +151,9 @@ def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]
 
         def make(args: tuple[Hashable, ...], versions: tuple[int, ...]) -> _T:
             with lock:
-                known = alive.get((versions, *args))
-            if known is not None:
-                return known
+                kept = alive.get((versions, *args))
+            if kept is not None:
+                return kept
             made = function(*args)
             with lock, contextlib.suppress(TypeError):  # plain values have no identity to keep
                 made = alive.setdefault((versions, *args), made)

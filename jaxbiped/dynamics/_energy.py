@@ -97,40 +97,32 @@ def energies(scene: AbstractWalkerScene, state: Any) -> Energies:
         The three energies [J], leaves shaped as the state's.
     """
     laws: Any = scene
-    whole = _placed(scene, state)
-    kinetic, moment = kinetic_and_moment(scene, whole)
-    elastic = jnp.zeros_like(kinetic)
+    ground, whole = scene.ground, _placed(scene, state)
+    kinetic = elastic = moment_x = moment_z = jnp.zeros_like(state[0])
+    for mass, point in _mass_points(scene, whole):
+        kinetic = kinetic + 0.5 * mass * (point.vx**2 + point.vz**2)
+        moment_x, moment_z = moment_x + mass * point.x, moment_z + mass * point.z
+    bodies = zip(scene.mechanism.bodies, poses_of(scene, whole), strict=True)
+    for j, (body, pose) in enumerate(bodies):
+        kinetic = kinetic + 0.5 * body.inertia * pose.motion.rates[j] ** 2
+    moment = moment_z * jnp.cos(ground.slope) - moment_x * jnp.sin(ground.slope)
     for foot in _feet(scene, state):
         stored = laws.normal.elastic_energy(foot.penetration)
         elastic = elastic + jnp.where(touches(foot), stored, 0.0)
     joints = _joint_energy(scene, whole)
     if joints is not None:
         elastic = elastic + joints.stored
-    return Energies(kinetic, scene.ground.g * moment, elastic)
+    return Energies(kinetic, ground.g * moment, elastic)
 
 
 def _placed(scene: AbstractWalkerScene, state: Any) -> Any:
-    """A state that has the place of the root point, which a rigid walker's follows from."""
+    """Gives a state that has the place of the root point, which follows from a rigid walker's."""
     return state if scene.compliant else whole_state(scene, state)
 
 
 def _feet(scene: AbstractWalkerScene, state: Any) -> tuple[FootMotion, ...]:
-    """The feet that press into the ground: none of a walker on rigid feet."""
+    """Gives the feet that press into the ground: none of a walker on rigid feet."""
     return feet(cast("CompliantScene", scene), state) if scene.compliant else ()
-
-
-def kinetic_and_moment(scene: AbstractWalkerScene, state: Any) -> tuple[Scalar, Scalar]:
-    """Kinetic energy [J] and mass times height [kg·m] of a walker of any kind."""
-    ground = scene.ground
-    kinetic = moment_x = moment_z = jnp.zeros_like(state[0])
-    for mass, point in _mass_points(scene, state):
-        kinetic = kinetic + 0.5 * mass * (point.vx**2 + point.vz**2)
-        moment_x, moment_z = moment_x + mass * point.x, moment_z + mass * point.z
-    bodies = zip(scene.mechanism.bodies, poses_of(scene, state), strict=True)
-    for j, (body, pose) in enumerate(bodies):
-        kinetic = kinetic + 0.5 * body.inertia * pose.motion.rates[j] ** 2
-    height = moment_z * jnp.cos(ground.slope) - moment_x * jnp.sin(ground.slope)
-    return kinetic, height
 
 
 def _mass_points(scene: AbstractWalkerScene, state: Any) -> list[tuple[Scalar, PointMotion]]:
@@ -217,7 +209,7 @@ def _driving(
     hip: Callable[[], HipMotion],
     pressing: Sequence[Scalar] = (),
 ) -> _Driving:
-    """Powers of all that drives a walker on feet of either kind.
+    """Computes the powers of all that drives a walker on feet of either kind.
 
     Args:
         scene: whose parts drive.

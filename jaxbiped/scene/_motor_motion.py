@@ -155,7 +155,7 @@ def _acts_by_side(part: Any, structure: Structure) -> bool:
 
 @kept_alone
 def _torques_at_images(mechanism: Any, motions: Any) -> Any:
-    """Torques of laws by side [N·m] at motions (n, 2 bodies + 1) and of twins at their images."""
+    """Computes torques by side [N·m] at motions (n, 2 bodies + 1), and of twins at images."""
     s, joints, count = mechanism.structure, mechanism.joints, len(mechanism.structure.bodies)
     twin = range(count) if s.body_twins is None else s.body_twins
     motors = [k for k, part in enumerate(joints) if _acts_by_side(part, s)]
@@ -179,7 +179,7 @@ def _torques_at_images(mechanism: Any, motions: Any) -> Any:
 
 @kept_alone
 def _torques_of_legs(part: AbstractHipActuator, hip: HipMotion) -> Any:
-    """Torques [N·m] at motions and, exchanged back, at those of the other leg, shape (n, 2, 2)."""
+    """Computes torques [N·m] at motions and, exchanged back, at images, shape (n, 2, 2)."""
 
     def torques(hip: HipMotion) -> Any:
         exchanged = part.torques(HipMotion._make(pair[::-1] for pair in hip))[::-1]
