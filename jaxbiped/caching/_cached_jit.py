@@ -15,7 +15,7 @@ import jax
 
 from jaxbiped._jax_versions import nothing_is_traced, without_switches
 from jaxbiped.caching import _caches
-from jaxbiped.caching._caches import Once, OncePerVersion, name_of, register_cache
+from jaxbiped.caching._caches import Once, OncePerVersion, bounded_cache, name_of, register_cache
 from jaxbiped.caching._compiled_store import (
     ArrayFunction,
     KeptProgram,
@@ -101,7 +101,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         arguments = arguments_of((args, kwargs))
         program = None if arguments is None else self._program(arguments, *self._others, _XLA)
         if arguments is None:
-            self._note_code((args, kwargs))
+            note_code(args, kwargs)
         found: _T
         if arguments is None or program is None:
             self._make_room()
@@ -148,12 +148,6 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
                 known = self._programs.setdefault(kind, OncePerVersion(kind))
         return known()[1]
 
-    def _note_code(self, given: object) -> None:
-        """Has JAX trace again what is traced, if code of the user's in it reads anything else."""
-        skeleton, _ = Skeleton.of(given)
-        with contextlib.suppress(TypeError):  # unhashable
-            self._once((skeleton.structure, *skeleton.leaves))
-
     def _program(self, arguments: Arguments, *forms: Form) -> KeptProgram | None:
         """The program for such arguments in the first of these forms that it has."""
         args, kwargs = arguments.given
@@ -190,6 +184,21 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
 
     def _count(self) -> int:
         return int(self._jitted._cached._cache_size()) + len(self._programs)
+
+
+def note_code(*given: object) -> None:
+    """Has JAX trace again what it traced of these, if code of the user's in it reads anything else.
+
+    It comes before anything is looked up that JAX made of them.
+    """
+    leaves, structure = jax.tree.flatten(given)
+    with contextlib.suppress(TypeError):  # unhashable
+        _note_code(structure, *(leaf for leaf in leaves if not eqx.is_array_like(leaf)))
+
+
+@bounded_cache(_caches.PROGRAMS)
+def _note_code(*given: Hashable) -> None:
+    """It makes nothing: whatever is looked up in a cache has its code compared."""
 
 
 def arguments_of(given: tuple[tuple[Any, ...], dict[str, Any]]) -> Arguments | None:

@@ -131,27 +131,6 @@ class OfObjects(Generic[_T]):
         return known[1]
 
 
-def code_in(tree: Any) -> tuple[Hashable, ...]:
-    """Finds the user's code in the structure of a tree."""
-    import jax
-
-    return _code_in(jax.tree.structure(tree))
-
-
-def versions_in(tree: Any) -> tuple[int, ...]:
-    """Gives the versions of the user's code in the structure of a tree; see `versions_of`."""
-    return versions_of(code_in(tree))
-
-
-_code_in = functools.lru_cache(PROGRAMS)(users_code)
-register_cache(
-    "jaxbiped.users_code",
-    lambda: _code_in.cache_info().currsize,
-    lambda: PROGRAMS,
-    _code_in.cache_clear,
-)
-
-
 def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]]:
     """Decorator: keeps a function's last `bound` results by its hashable positional arguments.
 
@@ -172,9 +151,9 @@ def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]
 
         def make(args: tuple[Hashable, ...], versions: tuple[int, ...]) -> _T:
             with lock:
-                known = alive.get((versions, *args))
-            if known is not None:
-                return known
+                kept = alive.get((versions, *args))
+            if kept is not None:
+                return kept
             made = function(*args)
             with lock, contextlib.suppress(TypeError):  # plain values have no identity to keep
                 made = alive.setdefault((versions, *args), made)

@@ -20,16 +20,13 @@ import jax
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._checks import LIBRARIES
 from jaxbiped.caching import IMPORT_BEGAN_AT
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.caching._source_digest import SourceDigests
 from jaxbiped.caching._user_code import code_members
 
 _PACKAGE = "jaxbiped"
-_LIBRARIES = (
-    "builtins", "collections", "diffrax", "equinox", "functools", "jax", "jaxlib", "jaxtyping",
-    "lineax", "llvmlite", "math", "numpy", "operator", "optax", "optimistix", "types",
-)  # fmt: skip
 _SETTINGS = (
     "jax_default_matmul_precision",
     "jax_default_prng_impl",
@@ -178,10 +175,10 @@ def _name(thing: Any) -> str:
 def _source_of(module: Any) -> str:
     """A digest of all code that a module of the package can reach; a library has its version."""
     root = str(module).split(".")[0]
-    if root in _LIBRARIES:
-        return ""
-    if root != _PACKAGE:
+    if root not in LIBRARIES:
         raise UnknownMeaningError(f"code of {module}")
+    if root != _PACKAGE:
+        return ""
     try:
         return _sources().digest(module)
     except LookupError as unknown:

@@ -5,6 +5,7 @@ attributes, arrays, cells, helpers. They may change while the function stays the
 every cache also compares the version of the code that a program was made of.
 """
 
+import contextlib
 import contextvars
 import dis
 import functools
@@ -16,7 +17,7 @@ import sys
 import threading
 import types
 from collections.abc import Hashable, Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 from jaxbiped._checks import LIBRARIES, ArgumentError
 
@@ -27,23 +28,7 @@ _PLAIN: tuple[Any, ...] = (dict, list, tuple, set, frozenset, bytes, bool, int, 
 _MOST_READINGS = 256
 
 
-class _Reading(NamedTuple):
-    """What a piece of code read.
-
-    Attributes:
-        content: all of it, written down.
-        names: all that its functions mention, by their codes.
-        kept: objects that are told apart by their identity, so that no other gets the same.
-        version: a number that no other content had.
-    """
-
-    content: bytes
-    names: dict[types.CodeType, frozenset[str]]
-    kept: list[object]
-    version: int
-
-
-_READINGS: dict[Hashable, _Reading] = {}
+_READINGS: "dict[Hashable, _Reader]" = {}
 _VERSIONS = itertools.count()
 _LOCK = threading.RLock()
 
@@ -67,19 +52,19 @@ def versions_of(code: tuple[Hashable, ...]) -> tuple[int, ...]:
 
 def _version(piece: Hashable) -> int:
     last = _READINGS.get(piece)
-    names, size = {} if last is None else last.names, -1
+    names, size = {} if last is None else last.by_code, -1
     while size < len(names):  # what is read may be more functions, which mention more
         size, reader = len(names), _Reader(piece, names)
         reader.dump(piece)
-    content = reader.file.getvalue()
-    if last is not None and last.content == content:
+    if last is not None and last.file.getvalue() == reader.file.getvalue():
         return last.version
     if last is not None or len(_READINGS) >= _MOST_READINGS:
         if last is None:
             _READINGS.clear()
         sys.modules["jax"].clear_caches()  # what it traced of this and of equal functions
-    _READINGS[piece] = _Reading(content, names, reader.kept, next(_VERSIONS))
-    return _READINGS[piece].version
+    reader.clear_memo()
+    _READINGS[piece] = reader
+    return reader.version
 
 
 def _made(*parts: object) -> None:
@@ -87,13 +72,17 @@ def _made(*parts: object) -> None:
 
 
 class _Reader(pickle.Pickler):
-    """It writes down all that a piece of code reads; without a piece, it finds those in a thing."""
+    """It writes down all that a piece of code reads; without a piece, it finds those in a thing.
 
-    def __init__(
-        self, piece: object, names: dict[types.CodeType, frozenset[str]] | None = None
-    ) -> None:
+    Attributes:
+        by_code: all that its functions mention, by their codes; `names` without these.
+        kept: objects that are told apart by their identity, so that no other gets the same.
+        version: a number that no other reader has.
+    """
+
+    def __init__(self, piece: object, names: dict[Any, frozenset[str]] | None = None) -> None:
         self.file, self.piece, self.kept = io.BytesIO(), piece, list[object]()
-        self.code, self.finds = dict[Any, None](), names is None
+        self.code, self.finds, self.version = dict[Any, None](), names is None, next(_VERSIONS)
         self.by_code = {} if names is None else names
         self.names = set[str]().union(*self.by_code.values())
         super().__init__(self.file, protocol=5)
@@ -115,9 +104,10 @@ class _Reader(pickle.Pickler):
             )
         # Of a node of JAX's trees, the package reads the parts, so that all of them count.
         is_piece = thing is kind or jax.tree_util.all_leaves([thing])
-        if users and self.finds and is_piece and _has_hash(thing):
-            self.code[thing] = None
-            return _made, ()
+        if users and self.finds and is_piece:
+            with contextlib.suppress(TypeError):  # JAX takes nothing without a hash for a program's
+                self.code[thing] = None
+                return _made, ()
         return _made, (getattr(kind, "__qualname__", ""),), tuple(self._parts(thing, kind, users))
 
     def _parts(self, thing: Any, kind: Any, users: bool) -> Iterator[object]:
@@ -126,12 +116,16 @@ class _Reader(pickle.Pickler):
             yield thing.__name__, [(n, x) for n, x in items if users or not callable(x)]
         elif isinstance(thing, types.FunctionType):
             yield thing.__code__, thing.__defaults__, thing.__kwdefaults__, thing.__closure__
-            read = self._names_of(thing.__code__) if users else frozenset[str]()
+            if users and thing.__code__ not in self.by_code:
+                self.by_code[thing.__code__] = _names(thing.__code__)
+                self.names |= self.by_code[thing.__code__]
+            read = self.by_code.get(thing.__code__, ())
             yield {name: thing.__globals__.get(name) for name in sorted(read)}, vars(thing)
         elif isinstance(thing, types.CodeType):
             yield from code_members(thing)
         elif isinstance(thing, types.CellType):
-            yield _content(thing)
+            with contextlib.suppress(ValueError):  # a name that is not defined yet
+                yield thing.cell_contents
         elif isinstance(thing, types.MethodType):
             yield thing.__func__, thing.__self__
         elif isinstance(thing, contextvars.ContextVar):
@@ -156,19 +150,12 @@ class _Reader(pickle.Pickler):
     def _library_parts(self, thing: Any) -> Iterator[object]:
         """Gives what an object of a library's class holds, or else its identity."""
         try:
-            how = thing.__reduce_ex__(5)
-            yield how if isinstance(how, str) else [*how[:3], *map(_listed, how[3:])]
+            yield [list(x) if isinstance(x, Iterator) else x for x in thing.__reduce_ex__(5)]
         except Exception:  # whatever a library's class raises
             self.kept.append(thing)
             values = [getattr(thing, name, None) for name in sorted(self.names)]
             yield [value for value in values if isinstance(value, _PLAIN)]
             yield id(thing), getattr(thing, "__wrapped__", None), getattr(thing, "fget", None)
-
-    def _names_of(self, code: types.CodeType) -> frozenset[str]:
-        if code not in self.by_code:
-            self.by_code[code] = frozenset(_names(code))
-            self.names |= self.by_code[code]
-        return self.by_code[code]
 
     def _named(self, attributes: dict[str, object]) -> dict[str, object]:
         """The attributes that the code may read."""
@@ -177,50 +164,28 @@ class _Reader(pickle.Pickler):
         return {name: attributes[name] for name in sorted(self.names) if name in attributes}
 
 
-def _has_hash(thing: object) -> bool:
-    try:
-        hash(thing)
-    except TypeError:  # JAX takes no such thing for a program's
-        return False
-    return True
-
-
-def _listed(items: Any) -> object:
-    return None if items is None or callable(items) else list(items)
-
-
 def _is_users(thing: Any) -> bool:
     """Tells whether what a function, class or module reads is the user's to change."""
-    module = thing.__module__ if isinstance(thing, type) else None
-    name = module or getattr(thing, "__globals__", vars(thing)).get("__name__")
-    if str(name).partition(".")[0] in LIBRARIES:
+    bases = [base.__module__ for base in getattr(thing, "__mro__", ())]
+    names = getattr(thing, "__globals__", vars(thing))
+    name = bases[0] if bases else str(names.get("__name__"))
+    if name.partition(".")[0] in LIBRARIES:
         return False
-    file = str(getattr(sys.modules.get(str(name)), "__file__", None))
     # Classes of installed packages are many and do not change, unless they extend this package.
-    extends = any(
-        base.__module__.startswith("jaxbiped.") for base in getattr(module and thing, "__mro__", ())
-    )
-    return module is None or extends or "site-packages" not in file
+    extends = not bases or any(base.startswith("jaxbiped.") for base in bases)
+    return extends or "site-packages" not in str(getattr(sys.modules.get(name), "__file__", None))
 
 
-def _content(cell: types.CellType) -> object:
-    try:
-        return (cell.cell_contents,)
-    except ValueError:  # a name that is not defined yet
-        return None
-
-
-def _names(code: types.CodeType) -> Iterator[str]:
-    """Yields what a function's code mentions: names, and texts that may be used as such."""
-    for step in dis.get_instructions(code):
-        if step.opcode in dis.hasname and step.opname != "STORE_ATTR":
-            yield step.argval
+def _names(code: types.CodeType) -> frozenset[str]:
+    """Finds what a function's code mentions: names, and texts that may be used as such."""
+    steps = (step for step in dis.get_instructions(code) if step.opcode in dis.hasname)
+    names = {step.argval for step in steps if step.opname != "STORE_ATTR"}
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            yield from _names(constant)
-        for text in constant if isinstance(constant, tuple) else (constant,):
-            if isinstance(text, str):
-                yield text
+            names |= _names(constant)
+        texts = constant if isinstance(constant, tuple) else (constant,)
+        names |= {text for text in texts if isinstance(text, str)}
+    return frozenset(names)
 
 
 def code_members(code: types.CodeType) -> Iterator[object]:

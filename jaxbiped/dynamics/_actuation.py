@@ -72,10 +72,11 @@ def motor_torque(
     structure, motor = mechanism.structure, mechanism.joints[number]
     assert isinstance(motor, Motor)
     own = structure.joints[number]
-    if motor.by == "side" or leg is None or not swings_at_section(structure, leg):
-        return MotorTorque(own, _told(motor, MotorMotion(structure, motion, slope, own, line)))
-    seen = MotorMotion(structure, exchanged(structure, motion), slope, own, line)
-    return MotorTorque(own.mirrored(exchange_of(structure)), _told(motor, seen))
+    as_written = motor.by == "side" or leg is None or not swings_at_section(structure, leg)
+    motion = motion if as_written else exchanged(structure, motion)
+    seen = MotorMotion(structure, motion.angles, motion.rates, slope, own, line)
+    angle = own if as_written else own.mirrored(exchange_of(structure))
+    return MotorTorque(angle, _told(motor, seen))
 
 
 def _told(motor: Motor, motion: MotorMotion) -> Scalar:
@@ -90,7 +91,8 @@ def _told(motor: Motor, motion: MotorMotion) -> Scalar:
     is_one = not isinstance(torque, list | tuple) and is_number(torque)
     if not is_one and not isinstance(torque, jax.Array):
         raise ArgumentError(_not_one_torque(words, repr(torque)))
-    known = jtu.tree_leaves(eqx.filter((motion.motion, motion.slope, motor), eqx.is_array_like))
+    given = motion.angles, motion.rates, motion.slope, motor
+    known = jtu.tree_leaves(eqx.filter(given, eqx.is_array_like))
     shape, most = np.shape(torque), np.broadcast_shapes(*map(np.shape, known))
     if shape != most[len(most) - len(shape) :] or jnp.iscomplexobj(torque):
         told = f"an array of the shape {shape} and the type {jnp.result_type(torque)}"

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import jax.numpy as jnp
 
@@ -69,7 +69,8 @@ class Powers(NamedTuple):
         friction: power lost to friction, never negative.
         actuation: power of motors and actuators, including springs and dampers between the legs;
             None for a passive walker.
-        motors: power of each motor, as in `ActuatorPowers`; None for a passive walker.
+        motors: power of each motor: one for each actuator at the hip that has a motor, one for each
+            foot that has a preload, and one for each motor at a joint; None for a passive walker.
     """
 
     gravity: Scalar
@@ -80,18 +81,8 @@ class Powers(NamedTuple):
     motors: tuple[Scalar, ...] | None = None
 
 
-class ActuatorPowers(NamedTuple):
-    """Powers of all that drives a walker, leaves shaped as the state's.
-
-    Attributes:
-        total: power of all motors and actuators on the walker, including the springs and dampers
-            of the latter [W].
-        motors: power of each motor [W]: one for each actuator at the hip that has a motor, one for
-            each foot that has a preload, and one for each motor at a joint.
-    """
-
-    total: Scalar
-    motors: tuple[Scalar, ...]
+_Driving: TypeAlias = tuple[Scalar, tuple[Scalar, ...]]
+"""The last two of `Powers`."""
 
 
 @kept_alone
@@ -106,40 +97,32 @@ def energies(scene: AbstractWalkerScene, state: Any) -> Energies:
         The three energies [J], leaves shaped as the state's.
     """
     laws: Any = scene
-    whole = _placed(scene, state)
-    kinetic, moment = kinetic_and_moment(scene, whole)
-    elastic = jnp.zeros_like(kinetic)
+    ground, whole = scene.ground, _placed(scene, state)
+    kinetic = elastic = moment_x = moment_z = jnp.zeros_like(state[0])
+    for mass, point in _mass_points(scene, whole):
+        kinetic = kinetic + 0.5 * mass * (point.vx**2 + point.vz**2)
+        moment_x, moment_z = moment_x + mass * point.x, moment_z + mass * point.z
+    bodies = zip(scene.mechanism.bodies, poses_of(scene, whole), strict=True)
+    for j, (body, pose) in enumerate(bodies):
+        kinetic = kinetic + 0.5 * body.inertia * pose.motion.rates[j] ** 2
+    moment = moment_z * jnp.cos(ground.slope) - moment_x * jnp.sin(ground.slope)
     for foot in _feet(scene, state):
         stored = laws.normal.elastic_energy(foot.penetration)
         elastic = elastic + jnp.where(touches(foot), stored, 0.0)
     joints = _joint_energy(scene, whole)
     if joints is not None:
         elastic = elastic + joints.stored
-    return Energies(kinetic, scene.ground.g * moment, elastic)
+    return Energies(kinetic, ground.g * moment, elastic)
 
 
 def _placed(scene: AbstractWalkerScene, state: Any) -> Any:
-    """A state that has the place of the root point, which a rigid walker's follows from."""
+    """Gives a state that has the place of the root point, which follows from a rigid walker's."""
     return state if scene.compliant else whole_state(scene, state)
 
 
 def _feet(scene: AbstractWalkerScene, state: Any) -> tuple[FootMotion, ...]:
-    """The feet that press into the ground: none of a walker on rigid feet."""
+    """Gives the feet that press into the ground: none of a walker on rigid feet."""
     return feet(cast("CompliantScene", scene), state) if scene.compliant else ()
-
-
-def kinetic_and_moment(scene: AbstractWalkerScene, state: Any) -> tuple[Scalar, Scalar]:
-    """Kinetic energy [J] and mass times height [kg·m] of a walker of any kind."""
-    ground = scene.ground
-    kinetic = moment_x = moment_z = jnp.zeros_like(state[0])
-    for mass, point in _mass_points(scene, state):
-        kinetic = kinetic + 0.5 * mass * (point.vx**2 + point.vz**2)
-        moment_x, moment_z = moment_x + mass * point.x, moment_z + mass * point.z
-    bodies = zip(scene.mechanism.bodies, poses_of(scene, state), strict=True)
-    for j, (body, pose) in enumerate(bodies):
-        kinetic = kinetic + 0.5 * body.inertia * pose.motion.rates[j] ** 2
-    height = moment_z * jnp.cos(ground.slope) - moment_x * jnp.sin(ground.slope)
-    return kinetic, height
 
 
 def _mass_points(scene: AbstractWalkerScene, state: Any) -> list[tuple[Scalar, PointMotion]]:
@@ -191,8 +174,7 @@ def powers(scene: AbstractWalkerScene, state: Any) -> Powers:
         indentation, damper = indentation + joints.taken, damper + joints.lost
     if not is_driven(scene):
         return Powers(gravity, indentation, damper, friction)
-    actuators = _actuator_powers(scene, state)
-    return Powers(gravity, indentation, damper, friction, actuators.total, actuators.motors)
+    return Powers(gravity, indentation, damper, friction, *_actuator_powers(scene, state))
 
 
 def is_driven(scene: AbstractWalkerScene) -> bool:
@@ -200,10 +182,10 @@ def is_driven(scene: AbstractWalkerScene) -> bool:
     return scene.mechanism.has_motors or getattr(scene, "actuation", None) is not None
 
 
-def _actuator_powers(scene: Any, state: Any) -> ActuatorPowers:
+def _actuator_powers(scene: Any, state: Any) -> _Driving:
     if not scene.compliant:
 
-        def standing(stance: Stance) -> ActuatorPowers:
+        def standing(stance: Stance) -> _Driving:
             hip = functools.partial(hip_motion_of, stance)
             return _driving(scene, stance.pose.motion, carriers_of(stance), hip)
 
@@ -226,8 +208,8 @@ def _driving(
     carriers: Carriers,
     hip: Callable[[], HipMotion],
     pressing: Sequence[Scalar] = (),
-) -> ActuatorPowers:
-    """Powers of all that drives a walker on feet of either kind.
+) -> _Driving:
+    """Computes the powers of all that drives a walker on feet of either kind.
 
     Args:
         scene: whose parts drive.
@@ -244,7 +226,7 @@ def _driving(
         motors = [_power(torques, now) for torques in turning if torques is not None] + motors
         total = sum((_power(part.torques(now), now) for part in parts), total)
     joints = motor_powers(scene.mechanism, motion, scene.ground.slope, *carriers)
-    return ActuatorPowers(sum((*pressing, *joints), total), (*motors, *joints))
+    return sum((*pressing, *joints), total), (*motors, *joints)
 
 
 def _power(torques: LegTorques, hip: HipMotion) -> Scalar:

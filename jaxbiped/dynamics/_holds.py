@@ -96,7 +96,7 @@ class Holds(NamedTuple):
         `least`: the rate or acceleration that is pressed away, below which one would have to pull.
         """
         held = [jnp.asarray(each) for each in held]
-        able = [i for i, each in enumerate(loose) if each is not False and self.rows[i]]
+        able = [i for i, row in enumerate(self.rows) if loose[i] is not False and row]
         wanted = [held[i] & loose[i] for i in able]
         for _ in range(_passes(len(able))):
             reactions = self.reactions(free, held)

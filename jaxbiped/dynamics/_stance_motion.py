@@ -30,7 +30,7 @@ from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 
 
 def hip_motion_of(stance: Stance) -> HipMotion:
-    """What actuators at the hip know of a walker on rigid feet: the leg that stands carries it."""
+    """Gives what actuators at the hip know on rigid feet, where the leg that stands carries all."""
     motion = stance.pose.motion
     structure = stance.tree.structure
     first, second = structure.pairs[0]
@@ -44,7 +44,7 @@ def hip_motion_of(stance: Stance) -> HipMotion:
 
 
 def carriers_of(stance: Stance) -> Carriers:
-    """The lines of all legs on rigid feet, and the leg that stands, which carries everything."""
+    """Gives the lines of all legs on rigid feet; the leg that stands carries everything."""
     mechanism = stance.mechanism
     bodies = len(mechanism.structure.bodies)
     legs = legs_in(mechanism, (rehung(mechanism, stance.pose),) * bodies)

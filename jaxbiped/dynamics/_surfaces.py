@@ -191,11 +191,10 @@ class HeelStrike(AbstractSection):
 
 @kept_alone
 def foot_ahead(scene: Any, state: PyTree) -> Scalar:
-    """How far ahead of the root point the stance leg's foot stands on a section [m]."""
+    """Computes how far ahead of the root point the stance leg's foot stands on a section [m]."""
     if is_rigid(scene):
         return of_stance(scene, state, lambda stance: standing_place(stance) - stance.root.x)
-    ahead: Scalar = legs_at(scene, state)[scene.mechanism.structure.stance_leg].x
-    return ahead
+    return legs_at(scene, state)[scene.mechanism.structure.stance_leg].x
 
 
 class Section(AbstractSection):

@@ -11,7 +11,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._types import Scalar, Time, by_numpy
-from jaxbiped.caching._caches import versions_in
+from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._ground import check_pulls
@@ -158,7 +158,7 @@ def return_map_spec(
     Raises:
         ArgumentError: a section, solver or engine that is unknown or cannot do this.
     """
-    versions_in((args, section, solver, system))  # before anything is looked up that JAX traced
+    note_code(args, section, solver, system)
     section = section_of(args, section)
     method = orbit_solver(solver, rigid=is_rigid(args))
     obstacle = lane_obstacle(method, section, (args, state))

@@ -175,15 +175,15 @@ def rigid_ledger(scene: RigidScene, walk: Trajectory[Any]) -> RigidLedger:
     )
     push = np.asarray(push_off_work(scene, last))
     changes = mode_changes(scene, starts, (1.0 - _BEFORE) * periods)
-    works = _works(scene, starts, periods, changes)
+    driving, motors, joints = _works(scene, starts, periods, changes)
     gravity = held_first.gravitational - held_last.gravitational
     loss = held_last.kinetic + push - after.kinetic
     stored = after.kinetic - held_first.kinetic + held_last.elastic - held_first.elastic
-    work = works.actuation + push
+    work = driving + push
     stops = _stop_losses(scene, starts, periods, changes)
-    residual = gravity + work - loss - stops - works.joints - stored
-    motors = works.motors + np.maximum(push, 0.0)
-    return RigidLedger(gravity, work, loss, stored, residual, motors, works.joints, stops)
+    residual = gravity + work - loss - stops - joints - stored
+    motors = motors + np.maximum(push, 0.0)
+    return RigidLedger(gravity, work, loss, stored, residual, motors, joints, stops)
 
 
 def _stop_losses(
@@ -221,20 +221,15 @@ def _before_impact(scene: RigidScene, starts: Any, periods: np.ndarray) -> Any:
     return moved._replace(**angles)
 
 
-class _Works(NamedTuple):
-    """Works in each footstep [J], shape (n,): of all that drives, of motors where they drive, and
-    what joints lose."""
+def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeChanges) -> np.ndarray:
+    """Computes works in each footstep [J], shape (3, n).
 
-    actuation: np.ndarray
-    motors: np.ndarray
-    joints: np.ndarray
-
-
-def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeChanges) -> _Works:
+    They are the work of all that drives, that of motors where they drive, and what joints lose.
+    """
     count = len(periods)
     works, sizes = np.zeros((3, count)), np.zeros(count)
     if not is_driven(scene) and not scene.mechanism.joints:
-        return _Works(*works)
+        return works
     # Powers jump where the mode changes, so that no panel straddles a change. Panels are split
     # where a motor's law jumps or bends, and where a damper settles.
     even = np.linspace(0.0, 1.0, _PANELS + 1)
@@ -242,9 +237,9 @@ def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeCha
         np.unique([*(period * even), *changes.since[changes.number == k]])
         for k, period in enumerate(periods)
     ]
-    number = np.repeat(np.arange(count), [len(each) - 1 for each in edges])
-    begins = np.concatenate([each[:-1] for each in edges])
-    widths = np.concatenate([np.diff(each) for each in edges])
+    number = np.repeat(np.arange(count), [len(ends) - 1 for ends in edges])
+    begins = np.concatenate([ends[:-1] for ends in edges])
+    widths = np.concatenate([np.diff(ends) for ends in edges])
     for splits in range(_SPLITS + 1):
         sampled = _sampled_powers(scene, rows_of(starts, number), begins, widths)
         samples = Samples(np.append(0.0, np.cumsum(widths)), None)
@@ -261,14 +256,16 @@ def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeCha
         begins, widths = begins[~ready], np.repeat(widths[~ready] / _PARTS, _PARTS)
         begins = np.repeat(begins, _PARTS) + widths * np.resize(np.arange(_PARTS), len(widths))
         number = np.repeat(number[~ready], _PARTS)
-    return _Works(*works)
+    return works
 
 
 def _sampled_powers(
     scene: RigidScene, starts: Any, begins: np.ndarray, widths: np.ndarray
 ) -> np.ndarray:
-    """At the Gauss points of n panels, so long after their starts: powers of all that drives, of
-    what joints lose, and of each motor [W], shape (k, n, 5)."""
+    """Computes powers at the Gauss points of n panels [W], shape (k, n, 5).
+
+    They are the power of all that drives, what joints lose, and the power of each motor.
+    """
     times = begins[:, None] + widths[:, None] * 0.5 * (1.0 + NODES)
     many = rows_of(starts, np.repeat(np.arange(len(begins)), len(NODES)))
     flows = evaluate_along(scene, states_after(scene, many, times.ravel()), powers)

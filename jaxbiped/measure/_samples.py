@@ -51,7 +51,7 @@ class Samples(NamedTuple):
         return np.asarray(np.diff(self.edges) * (leaf @ (0.5 * _WEIGHTS)))
 
     def roughness(self, leaf: np.ndarray) -> np.ndarray:
-        """How much an integral differs from that by a rule of lower order, shape (n,)."""
+        """Tells how much an integral differs from that by a rule of lower order, shape (n,)."""
         return np.abs(np.diff(self.edges) * (leaf @ (0.5 * (_WEIGHTS - _CUBIC))))
 
     def positive_integral(self, leaf: np.ndarray) -> np.ndarray:
@@ -61,15 +61,15 @@ class Samples(NamedTuple):
         """
         drives = np.hstack([leaf, leaf @ _TO_ENDS]) > 0.0
         always = drives.all(axis=1)
-        found, halves = np.where(always, self.integral(leaf), 0.0), 0.5 * np.diff(self.edges)
+        driving, halves = np.where(always, self.integral(leaf), 0.0), 0.5 * np.diff(self.edges)
         for row in np.flatnonzero(drives.any(axis=1) & ~always):
             curve = np.polynomial.Polynomial.fit(NODES, leaf[row], len(NODES) - 1, [-1.0, 1.0])
             roots = curve.roots()
             turns = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
             ends = np.concatenate([[-1.0], turns[np.abs(turns) < 1.0], [1.0]])
             parts = np.diff(curve.integ()(ends))
-            found[row] = halves[row] * parts[parts > 0.0].sum()
-        return found
+            driving[row] = halves[row] * parts[parts > 0.0].sum()
+        return driving
 
     def stretches(self, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which stretch between consecutive ends [s] each interval lies in, and whether in any."""

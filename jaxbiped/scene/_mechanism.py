@@ -3,7 +3,7 @@
 import contextlib
 import dataclasses
 import functools
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -14,8 +14,7 @@ from jaxbiped._jax_versions import current_trace
 from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
 from jaxbiped._summary import in_short
 from jaxbiped._types import Parameter, Scalar, by_numpy, is_traced
-from jaxbiped.caching._caches import OfObjects, code_in
-from jaxbiped.caching._user_code import versions_of
+from jaxbiped.caching._caches import OfObjects, OncePerVersion
 from jaxbiped.scene._bodies import Body, Foot
 from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling, Motor, Stop
 from jaxbiped.scene._mechanism_pieces import (
@@ -273,8 +272,9 @@ def mechanism_of(walker: Any) -> Mechanism:
             "mechanism() that makes one."
         )
     # What is made within one trace means nothing in another.
-    traced, (code, made) = is_traced(walker), _MADE(walker, lambda: (code_in(walker), {}))
-    trace = versions_of(code), current_trace() if traced else None
+    _, once = _MADE(walker, lambda: OncePerVersion(jax.tree.structure(walker)))()
+    made, traced = once(dict), is_traced(walker)
+    trace = current_trace() if traced else None
     if trace not in made:
         # The walker's own rules first: they name its fields, and its leaves may be new to them.
         getattr(walker, "__check_init__", lambda: None)()
@@ -285,7 +285,7 @@ def mechanism_of(walker: Any) -> Mechanism:
     return made[trace]
 
 
-_MADE = OfObjects[tuple[tuple[Hashable, ...], dict[Any, Mechanism]]]()
+_MADE = OfObjects[OncePerVersion[dict[Any, Mechanism]]]()
 
 
 def _share(group: Sequence[Any], twins: Indices | None, pieces: list[Any]) -> Indices:

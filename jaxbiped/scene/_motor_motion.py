@@ -2,7 +2,7 @@
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, NoReturn
 
 import jax
@@ -23,17 +23,10 @@ _NUMBERS = 1000
 _ROUNDING = 1e-9
 
 
-def angle_value(angle: Angle, values: tuple[Scalar, ...], vertical: Scalar | None) -> Scalar:
+def angle_value(angle: Angle, values: Sequence[Scalar], vertical: Scalar | None) -> Scalar:
     """A sum of angles, or of rates, for which `vertical` is None."""
     total = angle.of(values, vertical)
     return jnp.zeros_like(values[0]) if total is None else total
-
-
-class BodyAngles(NamedTuple):
-    """Angles [rad] and rates [rad/s] of all bodies."""
-
-    angles: Sequence[Scalar]
-    rates: Sequence[Scalar]
 
 
 class MotorMotion(NamedTuple):
@@ -41,14 +34,16 @@ class MotorMotion(NamedTuple):
 
     Attributes:
         structure: of the mechanism.
-        motion: angles and rates of all bodies, exchanged where the law's sides are.
+        angles: of all bodies [rad], exchanged where the law's sides are.
+        rates: of all bodies [rad/s], likewise.
         slope: angle of the vertical [rad].
         own: the motor's angle.
         stance: line of the leg that stands; None where no leg does.
     """
 
     structure: Structure
-    motion: Any
+    angles: Sequence[Scalar]
+    rates: Sequence[Scalar]
     slope: Scalar
     own: Angle
     stance: Any
@@ -56,12 +51,12 @@ class MotorMotion(NamedTuple):
     @property
     def angle(self) -> Scalar:
         """The motor's own angle [rad]."""
-        return angle_value(self.own, self.motion.angles, self.slope)
+        return angle_value(self.own, self.angles, self.slope)
 
     @property
     def rate(self) -> Scalar:
         """Its rate [rad/s]."""
-        return angle_value(self.own, self.motion.rates, None)
+        return angle_value(self.own, self.rates, None)
 
     def of(self, angle: Any) -> tuple[Scalar, Scalar]:
         """Value [rad] and rate [rad/s] of a body's angle by its name, or of weighted angles.
@@ -69,9 +64,8 @@ class MotorMotion(NamedTuple):
         Raises:
             ArgumentError: a name that is no body, "normal" or "vertical".
         """
-        found = named_sum("motion.of", angle, self.structure.parents, self.structure.bodies)
-        value = angle_value(found, self.motion.angles, self.slope)
-        return value, angle_value(found, self.motion.rates, None)
+        read = named_sum("motion.of", angle, self.structure.parents, self.structure.bodies)
+        return angle_value(read, self.angles, self.slope), angle_value(read, self.rates, None)
 
     @property
     def phase(self) -> Scalar:
@@ -114,46 +108,44 @@ def check_images(mechanism: Any) -> None:
     Laws are evaluated at random motions and at their images by the mirror or the turn. Those by
     role are their own images, and numbers that JAX traces cannot be compared.
     """
-    s, twins = mechanism.structure, mechanism.structure.joint_twins
-    numbers = [k for k, part in enumerate(mechanism.joints) if _acts_by_side(part, s)]
-    if not numbers or (twins is None and s.turn is None) or is_traced(mechanism.joints):
-        return
-    count = _NUMBERS // (2 * len(s.bodies) + 1)
-    motions = np.random.default_rng(0).uniform(-1.0, 1.0, (count, 2 * len(s.bodies) + 1))
-    motions[::2] *= 0.1  # of every second one all angles are small
-    torques: Any = None
-    with contextlib.suppress(Exception), untraced():  # a law that fails is refused where it acts
-        torques = np.asarray(_torques_at_images(mechanism, motions))
-    for place, k in enumerate(() if torques is None else numbers):
-        twin = place if twins is None else numbers.index(twins[k])
-        words = f"the law of Motor({mechanism.joints[k].angle!r})"
-        symmetry = "turn" if twins is None else "mirror"
-        _check_same(words, symmetry, torques[:, 0, place], torques[:, 1, twin])
+    s = mechanism.structure
+    parts = [part for part in mechanism.joints if _acts_by_side(part, s)]
+    symmetric = s.joint_twins is not None or s.turn is not None
+    if parts and symmetric and not is_traced(mechanism.joints):
+        count = _NUMBERS // (2 * len(s.bodies) + 1)
+        motions = np.random.default_rng(0).uniform(-1.0, 1.0, (count, 2 * len(s.bodies) + 1))
+        motions[::2] *= 0.1  # of every second one all angles are small
+        words = [f"the law of Motor({part.angle!r})" for part in parts]
+        symmetry = "turn" if s.joint_twins is None else "mirror"
+        _check_alike(words, symmetry, _torques_at_images, mechanism, motions)
 
 
 def check_legs_alike(actuation: Any) -> None:
     """Raises `ArgumentError` for an actuator at the hip that tells one leg from the other."""
     draw = np.random.default_rng(0).uniform
     for part in actuation or ():
-        for load in (tuple(draw(0.0, 0.5, (2, 100))), (None, np.ones(100))):
-            hip = HipMotion._make([*map(tuple, draw(-1.0, 1.0, (2, 2, 100))), load])
-            torques: Any = None
-            users = type(part).__module__.partition(".")[0] not in LIBRARIES
-            if users and isinstance(part, AbstractHipActuator) and not is_traced(part):
-                with contextlib.suppress(Exception), untraced():
-                    torques = np.asarray(_torques_of_legs(part, hip))
-            if torques is not None:
-                _check_same(type(part).__name__, "mirror", *np.moveaxis(torques, 1, 0))
+        name, package = type(part).__name__, type(part).__module__.partition(".")[0]
+        users = package not in LIBRARIES
+        if users and isinstance(part, AbstractHipActuator) and not is_traced(part):
+            for load in (tuple(draw(0.0, 0.5, (2, 100))), (None, np.ones(100))):
+                hip = HipMotion._make([*map(tuple, draw(-1.0, 1.0, (2, 2, 100))), load])
+                _check_alike([name, name], "mirror", _torques_of_legs, part, hip)
 
 
-def _check_same(words: str, symmetry: str, torques: np.ndarray, images: np.ndarray) -> None:
+def _check_alike(
+    words: Sequence[str], symmetry: str, at_images: Callable[..., Any], part: Any, motions: Any
+) -> None:
+    """Raises `ArgumentError` where torques at motions and images, (n, 2, len(words)), differ."""
+    torques = images = np.zeros((1, 1))
+    with contextlib.suppress(Exception), untraced():  # a law that fails is refused where it acts
+        torques, images = np.moveaxis(np.asarray(at_images(part, motions)), 1, 0)
     off = np.nan_to_num(np.abs(torques - images))
-    if np.max(off) > _ROUNDING * np.max(np.abs(torques)):
+    if np.max(off) > _ROUNDING * np.max(np.nan_to_num(np.abs(torques))):
         worst = np.unravel_index(np.argmax(off), off.shape)
         raise ArgumentError(
-            f"{words} gives {torques[worst]:.4g} N m at a motion and {images[worst]:.4g} N m at "
-            f"its image by the {symmetry}, which is not allowed: treat both alike, or leave the "
-            f"{symmetry} out."
+            f"{words[int(worst[1])]} gives {torques[worst]:.4g} N m at a motion and "
+            f"{images[worst]:.4g} N m at its image by the {symmetry}, which is not allowed: treat "
+            f"both alike, or leave the {symmetry} out."
         )
 
 
@@ -163,9 +155,11 @@ def _acts_by_side(part: Any, structure: Structure) -> bool:
 
 @kept_alone
 def _torques_at_images(mechanism: Any, motions: Any) -> Any:
-    """Torques of laws by side [N·m] at motions (n, 2 bodies + 1) and at images, (n, 2, motors)."""
+    """Computes torques by side [N·m] at motions (n, 2 bodies + 1), and of twins at images."""
     s, joints, count = mechanism.structure, mechanism.joints, len(mechanism.structure.bodies)
     twin = range(count) if s.body_twins is None else s.body_twins
+    motors = [k for k, part in enumerate(joints) if _acts_by_side(part, s)]
+    twins = motors if s.joint_twins is None else [s.joint_twins[k] for k in motors]
 
     def torques(values: Any) -> Any:
         slope = values[-1]
@@ -174,14 +168,10 @@ def _torques_at_images(mechanism: Any, motions: Any) -> Any:
         turned = [angles[j] for j in twin]
         if s.turn is not None:
             turned[s.turn.body] += 2.0 * math.pi / s.turn.order
-        images = BodyAngles(angles, rates), BodyAngles(turned, [rates[j] for j in twin])
+        images = (motors, (angles, rates)), (twins, (turned, [rates[j] for j in twin]))
         return [
-            [
-                jnp.asarray(part.law(MotorMotion(s, seen, slope, angle, None)))
-                for part, angle in zip(joints, s.joints, strict=True)
-                if _acts_by_side(part, s)
-            ]
-            for seen in images
+            [joints[k].law(MotorMotion(s, *seen, slope, s.joints[k], None)) for k in numbers]
+            for numbers, seen in images
         ]
 
     return jax.vmap(lambda values: jnp.asarray(torques(values)))(motions)
@@ -189,7 +179,7 @@ def _torques_at_images(mechanism: Any, motions: Any) -> Any:
 
 @kept_alone
 def _torques_of_legs(part: AbstractHipActuator, hip: HipMotion) -> Any:
-    """Torques [N·m] at motions and, exchanged back, at those of the other leg, shape (n, 2, 2)."""
+    """Computes torques [N·m] at motions and, exchanged back, at images, shape (n, 2, 2)."""
 
     def torques(hip: HipMotion) -> Any:
         exchanged = part.torques(HipMotion._make(pair[::-1] for pair in hip))[::-1]

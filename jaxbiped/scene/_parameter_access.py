@@ -84,7 +84,7 @@ def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
     """
     paths = {name: path for name, (path, _) in _parameters(scene).items()}
     quantities = {name: _quantity(_modelled(scene), name, path) for name, path in paths.items()}
-    shared = Counter(each.symbol or each.words for each in quantities.values())
+    shared = Counter(word.symbol or word.words for word in quantities.values())
     for name, quantity in quantities.items():
         part, dot, _ = name.rpartition(".")
         if dot and shared[quantity.symbol or quantity.words] > 1:

@@ -62,17 +62,16 @@ def check_rolls(mechanism: Mechanism) -> None:
     rigid_modes(mechanism)
 
 
-def _touch_within(mechanism: Mechanism, one: Foot, other: Foot) -> Scalar:
-    """Whether the circles of two feet are one, or touch where one lies in the other."""
+def _touch_within(mechanism: Mechanism, one: Foot, other: Foot) -> Any:
+    """Tells whether the circles of two feet are one, or touch where one lies in the other."""
     places = [(foot.centre.along, foot.centre.ahead, foot.radius) for foot in (one, other)]
-    numbers = (0.0 if each is None else each for place in places for each in place)
+    numbers = (0.0 if number is None else number for place in places for number in place)
 
     def test(_: Any, height: Any, a: Any, b: Any, r: Any, c: Any, d: Any, s: Any) -> Any:
         apart = (a - c) ** 2 + (b - d) ** 2 - (r - s) ** 2
         return abs(apart) <= _LEVEL * height**2
 
-    found: Scalar = by_numpy(test, mechanism.height, *numbers)
-    return found
+    return by_numpy(test, mechanism.height, *numbers)
 
 
 def rigid_modes(mechanism: Mechanism) -> Modes:

@@ -15,8 +15,8 @@ from jaxtyping import ArrayLike
 from jaxbiped._checks import ArgumentError, check_type, is_number, traced_rules
 from jaxbiped._jax_versions import undifferentiated
 from jaxbiped._types import SomeTree, as_float, is_real, is_traced
-from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.caching._caches import OfObjects, versions_in
+from jaxbiped.caching._cached_jit import cached_jit, note_code
+from jaxbiped.caching._caches import OfObjects, OncePerVersion
 
 SomeModule = TypeVar("SomeModule", bound=eqx.Module)
 
@@ -29,7 +29,7 @@ def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
             NaN throughout instead, in that lane.
     """
     check_type("scene", scene, *kinds)
-    versions = versions_in(scene)  # before anything is looked up that was made of it
+    note_code(scene)
     leaves, structure = jtu.tree_flatten(scene)
     exact = [_in_64_bits(leaf) for leaf in leaves]
     if any(a is not b for a, b in zip(leaves, exact, strict=True)):
@@ -41,15 +41,12 @@ def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
         return where_allowed(rules, scene)
     # Within a caller's trace, too, what is computed of known numbers is known.
     with jax.ensure_compile_time_eval():
-        checked = _CHECKED(told, set)
-        if versions not in checked:
-            _check_parts(told)
-            checked.add(versions)
+        _, once = _CHECKED(told, lambda: OncePerVersion(structure))()
+        once(lambda: _check_parts(told))
     return scene
 
 
-_CHECKED = OfObjects[set[tuple[int, ...]]]()
-"""The versions of the user's code for which a scene was checked."""
+_CHECKED = OfObjects[OncePerVersion[None]]()
 
 
 def _check_parts(scene: Any) -> None:

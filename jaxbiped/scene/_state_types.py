@@ -201,7 +201,7 @@ def _made(names: tuple[str, ...]) -> type[Any]:
 
 
 def scalars_named(state: Any, names: Sequence[str]) -> tuple[Any, ...]:
-    """The scalars of a state with these names.
+    """Gives the scalars of a state that have these names.
 
     Raises:
         ArgumentError: the state is another scene's, and does not have one of them.

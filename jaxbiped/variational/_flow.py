@@ -153,7 +153,7 @@ def earlier_at(flow: Flow, landed: Scalar, which: Scalar, parameters: Scalar) ->
 
 
 def sides_of(flow: Flow, landed: Scalar, which: Scalar, parameters: Scalar) -> Scalar:
-    """Times at which to look at both sides of the switch of this number, as in `SIDES`, (6,)."""
+    """Gives times at which to look at both sides of a switch by its number, see `SIDES`, (6,)."""
     surfaces = flow.surfaces(jnp.concatenate([landed, parameters]))
     parts = [jnp.asarray(_NEARER if surface.corner else 1.0) for surface in surfaces]
     return jnp.asarray(SIDES) * _pick(which, parts, 1.0)

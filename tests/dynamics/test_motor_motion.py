@@ -92,10 +92,11 @@ MOTION = motion_with((0.3, -0.2, 0.1), (1.0, -2.0, 0.5))
 
 
 def test_laws_read_any_angle_and_the_phase():
-    seen = MotorMotion(with_motor(jb.actuation.Constant(1.0)).structure, MOTION, 0.02, *(
-        with_motor(jb.actuation.Constant(1.0)).structure.joints[0],
+    structure, line = (
+        with_motor(jb.actuation.Constant(1.0)).structure,
         leg_line(two_legs(), MOTION, 1),
-    ))  # fmt: skip
+    )
+    seen = MotorMotion(structure, MOTION.angles, MOTION.rates, 0.02, structure.joints[0], line)
     np.testing.assert_allclose((seen.angle, seen.rate), (0.1 - 0.02, 0.5), rtol=1e-15)
     np.testing.assert_allclose(seen.of("leg_1"), (0.3, 1.0))
     np.testing.assert_allclose(seen.of({"leg_1": 1, "leg_2": -1}), (0.5, 3.0), rtol=1e-15)

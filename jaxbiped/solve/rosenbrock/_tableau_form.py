@@ -52,17 +52,15 @@ def last_stage(tableau: RosenbrockTableau) -> Row:
 
 
 def direct_weights(tableau: RosenbrockTableau, row: Row) -> Row:
-    """Weights of s_0, u_s1, u_s2 … in (Σ_j row_j u_j)/(γ h) of a component with the rate s.
+    """Gives the weights of s_0, u_s1, u_s2 … in (Σ_j row_j u_j)/(γ h) of a component of rate s.
 
     They are 1ᵀz and (a + I)ᵀz with (I − γ c)ᵀ z = row. Fractions find them exactly: LAPACK and BLAS
     round otherwise on each kind of processor.
     """
     gamma, z = Fraction(tableau.gamma), [*map(Fraction, row)]
+    weights = [Fraction(0)] * len(z)
     for i in range(len(z) - 1, 0, -1):
-        for j, c in enumerate(tableau.c[i - 1]):
-            z[j] += gamma * Fraction(c) * z[i]
-    weights = list(z)
-    for i in range(1, len(z)):
-        for j, a in enumerate(tableau.a[i - 1]):
+        for j, (a, c) in enumerate(zip(tableau.a[i - 1], tableau.c[i - 1], strict=True)):
             weights[j] += Fraction(a) * z[i]
-    return (float(sum(z)), *map(float, weights))
+            z[j] += gamma * Fraction(c) * z[i]
+    return (float(sum(z)), *(float(w + last) for w, last in zip(weights, z, strict=True)))
