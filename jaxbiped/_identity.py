@@ -20,13 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from jaxbiped._checks import LIBRARIES
 from jaxbiped.caching._caches import bounded_cache
 
-_KNOWN = (
-    *("jaxbiped", "equinox", "diffrax", "jax", "numpy"),
-    *("builtins", "abc", "collections", "enum", "typing"),
-)
-"""Packages whose code is no user's own."""
 _OWN_MODULE = re.compile(r"^jaxbiped\.(?:[a-z]\w*\.)*_\w+\.")
 
 
@@ -143,7 +139,7 @@ def source_digests(things: Iterable[Any]) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     parts = (base for each in things for base in getattr(each, "__mro__", (each,)))
-    for own in (part for part in parts if part.__module__.partition(".")[0] not in _KNOWN):
+    for own in (part for part in parts if part.__module__.partition(".")[0] not in LIBRARIES):
         try:
             digest = hashlib.sha256(inspect.getsource(own).encode()).hexdigest()[:16]
         except (OSError, TypeError):
