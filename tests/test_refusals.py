@@ -46,6 +46,26 @@ CASES = {
     "another scene": (lambda: jb.footsteps(jb.seed_scene(slope=0.03), CUT), "with another one"),
     "no scene": (lambda: jb.footsteps(None, CUT), "scene = None"),
     "over a name": (lambda: jb.gait_sweep(SCENE, "K"), "over = 'K'"),
+    "parameters that are none": (
+        lambda: jb.find_gait(RIGID, parameters=3),
+        r"parameters = 3 is not allowed: give a tuple of names, such as \('slope',\)",
+    ),
+    "parameters of a sweep that are none": (
+        lambda: jb.gait_sweep(RIGID, {"slope": [0.02]}, parameters=3),
+        "parameters = 3 is not allowed",
+    ),
+    "optimiser of Newton's method": (
+        lambda: jb.find_gait(RIGID, optimiser="luck"),
+        "optimiser = 'luck' is not allowed with method = 'newton'",
+    ),
+    "optimiser that is none": (
+        lambda: jb.find_gait(RIGID, method="optax", optimiser="luck"),
+        "optimiser = 'luck' is not allowed with method = 'optax'",
+    ),
+    "restarts and a half": (
+        lambda: jb.optimise_gait(RIGID, vary={"d": (0.05, 0.2)}, maximise="speed", restarts=1.5),
+        "restarts = 1.5 is not allowed: it must be a whole number of at least 0",
+    ),
     "parameters in words": (lambda: jb.find_gait(RIGID, parameters="xi"), r"give .*\('xi',\)"),
     "misspelt": (lambda: jb.seed_scene(slop=0.1), r"'slop' .* \(perhaps slope is meant\)"),
     "misspelt by name": (

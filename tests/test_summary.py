@@ -89,10 +89,12 @@ def test_a_gait_tells_its_measures_and_a_lost_one_no_more_than_it_knows():
     assert "stable=True" in said
     assert repr(measures).startswith("Measures(\n  period=0.44378,")
     assert gait.state is measures.state
-    lost = repr(jb.find_gait(jb.with_parameters(scene, {"slope": -0.02})))
-    assert "outcome='not converged'" in lost
-    assert "period" not in lost
-    assert "nan" not in lost
+    lost = jb.find_gait(jb.with_parameters(scene, {"slope": -0.02}))
+    assert "outcome='not converged'" in repr(lost)
+    assert "period" not in repr(lost)
+    assert "nan" not in repr(lost) + repr(lost.origin) + repr(gait.origin)
+    assert "nearest=RigidScene(" in repr(lost.origin)
+    assert "nearest" not in repr(gait.origin)
     assert repr(jb.labelling(scene)) == "Labelling(RigidScene, 1 gaits, engine=lanes)"
 
 

@@ -1,5 +1,6 @@
 """`jaxbiped constraints`: the constraint methods compared: violation, error and time."""
 
+import contextlib
 import dataclasses
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -130,22 +131,20 @@ class Constraints(options.Command):
         self.output.make_folder()
         report, runs = Report(self.output.json, self.output.csv), list[ConstraintRun]()
         many = len(integrators) * len(self.methods)
-        with stage("comparing", total=many, unit="runs") as now:
-            try:
-                for run in compare_constraints(
-                    scene,
-                    self.start.start(scene, self.scene.walker),
-                    duration=self.duration,
-                    integrators=integrators,
-                    methods=self.methods,
-                    repeats=self.repeats,
-                ):
-                    runs.append(run)
-                    now.clear()
-                    report.say(_line(runs))
-                    now.update()
-            except KeyboardInterrupt:
-                pass  # what is done is reported
+        comparing = stage("comparing", total=many, unit="runs")
+        with comparing as now, contextlib.suppress(KeyboardInterrupt):  # what is done is reported
+            for run in compare_constraints(
+                scene,
+                self.start.start(scene, self.scene.walker),
+                duration=self.duration,
+                integrators=integrators,
+                methods=self.methods,
+                repeats=self.repeats,
+            ):
+                runs.append(run)
+                now.clear()
+                report.say(_line(runs))
+                now.update()
         complete = len(runs) == many
         # Times by one engine are not those by the other.
         engines = {run.integrator: f"; {run.integrator} ({run.engine})" for run in runs}

@@ -18,6 +18,8 @@ from jaxbiped.cli._report import Report, columns, records
 from jaxbiped.cli._scene_options import SceneOptions, minimal
 
 _MEASURE = re.compile(r"\s*(\w+)")
+_TESTS = ("footsteps", "fatal_push", "other_engine")
+"""Options of the certificate under its own names."""
 _USUAL_RANGE = (0.5, 2.0)
 """Factors of a parameter's own value between which it varies unless bounds are given."""
 _STABLE = {True: "stable", False: "NOT STABLE", None: "undecided within the error"}
@@ -89,15 +91,10 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         del how["footsteps"]  # of the certificate's walk
         found = jb.optimise_gait(scene, **how)
         ended = jb.optimise.Outcome
-        tests: dict[str, Any] = {
-            "starts": self.basin,
-            "footsteps": self.footsteps,
-            "fatal_push": self.fatal_push,
-            "bifurcations_along": along,
-            "other_engine": self.other_engine,
-        }
-        if found.outcome is ended.INTERRUPTED:
-            tests = {"starts": 0, "footsteps": 0, "bifurcations_along": ()}
+        tests: dict[str, Any] = {"starts": 0, "footsteps": 0, "bifurcations_along": ()}
+        if found.outcome is not ended.INTERRUPTED:
+            tests = {"starts": self.basin, "bifurcations_along": along}
+            tests |= {name: getattr(self, name) for name in _TESTS}
         certificate = jb.optimise.certify(found, **tests)
         sense = "minimise" if self.maximise is None else "maximise"
         goal = getattr(self, sense)

@@ -1,5 +1,6 @@
 """`jaxbiped trade`: what accuracy costs for a scene, by our own ways of solving."""
 
+import contextlib
 import functools
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Annotated, Any
@@ -64,52 +65,48 @@ class Trade(options.Command):
             "walk": WalkTrade(scene, start, self.duration, self.repeats),
             "gait": GaitTrade(scene, 1),
         }
-        found, complete = dict[str, tuple[list[Row], Truth | None]](), True
-        for name, trade in trades.items():
-            if complete:
-                rows, truth, complete = self._measure(name, trade)
-                found[name] = rows, truth
-                _say(report, name, rows, truth)
+        results, complete = dict[str, tuple[list[Row], Truth | None]](), False
+        with contextlib.suppress(KeyboardInterrupt):  # what is measured is reported
+            for name, trade in trades.items():
+                with stage(f"solving the {name} with the reference methods"):
+                    truth = trade.truth()
+                rows, _ = results[name] = [], truth
+                try:
+                    rows.extend(self._rows(name, trade, truth))
+                finally:
+                    _say(report, name, rows, truth)
+            complete = True
         numbers: JsonObject = {
             "duration_s": self.duration,
-            "rows": [{"of": name} | row.numbers() for name, (rows, _) in found.items()
+            "rows": [{"of": name} | row.numbers() for name, (rows, _) in results.items()
                      for row in rows],
-            "floors": {name: truth.floor for name, (_, truth) in found.items() if truth},
-            "cheapest": {name: _advice(rows) for name, (rows, _) in found.items()},
+            "floors": {name: truth.floor for name, (_, truth) in results.items() if truth},
+            "cheapest": {name: _advice(rows) for name, (rows, _) in results.items()},
         }  # fmt: skip
         report.finish(numbers, lambda: csv_of(numbers["rows"]))
-        for rows, truth in found.values():
+        for rows, truth in results.values():
             report.wrote(self.output.draw(_figures(rows, truth)))
         if not complete:
             raise options.interrupted(f"{len(numbers['rows'])} settings are measured")
-        return int(any(truth is None for _, truth in found.values()))
+        return int(any(truth is None for _, truth in results.values()))
 
-    def _measure(
-        self, name: str, trade: "WalkTrade | GaitTrade"
-    ) -> "tuple[list[Row], Truth | None, bool]":
-        """Rows of all methods, the reference of their errors, and whether Ctrl-C cut none off.
+    def _rows(
+        self, name: str, trade: "WalkTrade | GaitTrade", truth: "Truth | None"
+    ) -> "Iterator[Row]":
+        """Rows of all methods, as they are measured; there is none without a reference."""
+        from jaxbiped.trade import Way
 
-        Without a reference there are no rows.
-        """
-        from jaxbiped.trade import Row, Way
-
-        rows, truth = list[Row](), None
         ways = [
             Way(solver, engine, setting, rtol)
             for solver, engine in _QUICK[name] + (_FURTHER[name] if self.full else ())
             for setting, rtol in self._settings(name, trade.scene)
         ]
-        try:
-            with stage(f"solving the {name} with the reference methods"):
-                truth = trade.truth()
-            if truth is not None:
-                with stage(f"measuring the {name}", total=len(ways), unit="methods") as now:
-                    for way in ways:
-                        rows.append(trade.row(way, truth))
-                        now.update()
-        except KeyboardInterrupt:
-            return rows, truth, False
-        return rows, truth, True
+        if truth is None:
+            return
+        with stage(f"measuring the {name}", total=len(ways), unit="methods") as now:
+            for way in ways:
+                yield trade.row(way, truth)
+                now.update()
 
     def _settings(self, name: str, scene: Any) -> Iterator[tuple[str, float]]:
         """What a user would write, and the relative tolerance that it stands for in this scene."""

@@ -183,13 +183,10 @@ def _beyond(
         s = min(float(branch.s[branch.farthest]) + gap, 1.0)
         scene: Any = line.at(np.float64(s))
         kind = type(default_guess(scene))
-
-        def found_from(point: np.ndarray, scene: Any = scene, kind: type = kind) -> Found:
-            return search(problem._replace(args=scene, guess=state_at(kind, point)), _TURNS)
-
         about = walks_of(scene, lambda: [last], most=1)
         settled = (row for walks in about for row in walks.settled())
-        for found in map(found_from, chain([last], settled)):
+        for point in chain([last], settled):
+            found = search(problem._replace(args=scene, guess=state_at(kind, point)), _TURNS)
             if int(found.ending) == int(Search.FOUND) and bool(found.sound):
                 return np.asarray(found.recurring), s
     return None

@@ -12,7 +12,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import check_choice, check_count, check_unbatched
+from jaxbiped._checks import ArgumentError, check_choice, check_count, check_unbatched
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._progress import stage
 from jaxbiped._types import is_traced
@@ -154,6 +154,11 @@ def find_gait(
     if isinstance(accuracy, str):
         check_accuracy_name(accuracy)
     check_choice("method", method, ("newton", "optax"))
+    if optimiser is not None and (method == "newton" or not hasattr(optimiser, "update")):
+        raise ArgumentError(
+            f"optimiser = {optimiser!r} is not allowed with method = {method!r}: give an "
+            'optimiser of optax with method = "optax".'
+        )
     arrivals = arrivals_of(scene, footsteps)
     check_unbatched("scene", scene)
     section = section_of(scene, section)

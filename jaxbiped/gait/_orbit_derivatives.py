@@ -124,9 +124,8 @@ def with_parameter_columns(problem: FixedPointProblem, found: Found) -> Found:
         every = getattr(new, name)
         unknown = jnp.reshape(lost | (new.code != 0), (-1, *[1] * (every.ndim - 1)))
         parameters = jnp.where(unknown, jnp.nan, every[..., m:])
-        known = jnp.where(unknown[1:], alone[name][1:], every[1:, ..., :m])
-        witness = alone[name][1:] if name == "monodromy" else known
-        return jnp.concatenate([jnp.concatenate([alone[name][:1], witness]), parameters], axis=-1)
+        kept = (name == "monodromy") | unknown.at[0].set(True)
+        return jnp.concatenate([jnp.where(kept, alone[name], every[..., :m]), parameters], axis=-1)
 
     changed = {name: joined(name) for name in _ROWS}
     for name in ("jumps", "grazes"):

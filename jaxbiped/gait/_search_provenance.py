@@ -9,7 +9,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import warn
 from jaxbiped._ending import Ending, NamedCode
-from jaxbiped._types import Scalar
+from jaxbiped._summary import call_text
+from jaxbiped._types import Scalar, is_traced
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search, takes_steps
 from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._ground import AlwaysTouching
@@ -122,6 +123,11 @@ class Origin(NamedTuple):
     nearest: AbstractScene
     walks: Scalar
     searches: Scalar
+
+    def __repr__(self) -> str:
+        scene = self.nearest
+        lost = not is_traced(scene) and np.isnan(jtu.tree_leaves(scene)[0]).all()
+        return call_text("Origin", self._asdict() | {"nearest": None if lost else scene})
 
 
 def single_stage_origin(problem: FixedPointProblem, found_by: FoundBy) -> Origin:

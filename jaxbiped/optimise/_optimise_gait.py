@@ -11,7 +11,6 @@ from jaxbiped._checks import (
     check_choice,
     check_count,
     check_finite,
-    check_not_negative,
     check_type,
 )
 from jaxbiped._files import user_path
@@ -136,7 +135,7 @@ def optimise_gait(
     check_count("iterations", iterations)
     near = state_of_guess(scene, guess)
     arrivals_of(scene, footsteps)  # refused where they are no whole cycles
-    check_not_negative("restarts", restarts)
+    check_count("restarts", restarts, 0)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     if requirements and optimiser not in OPTIMISERS[:3]:
         raise ArgumentError(

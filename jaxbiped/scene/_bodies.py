@@ -7,8 +7,7 @@ from typing import Any, ClassVar, TypeAlias
 import equinox as eqx
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._parameter_declaration import AbstractPart, check_parameters, parameter
-from jaxbiped._summary import in_short
+from jaxbiped._parameter_declaration import AbstractPart, parameter
 from jaxbiped._types import Parameter
 
 _NAME = re.compile(r"[A-Za-z0-9_]+")
@@ -79,7 +78,7 @@ def check_name(argument: str, name: object) -> None:
         )
 
 
-class Body(eqx.Module):
+class Body(AbstractPart):
     """A rigid body that hangs by a hinge on another body, or on the root point.
 
     Its angle θ is absolute, measured from the slope's normal. It is 0 if the body hangs straight
@@ -108,12 +107,10 @@ class Body(eqx.Module):
     centre: Place = eqx.field(converter=point_of)
     parent: str | None = eqx.field(static=True, default=None)
     at: Place | None = eqx.field(converter=point_of, default=None)
-    __repr__ = in_short
 
     def __check_init__(self) -> None:
         check_name("name", self.name)
         check_centre(self.centre, f"Body({self.name!r})")
-        check_parameters(self)
         if self.at is not None and self.parent is None:
             raise ArgumentError(
                 f"at is not allowed for Body({self.name!r}), which has no parent: bodies without "
@@ -121,7 +118,7 @@ class Body(eqx.Module):
             )
 
 
-class Foot(eqx.Module):
+class Foot(AbstractPart):
     """A circular foot of a body, or a point foot.
 
     Attributes:
@@ -144,11 +141,9 @@ class Foot(eqx.Module):
     radius: Parameter | None = parameter("foot radius", "$r$", "m", minimum=0.0, default=None)
     name: str | None = eqx.field(static=True, default=None)
     leg: str | None = eqx.field(static=True, default=None)
-    __repr__ = in_short
 
     def __check_init__(self) -> None:
         for argument in ("name", "leg"):
             if getattr(self, argument) is not None:
                 check_name(argument, getattr(self, argument))
         check_centre(self.centre, f"Foot({self.body!r})")
-        check_parameters(self)

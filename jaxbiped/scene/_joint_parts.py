@@ -10,8 +10,7 @@ import equinox as eqx
 import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type, holds_somewhere, is_number
-from jaxbiped._parameter_declaration import check_parameters, parameter
-from jaxbiped._summary import in_short
+from jaxbiped._parameter_declaration import AbstractPart, parameter
 from jaxbiped._types import Parameter
 from jaxbiped.scene._bodies import check_name
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
@@ -44,7 +43,7 @@ def _weight(name: object, weight: object) -> float:
     return found
 
 
-class AbstractJointPart(eqx.Module):
+class AbstractJointPart(AbstractPart):
     """A force or a constraint on an angle of a mechanism.
 
     The angle φ is a body's name, for its angle from the body that it hangs on (from the slope's
@@ -61,13 +60,11 @@ class AbstractJointPart(eqx.Module):
     kind: ClassVar[str]
     angle: eqx.AbstractVar[Angle]
     name: eqx.AbstractVar[str | None]
-    __repr__ = in_short
 
     def __check_init__(self) -> None:
         if self.name is not None:
             check_name("name", self.name)
         check_angle(self.angle)
-        check_parameters(self)
 
 
 def check_angle(angle: object) -> None:

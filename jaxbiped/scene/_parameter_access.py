@@ -134,10 +134,12 @@ def select_parameters(
     Raises:
         ArgumentError: a name that the scene does not have.
     """
-    if isinstance(parameters, str):
+    is_plain = parameters is not None and not hasattr(parameters, "__iter__")
+    if isinstance(parameters, str) or is_plain:
+        name = parameters if isinstance(parameters, str) else "slope"
         raise ArgumentError(
             f"parameters = {parameters!r} is not allowed: give a tuple of names, such as "
-            f"({parameters!r},)."
+            f"({name!r},)."
         )
     names = parameter_names(scene) if parameters is None else tuple(parameters)
     by_leaf = list(_leaves_by_name(scene))

@@ -25,6 +25,7 @@ from jaxbiped.scene._parameter_access import (
     parameter_quantities,
     parameter_values,
     scene_identity,
+    select_parameters,
     with_parameters,
 )
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
@@ -99,6 +100,7 @@ def gait_sweep(
             'such as {"K": [1e6, 2e6]}.'
         )
     values = parameter_axes(scene, over, "over")
+    select_parameters(scene.minimal, parameters)  # which refuses what is no name
     path = store_path(store)
     options: dict[str, Any] = dict(
         parameters=parameters,

@@ -105,10 +105,6 @@ class Sample(AbstractStarts):
         return (self.count,)
 
     @property
-    def axes(self) -> dict[str, np.ndarray | None]:
-        return {"start": None}
-
-    @property
     def own_columns(self) -> tuple[str, ...]:
         return tuple(self.lower)
 

@@ -49,9 +49,9 @@ class AbstractStarts(eqx.Module):
         """How many there are along each axis."""
 
     @property
-    @abc.abstractmethod
     def axes(self) -> dict[str, np.ndarray | None]:
-        """The axes by name, with their coordinates where they have such."""
+        """The axes by name, with their coordinates where they have such; by default one without."""
+        return {"start": None}
 
     @abc.abstractmethod
     def at(self, labelling: Labelling, numbers: np.ndarray) -> Batch:
@@ -262,10 +262,6 @@ class GivenStarts(AbstractStarts):
     @property
     def shape(self) -> tuple[int, ...]:
         return (len(self.states[0]),)
-
-    @property
-    def axes(self) -> dict[str, np.ndarray | None]:
-        return {"start": None}
 
     @property
     def own_columns(self) -> tuple[str, ...]:
