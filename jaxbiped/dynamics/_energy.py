@@ -34,6 +34,7 @@ from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._motor_motion import angle_value
 from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene._state_types import check_scalars
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion, LegTorques
 
 
@@ -95,6 +96,9 @@ def energies(scene: AbstractWalkerScene, state: Any) -> Energies:
 
     Returns:
         The three energies [J], leaves shaped as the state's.
+
+    Raises:
+        ArgumentError: the state is another scene's.
     """
     laws: Any = scene
     ground, whole = scene.ground, _placed(scene, state)
@@ -117,7 +121,10 @@ def energies(scene: AbstractWalkerScene, state: Any) -> Energies:
 
 def _placed(scene: AbstractWalkerScene, state: Any) -> Any:
     """Gives a state that has the place of the root point, which follows from a rigid walker's."""
-    return state if scene.compliant else whole_state(scene, state)
+    if scene.compliant:
+        return state
+    check_scalars(state, scene.state_names)
+    return whole_state(scene, state)
 
 
 def _feet(scene: AbstractWalkerScene, state: Any) -> tuple[FootMotion, ...]:
@@ -155,6 +162,9 @@ def powers(scene: AbstractWalkerScene, state: Any) -> Powers:
     Returns:
         The powers [W], leaves shaped as the state's. On rigid feet they are those of the motion
         between impacts.
+
+    Raises:
+        ArgumentError: the state is another scene's.
     """
     laws: Any = scene
     ground, whole = scene.ground, _placed(scene, state)
