@@ -146,13 +146,13 @@ def vector_field(t: Time, state: Any, scene: Scene) -> Any:
     Raises:
         ArgumentError: the scene is of another kind, or the state is another scene's.
     """
-    structure = scene.mechanism.structure
+    structure, accelerated = scene.mechanism.structure, accelerations(scene, state)
     check_scalars(state, scene.minimal.state_names)
     places = {
         place: getattr(state, rate)
         for place, rate in zip(structure.coordinates, structure.rates, strict=True)
     }
-    second = dict(zip(structure.rates, accelerations(scene, state), strict=True))
+    second = dict(zip(structure.rates, accelerated, strict=True))
     memory = {}
     if isinstance(scene.friction, AbstractBristleLaw):
         memory = bristle_rates(scene.friction, scene, state)

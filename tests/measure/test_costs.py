@@ -74,7 +74,7 @@ def test_works_are_sums_over_actuators(driven):
     forces = jb.dynamics.foot_forces(scene, walk.state)
     _, speed = scene.actuation[-1].set_point(walk.state.theta_2, walk.state.omega_2)
     # Two programs, each of which rounds the difference that is the foot's depth.
-    np.testing.assert_allclose(together.motors[-1], forces[1].normal * speed, rtol=1e-9)
+    np.testing.assert_allclose(together.motors[-1], forces[1].normal * speed, rtol=1e-9, atol=1e-14)
     assert len(together.motors) == len(PARTS) + 2
     assert len(jb.dynamics.powers(hip_only, walk.state).motors) == len(PARTS)
 

@@ -165,7 +165,11 @@ def straight_legs(mass, inertia, along):
 
 
 def same_multipliers(ours, theirs):
-    """Largest difference of two sets of multipliers, in the order that fits best."""
+    """Largest difference of two sets of multipliers, in the order that fits best.
+
+    Equations by hand have no mode, and nothing that is held: ours have zeros for these.
+    """
+    theirs = np.append(theirs, np.zeros(len(ours) - len(theirs)))
     return min(
         np.max(np.abs(np.asarray(order) - np.asarray(theirs)))
         for order in itertools.permutations(ours)
