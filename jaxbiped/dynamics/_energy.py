@@ -119,7 +119,7 @@ def energies(scene: AbstractWalkerScene, state: Any) -> Energies:
     return Energies(kinetic, ground.g * moment, elastic)
 
 
-def _placed(scene: AbstractWalkerScene, state: Any) -> Any:
+def _placed(scene: Any, state: Any) -> Any:
     """Gives a state that has the place of the root point, which follows from a rigid walker's."""
     if scene.compliant:
         return state
