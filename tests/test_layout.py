@@ -15,7 +15,7 @@ EXPERIMENTS = sorted((PACKAGE.parent / "experiments").rglob("*.py"))
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_modules_are_short_and_arrows_point_one_way(path):
-    assert len(path.read_text().splitlines()) < 300
+    assert len(path.read_text().splitlines()) <= 500
     own = layer_of("jaxbiped." + path.relative_to(PACKAGE).parts[0])
     if own is None:
         return
