@@ -56,7 +56,8 @@ from jaxbiped import cli
 sent = []
 def callback(*_):
     if not sent:
-        sent.append(os.kill(os.getpid(), signal.SIGINT))
+        sent.append(True)
+        os.kill(os.getpid(), signal.SIGINT)
         time.sleep(0.1)
 class Collecting(cli.Command):
     def run(self):

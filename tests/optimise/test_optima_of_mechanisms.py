@@ -68,7 +68,7 @@ def test_motors_are_bounded_as_actuators_are():
 
 @pytest.mark.nightly
 def test_objectives_of_the_seed_as_a_mechanism_are_the_seeds():
-    seed, names = jb.seed_scene(slope=0.02), ("cost_of_transport", "spectral_radius")
+    seed, names = jb.seed_scene(slope=0.02), ("impact_loss", "cost_of_transport", "spectral_radius")
     told = []
     for scene in (seed, dataclasses.replace(seed, walker=seed_walker(), clearance=STANCE)):
         gait = jb.find_gait(scene, radius_sensitivities=False)
