@@ -107,6 +107,14 @@ def test_every_page_can_be_reached_from_the_readme_or_from_contributing():
     assert [page for page in GUIDES if path_of(page) not in doors and page != README] == []
 
 
+def test_no_two_pages_have_one_title():
+    titles = [
+        re.search(r"^# (.*)$", shown_in(page), re.MULTILINE)[1] for page in GUIDES + NOTEBOOKS
+    ]
+    repeated = {title for title in titles if titles.count(title) > 1}
+    assert repeated == set()
+
+
 def _anchors(page):
     titles = re.findall(r"^#+ (.*)$", page.read_text(), flags=re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", title).lower().replace(" ", "-") for title in titles}

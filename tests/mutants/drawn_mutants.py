@@ -75,9 +75,9 @@ def stages(drawn: Drawn, nearness: Nearness, executed: ExecutedBlocks) -> list[S
     near = nearness.files(drawn)
     if covering:
         seen = list(dict.fromkeys(test.split("::")[0] for _, test in covering))
-        near = sorted(seen, key=lambda f: near.index(f) if f in near else len(near)) + [
-            file for file in near if file not in executed.files()
-        ]
+        elsewhere = executed.files().difference(seen)
+        near = [file for file in [*near, *seen] if file not in elsewhere]
+        near = list(dict.fromkeys(near))
     found = [Stage(_up_to(covering, 20.0), QUICK, 60.0)] if covering else []
     return [
         *found,

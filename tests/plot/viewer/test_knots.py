@@ -40,3 +40,12 @@ def test_a_jump_is_split_no_further_than_the_shortest_interval():
     assert before < 1 / np.pi < after
     assert 1e-4 / 4 < after - before <= 1e-4
     assert len(t) < 20
+
+
+def test_a_cubic_needs_no_knots_between_its_ends():
+    def cubic(t):
+        return {"angle": t**3 - 2.0 * t**2, "rate": 3.0 * t**2 - 4.0 * t}
+
+    tolerances = Tolerances({"angle": ("rate", 1e-12)}, {}, shortest=1e-6)
+    t, _ = adaptive_knots(cubic, np.linspace(0.0, 1.0, 33), tolerances)
+    assert t.tolist() == [0.0, 1.0]
