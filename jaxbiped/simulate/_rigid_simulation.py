@@ -39,14 +39,15 @@ from jaxbiped.simulate._start import (
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._mode_history import history_of
-from jaxbiped.solve._rigid_progress import (
+from jaxbiped.solve._rigid_steps import (
     RigidProgress,
     RigidWalk,
+    attempt_step,
+    ending_of,
     initial_progress,
     is_pulled,
     state_with_hip,
 )
-from jaxbiped.solve._rigid_steps import attempt_step, ending_of
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, scene_key, single_time
 
 _ROOM = 256

@@ -20,7 +20,7 @@ from jaxbiped.dynamics._surfaces import AbstractSection, in_nearest_names, switc
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve._ending_surfaces import ending_surface
-from jaxbiped.solve._rigid_progress import RigidWalk
+from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock

@@ -19,7 +19,7 @@ from jaxbiped.scene._rigid_feet import limit_motions, rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve._adaptive_program import Solve
-from jaxbiped.solve._rigid_progress import RigidWalk
+from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve.controllers._wrapped_control import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import Goals
