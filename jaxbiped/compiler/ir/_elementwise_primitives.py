@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jaxbiped.compiler.ir import _elementary_functions as elementary
-from jaxbiped.compiler.ir import _powers as powers
+from jaxbiped.compiler.ir import _elementary_functions as powers
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 
 Array: TypeAlias = np.ndarray
