@@ -27,12 +27,14 @@ from jaxbiped.compiler.ir._elementwise_primitives import (
     match_kinds,
 )
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
-from jaxbiped.compiler.ir._jacobian import JACOBIAN, parted, pulled_back
 from jaxbiped.compiler.ir._vertex_elimination import (
+    JACOBIAN,
     Arithmetic,
     NoRuleError,
     Weight,
     eliminated_rows,
+    parted,
+    pulled_back,
 )
 
 _LONGEST_UNROLLED, _LARGEST_UNROLLED = 4, 2000
