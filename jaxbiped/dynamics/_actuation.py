@@ -19,13 +19,13 @@ from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._motor_motion import MotorMotion, exchange_of
 from jaxbiped.scene._scene import CompliantScene, RigidScene
 from jaxbiped.scene._structure import Angle, Structure
-from jaxbiped.scene.actuation._abstract_actuator import (
+from jaxbiped.scene.actuation._actuators import (
     AbstractActuator,
     AbstractHipActuator,
+    FootPreload,
     HipMotion,
     LegTorques,
 )
-from jaxbiped.scene.actuation._actuators import FootPreload
 
 
 def exchanged(structure: Structure, motion: Motion) -> Motion:

@@ -35,7 +35,7 @@ from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._motor_motion import angle_value
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene._state_types import check_scalars
-from jaxbiped.scene.actuation._abstract_actuator import HipMotion, LegTorques
+from jaxbiped.scene.actuation._actuators import HipMotion, LegTorques
 
 
 class Energies(NamedTuple):

@@ -26,7 +26,7 @@ from jaxbiped.scene._rigid_feet import rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._state_types import check_scalars, state_type_of
 from jaxbiped.scene._structure import Indices
-from jaxbiped.scene.actuation._abstract_actuator import HipMotion
+from jaxbiped.scene.actuation._actuators import HipMotion
 
 
 def hip_motion_of(stance: Stance) -> HipMotion:

@@ -16,7 +16,7 @@ from jaxbiped.compiler import kept_alone
 from jaxbiped.scene._joint_parts import Motor
 from jaxbiped.scene._mechanism_pieces import named_sum, with_fixed
 from jaxbiped.scene._structure import Angle, Indices, Structure
-from jaxbiped.scene.actuation._abstract_actuator import AbstractHipActuator, HipMotion
+from jaxbiped.scene.actuation._actuators import AbstractHipActuator, HipMotion
 
 _NUMBERS = 1000
 """Numbers in random motions, as many as NumPy runs a function of."""

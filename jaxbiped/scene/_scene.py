@@ -20,7 +20,7 @@ from jaxbiped.scene._motor_motion import check_legs_alike
 from jaxbiped.scene._placement import placement
 from jaxbiped.scene._rigid_feet import check_rolls, check_stands, rigid_modes, starting_mode
 from jaxbiped.scene._state_types import state_type_of
-from jaxbiped.scene.actuation._abstract_actuator import (
+from jaxbiped.scene.actuation._actuators import (
     AbstractActuator,
     Actuation,
     actuation_of,
