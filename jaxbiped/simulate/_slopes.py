@@ -19,7 +19,7 @@ from jaxbiped.dynamics._strike_surfaces import opening, uprightness
 from jaxbiped.dynamics._surfaces import AbstractSection, in_nearest_names, switches
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import units_of
-from jaxbiped.solve._ending_surfaces import ending_surface
+from jaxbiped.solve._failure_events import ending_surface
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
