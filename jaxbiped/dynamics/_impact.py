@@ -31,7 +31,7 @@ from jaxbiped.dynamics._state import state_type
 from jaxbiped.dynamics._strike_surfaces import clearance
 from jaxbiped.dynamics._tree import Loads, rehung
 from jaxbiped.dynamics._tree_inertia import composites, eliminate
-from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
+from jaxbiped.scene._modes import leg_after_strike, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._structure import Indices

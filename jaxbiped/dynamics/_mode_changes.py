@@ -22,8 +22,7 @@ from jaxbiped.dynamics._stance_motion import (
     turning_of,
 )
 from jaxbiped.dynamics._surfaces import Switch
-from jaxbiped.scene._modes import THROUGH_STRIKE, Mode, Modes
-from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
+from jaxbiped.scene._modes import THROUGH_STRIKE, Mode, Modes, leg_after_strike, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 
 SLACK = 1e-9

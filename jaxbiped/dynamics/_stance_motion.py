@@ -21,8 +21,7 @@ from jaxbiped.dynamics._tree import Loads, rehung
 from jaxbiped.dynamics._tree_inertia import inertial_loads
 from jaxbiped.linalg._sparse_lu import Entry, factorise, plus, product
 from jaxbiped.scene._ground import gravity_on
-from jaxbiped.scene._modes import Modes
-from jaxbiped.scene._rigid_feet import rigid_modes
+from jaxbiped.scene._modes import Modes, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._state_types import check_scalars, state_type_of
 from jaxbiped.scene._structure import Indices

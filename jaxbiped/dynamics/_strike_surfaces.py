@@ -16,7 +16,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._rigid_feet import next_leg, standing_legs
+from jaxbiped.scene._modes import next_leg, standing_legs
 from jaxbiped.scene._scene import RigidScene
 
 FALL_ANGLE = 1.0

@@ -15,10 +15,15 @@ from jaxbiped.scene._abstract_scene import AbstractMinimalScene, AbstractWalkerS
 from jaxbiped.scene._ground import AbstractClearance, AlwaysTouching, Ground, OneFoot, warn_if_steep
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._linkages import check_loaded_bodies, walker_linkage
-from jaxbiped.scene._modes import limits_named
+from jaxbiped.scene._modes import (
+    check_rolls,
+    check_stands,
+    limits_named,
+    rigid_modes,
+    starting_mode,
+)
 from jaxbiped.scene._motor_motion import check_legs_alike
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._rigid_feet import check_rolls, check_stands, rigid_modes, starting_mode
 from jaxbiped.scene._state_types import state_type_of
 from jaxbiped.scene.actuation._actuators import (
     AbstractActuator,

@@ -24,7 +24,7 @@ from jaxbiped.compiler import BY_NAME, Program, Request
 from jaxbiped.dynamics._state import check_state, state_type, without_whole_turns
 from jaxbiped.dynamics._surfaces import HeelStrike
 from jaxbiped.scene._ground import check_pulls
-from jaxbiped.scene._rigid_feet import check_mode, rigid_modes
+from jaxbiped.scene._modes import check_mode, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._derivatives import with_derivatives

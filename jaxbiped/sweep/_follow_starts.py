@@ -15,7 +15,7 @@ from jaxbiped._types import as_float
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import BY_NAME, DEVICES, Program, Request
 from jaxbiped.dynamics._mode_changes import SLACK
-from jaxbiped.scene._rigid_feet import limit_motions, rigid_modes
+from jaxbiped.scene._modes import limit_motions, rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve._adaptive_program import Solve
