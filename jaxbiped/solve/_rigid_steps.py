@@ -15,20 +15,18 @@ from jaxbiped.dynamics._strike_surfaces import lean
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._failure_events import rigid_ending
-from jaxbiped.solve._mode_steps import (
-    ModeEvents,
-    SurfaceCourse,
-    course_of,
-    mode_events,
-    onto_surface,
-)
 from jaxbiped.solve._rolling_step import (
-    NEAR,
+    EULER_DISTANCE,
+    ModeEvents,
     Rates,
     StepOnto,
+    SurfaceCourse,
     advance,
+    course_of,
     euler_step_onto,
     events_within,
+    mode_events,
+    onto_surface,
     rolling_step,
     with_changes,
 )
@@ -324,7 +322,7 @@ def _after_strike(
     t = trial.t + onto.rest
     period = t - trial.strike
     change_of_rest = jnp.abs(period - trial.period) * jnp.abs(onto.closing)
-    steady = change_of_rest <= 2.0 * NEAR * jnp.sqrt(walk.rtol)
+    steady = change_of_rest <= 2.0 * EULER_DISTANCE * jnp.sqrt(walk.rtol)
     due = jnp.where(steady, t + period, jnp.inf)
     return trial._replace(
         t=t,
