@@ -16,15 +16,19 @@ from jax.extend.core import Jaxpr, JaxprEqn, Literal, Var
 from jaxbiped._checks import ArgumentError
 from jaxbiped._jax_versions import ClosedJaxpr, called_program, scan_counts
 from jaxbiped._types import Numbers
-from jaxbiped.compiler.ir._array_primitives import MOVES, REDUCTIONS, iota, product, reduce
 from jaxbiped.compiler.ir._elementwise_primitives import (
     ELEMENTWISE,
     KINDS,
+    MOVES,
+    REDUCTIONS,
     Array,
     array_of,
     convert,
     elementwise,
+    iota,
     match_kinds,
+    product,
+    reduce,
 )
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.ir._vertex_elimination import (
