@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._stance import Stance, of_stance
+from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import next_leg, standing_legs
 from jaxbiped.scene._scene import RigidScene
@@ -25,6 +26,11 @@ FALL_ANGLE = 1.0
 _APART = 1e-3
 """How far ahead a foot strikes at least, in units of the walker's height: where two legs of one
 length pass each other their feet are level as well, and none comes down."""
+
+
+def rate_unit(scene: AbstractWalkerScene) -> Scalar:
+    """√(g/l), by the root point's height l with all angles 0 [1/s]."""
+    return jnp.sqrt(scene.ground.g / scene.mechanism.height)
 
 
 def clearance(scene: RigidScene, state: Any) -> Scalar:

@@ -27,7 +27,7 @@ from jaxbiped.dynamics._footfalls import (
     touching_legs,
 )
 from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._strike_surfaces import FALL_ANGLE, lean, uprightness
+from jaxbiped.dynamics._strike_surfaces import FALL_ANGLE, lean, rate_unit, uprightness
 from jaxbiped.scene._ground import AbstractClearance, StanceRotation
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import State
@@ -60,11 +60,6 @@ def fall_height(scene: Scene) -> Scalar:
 def has_fallen(scene: Scene, state: State) -> Scalar:
     """Whether the root point is lower than a leg at 1 rad could carry it (boolean)."""
     return root_height(scene, state) < fall_height(scene)
-
-
-def rate_unit(scene: Scene) -> Scalar:
-    """√(g/l), by the root point's height l with all angles 0 [1/s]."""
-    return jnp.sqrt(scene.ground.g / scene.mechanism.height)
 
 
 def speed_unit(scene: Scene) -> Scalar:
