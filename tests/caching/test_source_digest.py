@@ -13,8 +13,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.caching import _fingerprint, _source_digest
 from jaxbiped.caching._disk_cache import CACHE_VARIABLE
-from jaxbiped.caching._fingerprint import as_leaves, fingerprint
-from jaxbiped.caching._source_digest import SourceDigests
+from jaxbiped.caching._fingerprint import SourceDigests, as_leaves, fingerprint
 
 PACKAGE = Path(jb.__file__).parent
 LATER = time.time_ns() + 10**15
