@@ -9,22 +9,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_at_least
-from jaxbiped._parameter_declaration import AbstractPart
-from jaxbiped._types import Scalar, by_numpy
+from jaxbiped._checks import ArgumentError, check_at_least, check_choice
+from jaxbiped._parameter_declaration import AbstractPart, parameter
+from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._linkage import Linkage, Row, constraints_of, masses_of, row_times
-from jaxbiped.linalg._small_matrices import symmetric_factors
+from jaxbiped.linalg._small_matrices import SymmetricFactors, symmetric_factors
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
 else:
     from equinox import AbstractClassVar
-from jaxbiped._checks import check_choice
-from jaxbiped._parameter_declaration import parameter
-from jaxbiped._types import Parameter
-from jaxbiped.linalg._small_matrices import SymmetricFactors
 
 
 class Constrained(NamedTuple):

@@ -30,10 +30,9 @@ from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.dynamics._stance_motion import carriers_of, hip_motion_of
 from jaxbiped.dynamics._tree import Motion, PointMotion, point_motion
 from jaxbiped.linalg._sparse_lu import product
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._motor_motion import angle_value
-from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene._scene import AbstractWalkerScene, CompliantScene
 from jaxbiped.scene._state_types import check_scalars
 from jaxbiped.scene.actuation._actuators import HipMotion, LegTorques
 

@@ -15,10 +15,9 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._stance import Stance, of_stance
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import next_leg, standing_legs
-from jaxbiped.scene._scene import RigidScene
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene
 
 FALL_ANGLE = 1.0
 """A root point lower than a straight leg at this angle [rad] could carry it has fallen."""

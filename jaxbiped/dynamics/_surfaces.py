@@ -27,8 +27,7 @@ from jaxbiped.dynamics._footfalls import (
 )
 from jaxbiped.dynamics._stance import of_stance
 from jaxbiped.dynamics._strike_surfaces import lead, lean, opening, standing_place
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
-from jaxbiped.scene._scene import CompliantScene, is_rigid
+from jaxbiped.scene._scene import AbstractWalkerScene, CompliantScene, is_rigid
 from jaxbiped.scene._state_types import SomeState
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 

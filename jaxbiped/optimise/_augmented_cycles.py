@@ -24,9 +24,8 @@ from jaxbiped.optimise._augmented_system import (
     join,
     motion_of,
 )
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._ground import Ground, SteppedGround
-from jaxbiped.scene._scene import RigidScene, Scene, is_rigid
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene, is_rigid
 from jaxbiped.variational._hybrid_system import AbstractSystem
 
 _APART = 1e-2

@@ -35,7 +35,7 @@ CODE = {
     "string": ("gait/_find_gait.py", '"newton"', '"newtons"'),
     "registered for a class": ("dynamics/_stance_motion.py", "return rolling_field", "return None"),
     "compiler": ("compiler/ir/_liveness.py", "value.op in", "value.op not in"),
-    "how programs are kept": ("caching/_compiled_store.py", '_KIND = "xla"', '_KIND = "lax"'),
+    "how programs are kept": ("caching/_cached_jit.py", '_KIND = "xla"', '_KIND = "lax"'),
     "what laws there are": ("scene/laws/__init__.py", "Tsuji as Tsuji", "Tsuji as Fuji"),
 }
 ELSEWHERE = {
