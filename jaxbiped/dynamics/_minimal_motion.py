@@ -26,12 +26,7 @@ from jaxbiped.dynamics._implicit_field import (
 from jaxbiped.dynamics._joint_loads import with_constraint_torques
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, Pose, point_motion, pose_of
-from jaxbiped.dynamics._tree_inertia import (
-    Composites,
-    composites,
-    eliminate,
-    inertial_loads,
-)
+from jaxbiped.dynamics._tree_inertia import Composites, composites, eliminate, inertial_loads
 from jaxbiped.linalg._sparse_lu import SparseMatrix, times
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._mechanism import Mechanism
