@@ -360,12 +360,12 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
 
     def _once(self, kind: Hashable) -> Once[KeptProgram | None]:
         with self._lock:
-            known = self._programs.get(kind)
-        if known is None:
+            program = self._programs.get(kind)
+        if program is None:
             self._make_room()
             with self._lock:
-                known = self._programs.setdefault(kind, OncePerVersion(kind))
-        return known()[1]
+                program = self._programs.setdefault(kind, OncePerVersion(kind))
+        return program()[1]
 
     def _program(self, arguments: Arguments, *forms: Form) -> KeptProgram | None:
         """The program for such arguments in the first of these forms that it has."""

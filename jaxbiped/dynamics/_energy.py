@@ -200,14 +200,14 @@ def _actuator_powers(scene: Any, state: Any) -> _Driving:
 
         return of_stance(scene, state, standing)
     structure = scene.mechanism.structure
-    motion, found = poses_of(scene, state)[0].motion, feet(scene, state)
-    legs, forces = legs_at(scene, state), normal_forces(scene, found)
+    motion, contacts = poses_of(scene, state)[0].motion, feet(scene, state)
+    legs, forces = legs_at(scene, state), normal_forces(scene, contacts)
     shares, pressing = leg_loads(structure, load_shares(scene, forces)), []
     for force, leg in zip(forces, structure.leg_of_foot, strict=True):
         moved = preload(scene, legs[leg])
         if moved is not None and force is not None:
             pressing.append(force * moved[1])
-    hip = functools.partial(hip_motion, scene, found, motion.angles, motion.rates)
+    hip = functools.partial(hip_motion, scene, contacts, motion.angles, motion.rates)
     return _driving(scene, motion, (legs, shares), hip, pressing)
 
 

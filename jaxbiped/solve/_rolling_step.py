@@ -195,9 +195,9 @@ def onto_surface(at: SurfaceCourse, which: Scalar, rtol: Scalar, pace: Scalar) -
         value, rate, bend, live, known = select(
             which == k, (*each, jnp.asarray(k < len(at.bends))), (value, rate, bend, live, known)
         )
-    there = jnp.abs(value) <= EULER_DISTANCE * rtol
+    reachable = jnp.abs(value) <= EULER_DISTANCE * rtol
     # So slow that it lies on its surface as far as that is known.
-    lies = there & (jnp.abs(rate) <= jnp.sqrt(rtol))
+    lies = reachable & (jnp.abs(rate) <= jnp.sqrt(rtol))
     rest = -value / jnp.where(rate == 0.0, 1.0, rate)
     turned = 0.5 * bend * rest * rest
     # Where it is known how a gap bends, one step leads onto it from farther away.
@@ -209,7 +209,7 @@ def onto_surface(at: SurfaceCourse, which: Scalar, rtol: Scalar, pace: Scalar) -
         & (jnp.abs(rest) <= root * pace)
     )
     close = close & (jnp.abs(turned) <= 0.2 * EULER_DISTANCE * rtol)
-    near = (there & (lies | (rate != 0.0))) | close
+    near = (reachable & (lies | (rate != 0.0))) | close
     rest = jnp.where(lies, 0.0, rest - turned / jnp.where(rate == 0.0, 1.0, rate))
     return OntoSurface(live & near, rest)
 
