@@ -21,8 +21,7 @@ from jaxbiped.dynamics._stance_motion import (
     plastic_impact,
     turning_of,
 )
-from jaxbiped.dynamics._strike_surfaces import rate_unit
-from jaxbiped.dynamics._surfaces import Switch
+from jaxbiped.dynamics._surfaces import Switch, rate_unit
 from jaxbiped.scene._modes import THROUGH_STRIKE, Mode, Modes, leg_after_strike, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 

@@ -16,8 +16,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, Time, select
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._equivalent_states import exchange_legs
-from jaxbiped.dynamics._strike_surfaces import clearance, clearance_rate, distance_ahead
-from jaxbiped.dynamics._surfaces import AbstractSection
+from jaxbiped.dynamics._surfaces import AbstractSection, clearance, clearance_rate, distance_ahead
 from jaxbiped.optimise._augmented_system import (
     AbstractAugmentedSystem,
     MotionSection,

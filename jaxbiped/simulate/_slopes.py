@@ -15,8 +15,13 @@ from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._mode_changes import change_mode_on_surface, mode_switches
 from jaxbiped.dynamics._stance_motion import rolling_field
-from jaxbiped.dynamics._strike_surfaces import opening, uprightness
-from jaxbiped.dynamics._surfaces import AbstractSection, in_nearest_names, switches
+from jaxbiped.dynamics._surfaces import (
+    AbstractSection,
+    in_nearest_names,
+    opening,
+    switches,
+    uprightness,
+)
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve._failure_events import ending_surface

@@ -27,7 +27,7 @@ from jaxbiped.dynamics._footfalls import (
     touching_legs,
 )
 from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._strike_surfaces import FALL_ANGLE, lean, rate_unit, uprightness
+from jaxbiped.dynamics._surfaces import FALL_ANGLE, lean, rate_unit, uprightness
 from jaxbiped.scene._ground import AbstractClearance, StanceRotation
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import State

@@ -11,7 +11,7 @@ from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._mode_changes import SLACK, change_mode
 from jaxbiped.dynamics._stance import Stance, angles_and_rates, of_stance
 from jaxbiped.dynamics._stance_motion import ground_force, rolling_rates
-from jaxbiped.dynamics._strike_surfaces import lean
+from jaxbiped.dynamics._surfaces import lean
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._failure_events import rigid_ending

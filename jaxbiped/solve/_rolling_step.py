@@ -21,14 +21,7 @@ from jaxbiped.dynamics._joint_loads import of_all_bodies
 from jaxbiped.dynamics._mode_changes import mode_switches
 from jaxbiped.dynamics._stance import angles_and_rates
 from jaxbiped.dynamics._stance_motion import rolling_field, rolling_rates
-from jaxbiped.dynamics._strike_surfaces import (
-    Surface,
-    lead,
-    lean,
-    opening,
-    surface_along,
-    uprightness,
-)
+from jaxbiped.dynamics._surfaces import Surface, lead, lean, opening, surface_along, uprightness
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._step_polynomials import Quintic, StepCubic

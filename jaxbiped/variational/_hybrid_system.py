@@ -26,8 +26,15 @@ from jaxbiped.dynamics._mode_changes import change_mode, change_mode_on_surface,
 from jaxbiped.dynamics._redundant_motion import BodiesField
 from jaxbiped.dynamics._stance_motion import rolling, rolling_field
 from jaxbiped.dynamics._state import cyclic_names, recurring_leaves, recurring_names
-from jaxbiped.dynamics._strike_surfaces import lead, opening
-from jaxbiped.dynamics._surfaces import AbstractSection, HeelStrike, MidStance, Switch, switches
+from jaxbiped.dynamics._surfaces import (
+    AbstractSection,
+    HeelStrike,
+    MidStance,
+    Switch,
+    lead,
+    opening,
+    switches,
+)
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import (
     AbstractScene,
