@@ -1,7 +1,9 @@
-"""Surfaces in state space: heel strikes and falls, switches, where the field is not smooth, sections.
+"""Surfaces in state space: switches, where the field is not smooth, heel strikes, and sections.
 
-No step may straddle a switch: derivatives taken through it would be wrong. At a Poincaré section an
-orbit is observed, once per cycle.
+No step may straddle a switch: derivatives taken through it would be wrong. Single support ends as
+the swing foot comes down or the walker has fallen: where all legs are bodies on the root point,
+their angles tell both, exactly; else places do, in units of the walker's height. At a Poincaré
+section an orbit is observed, once per cycle.
 """
 
 import abc
