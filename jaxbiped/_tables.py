@@ -1,6 +1,10 @@
 """Tables: a result as a labelled dataset, and rows of any dataset as a data frame, CSV or LaTeX.
 
 Variables carry words, SI unit and, by CF's `ancillary_variables`, the name of their error bars.
+
+In LaTeX, values have their error bars in the notation of siunitx: a bar has two digits, and its
+value as many decimals. 0.441032 ± 0.000012 is 0.441032(12), which the versions 2 and 3 of siunitx
+read and set as value ± bar.
 """
 
 import abc

@@ -16,7 +16,8 @@ from jax.extend.core import Jaxpr, JaxprEqn, Literal, Var
 from jaxbiped._checks import ArgumentError
 from jaxbiped._jax_versions import ClosedJaxpr, called_program, scan_counts
 from jaxbiped._types import Numbers
-from jaxbiped.compiler.ir._elementwise_primitives import (
+from jaxbiped.compiler.ir._graph import Block, Kind, Value
+from jaxbiped.compiler.ir._primitives import (
     ELEMENTWISE,
     KINDS,
     MOVES,
@@ -30,7 +31,6 @@ from jaxbiped.compiler.ir._elementwise_primitives import (
     product,
     reduce,
 )
-from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.ir._vertex_elimination import (
     JACOBIAN,
     Arithmetic,

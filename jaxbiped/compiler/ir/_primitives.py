@@ -1,4 +1,4 @@
-"""Elementwise primitives of JAX, as operations of a graph."""
+"""Primitives of JAX as operations of a graph, elementwise ones and those of small arrays."""
 
 import enum
 import functools
