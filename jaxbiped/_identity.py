@@ -139,12 +139,12 @@ def source_digests(things: Iterable[Any]) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     parts = (base for each in things for base in getattr(each, "__mro__", (each,)))
-    for own in (part for part in parts if part.__module__.partition(".")[0] not in LIBRARIES):
+    for code in (part for part in parts if part.__module__.partition(".")[0] not in LIBRARIES):
         try:
-            digest = hashlib.sha256(inspect.getsource(own).encode()).hexdigest()[:16]
+            digest = hashlib.sha256(inspect.getsource(code).encode()).hexdigest()[:16]
         except (OSError, TypeError):
             digest = "unknown"
-        name = qualified_name(own)  # which several functions without names of their own share
+        name = qualified_name(code)  # which several functions without names of their own share
         found[name] = f"{found[name]} {digest}" if name in found else digest
     return dict(sorted(found.items()))
 

@@ -5,18 +5,257 @@ every array in a `.npy` of its own. A module, a named tuple or an enumeration st
 import path of its class and the values of its fields; nothing is pickled.
 """
 
+import contextlib
+import dataclasses
+import enum
+import functools
+import importlib
 import io
 import json
+import math
+import sys
 import zipfile
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, warn
-from jaxbiped._encoding import Decoder, Encoder
 from jaxbiped._files import check_writable_file, failure_kind, user_path
 from jaxbiped._identity import provenance, source_digests
+from jaxbiped._types import JsonObject, as_array
+
+_ARRAYS = (np.ndarray, np.ma.MaskedArray)
+_NOWHERE = ("<locals>", "<lambda>")
+"""In the names of functions and classes that nobody can import."""
+
+
+class Encoder:
+    """A value as JSON and arrays; `found` are the classes and functions in it by import path."""
+
+    def __init__(self) -> None:
+        self.arrays: list[np.ndarray] = []
+        self.found: dict[str, Any] = {}
+
+    def encode(self, value: Any, where: str) -> Any:
+        """The value as JSON; `where` it lies, for what cannot be saved."""
+        if isinstance(value, enum.Enum):
+            return {
+                "enum": self._path(type(value), where),
+                "value": self.encode(value.value, where),
+            }
+        if isinstance(value, jax.core.Tracer):
+            raise ArgumentError(f"{where} is traced: save what a transformed function returns.")
+        if type(value) in _ARRAYS or isinstance(value, np.generic | jax.Array):
+            return self._array(value, where)
+        if value is None or type(value) in (bool, int, str):
+            return value
+        if type(value) is float:
+            return value if math.isfinite(value) else {"float": str(value)}
+        if type(value) is complex:
+            return {"complex": [self.encode(part, where) for part in (value.real, value.imag)]}
+        if hasattr(value, "_asdict") and not isinstance(value, type):
+            return self._fields(value, value._asdict(), where)
+        if type(value) in (list, tuple):
+            items = [self.encode(each, f"{where}[{k}]") for k, each in enumerate(value)]
+            return items if isinstance(value, list) else {"tuple": items}
+        if type(value) is dict:
+            pairs = [[self.encode(k, where), self.encode(v, f"{where}[{k!r}]")]
+                     for k, v in value.items()]  # fmt: skip
+            return {"dict": pairs}
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            names = (field.name for field in dataclasses.fields(value))
+            fields = {name: getattr(value, name) for name in names if hasattr(value, name)}
+            return self._fields(value, fields, where)
+        if _is_dataset(value):
+            return self._dataset(value, where)
+        if callable(value) and hasattr(value, "__qualname__"):
+            return {"import": self._path(value, where)}
+        raise ArgumentError(
+            f"{where} is not allowed: objects of type {type(value).__name__} cannot be saved."
+        )
+
+    def _array(self, value: Any, where: str) -> JsonObject:
+        if isinstance(value, np.ma.MaskedArray):
+            parts = (np.asarray(value.data), value.mask, value.fill_value)
+            return {"masked": [self.encode(part, where) for part in parts]}
+        if isinstance(value, jax.Array) and hasattr(value.dtype, "_impl"):
+            raise ArgumentError(f"{where} is not allowed: {value.dtype} cannot be saved.")
+        array, small = np.asarray(value), {}
+        if array.dtype.type.__module__ == "ml_dtypes":  # such as bfloat16: a file holds its bits
+            array, small = array.view(f"u{array.itemsize}"), {"dtype": array.dtype.name}
+        if array.dtype == object:
+            items = [self.encode(each, where) for each in array.ravel().tolist()]
+            return {"objects": items, "shape": list(array.shape)}
+        if not _is_kept(array.dtype):
+            raise ArgumentError(f"{where} is not allowed: {array.dtype} cannot be saved.")
+        self.arrays.append(array)
+        kind = "scalar" if isinstance(value, np.generic) else "numpy"
+        return {"jax" if isinstance(value, jax.Array) else kind: len(self.arrays) - 1} | small
+
+    def _fields(self, value: Any, fields: Mapping[str, Any], where: str) -> JsonObject:
+        own = {name: self.encode(each, f"{where}.{name}") for name, each in fields.items()}
+        return {"class": self._path(type(value), where), "fields": own}
+
+    def _dataset(self, value: Any, where: str) -> JsonObject:
+        variables = {
+            str(name): self.encode((each.dims, each.values, dict(each.attrs)), where)
+            for name, each in value.variables.items()
+        }
+        coordinates = list(map(str, value.coords))
+        attributes = self.encode(dict(value.attrs), where)
+        return {"dataset": variables, "coords": coordinates, "attrs": attributes}
+
+    def _path(self, thing: Any, where: str) -> str:
+        name = f"{_home(thing)}:{thing.__qualname__}"
+        nowhere = any(part in name for part in _NOWHERE)
+        if nowhere or _imported(*name.split(":")) is not thing:
+            raise ArgumentError(
+                f"{where} is not allowed: {thing.__qualname__} has no import path; define it at "
+                "the top of a module."
+            )
+        self.found[name] = thing
+        return name
+
+
+def _home(thing: Any) -> str:
+    """The outermost package that exports a class or function, else its module, which may move."""
+    parts, name = str(thing.__module__).split("."), thing.__qualname__
+    for depth in range(1, len(parts)):
+        package = sys.modules[".".join(parts[:depth])]
+        if name in dir(package) and getattr(package, name) is thing:
+            return package.__name__
+    return str(thing.__module__)
+
+
+def _is_kept(dtype: np.dtype) -> bool:
+    """Whether a `.npy` file holds arrays of a type, without pickled objects."""
+    form: Any = np.lib.format
+    with contextlib.suppress(TypeError, ValueError):
+        return not dtype.hasobject and form.descr_to_dtype(form.dtype_to_descr(dtype)) == dtype
+    return False
+
+
+def _is_dataset(value: Any) -> bool:
+    xarray = sys.modules.get("xarray")
+    return xarray is not None and isinstance(value, xarray.Dataset)
+
+
+class Decoder:
+    """Values from JSON and arrays; `found` are the classes and functions in them by import path."""
+
+    def __init__(self, array: Callable[[int], np.ndarray], version: str) -> None:
+        """`array` gives one by its number; `version` is the jaxbiped that wrote them."""
+        self._array, self._version = array, version
+        self.found: dict[str, Any] = {}
+
+    def decode(self, tree: Any) -> Any:
+        """The value that JSON stands for."""
+        if isinstance(tree, list):
+            return [self.decode(each) for each in tree]
+        if not isinstance(tree, dict):
+            return tree
+        kind, held = next(iter(tree.items()))
+        decoders: dict[str, Callable[[], Any]] = {
+            "float": lambda: float(held),
+            "complex": lambda: complex(*self.decode(held)),
+            "tuple": lambda: tuple(self.decode(held)),
+            "dict": lambda: {self.decode(key): self.decode(each) for key, each in held},
+            "numpy": lambda: self._array_of(tree, held),
+            "scalar": lambda: self._array_of(tree, held)[()],
+            "jax": lambda: as_array(self._array_of(tree, held)),
+            "masked": lambda: self._masked(*self.decode(held)),
+            "objects": lambda: self._objects(held, tree["shape"]),
+            "enum": lambda: self._import(held, enum.Enum)(self.decode(tree["value"])),
+            "import": lambda: self._import(held),
+            "class": lambda: self._instance(held, tree["fields"]),
+            "dataset": lambda: self._dataset(tree),
+        }
+        return decoders[kind]()
+
+    def _array_of(self, tree: JsonObject, number: int) -> np.ndarray:
+        array = self._array(number)
+        return array.view(jax.numpy.dtype(tree["dtype"])) if "dtype" in tree else array
+
+    def _masked(self, values: np.ndarray, mask: np.ndarray, fill: Any = None) -> np.ndarray:
+        return np.ma.MaskedArray(values, mask, fill_value=fill)
+
+    def _objects(self, items: list[Any], shape: list[int]) -> np.ndarray:
+        array = np.empty(len(items), object)
+        for place, item in enumerate(items):  # an item may be an array itself
+            array[place] = self.decode(item)
+        return array.reshape(shape)
+
+    def _dataset(self, tree: JsonObject) -> Any:
+        import xarray
+
+        variables = {name: self.decode(each) for name, each in tree["dataset"].items()}
+        found = xarray.Dataset(variables, attrs=self.decode(tree["attrs"]))
+        return found.set_coords(tree["coords"])
+
+    def _import(self, name: str, *kinds: type) -> Any:
+        module, _, inner = name.partition(":")
+        thing = _imported(module, inner)
+        if thing is None or (kinds and not (isinstance(thing, type) and issubclass(thing, kinds))):
+            raise ArgumentError(
+                f"it needs {inner} of the module {module}, which is not found{self._by(module)}; "
+                "make that module importable."
+            )
+        self.found[name] = thing
+        return thing
+
+    def _instance(self, name: str, fields: JsonObject) -> Any:
+        kind = self._import(name)
+        values = {each: self.decode(tree) for each, tree in fields.items()}
+        if dataclasses.is_dataclass(kind):
+            own: dict[str, Any] = {field.name: field for field in dataclasses.fields(kind)}
+            defaults = {name for name, field in own.items() if _has_default(field)}
+            for each in defaults - set(values):
+                factory = own[each].default_factory
+                values[each] = own[each].default if factory is dataclasses.MISSING else factory()
+        else:
+            own = dict.fromkeys(getattr(kind, "_fields", ()))
+            defaults = set(getattr(kind, "_field_defaults", own))
+        odd = sorted((set(own) - defaults - set(values)) | (set(values) - set(own)))
+        if odd:
+            raise ArgumentError(
+                f"{name.partition(':')[2]} has other fields here: {', '.join(odd)}{self._by(name)}."
+            )
+        if issubclass(kind, tuple):
+            return kind(**values)
+        # As it was, and not made anew: what was saved has been checked, and NaN stays.
+        made = object.__new__(kind)
+        for each, value in values.items():
+            object.__setattr__(made, each, value)
+        return made
+
+    def _by(self, module: str) -> str:
+        """That another version wrote it, of the package's own."""
+        own = provenance()["version_jaxbiped"]
+        if not module.startswith("jaxbiped") or own == self._version:
+            return ""
+        return f" (written by jaxbiped {self._version}; this is {own})"
+
+
+def _imported(module: str, name: str) -> Any:
+    """What lies in a module by this name; None where it is not found."""
+    # Nothing that can be saved lies in the standard library, and a file may come from anybody.
+    if module.partition(".")[0] in sys.stdlib_module_names:
+        return None
+    try:
+        thing: Any = importlib.import_module(module)
+        # Types of states are found by one name, which has no points.
+        return functools.reduce(getattr, name.split("."), thing)
+    except (ImportError, AttributeError):
+        return None
+
+
+def _has_default(field: Any) -> bool:
+    missing = dataclasses.MISSING
+    return field.default is not missing or field.default_factory is not missing
+
 
 FORMAT = 1
 """Of files: another one is written where this version could not read what is in them."""

@@ -18,7 +18,7 @@ import threading
 from pathlib import Path
 
 import jaxbiped as jb
-from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene
 from tests.import_graph import imports_of
 
 ROOT = Path(jb.__file__).parent

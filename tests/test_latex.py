@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from jaxbiped._latex import escape_latex, latex_number, latex_table, latex_unit
+from jaxbiped._tables import escape_latex, latex_number, latex_table, latex_unit
 
 NUMBER = re.compile(r"(-?\d+)(?:\.(\d+))?(?:\((\d+)\))?(?:e(-?\d+))?")
 """As siunitx's manual has it: decimals, an uncertainty in its last digits, an exponent."""

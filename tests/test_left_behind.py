@@ -12,7 +12,7 @@ import pytest
 from jaxbiped._checks import _RULES, traced_rules
 from jaxbiped._jax_versions import trace_ctx, untraced
 from jaxbiped._progress import _outermost, stage
-from jaxbiped.caching._compiled_store import _without_noise
+from jaxbiped.caching._cached_jit import _without_noise
 from jaxbiped.caching._disk_cache import CACHE_VARIABLE, read_entry, write_entry
 from jaxbiped.plot import figure_style
 from jaxbiped.plot._figure_style import _CHOSEN

@@ -9,8 +9,8 @@ from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES as ARCHITECTURES
 from jaxbiped.compiler.codegen._ptx_kernel import ptx_text as ptx_text
 from jaxbiped.compiler.host_code._host_jit import host_jit as host_jit
 from jaxbiped.compiler.host_code._host_jit import kept_alone as kept_alone
-from jaxbiped.compiler.ir._jacobian import jacobian as jacobian
-from jaxbiped.compiler.ir._jacobian import partial_derivatives as partial_derivatives
+from jaxbiped.compiler.ir._vertex_elimination import jacobian as jacobian
+from jaxbiped.compiler.ir._vertex_elimination import partial_derivatives as partial_derivatives
 from jaxbiped.compiler.runtime._engines import AbstractEngine as AbstractEngine
 from jaxbiped.compiler.runtime._engines import LaneEngine as LaneEngine
 from jaxbiped.compiler.runtime._engines import LoopEngine as LoopEngine

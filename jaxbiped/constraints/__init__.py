@@ -3,16 +3,16 @@
 import warnings as _warnings
 from typing import Any as _Any
 
-from jaxbiped.constraints._constraint_method import (
+from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS as CONSTRAINT_METHODS
+from jaxbiped.constraints._constraint_methods import (
     AbstractConstraintMethod as AbstractConstraintMethod,
 )
-from jaxbiped.constraints._constraint_method import (
+from jaxbiped.constraints._constraint_methods import (
     AbstractProjectingMethod as AbstractProjectingMethod,
 )
-from jaxbiped.constraints._constraint_method import Constrained as Constrained
-from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS as CONSTRAINT_METHODS
 from jaxbiped.constraints._constraint_methods import Augmented as Augmented
 from jaxbiped.constraints._constraint_methods import Baumgarte as Baumgarte
+from jaxbiped.constraints._constraint_methods import Constrained as Constrained
 from jaxbiped.constraints._constraint_methods import DirectCorrection as DirectCorrection
 from jaxbiped.constraints._constraint_methods import Index1 as Index1
 from jaxbiped.constraints._constraint_methods import Index1Augmented as Index1Augmented

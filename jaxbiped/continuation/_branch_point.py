@@ -9,13 +9,13 @@ from jaxbiped.continuation._cycle import Cycle
 from jaxbiped.gait._orbit_derivatives import CLOSENESS
 from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint
 from jaxbiped.gait._stability import critical_bifurcation, eigenvalue_errors
-from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameter_access import (
     parameter_names,
     parameter_values,
     select_parameters,
     with_parameters,
 )
+from jaxbiped.scene._scene import AbstractScene
 
 _DECADES = 100.0
 """Ratio of the ends of a range from which it is gone through by equal factors."""

@@ -17,7 +17,7 @@ from jaxbiped.compiler import host_jit
 from jaxbiped.gait._fixed_point_search import is_sound, search_by_lanes, takes_steps, with_looser
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 
 NO_WALK = -1

@@ -19,13 +19,13 @@ from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._motor_motion import MotorMotion, exchange_of
 from jaxbiped.scene._scene import CompliantScene, RigidScene
 from jaxbiped.scene._structure import Angle, Structure
-from jaxbiped.scene.actuation._abstract_actuator import (
+from jaxbiped.scene.actuation._actuators import (
     AbstractActuator,
     AbstractHipActuator,
+    FootPreload,
     HipMotion,
     LegTorques,
 )
-from jaxbiped.scene.actuation._actuators import FootPreload
 
 
 def exchanged(structure: Structure, motion: Motion) -> Motion:
@@ -71,15 +71,15 @@ def motor_torque(
     """
     structure, motor = mechanism.structure, mechanism.joints[number]
     assert isinstance(motor, Motor)
-    own = structure.joints[number]
+    joint = structure.joints[number]
     as_written = motor.by == "side" or leg is None or not swings_at_section(structure, leg)
     motion = motion if as_written else exchanged(structure, motion)
-    seen = MotorMotion(structure, motion.angles, motion.rates, slope, own, line)
-    angle = own if as_written else own.mirrored(exchange_of(structure))
-    return MotorTorque(angle, _told(motor, seen))
+    seen = MotorMotion(structure, motion.angles, motion.rates, slope, joint, line)
+    angle = joint if as_written else joint.mirrored(exchange_of(structure))
+    return MotorTorque(angle, _law_torque(motor, seen))
 
 
-def _told(motor: Motor, motion: MotorMotion) -> Scalar:
+def _law_torque(motor: Motor, motion: MotorMotion) -> Scalar:
     words = f"the law of Motor({motor.angle!r})"
     try:
         torque = motor.law(motion)
@@ -92,16 +92,16 @@ def _told(motor: Motor, motion: MotorMotion) -> Scalar:
     if not is_one and not isinstance(torque, jax.Array):
         raise ArgumentError(_not_one_torque(words, repr(torque)))
     given = motion.angles, motion.rates, motion.slope, motor
-    known = jtu.tree_leaves(eqx.filter(given, eqx.is_array_like))
-    shape, most = np.shape(torque), np.broadcast_shapes(*map(np.shape, known))
+    leaves = jtu.tree_leaves(eqx.filter(given, eqx.is_array_like))
+    shape, most = np.shape(torque), np.broadcast_shapes(*map(np.shape, leaves))
     if shape != most[len(most) - len(shape) :] or jnp.iscomplexobj(torque):
-        told = f"an array of the shape {shape} and the type {jnp.result_type(torque)}"
-        raise ArgumentError(_not_one_torque(words, told))
+        array = f"an array of the shape {shape} and the type {jnp.result_type(torque)}"
+        raise ArgumentError(_not_one_torque(words, array))
     return jnp.asarray(torque) if motor.share is None else motor.share * torque
 
 
-def _not_one_torque(words: str, told: str) -> str:
-    return f"{words} returns {told}, which is not allowed: it must return one torque [N m]."
+def _not_one_torque(words: str, returned: str) -> str:
+    return f"{words} returns {returned}, which is not allowed: it must return one torque [N m]."
 
 
 def motor_torques(

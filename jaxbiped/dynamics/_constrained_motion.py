@@ -14,7 +14,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_type, holds_somewhere
 from jaxbiped._types import RealScalarLike, Scalar, StateLeaf, Time, by_numpy, in_64_bits
 from jaxbiped.compiler import kept_alone
-from jaxbiped.constraints._constraint_method import (
+from jaxbiped.constraints._constraint_methods import (
     AbstractConstraintMethod,
     AbstractProjectingMethod,
     Constrained,

@@ -25,7 +25,7 @@ from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, Scene
 from jaxbiped.scene._state_types import SomeState
 from jaxbiped.scene._structure import Structure
-from jaxbiped.scene.actuation._abstract_actuator import HipMotion
+from jaxbiped.scene.actuation._actuators import HipMotion
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw, AbstractNormalLaw
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 

@@ -30,12 +30,11 @@ from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.dynamics._stance_motion import carriers_of, hip_motion_of
 from jaxbiped.dynamics._tree import Motion, PointMotion, point_motion
 from jaxbiped.linalg._sparse_lu import product
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._motor_motion import angle_value
-from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene._scene import AbstractWalkerScene, CompliantScene
 from jaxbiped.scene._state_types import check_scalars
-from jaxbiped.scene.actuation._abstract_actuator import HipMotion, LegTorques
+from jaxbiped.scene.actuation._actuators import HipMotion, LegTorques
 
 
 class Energies(NamedTuple):
@@ -201,14 +200,14 @@ def _actuator_powers(scene: Any, state: Any) -> _Driving:
 
         return of_stance(scene, state, standing)
     structure = scene.mechanism.structure
-    motion, found = poses_of(scene, state)[0].motion, feet(scene, state)
-    legs, forces = legs_at(scene, state), normal_forces(scene, found)
+    motion, contacts = poses_of(scene, state)[0].motion, feet(scene, state)
+    legs, forces = legs_at(scene, state), normal_forces(scene, contacts)
     shares, pressing = leg_loads(structure, load_shares(scene, forces)), []
     for force, leg in zip(forces, structure.leg_of_foot, strict=True):
         moved = preload(scene, legs[leg])
         if moved is not None and force is not None:
             pressing.append(force * moved[1])
-    hip = functools.partial(hip_motion, scene, found, motion.angles, motion.rates)
+    hip = functools.partial(hip_motion, scene, contacts, motion.angles, motion.rates)
     return _driving(scene, motion, (legs, shares), hip, pressing)
 
 

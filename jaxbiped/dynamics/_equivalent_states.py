@@ -17,9 +17,8 @@ from jaxbiped.dynamics._joint_loads import motion_of
 from jaxbiped.dynamics._stance import angles_and_rates, of_stance, stance_on
 from jaxbiped.dynamics._state import OF_BODIES, state_type
 from jaxbiped.dynamics._tree import Motion, Pose, point_motion, pose_of
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._linkages import loaded_bodies
-from jaxbiped.scene._scene import RedundantScene, is_rigid
+from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, is_rigid
 from jaxbiped.scene._state_types import (
     MinimalState,
     SomeState,

@@ -20,8 +20,7 @@ from jaxbiped.linalg._small_matrices import symmetric_factors
 from jaxbiped.linalg._sparse_lu import SparseFactors
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._mechanism_pieces import with_fixed
-from jaxbiped.scene._modes import Limit, Modes
-from jaxbiped.scene._rigid_feet import rigid_modes, standing_legs
+from jaxbiped.scene._modes import Limit, Modes, rigid_modes, standing_legs
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._structure import Angle, weighted
 

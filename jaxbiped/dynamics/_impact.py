@@ -28,10 +28,10 @@ from jaxbiped.dynamics._mode_changes import (
 from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.dynamics._stance_motion import Impulse, plastic_impact, rolling
 from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._strike_surfaces import clearance
+from jaxbiped.dynamics._surfaces import clearance
 from jaxbiped.dynamics._tree import Loads, rehung
 from jaxbiped.dynamics._tree_inertia import composites, eliminate
-from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
+from jaxbiped.scene._modes import leg_after_strike, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._structure import Indices

@@ -1,7 +1,7 @@
 """Loads of what acts at the joints of a mechanism, and the constraint torques of couplings."""
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -81,13 +81,14 @@ _TORQUES: dict[type, Callable[..., Scalar]] = {
 }
 
 
-def _elastic(mechanism: Mechanism, *, stops: bool) -> list[tuple[Angle, Any]]:
-    """The parts that a torque is a law of, with their angles; `stops`: whether stops are."""
-    return [
-        (angle, part)
-        for angle, part in zip(mechanism.structure.joints, mechanism.joints, strict=True)
-        if type(part) in _TORQUES and (stops or not isinstance(part, Stop))
-    ]
+def _moved_parts(
+    mechanism: Mechanism, motion: Motion, slope: Scalar | None, *kinds: type
+) -> Iterator[tuple[Angle, Any, Scalar, Scalar]]:
+    """Gives the parts of these kinds with their angles, the values [rad] and rates [rad/s]."""
+    for angle, part in zip(mechanism.structure.joints, mechanism.joints, strict=True):
+        if type(part) in kinds:
+            value = angle_value(angle, motion.angles, slope)
+            yield angle, part, value, angle_value(angle, motion.rates, None)
 
 
 def with_joint_loads(
@@ -102,9 +103,8 @@ def with_joint_loads(
         slope: angle of the vertical [rad]; None for stops and latches of rigid feet alone.
         stops: whether they are elastic; on rigid feet they are plastic.
     """
-    for angle, part in _elastic(mechanism, stops=stops):
-        value = angle_value(angle, motion.angles, slope)
-        rate = angle_value(angle, motion.rates, None)
+    kinds = (Spring, Stop, Latch) if stops else (Spring, Latch)
+    for angle, part, value, rate in _moved_parts(mechanism, motion, slope, *kinds):
         loads = loads.with_torques(angle.weights, _TORQUES[type(part)](part, value, rate))
     return loads
 
@@ -160,9 +160,8 @@ def joint_energy(
     `stops`: whether they are elastic.
     """
     total: Any = (None, None, None)
-    for angle, part in _elastic(mechanism, stops=stops):
-        value = angle_value(angle, motion.angles, slope)
-        rate = angle_value(angle, motion.rates, None)
+    kinds = (Spring, Stop, Latch) if stops else (Spring, Latch)
+    for _, part, value, rate in _moved_parts(mechanism, motion, slope, *kinds):
         taken = -_TORQUES[type(part)](part, value, rate) * rate
         energy = functools.partial(_ENERGIES[type(part)], part)
         stored, kept = jax.jvp(energy, (value,), (rate,))
@@ -175,10 +174,8 @@ def stop_limits(
 ) -> tuple[tuple[AbstractNormalLaw, Pressed], ...]:
     """Every limit of every stop with its law."""
     found = []
-    for angle, part in zip(mechanism.structure.joints, mechanism.joints, strict=True):
-        if isinstance(part, Stop) and part.law is not None:
-            value = angle_value(angle, motion.angles, slope)
-            rate = angle_value(angle, motion.rates, None)
+    for _, part, value, rate in _moved_parts(mechanism, motion, slope, Stop):
+        if part.law is not None:
             found += [(part.law, limit) for limit in pressed_limits(part, value, rate)]
     return tuple(found)
 

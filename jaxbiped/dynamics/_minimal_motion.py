@@ -26,19 +26,14 @@ from jaxbiped.dynamics._implicit_field import (
 from jaxbiped.dynamics._joint_loads import with_constraint_torques
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, Pose, point_motion, pose_of
-from jaxbiped.dynamics._tree_inertia import (
-    Composites,
-    composites,
-    eliminate,
-    inertial_loads,
-)
+from jaxbiped.dynamics._tree_inertia import Composites, composites, eliminate, inertial_loads
 from jaxbiped.linalg._sparse_lu import SparseMatrix, times
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._scene import CompliantScene, Scene
 from jaxbiped.scene._state_types import check_scalars, state_type_of
 from jaxbiped.scene._structure import Structure
-from jaxbiped.scene.actuation._abstract_actuator import HipMotion
+from jaxbiped.scene.actuation._actuators import HipMotion
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
 

@@ -21,9 +21,8 @@ from jaxbiped.dynamics._stance_motion import (
     plastic_impact,
     turning_of,
 )
-from jaxbiped.dynamics._surfaces import Switch
-from jaxbiped.scene._modes import THROUGH_STRIKE, Mode, Modes
-from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
+from jaxbiped.dynamics._surfaces import Switch, rate_unit
+from jaxbiped.scene._modes import THROUGH_STRIKE, Mode, Modes, leg_after_strike, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 
 SLACK = 1e-9
@@ -134,14 +133,9 @@ def _gap_rates(stance: Stance, modes: Modes) -> list[Any]:
     return [limit.gap.of(stance.pose.motion.rates) for limit in modes.limits]
 
 
-def _unit(scene: RigidScene) -> Scalar:
-    """The unit of rates [rad/s]."""
-    return jnp.sqrt(scene.ground.g / scene.mechanism.height)
-
-
 def _still(scene: RigidScene) -> Scalar:
     """Rate below which an angle rests [rad/s]."""
-    return SLACK * _unit(scene)
+    return SLACK * rate_unit(scene)
 
 
 def mode_after_strike(scene: RigidScene, old: Stance, found: Struck) -> Mode:
@@ -225,7 +219,7 @@ def _staying(
     Those that leave very slowly stay, too: two that throw each other off come down ever sooner,
     infinitely often in a finite time. Behind that time both are at rest.
     """
-    slow, modes = _FLIES * _unit(scene), rigid_modes(scene.mechanism)
+    slow, modes = _FLIES * rate_unit(scene), rigid_modes(scene.mechanism)
     rates = _gap_rates(found.stance, modes)
     stay = [now | (was & (v <= slow)) for now, was, v in zip(found.held, held, rates, strict=True)]
     feet, fast = zip(found.stance.feet, stands, strict=False), slow * scene.mechanism.height

@@ -18,10 +18,9 @@ from jaxbiped.dynamics._joint_loads import motion_of
 from jaxbiped.dynamics._tree import Motion, PointMotion, Pose, point_motion, pose_of, rehung
 from jaxbiped.dynamics._tree_inertia import Composites, composites, mass_entries
 from jaxbiped.linalg._sparse_lu import Entry, SparseMatrix, plus
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._modes import Mode
-from jaxbiped.scene._rigid_feet import next_leg, rigid_modes, standing_legs
+from jaxbiped.scene._modes import Mode, next_leg, rigid_modes, standing_legs
+from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.scene._state_types import scalars_named
 from jaxbiped.scene._structure import Indices, Structure, weighted
 

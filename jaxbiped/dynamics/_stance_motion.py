@@ -4,6 +4,7 @@ Impacts are of soles that come down and of stops that are hit.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -21,12 +22,11 @@ from jaxbiped.dynamics._tree import Loads, rehung
 from jaxbiped.dynamics._tree_inertia import inertial_loads
 from jaxbiped.linalg._sparse_lu import Entry, factorise, plus, product
 from jaxbiped.scene._ground import gravity_on
-from jaxbiped.scene._modes import Modes
-from jaxbiped.scene._rigid_feet import rigid_modes
+from jaxbiped.scene._modes import Modes, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._state_types import check_scalars, state_type_of
 from jaxbiped.scene._structure import Indices
-from jaxbiped.scene.actuation._abstract_actuator import HipMotion
+from jaxbiped.scene.actuation._actuators import HipMotion
 
 
 def hip_motion_of(stance: Stance) -> HipMotion:
@@ -53,17 +53,6 @@ def carriers_of(stance: Stance) -> Carriers:
     return legs, shares
 
 
-def with_torques(loads: Loads, scene: RigidScene, stance: Stance) -> Loads:
-    """With the torques of joint parts and actuators."""
-    return with_driven_joints(
-        loads,
-        scene,
-        stance.pose.motion,
-        lambda: carriers_of(stance),
-        lambda: hip_motion_of(stance),
-    )
-
-
 class Turning(NamedTuple):
     """Accelerations of a stance, and what holds it.
 
@@ -87,7 +76,8 @@ def turning_of(scene: RigidScene, stance: Stance) -> Turning:
     downhill, weight = gravity_on(scene.ground)
     still: list[Entry] = [-downhill, weight, *[None] * len(tree.bodies)]
     loads = inertial_loads(tree.structure, tree.known, stance.pose, still)
-    loads = with_torques(loads, scene, stance)
+    carriers, hip = partial(carriers_of, stance), partial(hip_motion_of, stance)
+    loads = with_driven_joints(loads, scene, stance.pose.motion, carriers, hip)
     factors = factorise(fold_matrix(weights, stance.mass_matrix()))
     unheld: Any = factors.solve(fold(weights, loads.entries()))
     if not stance.may_hold:

@@ -16,9 +16,8 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar, VectorField, as_float, by_numpy
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.scene._state_types import SomeState, State, is_redundant, state_type_of
 
 

@@ -1,14 +1,19 @@
-"""Surfaces in state space: switches, where the field is not smooth, and Poincaré sections.
+"""Surfaces in state space: switches, where the field is not smooth, heel strikes, and sections.
 
-No step may straddle a switch: derivatives taken through it would be wrong. At a section an orbit is
-observed, once per cycle.
+No step may straddle a switch: derivatives taken through it would be wrong. Single support ends as
+the swing foot comes down or the walker has fallen: where all legs are bodies on the root point,
+their angles tell both, exactly; else places do, in units of the walker's height. At a Poincaré
+section an orbit is observed, once per cycle.
 """
 
 import abc
+import functools
+import math
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
@@ -22,15 +27,182 @@ from jaxbiped.dynamics._footfalls import (
     carrier_place,
     leg_depth,
     leg_places,
+    mean,
     touches,
     touching_legs,
 )
-from jaxbiped.dynamics._stance import of_stance
-from jaxbiped.dynamics._strike_surfaces import lead, lean, opening, standing_place
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
-from jaxbiped.scene._scene import CompliantScene, is_rigid
+from jaxbiped.dynamics._stance import Stance, of_stance
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._modes import next_leg, standing_legs
+from jaxbiped.scene._scene import AbstractWalkerScene, CompliantScene, RigidScene, is_rigid
 from jaxbiped.scene._state_types import SomeState
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
+
+FALL_ANGLE = 1.0
+"""A root point lower than a straight leg at this angle [rad] could carry it has fallen."""
+
+_APART = 1e-3
+"""How far ahead a foot strikes at least, in units of the walker's height: where two legs of one
+length pass each other their feet are level as well, and none comes down."""
+
+
+def rate_unit(scene: AbstractWalkerScene) -> Scalar:
+    """√(g/l), by the root point's height l with all angles 0 [1/s]."""
+    return jnp.sqrt(scene.ground.g / scene.mechanism.height)
+
+
+def clearance(scene: RigidScene, state: Any) -> Scalar:
+    """Height of the swing foot above the ground [m]; of a leg's lowest foot."""
+    return of_stance(scene, state, _clearance)
+
+
+def _clearance(stance: Stance) -> Scalar:
+    swings, stands = (
+        functools.reduce(jnp.minimum, [stance.height(k) for k in feet])
+        for feet in (stance.next_feet, stance.feet)
+    )
+    # Whichever foot of its leg stands, the lowest one is on the ground.
+    return swings if len(stance.feet) == 1 else swings - stands
+
+
+def clearance_rate(scene: RigidScene, state: Any) -> Scalar:
+    """Its rate [m/s], of the swing leg's feet on average."""
+
+    def rate(stance: Stance) -> Scalar:
+        return mean([stance.foot(k).vz for k in stance.next_feet])
+
+    return of_stance(scene, state, rate)
+
+
+def distance_ahead(scene: RigidScene, state: Any) -> Scalar:
+    """How far the swing leg's feet are ahead of the standing one's, on average [m]."""
+    return of_stance(scene, state, _distance_ahead)
+
+
+def _distance_ahead(stance: Stance) -> Scalar:
+    return mean([stance.foot(k).x for k in stance.next_feet]) - standing_place(stance)
+
+
+def standing_place(stance: Stance) -> Scalar:
+    """Where the centre of the standing foot is, or those of a leg's feet on average [m]."""
+    if len(stance.feet) == 1:
+        place: Scalar = stance.pose.motion.x
+        return place
+    return mean([stance.foot(k).x for k in stance.feet])
+
+
+def straight_legs(mechanism: Mechanism) -> tuple[int, int] | None:
+    """Numbers of swing leg and stance leg where these are alike bodies on the root point.
+
+    Such a walker that has fallen leans to one side for good; with bent legs it may change.
+    """
+    structure, leg = mechanism.structure, mechanism.structure.stance_leg
+    if len(standing_legs(structure)) > 1:
+        return None
+    feet = (*structure.feet_of_leg[next_leg(structure, leg)], *structure.feet_of_leg[leg])
+    bodies = [structure.feet[k] for k in feet]
+    bent = any(structure.parents[j] >= 0 for j in bodies) or len(feet) > 2
+    if bent or any(mechanism.feet[k].centre.ahead is not None for k in feet):
+        return None
+    swings, stands = bodies
+    return swings, stands
+
+
+def _leg_angles(stance: Stance) -> tuple[Scalar, Scalar] | None:
+    """Angles of the two, where there are."""
+    legs = straight_legs(stance.mechanism)
+    if legs is None:
+        return None
+    swings, stands = (stance.pose.motion.angles[j] for j in legs)
+    return swings, stands
+
+
+def opening(scene: RigidScene, state: Any) -> Scalar:
+    """Above zero while the swing foot is off the ground, where it is ahead [rad]."""
+    return of_stance(scene, state, _opening)
+
+
+def _opening(stance: Stance) -> Scalar:
+    angles = _leg_angles(stance)
+    if angles is not None:
+        return angles[0] + angles[1]
+    return _clearance(stance) / stance.mechanism.height
+
+
+def lead(scene: RigidScene, state: Any) -> Scalar:
+    """How far the swing foot is ahead [rad], above zero where it may strike."""
+    return of_stance(scene, state, _lead)
+
+
+def _lead(stance: Stance) -> Scalar:
+    angles = _leg_angles(stance)
+    if angles is not None:
+        return angles[0] - angles[1]
+    return _distance_ahead(stance) / stance.mechanism.height - _APART
+
+
+def lean(scene: RigidScene, state: Any) -> Scalar:
+    """Above zero while the root point is behind the standing foot [rad]."""
+    return of_stance(scene, state, _lean)
+
+
+def _lean(stance: Stance) -> Scalar:
+    angles = _leg_angles(stance)
+    if angles is not None:
+        return angles[1]
+    return (standing_place(stance) - stance.root.x) / stance.mechanism.height
+
+
+def uprightness(scene: RigidScene, state: Any, side: Scalar) -> Scalar:
+    """What is left before the walker has fallen, below zero afterwards [rad].
+
+    `side` is the sign of `lean`.
+    """
+    return of_stance(scene, state, lambda stance: _uprightness(stance, side))
+
+
+def _uprightness(stance: Stance, side: Scalar) -> Scalar:
+    mechanism, angles = stance.mechanism, _leg_angles(stance)
+    if angles is not None:
+        return FALL_ANGLE - side * angles[1]
+    return (stance.root.z - mechanism.height_over_feet(math.cos(FALL_ANGLE))) / mechanism.height
+
+
+class Surface(NamedTuple):
+    """How far a state is from where something happens, and how fast that changes.
+
+    Attributes:
+        value: above zero before it [rad].
+        rate, curvature: its first two derivatives with respect to time.
+    """
+
+    value: Scalar
+    rate: Scalar
+    curvature: Scalar
+
+
+def surface_along(
+    function: Callable[[Any], Scalar], state: Any, accelerations: tuple[Scalar, ...]
+) -> Surface:
+    """A function of the angles in a motion: its value and its first two derivatives.
+
+    Args:
+        function: of the state, of whose angles alone it depends.
+        state: at which it is asked.
+        accelerations: of the angles [rad/s²].
+    """
+    count = len(accelerations)
+    angles, rates = tuple(state[1 : 1 + count]), tuple(state[1 + count : 1 + 2 * count])
+
+    def of(angles: Any) -> Scalar:
+        return function(type(state)(state[0], *angles, *rates, *state[1 + 2 * count :]))
+
+    def course(angles: Any, rates: Any) -> tuple[Scalar, Scalar]:
+        return jax.jvp(of, (angles,), (rates,))
+
+    along = jax.jvp(course, (angles, rates), (rates, accelerations))
+    (value, rate), (_, curvature) = along
+    return Surface(value, rate, jnp.asarray(curvature))
 
 
 class Switch(NamedTuple):

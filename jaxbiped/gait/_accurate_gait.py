@@ -16,8 +16,8 @@ from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._return_map_spec import orbit_solver
 from jaxbiped.gait._search_provenance import unknown_derivatives
-from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameter_access import parameter_values
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision, relative_to_scene
 from jaxbiped.solve._error_estimate import Judged, check_untraced, refine
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P

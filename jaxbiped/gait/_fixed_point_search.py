@@ -28,7 +28,7 @@ from jaxbiped.gait._poincare_map import (
     state_with,
 )
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.variational._tangents import Seeded

@@ -20,8 +20,7 @@ from jaxbiped.gait._relaxation import like_model, relaxed, seed_like
 from jaxbiped.gait._search_provenance import BranchEnd, FoundBy, Origin
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.linalg._small_matrices import eigenpairs
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, Scene
 from jaxbiped.scene._walker import Walker
 
 _FIRST_STEP, _LARGEST_STEP, _LEAST_STEP = 0.05, 0.3, 1e-3

@@ -16,7 +16,7 @@ from jaxbiped.scene._joint_parts import Motor, Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._ready_scenes import kneed_scene, seed_scene
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene.actuation._abstract_actuator import Actuation
+from jaxbiped.scene.actuation._actuators import Actuation
 from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
 from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
 

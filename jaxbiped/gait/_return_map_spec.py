@@ -13,9 +13,8 @@ from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.dynamics._surfaces import AbstractSection
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._ground import check_pulls
-from jaxbiped.scene._scene import RedundantScene, is_rigid
+from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, is_rigid
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
 from jaxbiped.solve._solvers import solver_named, with_projection

@@ -20,14 +20,12 @@ from jaxbiped.dynamics._state import seed_state, state_for, state_type
 from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.dynamics._tree import pose_of
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._modes import Mode
+from jaxbiped.scene._modes import Mode, rigid_modes
 from jaxbiped.scene._placement import root_on_feet
 from jaxbiped.scene._ready_scenes import seed_scene
-from jaxbiped.scene._rigid_feet import rigid_modes
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import State, WalkerState
 from jaxbiped.scene._structure import Angle

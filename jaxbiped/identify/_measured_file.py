@@ -12,8 +12,8 @@ from jaxbiped._files import read_csv, read_json
 from jaxbiped._quantity import unit_scales
 from jaxbiped._types import JsonObject
 from jaxbiped.identify._measured_gait import MEASURES, MeasuredAngles, MeasuredGait
-from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameter_access import parameter_quantities
+from jaxbiped.scene._scene import AbstractScene
 
 _UNITS = dict(zip(MEASURES, ("s", "m", "m/s", "N"), strict=True))
 _KEYS = {f"{name}_{_UNITS[name].replace('/', '_')}": name for name in MEASURES}

@@ -15,9 +15,8 @@ from jaxbiped._types import AT_ONCE, Scalar, as_array, as_float, in_parts, rows_
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._stance import of_stance
 from jaxbiped.dynamics._state import check_state, state_type
-from jaxbiped.dynamics._strike_surfaces import standing_place
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.dynamics._surfaces import standing_place
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState, SomeState, State
 from jaxbiped.simulate._simulate import rigid_walk
 from jaxbiped.solve._trajectory import Arrivals, Trajectory, check_scene_of

@@ -16,17 +16,15 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, Time, select
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._equivalent_states import exchange_legs
-from jaxbiped.dynamics._strike_surfaces import clearance, clearance_rate, distance_ahead
-from jaxbiped.dynamics._surfaces import AbstractSection
+from jaxbiped.dynamics._surfaces import AbstractSection, clearance, clearance_rate, distance_ahead
 from jaxbiped.optimise._augmented_system import (
     AbstractAugmentedSystem,
     MotionSection,
     join,
     motion_of,
 )
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._ground import Ground, SteppedGround
-from jaxbiped.scene._scene import RigidScene, Scene, is_rigid
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene, is_rigid
 from jaxbiped.variational._hybrid_system import AbstractSystem
 
 _APART = 1e-2

@@ -18,8 +18,7 @@ from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._energy import is_driven, kinetic_energy, powers
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._impact import impact, push_off_work
-from jaxbiped.dynamics._strike_surfaces import clearance
-from jaxbiped.dynamics._surfaces import AbstractSection, Switch
+from jaxbiped.dynamics._surfaces import AbstractSection, Switch, clearance
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.variational._hybrid_system import AbstractSystem, Rolling, Walking

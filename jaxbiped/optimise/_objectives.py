@@ -10,7 +10,7 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._rigid_feet import rigid_modes
+from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 

@@ -26,8 +26,8 @@ from jaxbiped.plot._parameter_charts import branch
 from jaxbiped.plot._samples import AnyScene
 from jaxbiped.plot._skeleton import skeleton_of
 from jaxbiped.plot._symbols import HEIGHT, HORIZONTAL
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
 from jaxbiped.scene._parameter_access import parameter_quantities, parameter_values
+from jaxbiped.scene._scene import AbstractWalkerScene
 
 Rows = Iterable[tuple[str, ...]]
 

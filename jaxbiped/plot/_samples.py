@@ -18,7 +18,7 @@ from jaxbiped.dynamics._state import state_type
 from jaxbiped.measure._footsteps import HeelStrikes, heel_strikes
 from jaxbiped.measure._samples import NODES, Samples, evaluate_along, states_after
 from jaxbiped.plot._skeleton import body_motion
-from jaxbiped.scene._rigid_feet import rigid_modes, standing_legs
+from jaxbiped.scene._modes import rigid_modes, standing_legs
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.scene._structure import Structure

@@ -7,7 +7,7 @@ import equinox as eqx
 from jaxbiped._checks import ArgumentError, check_type, holds_somewhere
 from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
 from jaxbiped._types import Parameter, Scalar, by_numpy
-from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
+from jaxbiped.constraints._constraint_methods import AbstractConstraintMethod
 from jaxbiped.constraints._linkage import Linkage, LinkAngle, LinkBody, Pin
 from jaxbiped.scene._bodies import Body, Point
 from jaxbiped.scene._joint_parts import Coupling

@@ -16,7 +16,7 @@ from jaxbiped.compiler import kept_alone
 from jaxbiped.scene._joint_parts import Motor
 from jaxbiped.scene._mechanism_pieces import named_sum, with_fixed
 from jaxbiped.scene._structure import Angle, Indices, Structure
-from jaxbiped.scene.actuation._abstract_actuator import AbstractHipActuator, HipMotion
+from jaxbiped.scene.actuation._actuators import AbstractHipActuator, HipMotion
 
 _NUMBERS = 1000
 """Numbers in random motions, as many as NumPy runs a function of."""
@@ -37,7 +37,7 @@ class MotorMotion(NamedTuple):
         angles: of all bodies [rad], exchanged where the law's sides are.
         rates: of all bodies [rad/s], likewise.
         slope: angle of the vertical [rad].
-        own: the motor's angle.
+        joint: the motor's angle.
         stance: line of the leg that stands; None where no leg does.
     """
 
@@ -45,18 +45,18 @@ class MotorMotion(NamedTuple):
     angles: Sequence[Scalar]
     rates: Sequence[Scalar]
     slope: Scalar
-    own: Angle
+    joint: Angle
     stance: Any
 
     @property
     def angle(self) -> Scalar:
         """The motor's own angle [rad]."""
-        return angle_value(self.own, self.angles, self.slope)
+        return angle_value(self.joint, self.angles, self.slope)
 
     @property
     def rate(self) -> Scalar:
         """Its rate [rad/s]."""
-        return angle_value(self.own, self.rates, None)
+        return angle_value(self.joint, self.rates, None)
 
     def of(self, angle: Any) -> tuple[Scalar, Scalar]:
         """Value [rad] and rate [rad/s] of a body's angle by its name, or of weighted angles.

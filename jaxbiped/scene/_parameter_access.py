@@ -15,10 +15,10 @@ from jaxbiped._identity import identity
 from jaxbiped._parameter_declaration import parameter_infos, with_fields
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import JsonObject, Parameter, Scalar
-from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._bodies import Point
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._mechanism_pieces import path_texts
+from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 SomeScene = TypeVar("SomeScene", bound=eqx.Module)

@@ -34,15 +34,15 @@ def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
     exact = [_in_64_bits(leaf) for leaf in leaves]
     if any(a is not b for a, b in zip(leaves, exact, strict=True)):
         scene = jtu.tree_unflatten(structure, exact)
-    told = jtu.tree_map(undifferentiated, scene) if is_traced(exact) else scene
-    if is_traced(jtu.tree_leaves(told)):
+    plain = jtu.tree_map(undifferentiated, scene) if is_traced(exact) else scene
+    if is_traced(jtu.tree_leaves(plain)):
         with traced_rules() as rules:
             _check_parts(scene)
         return where_allowed(rules, scene)
     # Within a caller's trace, too, what is computed of known numbers is known.
     with jax.ensure_compile_time_eval():
-        _, once = _CHECKED(told, lambda: OncePerVersion(structure))()
-        once(lambda: _check_parts(told))
+        _, once = _CHECKED(plain, lambda: OncePerVersion(structure))()
+        once(lambda: _check_parts(plain))
     return scene
 
 

@@ -240,16 +240,16 @@ class Structure:
     @property
     def feet_told(self) -> tuple[str, ...]:
         """Names of the feet: their bodies', with the foot's own where a body has several."""
-        return tuple(
-            self.bodies[j] + (f".{name}" if self.feet.count(j) > 1 else "")
-            for j, name in zip(self.feet, self.foot_names, strict=True)
-        )
+        return self._feet_named(".")
 
     @property
     def bristles(self) -> tuple[str, ...]:
         """Names of each foot's bristles in states: the foot's own only where a body has several."""
+        return tuple(f"bristle_{name}" for name in self._feet_named("_"))
+
+    def _feet_named(self, separator: str) -> tuple[str, ...]:
         return tuple(
-            f"bristle_{self.bodies[j]}" + (f"_{name}" if self.feet.count(j) > 1 else "")
+            self.bodies[j] + (separator + name if self.feet.count(j) > 1 else "")
             for j, name in zip(self.feet, self.foot_names, strict=True)
         )
 
@@ -264,20 +264,21 @@ class Structure:
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of places and angles in states."""
-        angles = (f"theta_{self.bodies[j]}" for j in self.free)
-        return (f"{self.root}_x", f"{self.root}_z", *angles)
+        return self._scalars("x", "z", "theta")
 
     @property
     def rates(self) -> tuple[str, ...]:
         """Names of their rates, in the same order."""
-        rates = (f"omega_{self.bodies[j]}" for j in self.free)
-        return (f"{self.root}_vx", f"{self.root}_vz", *rates)
+        return self._scalars("vx", "vz", "omega")
 
     @property
     def accelerations(self) -> tuple[str, ...]:
         """Names of the rates of these."""
-        turning = (f"alpha_{self.bodies[j]}" for j in self.free)
-        return (f"{self.root}_ax", f"{self.root}_az", *turning)
+        return self._scalars("ax", "az", "alpha")
+
+    def _scalars(self, x: str, z: str, turning: str) -> tuple[str, ...]:
+        angles = (f"{turning}_{self.bodies[j]}" for j in self.free)
+        return (f"{self.root}_{x}", f"{self.root}_{z}", *angles)
 
 
 def pair_name(first: str, second: str) -> str:

@@ -19,7 +19,7 @@ from jaxbiped._checks import (
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, as_float, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.constraints._constraint_method import (
+from jaxbiped.constraints._constraint_methods import (
     AbstractProjectingMethod,
     check_independent,
     correct_step,

@@ -24,7 +24,7 @@ from jaxbiped.compiler import BY_NAME, Program, Request
 from jaxbiped.dynamics._state import check_state, state_type, without_whole_turns
 from jaxbiped.dynamics._surfaces import HeelStrike
 from jaxbiped.scene._ground import check_pulls
-from jaxbiped.scene._rigid_feet import check_mode, rigid_modes
+from jaxbiped.scene._modes import check_mode, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._derivatives import with_derivatives
@@ -39,14 +39,15 @@ from jaxbiped.simulate._start import (
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._mode_history import history_of
-from jaxbiped.solve._rigid_progress import (
+from jaxbiped.solve._rigid_steps import (
     RigidProgress,
     RigidWalk,
+    attempt_step,
+    ending_of,
     initial_progress,
     is_pulled,
     state_with_hip,
 )
-from jaxbiped.solve._rigid_steps import attempt_step, ending_of
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, scene_key, single_time
 
 _ROOM = 256

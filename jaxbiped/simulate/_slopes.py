@@ -15,12 +15,17 @@ from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._mode_changes import change_mode_on_surface, mode_switches
 from jaxbiped.dynamics._stance_motion import rolling_field
-from jaxbiped.dynamics._strike_surfaces import opening, uprightness
-from jaxbiped.dynamics._surfaces import AbstractSection, in_nearest_names, switches
+from jaxbiped.dynamics._surfaces import (
+    AbstractSection,
+    in_nearest_names,
+    opening,
+    switches,
+    uprightness,
+)
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import units_of
-from jaxbiped.solve._ending_surfaces import ending_surface
-from jaxbiped.solve._rigid_progress import RigidWalk
+from jaxbiped.solve._failure_events import ending_surface
+from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock

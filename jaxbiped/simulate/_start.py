@@ -21,7 +21,7 @@ from jaxbiped._checks import (
 from jaxbiped._jax_versions import untraced
 from jaxbiped._types import Scalar, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.constraints._constraint_method import check_independent
+from jaxbiped.constraints._constraint_methods import check_independent
 from jaxbiped.dynamics._constrained_motion import Consistent, consistent_state, coordinates_of
 from jaxbiped.dynamics._contacts import feet, limits_of
 from jaxbiped.dynamics._footfalls import touches

@@ -15,8 +15,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice, check_positive
 from jaxbiped._types import Numbers, RealScalarLike, Scalar, is_traced
 from jaxbiped.dynamics._state import dimensions_of, recurring_leaves, state_type
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
-from jaxbiped.scene._scene import CompliantScene, is_compliant, is_rigid
+from jaxbiped.scene._scene import AbstractWalkerScene, CompliantScene, is_compliant, is_rigid
 
 _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""

@@ -8,8 +8,7 @@ from jaxtyping import Array, Float, Int
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Numbers, Scalar, by_numpy
-from jaxbiped.scene._modes import Modes
-from jaxbiped.scene._rigid_feet import rigid_modes
+from jaxbiped.scene._modes import Modes, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 
 

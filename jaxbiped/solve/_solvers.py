@@ -15,7 +15,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import BoolScalarLike, Numbers, RealScalarLike, Time
-from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
+from jaxbiped.constraints._constraint_methods import AbstractConstraintMethod
 from jaxbiped.dynamics._constrained_motion import project
 from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm

@@ -15,11 +15,11 @@ from jaxbiped._types import as_float
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import BY_NAME, DEVICES, Program, Request
 from jaxbiped.dynamics._mode_changes import SLACK
-from jaxbiped.scene._rigid_feet import limit_motions, rigid_modes
+from jaxbiped.scene._modes import limit_motions, rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import units_of
 from jaxbiped.solve._adaptive_program import Solve
-from jaxbiped.solve._rigid_progress import RigidWalk
+from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve.controllers._wrapped_control import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import Goals

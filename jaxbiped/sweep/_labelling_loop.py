@@ -18,18 +18,17 @@ from jaxbiped.dynamics._contacts import contact_places, slip_distances
 from jaxbiped.dynamics._equivalent_states import images
 from jaxbiped.dynamics._footfalls import any_of
 from jaxbiped.dynamics._state import recurring_leaves
-from jaxbiped.dynamics._strike_surfaces import straight_legs
-from jaxbiped.dynamics._surfaces import MidStance
+from jaxbiped.dynamics._surfaces import MidStance, straight_legs
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
 from jaxbiped.solve._failure_events import WATCHES
-from jaxbiped.solve._rigid_progress import (
+from jaxbiped.solve._rigid_steps import (
     RigidProgress,
     RigidWalk,
+    attempt_step,
     initial_progress,
     state_with_hip,
 )
-from jaxbiped.solve._rigid_steps import attempt_step
 from jaxbiped.solve._saved_outputs import Saved, arrival_time
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import (

@@ -17,7 +17,7 @@ import numpy as np
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import jacobian
 from jaxbiped.linalg._small_matrices import BlockFactors, factorise
-from jaxbiped.solve.rosenbrock._implicit_linearisation import linearise
+from jaxbiped.solve.rosenbrock._linearisation import linearise
 from jaxbiped.variational._flow import jump_of
 from jaxbiped.variational._switch_locator import MARGIN
 

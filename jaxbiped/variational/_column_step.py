@@ -14,8 +14,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, VectorField
 from jaxbiped.compiler import jacobian
 from jaxbiped.solve._fusion_barrier import without_barriers
-from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, split
-from jaxbiped.solve.rosenbrock._linearisation import Components
+from jaxbiped.solve.rosenbrock._linearisation import Components, ImplicitForm, split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import Stages, stages_of
 from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau, end_weights, error_weights
 from jaxbiped.variational._rosenbrock_tangents import kept_in_order, stage_matrices

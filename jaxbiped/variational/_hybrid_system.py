@@ -26,11 +26,24 @@ from jaxbiped.dynamics._mode_changes import change_mode, change_mode_on_surface,
 from jaxbiped.dynamics._redundant_motion import BodiesField
 from jaxbiped.dynamics._stance_motion import rolling, rolling_field
 from jaxbiped.dynamics._state import cyclic_names, recurring_leaves, recurring_names
-from jaxbiped.dynamics._strike_surfaces import lead, opening
-from jaxbiped.dynamics._surfaces import AbstractSection, HeelStrike, MidStance, Switch, switches
-from jaxbiped.scene._abstract_scene import AbstractScene, AbstractWalkerScene
-from jaxbiped.scene._rigid_feet import rigid_modes
-from jaxbiped.scene._scene import CompliantScene, RigidScene, is_compliant, is_rigid
+from jaxbiped.dynamics._surfaces import (
+    AbstractSection,
+    HeelStrike,
+    MidStance,
+    Switch,
+    lead,
+    opening,
+    switches,
+)
+from jaxbiped.scene._modes import rigid_modes
+from jaxbiped.scene._scene import (
+    AbstractScene,
+    AbstractWalkerScene,
+    CompliantScene,
+    RigidScene,
+    is_compliant,
+    is_rigid,
+)
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._failure_events import WATCHES, ending_events, rigid_ending
 

@@ -12,8 +12,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, split
-from jaxbiped.solve.rosenbrock._linearisation import Components
+from jaxbiped.solve.rosenbrock._linearisation import Components, ImplicitForm, split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import Stages, stages_of
 from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau, end_weights, error_weights
 from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with_active

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.caching import _compiled_store
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._disk_cache import CACHE_VARIABLE, disk_use
 from jaxbiped.simulate._backends import by_xla
@@ -32,7 +31,6 @@ def test_what_was_compiled_is_loaded(cache, monkeypatch):
     first = just_before_end(np.float64(2.0))
     (kept,) = cache.iterdir()
     just_before_end.clear()
-    monkeypatch.setattr(_compiled_store, "trace_call", _refuse)
     monkeypatch.setattr("jaxbiped.caching._cached_jit.trace_call", _refuse)
     assert just_before_end(np.float64(2.0)) == first < 2.0
     assert just_before_end(np.float64(-3.0)) < -3.0
@@ -157,13 +155,13 @@ def test_its_shape_is_known_before_and_after(cache):
 
 WALK = """
 import jaxbiped as jb
-from jaxbiped.caching import _cached_jit, _compiled_store
+from jaxbiped.caching import _cached_jit
 from jaxbiped.compiler.runtime import _kernel
 import sys
 if sys.argv[1] == "loads":
     def refuse(*_):
         raise AssertionError("traced again")
-    _kernel.graph_of = _compiled_store.trace_call = _cached_jit.trace_call = refuse
+    _kernel.graph_of = _cached_jit.trace_call = refuse
 scene = jb.seed_scene(slope=float(sys.argv[2]))
 walk = jb.simulate(scene, jb.seed_state(), footsteps=2, accuracy="draft")
 gait = jb.find_gait(scene, accuracy="draft", radius_sensitivities=False)

@@ -21,7 +21,7 @@ from jaxbiped.compiler.runtime._primitive import call
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.simulate._rigid_simulation import rigid_program
 from jaxbiped.solve._failure_events import WATCHES, ending_events
-from jaxbiped.solve._rigid_progress import RigidWalk
+from jaxbiped.solve._rigid_steps import RigidWalk
 from tests.compiler.one_shot import compiled, stepped
 from tests.sweep.walkers import same
 

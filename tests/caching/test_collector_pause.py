@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from jaxbiped.caching._compiled_store import long_trace
+from jaxbiped.caching._cached_jit import long_trace
 
 SHORT, LONG = 0.005, 0.5
 

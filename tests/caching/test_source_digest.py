@@ -11,10 +11,9 @@ from pathlib import Path
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.caching import _fingerprint, _source_digest
+from jaxbiped.caching import _fingerprint
 from jaxbiped.caching._disk_cache import CACHE_VARIABLE
-from jaxbiped.caching._fingerprint import as_leaves, fingerprint
-from jaxbiped.caching._source_digest import SourceDigests
+from jaxbiped.caching._fingerprint import SourceDigests, as_leaves, fingerprint
 
 PACKAGE = Path(jb.__file__).parent
 LATER = time.time_ns() + 10**15
@@ -36,7 +35,7 @@ CODE = {
     "string": ("gait/_find_gait.py", '"newton"', '"newtons"'),
     "registered for a class": ("dynamics/_stance_motion.py", "return rolling_field", "return None"),
     "compiler": ("compiler/ir/_liveness.py", "value.op in", "value.op not in"),
-    "how programs are kept": ("caching/_compiled_store.py", '_KIND = "xla"', '_KIND = "lax"'),
+    "how programs are kept": ("caching/_cached_jit.py", '_KIND = "xla"', '_KIND = "lax"'),
     "what laws there are": ("scene/laws/__init__.py", "Tsuji as Tsuji", "Tsuji as Fuji"),
 }
 ELSEWHERE = {
@@ -62,7 +61,7 @@ def copied(tmp_path_factory):
 def keys(copied, monkeypatch, tmp_path):
     """Fingerprints of the programs, were the package the copy; an edit of it may be given."""
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
-    monkeypatch.setattr(_source_digest, "_SETTLED", 0)
+    monkeypatch.setattr(_fingerprint, "_SETTLED", 0)
 
     def found(file=None, old="", new=""):
         whole = None
@@ -172,9 +171,9 @@ def test_imports_of_all_kinds_are_followed(tmp_path, imports, monkeypatch):
 
 def test_the_next_process_reads_only_what_changed(tmp_path, monkeypatch):
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
-    monkeypatch.setattr(_source_digest, "_SETTLED", 0)
+    monkeypatch.setattr(_fingerprint, "_SETTLED", 0)
     folder = _package(tmp_path / "walks", own="from walks import far", far="near = 1")
-    read, read_module = [], _source_digest._read_module
+    read, read_module = [], _fingerprint._read_module
 
     def digest():
         read.clear()
@@ -184,7 +183,7 @@ def test_the_next_process_reads_only_what_changed(tmp_path, monkeypatch):
         read.append(name)
         return read_module(path, name, package)
 
-    monkeypatch.setattr(_source_digest, "_read_module", noted)
+    monkeypatch.setattr(_fingerprint, "_read_module", noted)
     first = digest()
     assert sorted(read) == ["walks", "walks.far", "walks.own"]
     assert digest() == first
@@ -200,7 +199,7 @@ def test_the_next_process_reads_only_what_changed(tmp_path, monkeypatch):
 def test_a_file_that_has_just_changed_is_read_again(tmp_path, monkeypatch):
     """Its next change may leave it the same stamp: clocks of file systems are coarse."""
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
-    monkeypatch.setattr(_source_digest, "_SETTLED", 10**12)
+    monkeypatch.setattr(_fingerprint, "_SETTLED", 10**12)
     folder = _package(tmp_path / "walks", own="")
     first = SourceDigests(folder, loaded=LATER)
     first.digest("walks.own")

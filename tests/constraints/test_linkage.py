@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.constraints._constraint_method import correct_step
+from jaxbiped.constraints._constraint_methods import correct_step
 from jaxbiped.constraints._linkage import constraints_of, masses_of
 from tests.linkages import (
     four_bar,

@@ -13,7 +13,7 @@ from jaxbiped.dynamics._stance import stance_on
 from jaxbiped.scene._bodies import Body, Foot
 from jaxbiped.scene._joint_parts import HOLDS, Stop
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._rigid_feet import leg_after_strike, rigid_modes
+from jaxbiped.scene._modes import leg_after_strike, rigid_modes
 from jaxbiped.variational._hybrid_system import Rolling
 from tests.dynamics.test_modes import (
     ANGLES,

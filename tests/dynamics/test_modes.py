@@ -15,8 +15,7 @@ from jaxbiped.dynamics._stance_motion import turning_of
 from jaxbiped.scene._bodies import Body, Foot, Point
 from jaxbiped.scene._joint_parts import HOLDS, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._modes import Mode
-from jaxbiped.scene._rigid_feet import rigid_modes
+from jaxbiped.scene._modes import Mode, rigid_modes
 from tests.dynamics.test_rolling_mechanisms import (
     a_state,
     floats,

@@ -15,8 +15,7 @@ from jaxbiped.dynamics._stance import stance_on
 from jaxbiped.dynamics._stance_motion import Grip, plastic_impact
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._modes import Mode
-from jaxbiped.scene._rigid_feet import rigid_modes
+from jaxbiped.scene._modes import Mode, rigid_modes
 from tests.dynamics.test_modes import HEEL_TOE, couples
 from tests.dynamics.test_rolling_mechanisms import rigid, sole_of, whole
 from tests.mechanisms import SLOPE, G

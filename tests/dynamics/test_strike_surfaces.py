@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxbiped.dynamics._strike_surfaces import lead, lean, opening, uprightness
+from jaxbiped.dynamics._surfaces import lead, lean, opening, uprightness
 from tests.dynamics.test_modes import hsu_chen
 
 

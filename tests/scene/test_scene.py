@@ -15,10 +15,9 @@ import jaxbiped as jb
 from jaxbiped.dynamics._minimal_motion import WalkerField
 from jaxbiped.dynamics._redundant_motion import BodiesField
 from jaxbiped.dynamics._state import field_of, state_type
-from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._scene import is_compliant, is_rigid
+from jaxbiped.scene._scene import AbstractScene, is_compliant, is_rigid
 from jaxbiped.scene._state_types import state_type_of
 from tests.mechanisms import FEET, LEGS, WALKERS, scene_of
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.solve._mode_steps import SurfaceCourse, mode_events, onto_surface
+from jaxbiped.solve._rolling_step import SurfaceCourse, mode_events, onto_surface
 
 RTOL, STEP = 1e-6, 0.5
 told = jax.jit(lambda before, after: mode_events(STEP, before, after, RTOL, jnp.asarray(0.1)))

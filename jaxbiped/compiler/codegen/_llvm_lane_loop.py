@@ -17,9 +17,9 @@ from jaxbiped.compiler.codegen._kernel_target import (
 from jaxbiped.compiler.codegen._lane_scheduler import LaneScheduler, Sizes
 from jaxbiped.compiler.codegen._llvm_from_graph import GraphWriter, Place
 from jaxbiped.compiler.codegen._llvm_function import BYTES, WEIGHTS, vector
-from jaxbiped.compiler.ir._elementwise_primitives import Array
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.ir._liveness import Liveness
+from jaxbiped.compiler.ir._primitives import Array
 from jaxbiped.compiler.runtime._program import Graph
 
 ENTRY = "jaxbiped_run"

@@ -16,10 +16,15 @@ from jaxbiped.compiler.codegen._kernel_target import OWN_LIBRARY, WARP_ANY, Kern
 from jaxbiped.compiler.codegen._llvm_from_graph import GraphWriter
 from jaxbiped.compiler.codegen._llvm_function import literal
 from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
-from jaxbiped.compiler.ir._elementary_functions import HALF_PI, Arithmetic
+from jaxbiped.compiler.ir._elementary_functions import (
+    HALF_PI,
+    Arithmetic,
+    any_logarithm,
+    any_power,
+    circular_within,
+)
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.ir._liveness import Liveness
-from jaxbiped.compiler.ir._powers import any_logarithm, any_power, circular_within
 from jaxbiped.compiler.runtime._machine_code import foreign_machine, optimised_module
 
 THREADS, BLOCKS = 64, 1

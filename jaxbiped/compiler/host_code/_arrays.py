@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from jaxbiped.compiler.ir._array_primitives import padded as padded
-from jaxbiped.compiler.ir._powers import whole_power
+from jaxbiped.compiler.ir._elementary_functions import whole_power
+from jaxbiped.compiler.ir._primitives import padded as padded
 
 
 def divide_whole(a: Any, b: Any) -> Any:

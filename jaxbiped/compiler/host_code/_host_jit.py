@@ -14,14 +14,19 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._jax_versions import nothing_is_traced, without_switches
-from jaxbiped.caching._cached_jit import Form, cached_jit
-from jaxbiped.caching._compiled_store import ArrayFunction, Skeleton, flattened, long_trace
+from jaxbiped.caching._cached_jit import (
+    ArrayFunction,
+    Form,
+    Skeleton,
+    cached_jit,
+    flattened,
+    long_trace,
+)
 from jaxbiped.caching._disk_cache import read_object, write_object
 from jaxbiped.caching._fingerprint import fingerprint
-from jaxbiped.compiler.host_code._control_flow import CONTROL_FLOW
 from jaxbiped.compiler.host_code._host_writer import NAMES, HostWriter, Rule, UnwrittenError, Value
 from jaxbiped.compiler.host_code._moves import MOVES
-from jaxbiped.compiler.host_code._operations import LINEAR_ALGEBRA, OPERATIONS
+from jaxbiped.compiler.host_code._operations import CONTROL_FLOW, LINEAR_ALGEBRA, OPERATIONS
 
 _KIND = "host"
 _FEW = 1000

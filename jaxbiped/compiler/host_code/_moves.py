@@ -16,7 +16,7 @@ from jaxbiped.compiler.host_code._host_writer import (
     Value,
     listed,
 )
-from jaxbiped.compiler.ir._array_primitives import iota
+from jaxbiped.compiler.ir._primitives import iota
 
 
 def single_number(value: Value, shape: tuple[int, ...]) -> Value:

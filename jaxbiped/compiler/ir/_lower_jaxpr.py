@@ -16,23 +16,29 @@ from jax.extend.core import Jaxpr, JaxprEqn, Literal, Var
 from jaxbiped._checks import ArgumentError
 from jaxbiped._jax_versions import ClosedJaxpr, called_program, scan_counts
 from jaxbiped._types import Numbers
-from jaxbiped.compiler.ir._array_primitives import MOVES, REDUCTIONS, iota, product, reduce
-from jaxbiped.compiler.ir._elementwise_primitives import (
+from jaxbiped.compiler.ir._graph import Block, Kind, Value
+from jaxbiped.compiler.ir._primitives import (
     ELEMENTWISE,
     KINDS,
+    MOVES,
+    REDUCTIONS,
     Array,
     array_of,
     convert,
     elementwise,
+    iota,
     match_kinds,
+    product,
+    reduce,
 )
-from jaxbiped.compiler.ir._graph import Block, Kind, Value
-from jaxbiped.compiler.ir._jacobian import JACOBIAN, parted, pulled_back
 from jaxbiped.compiler.ir._vertex_elimination import (
+    JACOBIAN,
     Arithmetic,
     NoRuleError,
     Weight,
     eliminated_rows,
+    parted,
+    pulled_back,
 )
 
 _LONGEST_UNROLLED, _LARGEST_UNROLLED = 4, 2000

@@ -15,8 +15,8 @@ import jax
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped.caching._cached_jit import long_trace
 from jaxbiped.caching._caches import Once
-from jaxbiped.caching._compiled_store import long_trace
 from jaxbiped.caching._disk_cache import read_entry, read_object, write_entry, write_object
 from jaxbiped.caching._fingerprint import as_leaves, fingerprint
 from jaxbiped.compiler.codegen._kernel_target import host_target

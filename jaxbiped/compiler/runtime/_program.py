@@ -16,16 +16,16 @@ from jaxtyping import PyTree
 
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.compiler.ir._elementwise_primitives import (
+from jaxbiped.compiler.ir._graph import Block, Kind, Value
+from jaxbiped.compiler.ir._liveness import Liveness, sink_code
+from jaxbiped.compiler.ir._lower_jaxpr import lower_jaxpr
+from jaxbiped.compiler.ir._primitives import (
     KINDS,
     Array,
     array_of,
     convert,
     match_kinds,
 )
-from jaxbiped.compiler.ir._graph import Block, Kind, Value
-from jaxbiped.compiler.ir._liveness import Liveness, sink_code
-from jaxbiped.compiler.ir._lower_jaxpr import lower_jaxpr
 
 _NO_WORK = ("input", "const", "part", "held", "taken")
 

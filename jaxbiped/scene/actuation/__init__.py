@@ -4,11 +4,11 @@ A part enters `ACTUATORS` by its `name` as it is defined. The command line has t
 below.
 """
 
-from jaxbiped.scene.actuation._abstract_actuator import ACTUATORS as ACTUATORS
-from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator as AbstractActuator
-from jaxbiped.scene.actuation._abstract_actuator import AbstractHipActuator as AbstractHipActuator
-from jaxbiped.scene.actuation._abstract_actuator import AbstractPhaseTorque as AbstractPhaseTorque
-from jaxbiped.scene.actuation._abstract_actuator import HipMotion as HipMotion
+from jaxbiped.scene.actuation._actuators import ACTUATORS as ACTUATORS
+from jaxbiped.scene.actuation._actuators import AbstractActuator as AbstractActuator
+from jaxbiped.scene.actuation._actuators import AbstractHipActuator as AbstractHipActuator
+from jaxbiped.scene.actuation._actuators import AbstractPhaseTorque as AbstractPhaseTorque
+from jaxbiped.scene.actuation._actuators import HipMotion as HipMotion
 
 # At the hip.
 from jaxbiped.scene.actuation._actuators import HipSpring as HipSpring

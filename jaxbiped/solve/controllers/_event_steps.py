@@ -28,8 +28,7 @@ from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.dynamics._contacts import Gap, feet, gaps
 from jaxbiped.dynamics._footfalls import any_of, landings, standing_leg
 from jaxbiped.scene._scene import CompliantScene
-from jaxbiped.solve._ending_surfaces import ending_surface
-from jaxbiped.solve._failure_events import ending_events
+from jaxbiped.solve._failure_events import ending_events, ending_surface
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import (

@@ -15,8 +15,14 @@ from jaxtyping import PyTree
 from jaxbiped._types import BoolScalarLike, Scalar, SomeTree, Time
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.solve.rosenbrock._implicit_linearisation import ImplicitForm, linearise, split
-from jaxbiped.solve.rosenbrock._linearisation import AbstractLinearisation, Components, StepMatrix
+from jaxbiped.solve.rosenbrock._linearisation import (
+    AbstractLinearisation,
+    Components,
+    ImplicitForm,
+    StepMatrix,
+    linearise,
+    split,
+)
 from jaxbiped.solve.rosenbrock._tableau_form import (
     RosenbrockTableau,
     Row,

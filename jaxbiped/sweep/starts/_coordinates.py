@@ -9,11 +9,10 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
-from jaxbiped.scene._abstract_scene import AbstractWalkerScene
+from jaxbiped.scene._modes import AT_LIMIT, limit_motions, rigid_modes
 from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, with_parameters
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._rigid_feet import AT_LIMIT, limit_motions, rigid_modes
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.sweep._follow_starts import passes_a_stop
 
 START_QUANTITIES = {

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.solve._ending_surfaces import ending_surface
-from jaxbiped.solve._failure_events import WATCHES, ending_events, fall_height
+from jaxbiped.solve._failure_events import WATCHES, ending_events, ending_surface, fall_height
 
 pytestmark = pytest.mark.slow
 

@@ -12,13 +12,14 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.scene._state_types import BristleState
-from jaxbiped.solve.rosenbrock._implicit_linearisation import (
+from jaxbiped.solve.rosenbrock._linearisation import (
     ImplicitForm,
     ImplicitLinearisation,
+    StepMatrix,
     linearise,
     split,
+    structure_of,
 )
-from jaxbiped.solve.rosenbrock._linearisation import StepMatrix, structure_of
 
 MASS, BOB, LENGTH, GRAVITY = 2.0, 0.7, 0.9, 9.81
 
