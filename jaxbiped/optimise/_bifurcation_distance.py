@@ -23,8 +23,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._pseudo_arclength import CurvePoint
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.optimise._cycle_functionals import Functional
-from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
-from jaxbiped.optimise._jacobian_weights import MODULI
+from jaxbiped.optimise._jacobian_functionals import MODULI, jacobian_functionals
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES

@@ -16,7 +16,7 @@ from jaxbiped.dynamics._state import state_of_recurring, state_type
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._jacobian_weights import CLUSTER
+from jaxbiped.optimise._jacobian_functionals import CLUSTER
 from jaxbiped.optimise._objective_values import (
     BothFunctionals,
     Evaluation,

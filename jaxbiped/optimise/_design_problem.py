@@ -22,7 +22,7 @@ from jaxbiped.optimise._design_gaits import (
     with_worse_members,
 )
 from jaxbiped.optimise._design_variables import Requirement, Variables
-from jaxbiped.optimise._jacobian_weights import CLUSTER
+from jaxbiped.optimise._jacobian_functionals import CLUSTER
 from jaxbiped.optimise._objective_values import Evaluation, Evaluations, evaluate
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene

@@ -33,8 +33,13 @@ from jaxbiped.optimise._cycle_functionals import (
     integral_names,
     weighted_sum,
 )
-from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
-from jaxbiped.optimise._jacobian_weights import CLEARANCE_NORMS, CLUSTER, SYMMETRIC
+from jaxbiped.optimise._jacobian_functionals import (
+    CLEARANCE_NORMS,
+    CLUSTER,
+    JACOBIAN_FUNCTIONALS,
+    SYMMETRIC,
+    jacobian_functionals,
+)
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.scene._parameter_access import parameter_names, select_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
