@@ -16,7 +16,12 @@ from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._step_size import step_control
 from jaxbiped.solve.controllers._wrapped_control import clip_step, first_step
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._column_step import Differentiated, column_step, cross, differentiate_step
+from jaxbiped.variational._rosenbrock_tangents import (
+    Differentiated,
+    column_step,
+    cross,
+    differentiate_step,
+)
 from jaxbiped.variational._saltation import (
     at_fixed_time,
     behind_arrival,
