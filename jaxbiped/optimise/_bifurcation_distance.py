@@ -14,8 +14,7 @@ from jaxbiped._checks import check_choice
 from jaxbiped._types import as_float
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent, advance, locate_near
 from jaxbiped.continuation._branch_point import axis_of, start_of
-from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
-from jaxbiped.continuation._continue_gait import traces_from
+from jaxbiped.continuation._continue_gait import ContinuationSetup, continuation_setup, traces_from
 from jaxbiped.continuation._critical_values import STEPS, fold_forcing, range_of
 from jaxbiped.continuation._trace import LIMITS, Trace
 from jaxbiped.gait._fixed_point_search import looser

@@ -17,10 +17,9 @@ from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state import dimensions_of
 from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._fixed_point_search import with_looser
-from jaxbiped.gait._orbit_derivatives import slopes_of
+from jaxbiped.gait._orbit_derivatives import second_variation, slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
-from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.linalg._small_matrices import Eigensystem, eigenpairs, eigensystem, singular_pairs
 from jaxbiped.optimise._augmented_system import (
     DROP,
