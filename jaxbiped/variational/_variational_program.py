@@ -29,9 +29,8 @@ from jaxbiped.variational._saltation import (
     meet,
     meeting_at,
 )
-from jaxbiped.variational._solve_to_section import onto_section, peak_of
+from jaxbiped.variational._solve_to_section import SHARE, onto_section, peak_of
 from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
-from jaxbiped.variational._tangent_solver import SHARE
 from jaxbiped.variational._tangents import (
     Seeded,
     Tangents,
