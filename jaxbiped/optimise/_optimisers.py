@@ -297,3 +297,9 @@ def run_optax(
             return RunEnding(True, "Steps became small.")
         logits = jnp.asarray(optax.apply_updates(logits, step))
     return RunEnding(False, "Iteration limit reached")
+
+
+_RUNS = (run_trust_region, run_slsqp, run_trust_constr, run_optax)
+BY_NAME: dict[str, Callable[[Functions, np.ndarray, int, Callback], RunEnding]] = dict(
+    zip(OPTIMISERS, _RUNS, strict=True)
+)
