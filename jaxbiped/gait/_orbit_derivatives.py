@@ -36,8 +36,6 @@ CLOSENESS = 1e-3
 _RADIUS_FLOOR = 2e-8
 """Error of the spectral radius's derivatives that no tolerance takes away, in units of the
 parameter's size: of the switches' crossings, which second derivatives magnify."""
-
-
 _ROWS = ("jacobian", "monodromy", "period_row", "advance_rows", "peak_row")
 """Those of a return's leaves that are derivatives."""
 _VALUES = ("recurring", "period", "advance", "peak")

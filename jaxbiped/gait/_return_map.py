@@ -56,8 +56,6 @@ NO_REVERSE = (
     "gradient = Forward() carries tangents along the motion and has no reverse mode: pass "
     "gradient=Reverse() to return_map, or differentiate by jax.jvp or jax.jacfwd."
 )
-
-
 _Arrived: TypeAlias = tuple[PyTree, Scalar, Scalar]
 """A state, the time that it took, and the code of what ended the motion."""
 

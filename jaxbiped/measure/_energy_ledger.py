@@ -24,6 +24,13 @@ from jaxbiped.measure._samples import (
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
+_PANELS, _PARTS, _SPLITS = 48, 4, 10
+"""Parts of a footstep, each with its Gauss points; into how many one is split, and how often."""
+_SETTLED = 1e-8
+"""What a split may change, in units of the largest power times the footstep's period."""
+_BEFORE = 1e-7
+"""How long before its impact a footstep is looked at, in units of its period."""
+
 
 class EnergyLedger(NamedTuple):
     """Gravity's work and where this energy goes, between consecutive times [J]; leaves (n,).
@@ -111,14 +118,6 @@ def ledger_and_motors(
         motors += flows.totals(flows.positive_integral(motor), ends)
     residual = gravity + driven - damper - friction - stored
     return EnergyLedger(gravity, damper, friction, stored, residual, driven), motors
-
-
-_PANELS, _PARTS, _SPLITS = 48, 4, 10
-"""Parts of a footstep, each with its Gauss points; into how many one is split, and how often."""
-_SETTLED = 1e-8
-"""What a split may change, in units of the largest power times the footstep's period."""
-_BEFORE = 1e-7
-"""How long before its impact a footstep is looked at, in units of its period."""
 
 
 class RigidLedger(NamedTuple):

@@ -27,6 +27,14 @@ from jaxbiped.scene._parameter_access import parameter_names, parameter_values, 
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 
+CRITERIA = ("mean", "worst")
+_CORNERS = 6
+"""Scattered parameters up to which the worst case is sought at all corners of their box."""
+_WIDTHS = (1.0, 0.5, 0.25, 0.1)
+"""Half-widths, as shares of the box's, about the worst member so far in which others are tried."""
+_WORSE = 1e-4
+"""Relative difference by which another member counts as worse."""
+
 
 class GaitSettings(NamedTuple):
     """How gaits are found; see `find_gait`."""
@@ -89,15 +97,6 @@ def _find_each(
         return gait, functionals_of(scene, gait, wanted, settings.accuracy)
 
     return jax.vmap(one)(scenes, starts)
-
-
-CRITERIA = ("mean", "worst")
-_CORNERS = 6
-"""Scattered parameters up to which the worst case is sought at all corners of their box."""
-_WIDTHS = (1.0, 0.5, 0.25, 0.1)
-"""Half-widths, as shares of the box's, about the worst member so far in which others are tried."""
-_WORSE = 1e-4
-"""Relative difference by which another member counts as worse."""
 
 
 class Ensemble(NamedTuple):

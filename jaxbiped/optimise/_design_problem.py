@@ -40,6 +40,8 @@ _SMALLEST = 1.0 / 32.0
 _FLOOR, _ASIDE, _NEAR = 0.1, 0.5, 0.02
 """Size below which components of the state count as of one size; how far aside, in units of the
 step, and how far at least, relative to it, a gait may lie from where it was expected."""
+SubjectTo: TypeAlias = Mapping[str, tuple[float | None, float | None]] | Sequence[str] | str | None
+"""Bounds by name, or words such as "spectral_radius<0.4"."""
 
 
 class Variables(NamedTuple):
@@ -123,10 +125,6 @@ def start_of(scene: Scene | RigidScene, variables: Variables) -> np.ndarray:
     """The scene's own design in u, moved into the bounds, shape (k,)."""
     own = parameter_values(scene)
     return variables.positions(np.asarray([float(own[name]) for name in variables.names]))
-
-
-SubjectTo: TypeAlias = Mapping[str, tuple[float | None, float | None]] | Sequence[str] | str | None
-"""Bounds by name, or words such as "spectral_radius<0.4"."""
 
 
 class Requirement(NamedTuple):

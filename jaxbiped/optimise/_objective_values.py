@@ -51,6 +51,8 @@ _DISTANCES = {
 }
 _WHOLE = ("sensitivity_norm", "floor_sensitivity", *CLEARANCE_NORMS)
 """What the whole sensitivity is made of: step length, step time and clearance, by both."""
+BothFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None]
+"""Those of a gait's Jacobian and those of its cycle, None where no measure needs them."""
 
 
 class Evaluation(NamedTuple):
@@ -78,10 +80,6 @@ class Evaluation(NamedTuple):
     def functional(self, name: str) -> Functional:
         """Value, error, derivatives and their errors of one objective."""
         return _row(*(part[name] for part in self[:4]))
-
-
-BothFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None]
-"""Those of a gait's Jacobian and those of its cycle, None where no measure needs them."""
 
 
 def functionals_of(

@@ -42,6 +42,7 @@ _CORRECTIONS = 2
 """Second-order corrections of a step that did not come where the cluster was expected."""
 _DISTANCES = (1e-2, 1e-3, 1e-4)
 """At which others are scattered about a design that seems best, in u."""
+Callback = Callable[[np.ndarray], None]
 
 
 class RunEnding(NamedTuple):
@@ -49,9 +50,6 @@ class RunEnding(NamedTuple):
 
     converged: bool
     message: str
-
-
-Callback = Callable[[np.ndarray], None]
 
 
 def run_trust_region(

@@ -82,8 +82,7 @@ class Runs:
         """How it ended: converged only where the design is certified as an optimum, too."""
         if self.interrupted:
             return Outcome.INTERRUPTED
-        told = optimality_of(self.problem, self.best)
-        if told.excess > self.problem.allowance(self.best.known):
+        if self.problem.excess(self.best.known) > self.problem.allowance(self.best.known):
             return Outcome.INFEASIBLE
         if any(self.problem.weights.get(name) for name in self.best.known.beyond_range):
             return Outcome.BEYOND_RANGE
