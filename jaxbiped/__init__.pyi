@@ -77,7 +77,7 @@ from jaxbiped.measure._footsteps import footsteps as footsteps
 
 # Periodic gaits and gradients.
 from jaxbiped.gait._find_gait import find_gait as find_gait
-from jaxbiped.gait._find_gaits import find_gaits as find_gaits
+from jaxbiped.gait._find_gait import find_gaits as find_gaits
 from jaxbiped.gait._gait import Gait as Gait
 from jaxbiped.gait._gait_measures import gait_measures as gait_measures
 from jaxbiped.gait._return_map import return_map as return_map

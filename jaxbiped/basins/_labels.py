@@ -150,7 +150,7 @@ def _lists_starts(labels: Any) -> bool:
         # By `dict`: where there are none, xarray makes up numbers.
         index = np.asarray(dict(labels.coords).get(name))
         steps = np.diff(index) if index.dtype.kind in "iuf" else np.full(1, np.nan)
-        along = any(name in each.dims for each in labels.coords.values())
+        along = any(name in coordinate.dims for coordinate in labels.coords.values())
         if name == "start" or (along and not (np.all(steps > 0) or np.all(steps < 0))):
             return True
     return hasattr(labels, "iloc") and np.ndim(labels) == 1

@@ -14,6 +14,19 @@ _LOOK_ON = 1.5
 """Rays are followed this much farther than the first exit: a nearer one may lie beside them."""
 _MOST_PARTS = 4
 """Brackets are split into at most so many parts a call: fewer calls, but more points."""
+Normal = Callable[[np.ndarray], npt.ArrayLike]
+"""Gradients, shape (n, d), of points on the boundary, shape (n, d)."""
+_TURNS = (1.0, 0.5, 2.0, 0.25)
+"""Parts of the way to the normal that are tried: short ones where the boundary bulges inward."""
+_SHORTEST = 0.02
+"""Turns are halved where none helps, and given up below this part of their lengths."""
+_GAIN = 0.8
+"""A turn that brings the boundary no nearer must bring the angle down to this part of it."""
+_MOST_ROUNDS = 30
+_POLL = 0.1
+"""Angle [rad] to the rays beside one that are tried where normals are secants."""
+_BESIDE = np.asarray([-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0])
+"""Where on a nearby ray the boundary is looked for: logarithms of distances, in angles to it."""
 
 
 class Brackets(NamedTuple):
@@ -142,22 +155,6 @@ def nearest_of(
     return Brackets(
         candidates[row, first], inside, np.where(found, outside, np.inf), labels[row, first]
     )
-
-
-Normal = Callable[[np.ndarray], npt.ArrayLike]
-"""Gradients, shape (n, d), of points on the boundary, shape (n, d)."""
-
-_TURNS = (1.0, 0.5, 2.0, 0.25)
-"""Parts of the way to the normal that are tried: short ones where the boundary bulges inward."""
-_SHORTEST = 0.02
-"""Turns are halved where none helps, and given up below this part of their lengths."""
-_GAIN = 0.8
-"""A turn that brings the boundary no nearer must bring the angle down to this part of it."""
-_MOST_ROUNDS = 30
-_POLL = 0.1
-"""Angle [rad] to the rays beside one that are tried where normals are secants."""
-_BESIDE = np.asarray([-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0])
-"""Where on a nearby ray the boundary is looked for: logarithms of distances, in angles to it."""
 
 
 class GivenNormals:

@@ -25,7 +25,7 @@ from jaxbiped.continuation._branch_point import (
     change_of,
     multipliers_of,
 )
-from jaxbiped.continuation._continuation_setup import ContinuationSetup, setup_of
+from jaxbiped.continuation._continue_gait import ContinuationSetup, setup_of
 from jaxbiped.continuation._trace import BOUND, BranchStop, is_bound, leaves_range, reason_of
 from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint, StepControl, correct, follow
 from jaxbiped.gait._search_provenance import BranchEnd

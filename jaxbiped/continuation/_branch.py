@@ -29,6 +29,15 @@ from jaxbiped.scene._state_types import WalkerState
 if TYPE_CHECKING:
     import xarray
 
+_STABLE = {True: 1, False: 0, None: -1}
+_NUMBERS = ("period", "step_length", "peak_normal", "unit_multiplier_error", "residual")
+_HOW = ("footsteps", "accuracy", "engine")
+_EVENT_NUMBERS = ("multiplier_real", "multiplier_imag", "error", "value_error", "beyond")
+_OWN = {
+    "unit_multiplier_error": Quantity("error of the unit multiplier"),
+    "residual": Quantity("residual", unit="SI"),
+}
+
 
 class Branch(eqx.Module, Tabular):
     """A branch of periodic gaits along a parameter, n points in the order of its arclength.
@@ -118,16 +127,6 @@ class Branch(eqx.Module, Tabular):
             its error. Everything else is in the attributes.
         """
         return _branch_dataset(self)
-
-
-_STABLE = {True: 1, False: 0, None: -1}
-_NUMBERS = ("period", "step_length", "peak_normal", "unit_multiplier_error", "residual")
-_HOW = ("footsteps", "accuracy", "engine")
-_EVENT_NUMBERS = ("multiplier_real", "multiplier_imag", "error", "value_error", "beyond")
-_OWN = {
-    "unit_multiplier_error": Quantity("error of the unit multiplier"),
-    "residual": Quantity("residual", unit="SI"),
-}
 
 
 def _branch_dataset(branch: Branch) -> "xarray.Dataset":

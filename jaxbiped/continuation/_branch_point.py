@@ -19,6 +19,8 @@ from jaxbiped.scene._scene import AbstractScene
 
 _DECADES = 100.0
 """Ratio of the ends of a range from which it is gone through by equal factors."""
+_LOCATED = 1e-9
+"""Error of a multiplier at least: so near to the unit circle bifurcations are located."""
 
 
 class Axis(NamedTuple):
@@ -79,10 +81,6 @@ def axis_of(
 def start_of(scene: AbstractScene, axis: Axis) -> float:
     """The scene's own value of the axis's parameter, or the nearest in its range."""
     return float(np.clip(float(parameter_values(scene)[axis.name]), axis.first, axis.last))
-
-
-_LOCATED = 1e-9
-"""Error of a multiplier at least: so near to the unit circle bifurcations are located."""
 
 
 class CycleFootsteps(NamedTuple):

@@ -16,12 +16,13 @@ from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import axis_of
-from jaxbiped.continuation._continuation_setup import (
+from jaxbiped.continuation._continue_gait import (
     ContinuationSetup,
     continuation_setup,
+    first_gait,
     setup_of,
+    traces_from,
 )
-from jaxbiped.continuation._continue_gait import first_gait, traces_from
 from jaxbiped.continuation._trace import Trace
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait

@@ -14,7 +14,7 @@ import numpy as np
 from jaxbiped._checks import check_choice, check_count
 from jaxbiped._progress import stage
 from jaxbiped.continuation._branch_point import BranchPoint, axis_of
-from jaxbiped.continuation._continuation_setup import (
+from jaxbiped.continuation._continue_gait import (
     ContinuationSetup,
     check_followed,
     continuation_setup,

@@ -12,7 +12,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._continuation_setup import ContinuationSetup, setup_of
+from jaxbiped.continuation._continue_gait import ContinuationSetup, setup_of
 from jaxbiped.continuation._trace import BranchStop, Trace
 from jaxbiped.gait._pseudo_arclength import CurvePoint, correct
 from jaxbiped.gait._search_provenance import BranchEnd

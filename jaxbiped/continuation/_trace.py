@@ -34,6 +34,22 @@ _UNLOADED = 1e-3
 _SLIDES = 1.5
 """Factor of the load that slips from which feet slide beyond a limit that they do not before."""
 _LITTLE = 0.01
+_CHORD_ASIDE = 0.1
+"""Distance from a chord between two points, in its length, up to which the curve is asked."""
+_SAME, _CORRECTIONS = 1e-7, 10.0
+"""Distance of two gaits that are one, at least; and in units of the corrector's last step."""
+_SMALLEST = 1e-6
+_FIRST = 0.25
+"""Of the largest step."""
+_LEAST_COSINE, _ASIDE = 0.95, 0.02
+_DIVERGED = 1e6
+"""Multiplier by which the return map counts as not smooth: near grazing it grows as a root."""
+_AT_BOUND = 1e-9
+_SAME_WAY = 0.9
+"""Cosine between the tangents where a branch passes its own beginning once more."""
+LIMITS = (BranchEnd.WALK_ENDS, BranchEnd.BREAKS_OFF, BranchEnd.NO_WALK)
+"""Ends that are limits of the model."""
+BOUND = "the range ends"
 
 
 def limit_cause(
@@ -75,12 +91,6 @@ def _slipping_load(scene: Scene, state: WalkerState, period: float) -> float:
     return float(np.sum(load * (slip[:, 1:] > slow)) / max(float(np.sum(load)), 1e-300))
 
 
-_CHORD_ASIDE = 0.1
-"""Distance from a chord between two points, in its length, up to which the curve is asked."""
-_SAME, _CORRECTIONS = 1e-7, 10.0
-"""Distance of two gaits that are one, at least; and in units of the corrector's last step."""
-
-
 def passed_before(curve: Curve, passed: Sequence[BranchPoint], there: CurvePoint) -> float | None:
     """Whether a point lies on the curve through points that are passed, in their order.
 
@@ -111,20 +121,6 @@ def passed_before(curve: Curve, passed: Sequence[BranchPoint], there: CurvePoint
         if apart < max(_SAME, _CORRECTIONS * curve.converged):
             return float(known.tangent @ there.tangent)
     return None
-
-
-_SMALLEST = 1e-6
-_FIRST = 0.25
-"""Of the largest step."""
-_LEAST_COSINE, _ASIDE = 0.95, 0.02
-_DIVERGED = 1e6
-"""Multiplier by which the return map counts as not smooth: near grazing it grows as a root."""
-_AT_BOUND = 1e-9
-_SAME_WAY = 0.9
-"""Cosine between the tangents where a branch passes its own beginning once more."""
-
-LIMITS = (BranchEnd.WALK_ENDS, BranchEnd.BREAKS_OFF, BranchEnd.NO_WALK)
-"""Ends that are limits of the model."""
 
 
 class BranchStop(NamedTuple):
@@ -243,9 +239,6 @@ def trace(
             raise
         return stopped(BranchEnd.INTERRUPTED, "interrupted by Ctrl-C")
     return stopped(BranchEnd.UNFINISHED, f"{max_points} points were followed")
-
-
-BOUND = "the range ends"
 
 
 def reason_of(code: int) -> tuple[BranchEnd, str]:

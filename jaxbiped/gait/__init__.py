@@ -1,6 +1,6 @@
 """Periodic gaits: search, return map, stability, sensitivities, continuation."""
 
-from jaxbiped.gait._find_gaits import Gaits as Gaits
+from jaxbiped.gait._find_gait import Gaits as Gaits
 from jaxbiped.gait._fixed_point_search import Search as Search
 from jaxbiped.gait._gait import Measures as Measures
 from jaxbiped.gait._orbit_derivatives import Slopes as Slopes

@@ -46,7 +46,6 @@ _FINER = Precision(3e-7, 3e-6)
 """How exactly the seed's gait is followed again where it was lost, by finer steps."""
 _LEAPS, _GAPS = 4, (0.01, 0.05)
 """Leaps over kinks of a branch at most, and how far each leads in s."""
-
 Searching = Callable[[FixedPointProblem, int], Found]
 """Newton's method on a return map from a guess, in at most so many evaluations."""
 
@@ -186,9 +185,9 @@ def _beyond(
         about = walks_of(scene, lambda: [last], most=1)
         settled = (row for walks in about for row in walks.settled())
         for point in chain([last], settled):
-            found = search(problem._replace(args=scene, guess=state_at(kind, point)), _TURNS)
-            if int(found.ending) == int(Search.FOUND) and bool(found.sound):
-                return np.asarray(found.recurring), s
+            gait = search(problem._replace(args=scene, guess=state_at(kind, point)), _TURNS)
+            if int(gait.ending) == int(Search.FOUND) and bool(gait.sound):
+                return np.asarray(gait.recurring), s
     return None
 
 

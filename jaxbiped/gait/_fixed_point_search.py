@@ -43,6 +43,8 @@ _DEEPEST = 3.0
 """Elastic force of a standing foot, in units of the walker's weight: about 1 where it stands."""
 _ERRORS, _TOLERANCES = 4.0, 30.0
 """Distance of two crossings that are one: in units of the fixed point's error, and of rtol."""
+Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]
+"""The return from recurring components, as exactly as a stage wants, or none where idle."""
 
 
 class Search(NamedCode):
@@ -102,10 +104,6 @@ class Found(NamedTuple):
             # By NumPy: JAX would compile a program for every shape.
             known = jax.tree.map(np.asarray, known)
         return jax.tree.map(lambda leaf: leaf[place], known)
-
-
-Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]
-"""The return from recurring components, as exactly as a stage wants, or none where idle."""
 
 
 class FixedPointProblem(NamedTuple):

@@ -53,7 +53,6 @@ _MOST_STEPS = 40_000_000
 _FIRST, _LEAST, _WIDER, _NEAR = 0.5, 0.02, 1.3, 0.3
 """Standard deviation of the first starts, the least of others, how much wider than the best they
 are spread, and of those about a single one."""
-
 Pushed = Callable[[], list[np.ndarray]]
 """States without hip_x that take the place of some starts, at most half of them."""
 

@@ -7,9 +7,9 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_increasing, check_type
 from jaxbiped.compiler import count_operations
 from jaxbiped.dynamics._state import field_of, state_type
-from jaxbiped.measure._energy_ledger import rigid_ledger
-from jaxbiped.measure._footsteps import driving_works, heel_strikes
-from jaxbiped.measure._samples import kept_strikes, places_of_standing
+from jaxbiped.measure._energy_ledger import ledger_and_motors, rigid_ledger
+from jaxbiped.measure._footsteps import heel_strikes, root_place
+from jaxbiped.measure._samples import evaluate_at, kept_strikes, places_of_standing
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
@@ -86,7 +86,11 @@ def cost_of_transport(
         if times is not None:
             check_increasing("times", times, 2)
         ends = heel_strikes(scene, walk).time_s if times is None else np.asarray(times)
-        distance, gravity, motors = driving_works(scene, walk, ends)
+        if len(ends) < 2:
+            return CostOfTransport(*[np.zeros(0)] * len(CostOfTransport._fields))
+        distance = np.diff(evaluate_at(scene, walk, root_place, ends))
+        ledger, motors = ledger_and_motors(scene, walk, ends)
+        gravity = ledger.gravity_work
     return CostOfTransport((motors + gravity) / (weight * distance), motors, gravity, distance)
 
 

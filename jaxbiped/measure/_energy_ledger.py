@@ -24,6 +24,13 @@ from jaxbiped.measure._samples import (
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
+_PANELS, _PARTS, _SPLITS = 48, 4, 10
+"""Parts of a footstep, each with its Gauss points; into how many one is split, and how often."""
+_SETTLED = 1e-8
+"""What a split may change, in units of the largest power times the footstep's period."""
+_BEFORE = 1e-7
+"""How long before its impact a footstep is looked at, in units of its period."""
+
 
 class EnergyLedger(NamedTuple):
     """Gravity's work and where this energy goes, between consecutive times [J]; leaves (n,).
@@ -88,6 +95,13 @@ def energy_ledger(
     if times is not None:
         check_increasing("times", times, 2)
     ends = np.asarray(trajectory.t)[[0, -1]] if times is None else np.asarray(times)
+    return ledger_and_motors(scene, trajectory, ends)[0]
+
+
+def ledger_and_motors(
+    scene: Scene, trajectory: Trajectory, ends: np.ndarray
+) -> tuple[EnergyLedger, np.ndarray]:
+    """The ledger between n + 1 times [s], and the motors' positive work [J], shape (n,)."""
     held = evaluate_at(scene, trajectory, energies, ends)
     flows = sample(scene, trajectory, powers, ends)
 
@@ -98,18 +112,12 @@ def energy_ledger(
     damper = between(flows.values.indentation) - np.diff(held.elastic)
     friction = between(flows.values.friction)
     stored = np.diff(held.kinetic) + np.diff(held.elastic)
-    power = flows.values.actuation
+    power, motors = flows.values.actuation, np.zeros(len(ends) - 1)
     driven = np.zeros(len(ends) - 1) if power is None else between(power)
+    for motor in flows.values.motors or ():
+        motors += flows.totals(flows.positive_integral(motor), ends)
     residual = gravity + driven - damper - friction - stored
-    return EnergyLedger(gravity, damper, friction, stored, residual, driven)
-
-
-_PANELS, _PARTS, _SPLITS = 48, 4, 10
-"""Parts of a footstep, each with its Gauss points; into how many one is split, and how often."""
-_SETTLED = 1e-8
-"""What a split may change, in units of the largest power times the footstep's period."""
-_BEFORE = 1e-7
-"""How long before its impact a footstep is looked at, in units of its period."""
+    return EnergyLedger(gravity, damper, friction, stored, residual, driven), motors
 
 
 class RigidLedger(NamedTuple):

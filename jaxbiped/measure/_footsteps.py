@@ -11,10 +11,9 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped._types import Numbers, Scalar, rows_of
 from jaxbiped.dynamics._contacts import Contacts, contacts
-from jaxbiped.dynamics._energy import energies, is_driven, powers
 from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._footfalls import landings, standing_leg
-from jaxbiped.measure._energy_ledger import energy_ledger
+from jaxbiped.measure._energy_ledger import ledger_and_motors
 from jaxbiped.measure._samples import (
     Samples,
     evaluate_along,
@@ -183,7 +182,8 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     time = strikes.time_s
     period, length = np.diff(time), np.diff(strike_places(scene, trajectory, strikes))
     loads = sample(scene, trajectory, contacts, time)
-    distance, gravity, motors = driving_works(scene, trajectory, time)
+    distance = np.diff(evaluate_at(scene, trajectory, root_place, time))
+    ledger, motors = ledger_and_motors(scene, trajectory, time)
     weight = float(scene.mechanism.total_mass) * float(scene.ground.g)
     normal = np.max([np.asarray(force.normal) for force in loads.values.forces], axis=0)
     return Footsteps(
@@ -194,31 +194,13 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
         peak_normal_N=_largest(normal, loads, time),
         max_penetration_m=_largest(_depth(loads.values), loads, time),
         double_support_s=_double_support(scene, trajectory, time, loads),
-        cost_of_transport=(motors + gravity) / (weight * distance),
-        energy_residual_J=energy_ledger(scene, trajectory, time).residual,
+        cost_of_transport=(motors + ledger.gravity_work) / (weight * distance),
+        energy_residual_J=ledger.residual,
         leg=leg,
     )
 
 
-def driving_works(
-    scene: Scene, walk: Trajectory, ends: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Distance [m], gravity's work and the motors' [J] between times."""
-    count = max(len(ends) - 1, 0)
-    if count == 0:
-        nothing = np.zeros(0)
-        return nothing, nothing, nothing
-    place = evaluate_at(scene, walk, _root_place, ends)
-    gravity = -np.diff(evaluate_at(scene, walk, energies, ends).gravitational)
-    driven = np.zeros(count)
-    if is_driven(scene):
-        flows = sample(scene, walk, powers, ends)
-        for power in flows.values.motors:
-            driven += flows.totals(flows.positive_integral(power), ends)
-    return np.diff(place), gravity, driven
-
-
-def _root_place(scene: Scene, state: Any) -> Scalar:
+def root_place(scene: Scene, state: Any) -> Scalar:
     """Place of the root point along the slope [m]."""
     return getattr(minimal_state(scene, state), scene.mechanism.structure.coordinates[0])
 

@@ -23,7 +23,6 @@ from jaxbiped.solve._trajectory import Arrivals, Trajectory, check_scene_of
 
 SomeScene = TypeVar("SomeScene", bound=AbstractWalkerScene)
 _Taken = TypeVar("_Taken")
-
 NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _TO_ENDS = np.linalg.solve(np.vander(NODES).T, np.vander([-1.0, 1.0], len(NODES)).T)
 """Weights of values at the Gauss points by which their polynomial has those at both ends."""

@@ -14,8 +14,7 @@ from jaxbiped._checks import check_choice
 from jaxbiped._types import as_float
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent, advance, locate_near
 from jaxbiped.continuation._branch_point import axis_of, start_of
-from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
-from jaxbiped.continuation._continue_gait import traces_from
+from jaxbiped.continuation._continue_gait import ContinuationSetup, continuation_setup, traces_from
 from jaxbiped.continuation._critical_values import STEPS, fold_forcing, range_of
 from jaxbiped.continuation._trace import LIMITS, Trace
 from jaxbiped.gait._fixed_point_search import looser
@@ -23,8 +22,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._pseudo_arclength import CurvePoint
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.optimise._cycle_functionals import Functional
-from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
-from jaxbiped.optimise._jacobian_weights import MODULI
+from jaxbiped.optimise._jacobian_functionals import MODULI, jacobian_functionals
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES

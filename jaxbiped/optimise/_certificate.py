@@ -42,8 +42,6 @@ _SETTLED = 1e-4
 """Relative difference between a walk's last footstep and the gait's that counts as none."""
 _FATAL = 1e-4
 """Scaled distance to which the smallest fatal push is bisected."""
-
-
 _Found = TypeVar("_Found")
 
 

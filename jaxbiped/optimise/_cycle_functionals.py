@@ -43,7 +43,6 @@ errors of derivatives of the spectral radius, of slip and of losses are then bel
 elasticity, as those of the gait's own measures are; it doubles what an evaluation costs."""
 _DRIVEN, _BOUND = 0.3, 0.1
 """Shares of these tolerances that keep the motors' work, and the bound of the radius, to 1e-5."""
-
 _AWAY = 1e-3
 """Relative distance from an orbit at which a cycle of it does not end."""
 

@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from jaxbiped.optimise._design_problem import DesignProblem, scale_of
-from jaxbiped.optimise._jacobian_weights import SYMMETRIC
+from jaxbiped.optimise._jacobian_functionals import SYMMETRIC
 from jaxbiped.optimise._objective_values import Evaluation
 
 _ACTIVE = 1e-4

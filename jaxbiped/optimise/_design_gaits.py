@@ -16,7 +16,7 @@ from jaxbiped.dynamics._state import state_of_recurring, state_type
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._jacobian_weights import CLUSTER
+from jaxbiped.optimise._jacobian_functionals import CLUSTER
 from jaxbiped.optimise._objective_values import (
     BothFunctionals,
     Evaluation,
@@ -26,6 +26,14 @@ from jaxbiped.optimise._objective_values import (
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
+
+CRITERIA = ("mean", "worst")
+_CORNERS = 6
+"""Scattered parameters up to which the worst case is sought at all corners of their box."""
+_WIDTHS = (1.0, 0.5, 0.25, 0.1)
+"""Half-widths, as shares of the box's, about the worst member so far in which others are tried."""
+_WORSE = 1e-4
+"""Relative difference by which another member counts as worse."""
 
 
 class GaitSettings(NamedTuple):
@@ -89,15 +97,6 @@ def _find_each(
         return gait, functionals_of(scene, gait, wanted, settings.accuracy)
 
     return jax.vmap(one)(scenes, starts)
-
-
-CRITERIA = ("mean", "worst")
-_CORNERS = 6
-"""Scattered parameters up to which the worst case is sought at all corners of their box."""
-_WIDTHS = (1.0, 0.5, 0.25, 0.1)
-"""Half-widths, as shares of the box's, about the worst member so far in which others are tried."""
-_WORSE = 1e-4
-"""Relative difference by which another member counts as worse."""
 
 
 class Ensemble(NamedTuple):

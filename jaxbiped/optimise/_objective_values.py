@@ -33,8 +33,13 @@ from jaxbiped.optimise._cycle_functionals import (
     integral_names,
     weighted_sum,
 )
-from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
-from jaxbiped.optimise._jacobian_weights import CLEARANCE_NORMS, CLUSTER, SYMMETRIC
+from jaxbiped.optimise._jacobian_functionals import (
+    CLEARANCE_NORMS,
+    CLUSTER,
+    JACOBIAN_FUNCTIONALS,
+    SYMMETRIC,
+    jacobian_functionals,
+)
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.scene._parameter_access import parameter_names, select_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -46,6 +51,8 @@ _DISTANCES = {
 }
 _WHOLE = ("sensitivity_norm", "floor_sensitivity", *CLEARANCE_NORMS)
 """What the whole sensitivity is made of: step length, step time and clearance, by both."""
+BothFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None]
+"""Those of a gait's Jacobian and those of its cycle, None where no measure needs them."""
 
 
 class Evaluation(NamedTuple):
@@ -73,10 +80,6 @@ class Evaluation(NamedTuple):
     def functional(self, name: str) -> Functional:
         """Value, error, derivatives and their errors of one objective."""
         return _row(*(part[name] for part in self[:4]))
-
-
-BothFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None]
-"""Those of a gait's Jacobian and those of its cycle, None where no measure needs them."""
 
 
 def functionals_of(

@@ -14,6 +14,12 @@ from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
+_SEARCHED = {
+    "fatal_push": "it is the nearest point of a basin's boundary, found by a search that has no "
+    "derivatives; jb.basins.minimal_fatal_shock tells it of a gait that was found",
+}
+"""What a gait has that is none of a smooth function's values."""
+
 
 def _of_driven(scene: Scene | RigidScene) -> str | None:
     return None if is_driven(scene) else "it has no actuators"
@@ -124,11 +130,6 @@ OBJECTIVES = {
   lies in the range that is followed the distance is that of the range's farther end, without
   derivatives: more than that of any design that has one.
 """
-_SEARCHED = {
-    "fatal_push": "it is the nearest point of a basin's boundary, found by a search that has no "
-    "derivatives; jb.basins.minimal_fatal_shock tells it of a gait that was found",
-}
-"""What a gait has that is none of a smooth function's values."""
 
 
 def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective") -> None:

@@ -7,7 +7,6 @@ import scipy  # its submodules are imported where they are first used
 
 from jaxbiped.optimise._design_functions import AnyRow, cluster_rows, rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem, scale_of
-from jaxbiped.optimise._objective_values import Evaluation
 
 OPTIMAL = 1e-3
 """Residual of the conditions of optimality from which a design counts as an optimum."""
@@ -138,42 +137,56 @@ def lagrangian_change(
     problem: DesignProblem, here: Design, there: Design, scale: float
 ) -> np.ndarray:
     """How the gradient of the scaled Lagrangian changes, with the multipliers of `there`."""
-    found = _balance(problem, there, scale)
-    ends = []
-    for each in (there, here):
-        own = _smooth_gradient(problem, each) / scale
-        for (row, _), multiplier in zip(found.active, found.multipliers, strict=False):
-            own = own - multiplier * problem.gradient(each.u, row.slopes(each.known))
-        ends.append(own)
-    return ends[0] - ends[1]
+    balance = _balance(problem, there, scale)
+
+    def gradient(design: Design) -> np.ndarray:
+        total = _smooth_gradient(problem, design) / scale
+        for (row, _), multiplier in zip(balance.active, balance.multipliers, strict=False):
+            total = total - multiplier * problem.gradient(design.u, row.slopes(design.known))
+        return total
+
+    return gradient(there) - gradient(here)
 
 
 def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
     """Multipliers that balance the gradient best, in the least-squares sense, with right signs.
 
     The design's own derivatives alone count. Where multipliers meet, the conditions on their
-    symmetric functions have derivatives that span all directions in which the radius grows.
+    symmetric functions have derivatives that span all directions in which the radius grows. The
+    multipliers of a requirement or a bound are those of moving it upwards, in its units.
     """
-    u, known = design
+    (u, known), variables, sense = design, problem.variables, problem.sense
     scale = max(abs(problem.objective(known).value), 1e-300)
-    found = _balance(problem, design, scale)
-    count = len(found.active)
+    balance = _balance(problem, design, scale)
+    count = len(balance.active)
     held: dict[tuple[str, float, float], tuple[float, float]] = {}
     for (row, in_sum), multiplier, error in zip(
-        found.active, found.multipliers[:count], found.spreads[:count], strict=True
+        balance.active, balance.multipliers[:count], balance.spreads[:count], strict=True
     ):
         if not in_sum:
             size = scale * row.by_bound(known)
             total, spread = held.get(row[:3], (0.0, 0.0))
             held[row[:3]] = total - multiplier * size, spread + error * abs(size)
-    rows = {row[:3]: row for row in rows_of(problem)}.values()
-    at_bounds = zip(_at_bounds(u), found.multipliers[count:], found.spreads[count:], strict=True)
+    requirements = []
+    for key in dict.fromkeys(row[:3] for row in rows_of(problem)):
+        (name, bound, _), (multiplier, error) = key, held.get(key, (0.0, 0.0))
+        value, off = known.values[name], known.errors[name]
+        multiplier, error = float(sense * multiplier), float(error)
+        requirements.append(Held(name, bound, value, off, key in held, multiplier, error))
+    values, rates, bounds = variables.values(u), variables.rates(u), []
+    for (place, side), multiplier, error in zip(
+        _at_bounds(u), balance.multipliers[count:], balance.spreads[count:], strict=True
+    ):
+        name, bound, rate = variables.names[place], float(values[place]), float(rates[place])
+        multiplier = float(side * multiplier * (scale * sense) / rate)
+        error = float(error * abs(scale * sense / rate))
+        bounds.append(Held(name, bound, bound, 0.0, True, multiplier, error))
     return Optimality(
-        residual=float(np.max(np.abs(found.left))),
-        error=float(np.max(found.errors)),
+        residual=float(np.max(np.abs(balance.left))),
+        error=float(np.max(balance.errors)),
         excess=problem.excess(known),
-        requirements=tuple(_held_measure(problem, row, known, held.get(row[:3])) for row in rows),
-        bounds=tuple(_held_variable(problem, u, scale, *each) for each in at_bounds),
+        requirements=tuple(requirements),
+        bounds=tuple(bounds),
     )
 
 
@@ -232,41 +245,3 @@ def _at_bounds(u: np.ndarray) -> list[tuple[int, float]]:
     """Variables at a bound: where, and 1 for the lower, −1 for the upper."""
     lower = [(int(k), 1.0) for k in np.flatnonzero(u <= _AT_BOUND)]
     return lower + [(int(k), -1.0) for k in np.flatnonzero(u >= 1.0 - _AT_BOUND)]
-
-
-def _held_measure(
-    problem: DesignProblem, row: AnyRow, known: Evaluation, found: tuple[float, float] | None
-) -> Held:
-    """Multipliers in the units of objective and measure: of moving the bound upwards."""
-    multiplier, error = found or (0.0, 0.0)
-    return Held(
-        name=row.name,
-        bound=row.bound,
-        value=known.values[row.name],
-        error=known.errors[row.name],
-        active=found is not None,
-        multiplier=float(problem.sense * multiplier),
-        multiplier_error=float(error),
-    )
-
-
-def _held_variable(
-    problem: DesignProblem,
-    u: np.ndarray,
-    scale: float,
-    at: tuple[int, float],
-    multiplier: float,
-    error: float,
-) -> Held:
-    (place, side), variables = at, problem.variables
-    value, rate = (float(each[place]) for each in (variables.values(u), variables.rates(u)))
-    scale *= problem.sense
-    return Held(
-        name=variables.names[place],
-        bound=value,
-        value=value,
-        error=0.0,
-        active=True,
-        multiplier=float(side * multiplier * scale / rate),
-        multiplier_error=float(error * abs(scale / rate)),
-    )

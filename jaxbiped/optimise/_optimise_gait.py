@@ -21,8 +21,8 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
 from jaxbiped.gait._search_starts import state_of_guess
 from jaxbiped.optimise._design_gaits import Ensemble, GaitSettings, ensemble_of
-from jaxbiped.optimise._design_problem import DesignProblem
-from jaxbiped.optimise._design_variables import (
+from jaxbiped.optimise._design_problem import (
+    DesignProblem,
     SubjectTo,
     larger_is_worse,
     requirements_of,

@@ -42,6 +42,7 @@ _CORRECTIONS = 2
 """Second-order corrections of a step that did not come where the cluster was expected."""
 _DISTANCES = (1e-2, 1e-3, 1e-4)
 """At which others are scattered about a design that seems best, in u."""
+Callback = Callable[[np.ndarray], None]
 
 
 class RunEnding(NamedTuple):
@@ -49,9 +50,6 @@ class RunEnding(NamedTuple):
 
     converged: bool
     message: str
-
-
-Callback = Callable[[np.ndarray], None]
 
 
 def run_trust_region(
@@ -297,3 +295,9 @@ def run_optax(
             return RunEnding(True, "Steps became small.")
         logits = jnp.asarray(optax.apply_updates(logits, step))
     return RunEnding(False, "Iteration limit reached")
+
+
+_RUNS = (run_trust_region, run_slsqp, run_trust_constr, run_optax)
+BY_NAME: dict[str, Callable[[Functions, np.ndarray, int, Callback], RunEnding]] = dict(
+    zip(OPTIMISERS, _RUNS, strict=True)
+)

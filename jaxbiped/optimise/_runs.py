@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,14 +14,7 @@ from jaxbiped.optimise._design_functions import Functions
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
 from jaxbiped.optimise._optimality import OPTIMAL, doubt_of, is_flat, is_near, optimality_of
-from jaxbiped.optimise._optimisers import (
-    Callback,
-    RunEnding,
-    run_optax,
-    run_slsqp,
-    run_trust_constr,
-    run_trust_region,
-)
+from jaxbiped.optimise._optimisers import BY_NAME, RunEnding, run_optax, run_trust_region
 from jaxbiped.optimise._optimum import Iteration, Optimum, Outcome
 
 if TYPE_CHECKING:
@@ -32,14 +24,6 @@ _DRAWN = 8
 """Designs that are drawn for each one that is kept."""
 _STAGES = 4
 """Steps in which the gaits of all of them are followed from the first design's."""
-
-
-_BY_NAME: dict[str, Callable[[Functions, np.ndarray, int, Callback], RunEnding]] = {
-    "trust-region": run_trust_region,
-    "slsqp": run_slsqp,
-    "trust-constr": run_trust_constr,
-    "optax": run_optax,
-}
 _NOT_ENDED = RunEnding(False, "")
 
 
@@ -73,7 +57,7 @@ class Runs:
         before = self.best
         functions = Functions(self.problem)
         if isinstance(self.optimiser, str):
-            optimise = _BY_NAME[self.optimiser]
+            optimise = BY_NAME[self.optimiser]
         else:
             optimise = functools.partial(run_optax, transformation=self.optimiser)
         ended = optimise(functions, begin.u, self.iterations, self.note)
@@ -98,8 +82,7 @@ class Runs:
         """How it ended: converged only where the design is certified as an optimum, too."""
         if self.interrupted:
             return Outcome.INTERRUPTED
-        told = optimality_of(self.problem, self.best)
-        if told.excess > self.problem.allowance(self.best.known):
+        if self.problem.excess(self.best.known) > self.problem.allowance(self.best.known):
             return Outcome.INFEASIBLE
         if any(self.problem.weights.get(name) for name in self.best.known.beyond_range):
             return Outcome.BEYOND_RANGE

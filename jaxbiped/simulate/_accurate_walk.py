@@ -34,8 +34,6 @@ _LONG = 1e-2
 _MANY = 8
 """Steps from which the other ones are longer, and cost less; those of fewer are shorter."""
 _LONGER, _SHORTER = (2.0, 2.0**0.5), (1.0 / 2.0, 1.0 / 3.0)
-
-
 AnySimulation: TypeAlias = Simulation | RigidSimulation
 
 

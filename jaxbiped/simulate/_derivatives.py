@@ -7,7 +7,7 @@ are, so a rule is given here.
 import contextlib
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
 import equinox as eqx
 import jax
@@ -18,15 +18,271 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._ending import Ending
 from jaxbiped._jax_versions import unbatched, untraced
-from jaxbiped._types import Scalar, is_real, is_traced
+from jaxbiped._types import Scalar, in_64_bits, is_real, is_traced, select
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.simulate._slopes import Slopes
+from jaxbiped.compiler import CUDA, host_jit
+from jaxbiped.dynamics._impact import impact
+from jaxbiped.dynamics._minimal_motion import vector_field
+from jaxbiped.dynamics._mode_changes import change_mode_on_surface, mode_switches
+from jaxbiped.dynamics._stance_motion import rolling_field
+from jaxbiped.dynamics._surfaces import (
+    AbstractSection,
+    in_nearest_names,
+    opening,
+    switches,
+    uprightness,
+)
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.solve._accuracy import units_of
+from jaxbiped.solve._failure_events import ending_surface
+from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
+from jaxbiped.variational._variational_solve import (
+    EventMotion,
+    TangentsAtTimes,
+    follow_event,
+    motion_solve,
+    seeded_directions,
+    tangents_after,
+    tangents_at_times,
+)
 
+_EARLY, _LEFT = 3.0, 1e-2
+"""How long before an event the motion is first followed, in tolerances times the unit of time, and
+the share of that which is left in the end: behind a touchdown derivatives change in nanoseconds."""
+_WATCH = Watch(field=vector_field, switches=switches)
+"""Derivatives are taken up to the times at which the plain solve saved."""
+_ROLLING = Watch(field=rolling_field, switches=mode_switches)
+_IN_MODES = Watch(field=rolling_field, switches=mode_switches, reset=change_mode_on_surface)
 _Run = TypeVar("_Run")
 _STILL = object()
 """Tangent of what is known."""
+
+
+class Slopes(NamedTuple):
+    """Derivatives at k moments: arrivals at a section, then what was saved.
+
+    Attributes:
+        time, state: in n directions, shapes (k, n) and (k, n, c).
+        clock: whether the moment is that of a clock, the duration or a time to save at, (k,).
+        rates: of the state there, shape (k, c).
+    """
+
+    time: Scalar
+    state: Scalar
+    clock: Scalar
+    rates: Scalar
+
+
+@host_jit(lambda *_, device, **__: not device)
+def slopes_of(
+    scene: Scene,
+    state: PyTree,
+    found: Trajectory,
+    *,
+    until: Scalar | None,
+    solver: AbstractRosenbrock,
+    section: AbstractSection | None,
+    rtol: Scalar,
+    places: tuple[int, ...],
+    active: tuple[int, ...],
+    device: bool,
+) -> Slopes:
+    """Derivatives of what was `found`, with respect to some leaves of the state and of the scene.
+
+    Args:
+        scene, state: what was simulated, and from where.
+        found: the result.
+        until: the duration, to which all moments but the last are events; None: the times to save
+            at were given.
+        solver: of the columns.
+        section: at which arrivals were saved.
+        rtol: relative tolerance of the solve.
+        places, active: of the leaves that are differentiated.
+        device: whether CUDA devices carry the columns; else it is lanes where they can, else XLA.
+    """
+    scene, state, saved, t = in_64_bits((scene, state, found.state, found.t))
+    if found.arrivals is not None:
+        t = jnp.concatenate([in_64_bits(found.arrivals.t), t])
+    by_clock = jnp.isfinite(t)
+    if until is not None:
+        last = jnp.arange(len(t)) == len(t) - 1
+        by_clock = last & (t >= until)
+    arrived = len(t) - len(found.t)
+    there = jtu.tree_map(lambda leaf: jnp.pad(leaf, (arrived, 0), mode="edge"), saved)
+    at = TangentsAtTimes(there, jnp.zeros((len(t), 0, len(there))))
+    time = jnp.zeros((len(t), 0))
+    if places or active:
+        how, engine = motion_solve(_WATCH, solver, rtol), CUDA if device else None
+        start, seeded = seeded_directions(scene, state, places, active)
+        early = _EARLY * rtol * units_of(scene, state).time
+        at = tangents_at_times(how, start, seeded, jnp.where(by_clock, t, t - early), engine)
+        time = jnp.zeros(at.columns.shape[:2])
+    columns = at.columns
+    if until is not None and (places or active):
+        end = jtu.tree_map(lambda leaf: leaf[-1], saved)
+
+        def nearer(here: Tangents, delay: Scalar) -> Tangents:
+            lasts = jnp.where(delay <= 2.0 * early, (1.0 - _LEFT) * jnp.maximum(delay, 0.0), 0.0)
+            return tangents_after(how, here, seeded, lasts, engine)
+
+        moves = _at_events(scene, at, end, found.ending, section, rtol, seeded, nearer)
+        time = jnp.where(by_clock[:, None], 0.0, moves.time)
+        columns = jnp.where(by_clock[:, None, None], columns, moves.state)
+    rates = jnp.stack(jtu.tree_leaves(jax.vmap(lambda y: vector_field(0.0, y, scene))(at.state)), 1)
+    reached = jnp.isfinite(t)[:, None]
+    return Slopes(
+        time=jnp.where(reached, time, 0.0),
+        state=jnp.where(reached[..., None], columns, 0.0),
+        clock=by_clock.astype(t.dtype),
+        rates=jnp.where(reached, rates, 0.0),
+    )
+
+
+def _at_events(
+    scene: Scene,
+    at: TangentsAtTimes,
+    end: PyTree,
+    ending: Scalar,
+    section: AbstractSection | None,
+    rtol: Scalar,
+    seeded: Seeded,
+    nearer: Callable[[Tangents, Scalar], Tangents],
+) -> EventMotion:
+    """At arrivals at a section, but at last where the simulation ends.
+
+    `nearer` follows the motion from before an event almost as far as that.
+    """
+    unit = units_of(scene, end).time
+
+    def follow(surface: Callable[[PyTree, PyTree], Scalar], here: TangentsAtTimes) -> EventMotion:
+        def event(at: Tangents) -> EventMotion:
+            return follow_event(
+                surface,
+                lambda a, y: vector_field(0.0, y, a),
+                at,
+                seeded,
+                rtol=rtol,
+                unit=unit,
+            )
+
+        first = Tangents(here.state, here.columns.T)
+        return event(nearer(first, event(first).delay))
+
+    def arrive(here: TangentsAtTimes) -> EventMotion:
+        assert section is not None
+
+        def surface(a: PyTree, y: PyTree) -> Scalar:
+            return section.value(a, in_nearest_names(section, a, here.state, y))
+
+        return follow(surface, here)
+
+    last = jtu.tree_map(lambda leaf: leaf[-1], at)
+    moments = [
+        jtu.tree_map(
+            lambda leaf: leaf[None],
+            follow(lambda a, y: ending_surface(ending, a, end, y), last),
+        )
+    ]
+    if section is not None:
+        moments.insert(0, jax.vmap(arrive)(jtu.tree_map(lambda leaf: leaf[:-1], at)))
+    found: EventMotion = jtu.tree_map(lambda *each: jnp.concatenate(each), *moments)
+    return found
+
+
+class _Strike(NamedTuple):
+    """A heel strike's time and the state after it, with their derivatives."""
+
+    t: Scalar
+    time: Scalar
+    after: Tangents
+
+
+@host_jit()
+def rigid_slopes_of(
+    walk: RigidWalk,
+    strikes: Scalar,
+    count: Scalar,
+    end: Scalar,
+    ending: Scalar,
+    *,
+    places: tuple[int, ...],
+    active: tuple[int, ...],
+) -> Slopes:
+    """Derivatives with respect to some leaves of the state and of the scene.
+
+    Args:
+        walk: what walked, from where, for how long and how exactly.
+        strikes: times of heel strikes [s], of which the first `count` came; NaN is told where
+            there were more.
+        count: how many there were.
+        end, ending: when and how the walk ended.
+        places, active: of the leaves that are differentiated.
+    """
+    scene, state = in_64_bits((walk.scene, walk.state))
+    start, seeded = seeded_directions(scene, state, places, active)
+    watch = _IN_MODES if hasattr(state, "mode") else _ROLLING
+    how = motion_solve(watch, Rodas5P(), walk.rtol)
+    unit = jnp.sqrt(scene.mechanism.height / scene.ground.g)
+    n = len(places) + len(active)
+
+    def follow(since: _Strike, t: Scalar) -> Tangents:
+        """With derivatives at this very time."""
+        found = tangents_after(how, since.after, seeded, t - since.t)
+        velocity = as_columns(rolling_field(0.0, found.state, scene))
+        return found._replace(columns=found.columns - velocity[:, None] * since.time)
+
+    def event(surface: PyTree, at: Tangents) -> EventMotion:
+        return follow_event(
+            surface, lambda a, y: rolling_field(0.0, y, a), at, seeded, rtol=walk.rtol, unit=unit
+        )
+
+    def strike(before: _Strike, given: tuple[Scalar, Scalar]) -> tuple[_Strike, _Strike]:
+        t, comes = given
+        at = follow(before, jnp.where(comes, t, before.t))
+        moves = event(lambda a, y: -opening(a, y), at)
+        # This solve's own strike, lest its phase drift away from the walk's.
+        rates = rolling_field(0.0, at.state, scene)
+        on = jtu.tree_map(lambda leaf, rate: leaf + rate * moves.delay, at.state, rates)
+        after, columns = along_columns(
+            lambda y, a: impact(a, y).state, Tangents(on, moves.state.T), seeded
+        )
+        found = _Strike(t + moves.delay, moves.time, Tangents(after, as_columns(columns)))
+        found = select(comes, found, before)
+        return found, found
+
+    first = _Strike(jnp.zeros_like(end), jnp.zeros(n), start)
+    reached = jnp.arange(len(strikes)) < count
+    last, each = jax.lax.scan(strike, first, (strikes, reached))
+    at = follow(last, end)
+
+    def fallen(a: RigidScene, y: Any) -> Scalar:
+        side = jnp.where(ending == int(Ending.FELL_FORWARD), -1.0, 1.0)
+        return -uprightness(a, y, side)
+
+    moves = event(fallen, at)
+    struck = (count > 0) & (end <= strikes[jnp.maximum(count - 1, 0)])
+    by_clock = ~struck & (end >= walk.duration)
+    lost = jnp.where(count > len(strikes), jnp.nan, 0.0)
+    time = jnp.where(struck, last.time, jnp.where(by_clock, 0.0, moves.time)) + lost
+    columns = jnp.where(by_clock, at.columns.T, moves.state)
+    columns = jnp.where(struck, last.after.columns.T, columns) + lost
+    rates = as_columns(rolling_field(0.0, at.state, scene))
+    return Slopes(
+        time=jnp.append(jnp.where(reached[:, None], each.time, 0.0), time[None], 0),
+        state=jnp.append(
+            jnp.where(reached[:, None, None], jnp.swapaxes(each.after.columns, 1, 2), 0.0),
+            columns[None],
+            0,
+        ),
+        clock=jnp.append(jnp.zeros(len(strikes)), jnp.where(by_clock, 1.0, 0.0)),
+        rates=jnp.broadcast_to(rates, (len(strikes) + 1, len(rates))),
+    )
 
 
 def with_derivatives(

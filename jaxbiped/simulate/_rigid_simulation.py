@@ -27,8 +27,7 @@ from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._modes import check_mode, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
-from jaxbiped.simulate._derivatives import with_derivatives
-from jaxbiped.simulate._slopes import Slopes, rigid_slopes_of
+from jaxbiped.simulate._derivatives import Slopes, rigid_slopes_of, with_derivatives
 from jaxbiped.simulate._start import (
     Options,
     check_limits,

@@ -36,8 +36,7 @@ from jaxbiped.simulate._backends import (
     prepare_lanes,
     trim,
 )
-from jaxbiped.simulate._derivatives import with_derivatives
-from jaxbiped.simulate._slopes import Slopes, slopes_of
+from jaxbiped.simulate._derivatives import Slopes, slopes_of, with_derivatives
 from jaxbiped.simulate._start import (
     Options,
     check_limits,

@@ -36,8 +36,6 @@ _DEEPEST = 0.25
 """Penetration of a foot that touches, in units of l, from which it starts below the ground."""
 _HIGHEST = 100.0
 """Energy stored in a foot's contact, in units of m g l, from which it does."""
-
-
 _TOLD_DEPTH = 0.01
 """Penetration of a foot that is reported, in units of the walker's height."""
 _TOLD_ANGLE = 0.1

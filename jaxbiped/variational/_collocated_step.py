@@ -31,6 +31,8 @@ RADAU = np.array(
     ]
 )
 """Weights of the rates at the nodes."""
+Field = Callable[[Sequence[Scalar], Sequence[Scalar]], list[Scalar]]
+"""Rates of all components, of components and active parameters."""
 
 
 class KnownStep(NamedTuple):
@@ -64,10 +66,6 @@ class KnownStep(NamedTuple):
         root = first + width * _NODES
         elapsed = width * _NODES * (root + first)
         return elapsed / jnp.where(self.span > 0.0, self.span, 1.0), 2.0 * root * width
-
-
-Field = Callable[[Sequence[Scalar], Sequence[Scalar]], list[Scalar]]
-"""Rates of all components, of components and active parameters."""
 
 
 class Order(NamedTuple):

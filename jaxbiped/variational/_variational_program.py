@@ -16,7 +16,12 @@ from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._step_size import step_control
 from jaxbiped.solve.controllers._wrapped_control import clip_step, first_step
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._column_step import Differentiated, column_step, cross, differentiate_step
+from jaxbiped.variational._rosenbrock_tangents import (
+    Differentiated,
+    column_step,
+    cross,
+    differentiate_step,
+)
 from jaxbiped.variational._saltation import (
     at_fixed_time,
     behind_arrival,
@@ -24,9 +29,8 @@ from jaxbiped.variational._saltation import (
     meet,
     meeting_at,
 )
-from jaxbiped.variational._solve_to_section import onto_section, peak_of
+from jaxbiped.variational._solve_to_section import SHARE, onto_section, peak_of
 from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
-from jaxbiped.variational._tangent_solver import SHARE
 from jaxbiped.variational._tangents import (
     Seeded,
     Tangents,
@@ -255,35 +259,30 @@ class AdaptiveColumns:
             bad = jnp.where(jnp.isfinite(jnp.sum(column)), jnp.inf, 0.0)
             return end, jnp.where(jnp.isnan(square), bad, square)
 
-        found, worst = [], jnp.zeros(())
-        by_state, by_parameter = now.columns
+        (by_state, by_parameter), worst = now.columns, jnp.zeros(())
         if by_state.shape[0]:
-            columns, squares = jax.lax.map(
+            by_state, squares = jax.lax.map(
                 lambda each: step_column(each[0], each[1], None), (by_state, given.state_floors)
             )
-            found.append(columns)
             worst = jnp.max(squares)
-        else:
-            found.append(by_state)
         if by_parameter.shape[0]:
             rows = jnp.moveaxis(step.by_parameter, -1, 0)
 
             def carried() -> tuple[Scalar, Scalar]:
                 columns, squares = jax.lax.map(
                     lambda each: step_column(each[0], each[1], each[2] * each[3]),
-                    (by_parameter, given.parameter_floors, rows, given.sizes),
+                    (now.columns[1], given.parameter_floors, rows, given.sizes),
                 )
                 return columns, jnp.max(squares)
 
-            columns, square = jax.lax.cond(
-                given.carries_parameters > 0.0, carried, lambda: (by_parameter, jnp.zeros(()))
+            by_parameter, square = jax.lax.cond(
+                given.carries_parameters > 0.0, carried, lambda: (now.columns[1], jnp.zeros(()))
             )
-            found.append(columns)
             worst = jnp.maximum(worst, square)
-        else:
-            found.append(by_parameter)
         # The step that crosses a switch is too short for them to change.
-        return found, jnp.where(now.next_t - now.t > 2.0 * NEAR, jnp.sqrt(worst), 0.0)
+        return [by_state, by_parameter], jnp.where(
+            now.next_t - now.t > 2.0 * NEAR, jnp.sqrt(worst), 0.0
+        )
 
     def _controller(self, given: VariationalProblem, columns_norm: Scalar) -> SwitchLocator:
         def norm(error: PyTree) -> Scalar:

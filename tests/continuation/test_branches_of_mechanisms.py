@@ -8,7 +8,7 @@ from reference.mechanism_flow import checked_cycle
 import jaxbiped as jb
 from jaxbiped.continuation import BranchEvent
 from jaxbiped.continuation._branch_point import axis_of
-from jaxbiped.continuation._continuation_setup import continuation_setup
+from jaxbiped.continuation._continue_gait import continuation_setup
 from tests.mechanism_numbers import tree_of
 from tests.mechanisms import SEED_WITH_TORSO, scene_of
 

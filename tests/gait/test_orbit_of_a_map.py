@@ -23,10 +23,9 @@ from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gait_measures import _by_correction
 from jaxbiped.gait._gait_summary import elasticities_of, measure_errors, measure_slopes
 from jaxbiped.gait._newton import Method, Stage, initial_progress, newton_iteration
-from jaxbiped.gait._orbit_derivatives import slopes_of
+from jaxbiped.gait._orbit_derivatives import SecondVariation, slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import return_map_spec
-from jaxbiped.gait._second_variation import SecondVariation
 from jaxbiped.variational._solve_to_section import Nodes
 
 P = np.array([0.7, -0.4])

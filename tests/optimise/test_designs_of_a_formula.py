@@ -27,7 +27,7 @@ from jaxbiped.optimise._design_gaits import (
     with_worse_members,
 )
 from jaxbiped.optimise._design_problem import scale_of
-from jaxbiped.optimise._jacobian_weights import entry_weights, leading_multipliers
+from jaxbiped.optimise._jacobian_functionals import entry_weights, leading_multipliers
 from jaxbiped.optimise._local_model import Local
 from jaxbiped.optimise._objective_values import Evaluation, _cost_of_transport, _root_of_squares
 from jaxbiped.optimise._optimality import optimality_of

@@ -24,8 +24,8 @@ from jaxbiped.variational._flow import (
 from jaxbiped.variational._grazing import turns_of
 from jaxbiped.variational._hybrid_system import RedundantWalking, Rolling, Walking
 from jaxbiped.variational._saltation import saltation_at
+from jaxbiped.variational._solve_to_section import TangentSolver, VariationalField
 from jaxbiped.variational._switch_locator import SwitchLocator
-from jaxbiped.variational._tangent_solver import TangentSolver, VariationalField
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch
 from tests.systems import Plain
 

@@ -23,8 +23,8 @@ from jaxbiped.solve.controllers._wrapped_control import (
     Extremes,
     just_before_end,
 )
+from jaxbiped.variational._solve_to_section import TangentControl
 from jaxbiped.variational._switch_locator import SwitchLocator
-from jaxbiped.variational._tangent_solver import TangentControl
 
 WRAPPERS = {
     Extremes: (lambda args, y: y,),
