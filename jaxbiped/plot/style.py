@@ -54,11 +54,10 @@ _ENERGY_COLOURS = {
 
 
 def view_colours() -> dict[str, str]:
-    """The viewer's colours, `light-…` and `dark-…`, by what they stand for."""
+    """The viewer's colours by what they stand for, each for a light page and a dark one (CSS)."""
     pairs = {f"leg-{leg}": pair for leg, pair in enumerate(_GROUPS, 1)}
     pairs |= _ENERGY_COLOURS | {"ground": (GROUND_COLOUR, "#B9B9B9")}
-    pages = ("light", "dark")
-    return {f"{pages[k]}-{name}": pair[k] for k in (0, 1) for name, pair in pairs.items()}
+    return {name: f"light-dark({light}, {dark})" for name, (light, dark) in pairs.items()}
 
 
 MARKERS = "osD^vPX"

@@ -58,7 +58,6 @@ def continue_store(
             another version, or may not be written.
         ResourceError: its disk is full or fails.
     """
-    check_store(path)
     with writing(path):
         new = is_new(path)
         if new:
@@ -120,11 +119,24 @@ def _is_close(old: Any, new: Any, name: str) -> bool:
 
 
 def store_path(store: str | Path | None) -> Path | None:
-    """The path that a user gives for a store, None for one in memory; raises as `check_store`."""
+    """The path that a user gives for a store, None for one in memory.
+
+    Raises:
+        ArgumentError: no path, a kind of address that nothing here opens, or a place where no store
+            can be made or continued.
+        ResourceError: a package that is missing for it, or a disk that fails.
+    """
     if store is None:
         return None
     path = store_address(store)
-    check_store(path)
+    with writing(path):
+        is_new(path)
+    if not is_remote(path):
+        home = next(each for each in [path, *path.absolute().parents] if each.is_dir())
+        if not os.access(home, os.W_OK | os.X_OK):
+            raise ArgumentError(
+                f"store = {str(path)!r} cannot be written: its folder must be writable."
+            )
     return path
 
 
@@ -133,19 +145,6 @@ def what_is_kept(path: Path | None) -> str:
     if path is None:
         return "without a store nothing is kept"
     return f"what is done is in {path.name!r}, where the same call continues"
-
-
-def check_store(path: Path) -> None:
-    """Raises `ArgumentError` where no store can be made or continued at this path."""
-    with writing(path):
-        is_new(path)
-    if is_remote(path):
-        return
-    home = next(each for each in [path, *path.absolute().parents] if each.is_dir())
-    if not os.access(home, os.W_OK | os.X_OK):
-        raise ArgumentError(
-            f"store = {str(path)!r} cannot be written: its folder must be writable."
-        )
 
 
 def open_store(path: Path) -> "xarray.Dataset":
