@@ -89,24 +89,24 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         vary = {"vary": _bounds(scene, self.vary), "subject_to": self.subject_to or None}
         how = self.arguments("optimise_gait") | vary
         del how["footsteps"]  # of the certificate's walk
-        found = jb.optimise_gait(scene, **how)
+        optimum = jb.optimise_gait(scene, **how)
         ended = jb.optimise.Outcome
         tests: dict[str, Any] = {"starts": 0, "footsteps": 0, "bifurcations_along": ()}
-        if found.outcome is not ended.INTERRUPTED:
+        if optimum.outcome is not ended.INTERRUPTED:
             tests = {"starts": self.basin, "bifurcations_along": along}
             tests |= {name: getattr(self, name) for name in _TESTS}
-        certificate = jb.optimise.certify(found, **tests)
+        certificate = jb.optimise.certify(optimum, **tests)
         sense = "minimise" if self.maximise is None else "maximise"
         goal = getattr(self, sense)
         report = Report(self.output.json, self.output.csv)
-        _print(report, scene, found, goal)
+        _print(report, scene, optimum, goal)
         report.say(*_certificate_lines(certificate))
-        figures = {"optimisation": lambda: jb.plot.optimisation(found)}
-        report.finish(_optimum_numbers(found, certificate, goal, sense), found.to_csv)
-        report.wrote(self.output.draw(figures | gait_figures(found.gait)))
-        if found.outcome is ended.INTERRUPTED or "interrupted" in certificate.failed.values():
+        figures = {"optimisation": lambda: jb.plot.optimisation(optimum)}
+        report.finish(_optimum_numbers(optimum, certificate, goal, sense), optimum.to_csv)
+        report.wrote(self.output.draw(figures | gait_figures(optimum.gait)))
+        if optimum.outcome is ended.INTERRUPTED or "interrupted" in certificate.failed.values():
             raise options.interrupted("the best design so far is what is reported")
-        return int(found.outcome in (ended.UNFINISHED, ended.INFEASIBLE))
+        return int(optimum.outcome in (ended.UNFINISHED, ended.INFEASIBLE))
 
 
 def _parts(text: str) -> dict[str, str]:
@@ -120,62 +120,62 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
     """Bounds by name from d=0.05:0.2,r,J."""
     from jaxbiped.continuation._critical_values import farthest_allowed
 
-    own, found = jb.parameter_values(scene), {}
+    values, pairs = jb.parameter_values(scene), {}
     units = units_of(jb.parameter_quantities(scene))
     for name, bounds in _parts(text).items():
         check_choice("vary", name, units)
         if bounds:
             low, high = numbers_in("vary", name, bounds, units[name], ":", 2)
-        elif (value := float(own[name])) != 0.0:
+        elif (value := float(values[name])) != 0.0:
             low, high = sorted(farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
         else:
             raise ArgumentError(
                 f"vary = {name} needs bounds, as its value is 0: write {name}=low:high."
             )
-        found[name] = (low, high)
-    return found
+        pairs[name] = (low, high)
+    return pairs
 
 
 def _optimum_numbers(
-    found: "jb.optimise.Optimum", certificate: "jb.optimise.Certificate", goal: str, sense: str
+    optimum: "jb.optimise.Optimum", certificate: "jb.optimise.Certificate", goal: str, sense: str
 ) -> JsonObject:
     """What is known of an optimum in SI units, for `strict_json`."""
     return {
-        "outcome": str(found.outcome),
-        "message": found.message,
-        "variables": found.variables,
+        "outcome": str(optimum.outcome),
+        "message": optimum.message,
+        "variables": optimum.variables,
         "objective": {
             "name": goal,
             "sense": sense,
-            "value": found.objective,
-            "error": found.error,
+            "value": optimum.objective,
+            "error": optimum.error,
             "unit": jb.optimise.OBJECTIVES[goal].quantity.unit,
         },
         "measures": {
             name: {
                 "value": value,
-                "error": found.known.errors[name],
-                "beyond_range": name in found.known.beyond_range,
+                "error": optimum.known.errors[name],
+                "beyond_range": name in optimum.known.beyond_range,
             }
-            for name, value in found.known.values.items()
+            for name, value in optimum.known.values.items()
         },
-        "history": records(found.history),
-        "evaluations": found.evaluations,
-        "lost": found.lost,
-        "unmeasured": found.unmeasured,
+        "history": records(optimum.history),
+        "evaluations": optimum.evaluations,
+        "lost": optimum.lost,
+        "unmeasured": optimum.unmeasured,
         "certificate": _certificate_numbers(certificate),
     }
 
 
 def _certificate_numbers(certificate: "jb.optimise.Certificate") -> JsonObject:
-    told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
+    kkt, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
     basin, push = certificate.basin, certificate.fatal_push
     numbers = {
-        "kkt_residual": told.residual,
-        "kkt_residual_error": told.error,
-        "excess": told.excess,
-        "constraints": records(told.requirements),
-        "bounds": records(told.bounds),
+        "kkt_residual": kkt.residual,
+        "kkt_residual_error": kkt.error,
+        "excess": kkt.excess,
+        "constraints": records(kkt.requirements),
+        "bounds": records(kkt.bounds),
     } | records(certificate)
     del numbers["optimality"]
     return numbers | {
@@ -186,16 +186,16 @@ def _certificate_numbers(certificate: "jb.optimise.Certificate") -> JsonObject:
 
 
 def _print(
-    report: Report, scene: "jb.Scene | jb.RigidScene", found: "jb.optimise.Optimum", goal: str
+    report: Report, scene: "jb.Scene | jb.RigidScene", optimum: "jb.optimise.Optimum", goal: str
 ) -> None:
-    units, own = jb.parameter_quantities(scene), jb.parameter_values(scene)
+    units, values = jb.parameter_quantities(scene), jb.parameter_values(scene)
     variables = {
         "variable": "{0[0]}",
         "began": "{0[1]:.6g}",
         "best": "{0[2]:.6g}",
         "unit": "{0[3].unit_in_text}",
     }
-    rows = [(name, float(own[name]), x, units[name]) for name, x in found.variables.items()]
+    rows = [(name, float(values[name]), x, units[name]) for name, x in optimum.variables.items()]
     measures = {
         "measure": "{0[0]}",
         "began": "{0[1]}",
@@ -203,33 +203,33 @@ def _print(
         "error": "{0[3]}",
         "unit": "{0[4].quantity.unit_in_text}",
     }
-    report.say(columns(variables, rows), "", columns(measures, _measures(found)), "")
+    report.say(columns(variables, rows), "", columns(measures, _measures(optimum)), "")
     report.say(
-        f"{goal} {found.objective:.6g}, {found.outcome} after {len(found.history)} iterations and "
-        f"{found.evaluations} gaits ({found.message})"
+        f"{goal} {optimum.objective:.6g}, {optimum.outcome} after {len(optimum.history)} "
+        f"iterations and {optimum.evaluations} gaits ({optimum.message})"
     )
 
 
-def _measures(found: "jb.optimise.Optimum") -> Iterator[tuple[object, ...]]:
+def _measures(optimum: "jb.optimise.Optimum") -> Iterator[tuple[object, ...]]:
     """Each measure, its first value, its best one and the error, or more than a range holds."""
-    first = found.history[0].measures if found.history else {}
-    for name, value in found.known.values.items():
+    first = optimum.history[0].measures if optimum.history else {}
+    for name, value in optimum.known.values.items():
         if name in jb.optimise.OBJECTIVES:
             began = f"{first[name]:.6g}" if name in first else "–"
-            best, error = f"{value:.6g}", f"{found.known.errors[name]:.1e}"
-            if name in found.known.beyond_range:
+            best, error = f"{value:.6g}", f"{optimum.known.errors[name]:.1e}"
+            if name in optimum.known.beyond_range:
                 best, error = f"> {best}", "–"
             yield name, began, best, error, jb.optimise.OBJECTIVES[name]
 
 
 def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
-    told, basin, walk = certificate.optimality, certificate.basin, certificate.walk
-    yield "optimality: residual {:.1e} ± {:.1e}, requirements missed by {:.1e}".format(*told[:3])
-    for each in (*told.requirements, *told.bounds):
-        if each.active:
+    kkt, basin, walk = certificate.optimality, certificate.basin, certificate.walk
+    yield "optimality: residual {:.1e} ± {:.1e}, requirements missed by {:.1e}".format(*kkt[:3])
+    for limit in (*kkt.requirements, *kkt.bounds):
+        if limit.active:
             yield (
-                f"held by {each.name} at {each.bound:.6g}: multiplier {each.multiplier:.4g} ± "
-                f"{each.multiplier_error:.1e}"
+                f"held by {limit.name} at {limit.bound:.6g}: multiplier {limit.multiplier:.4g} ± "
+                f"{limit.multiplier_error:.1e}"
             )
     pairs = zip(certificate.multipliers, certificate.multiplier_errors, strict=True)
     sizes = ", ".join(f"{abs(size):.4f} ± {error:.0e}" for size, error in list(pairs)[:3])

@@ -233,26 +233,26 @@ def rigid_motion(scene: RigidScene, walk: Trajectory[Any]) -> RigidMotion:
 
 
 def _exchanged_back(
-    structure: Structure, found: dict[str, np.ndarray], rows: np.ndarray
+    structure: Structure, values: dict[str, np.ndarray], rows: np.ndarray
 ) -> dict[str, np.ndarray]:
     """What bodies and feet have, under the names that they have in the first footstep."""
-    changed, odd = dict(found), rows % 2 == 1
+    changed, odd = dict(values), rows % 2 == 1
     for j, twin in enumerate(structure.body_twins or ()):
         for word in ("theta", "omega"):
-            own, other = (f"{word}_{structure.bodies[k]}" for k in (j, twin))
-            if own in found:
-                changed[own] = np.where(odd, found[other], found[own])
+            name, other = (f"{word}_{structure.bodies[k]}" for k in (j, twin))
+            if name in values:
+                changed[name] = np.where(odd, values[other], values[name])
     turn = structure.turn
-    if turn is not None and (name := f"theta_{structure.bodies[turn.body]}") in found:
-        changed[name] = found[name] - 2.0 * np.pi / turn.order * rows
+    if turn is not None and (name := f"theta_{structure.bodies[turn.body]}") in values:
+        changed[name] = values[name] - 2.0 * np.pi / turn.order * rows
     for word in ("normal", "tangential"):
         names = [f"{word}_{k + 1}" for k in range(len(structure.feet))]
-        if names[0] in found:
+        if names[0] in values:
             changed |= {name: np.zeros(len(rows)) for name in names}
             for row in np.unique(rows):
                 for k, name in zip(structure.feet_renamed(-int(row)), names, strict=True):
-                    own = names[k]
-                    changed[own] = np.where(rows == row, found[name], changed[own])
+                    first = names[k]
+                    changed[first] = np.where(rows == row, values[name], changed[first])
     return changed
 
 
