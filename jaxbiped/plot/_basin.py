@@ -334,7 +334,8 @@ def gait_marks(dataset: Any, x: str, y: str) -> list[GaitMark]:
     projected onto it, and its label says so.
     """
     settings = json.loads(dataset.attrs.get("settings", "{}"))
-    fixed = {str(n): float(c) for n, c in dataset.coords.items() if not c.ndim and _is_number(c)}
+    places = {str(n): c for n, c in dataset.coords.items() if not c.ndim}
+    fixed = {name: float(c) for name, c in places.items() if c.dtype.kind in "iuf"}
     based = "base" in settings.get("starts", {})
     found: dict[int, list[tuple[float, float, bool]]] = {}
     for row in json.loads(dataset.attrs.get("gaits", "[]")):
@@ -382,7 +383,3 @@ def draw_gait_marks(ax: Axes, marks: list[GaitMark]) -> list[Line2D]:
         ax.plot(*shown.T, clip_on=False, zorder=5, **look)
         entries.append(Line2D([], [], label=mark.label, **look))
     return entries
-
-
-def _is_number(coordinate: Any) -> bool:
-    return coordinate.dtype.kind in "iuf"

@@ -211,10 +211,7 @@ def grid(
     check_coordinates(scene, values)
     if not values:
         raise ArgumentError("values = {} is empty: name at least one coordinate.")
-    axes = {}
-    for name, given in values.items():
-        check_finite(name, given)
-        axes[name] = axis_values(name, np.atleast_1d(given))
+    axes = {name: axis_values(name, np.atleast_1d(given)) for name, given in values.items()}
     check_parameters(scene, axes)
     swept = tuple(parameters_among(scene, axes))
     return Grid(axes, rest_of(scene, axes, place, follow, base), swept)
