@@ -5,7 +5,7 @@ Scenes are made with public names alone, so that a look at the walkers' names do
 
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jaxbiped as jb
@@ -287,29 +287,17 @@ def _struck(angle: float, swing: float, stance: float) -> dict[str, float]:
 
 
 _SHORT = (0.193937369810184, -0.203866927442010)
-_BENT = {
-    "theta_thigh_1": 0.14,
-    "theta_shank_1": -0.20,
-    "omega_thigh_1": 3.4,
-    "omega_shank_1": 1.7,
-    "theta_thigh_2": -0.086,
-    "theta_shank_2": 0.118,
-    "omega_thigh_2": -0.88,
-    "omega_shank_2": -0.88,
-    "standing": "shank_2",
-}
 
-_KNEES_STRAIGHT = {
-    "theta_thigh_1": -0.2386,
-    "theta_shank_1": -0.2386,
-    "omega_thigh_1": -0.0571,
-    "omega_shank_1": -0.0571,
-    "theta_thigh_2": 0.2386,
-    "theta_shank_2": 0.2386,
-    "omega_thigh_2": -1.1096,
-    "omega_shank_2": -1.1096,
-    "held": "shank_2",
-}
+
+def knees(angles: Sequence[float], rates: Sequence[float]) -> dict[str, float]:
+    """Angles [rad] and rates of the bodies of two legs with knees: thigh 1, shank 1, thigh 2, …"""
+    bodies = ("thigh_1", "shank_1", "thigh_2", "shank_2")
+    named = {f"theta_{name}": x for name, x in zip(bodies, angles, strict=True)}
+    return named | {f"omega_{name}": x for name, x in zip(bodies, rates, strict=True)}
+
+
+_BENT = knees((0.14, -0.20, -0.086, 0.118), (3.4, 1.7, -0.88, -0.88))
+_STRAIGHT = knees((-0.2386, -0.2386, 0.2386, 0.2386), (-0.0571, -0.0571, -1.1096, -1.1096))
 
 MODELS: dict[str, Model] = {
     "garcia": Model(
@@ -335,13 +323,13 @@ MODELS: dict[str, Model] = {
     "mcgeer-kneed": Model(
         "legs with knees on round, compliant feet (McGeer 1990)",
         functools.partial(mcgeer, knees=True),
-        {"gait": _BENT},
+        {"gait": _BENT | {"standing": "shank_2"}},
         rigid=False,
     ),
     "hsu-chen": Model(
         "legs with knees that lock, on point feet (Hsu Chen 2007)",
         hsu_chen,
-        {"gait": _KNEES_STRAIGHT},
+        {"gait": _STRAIGHT | {"held": "shank_2"}},
     ),
     "rimless-wheel": Model(
         "a wheel without a rim (McGeer 1990)",
