@@ -202,12 +202,8 @@ class MeasuredGait:
     @property
     def values(self) -> np.ndarray:
         """All measured values, one after the other, shape (n,)."""
-        return np.concatenate(
-            [
-                [value for value, _ in self.measures.values()],
-                [] if self.angles is None else self.angles.values,
-            ]
-        )
+        angles = [] if self.angles is None else self.angles.values
+        return np.concatenate([[value for value, _ in self.measures.values()], angles])
 
     @property
     def clocks(self) -> int:

@@ -90,9 +90,7 @@ def goswami(
     check_positive("mu", mu)
     check_positive("beta", beta)
     mass = 20.0 / (2.0 + mu)
-    walker = jb.Walker(
-        m=mass, J=0.0, l=1.0, d=beta / (1.0 + beta), r=0.0, hip_mass=mu * mass
-    )  # fmt: skip
+    walker = jb.Walker(m=mass, J=0.0, l=1.0, d=beta / (1.0 + beta), r=0.0, hip_mass=mu * mass)
     return jb.RigidScene(walker, jb.Ground(slope=slope, g=9.8))
 
 
