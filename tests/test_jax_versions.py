@@ -24,7 +24,7 @@ PRIVATE = {
     ("gait/_return_map.py", "equinox.internal"),
     ("solve/_fusion_barrier.py", "equinox.internal"),
     ("solve/rosenbrock/_rosenbrock_solver.py", "equinox.internal.ω"),
-    ("sweep/_labelling_loop.py", "equinox.internal"),
+    ("sweep/_follow_starts.py", "equinox.internal"),
 }
 """Each name that no other package promises to keep, and where it is used."""
 

@@ -96,8 +96,7 @@ KNOW_OF_TWO_LEGS = {
     "cli/_walkers.py",  # starts of named walkers
     "dynamics/_state.py",  # the seed's start
     "gait/_search_starts.py",  # the seed's start
-    "models/_catalogue.py",  # starts of published walkers
-    "models/_published_walkers.py",  # which angles of papers they are
+    "models/_published_walkers.py",  # which angles of papers they are, and starts
     "identify/_measured_gait.py",  # two names of angles
     "plot/_parameter_charts.py",  # an example
     "scene/_state_types.py",

@@ -24,11 +24,10 @@ from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._continue import ContinueGait
 from jaxbiped.cli._doctor import Cache, Doctor
-from jaxbiped.cli._fit import Fit
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
-from jaxbiped.cli._optimise import Optimise
 from jaxbiped.cli._options import Command
+from jaxbiped.cli._parameter_search import Fit, Optimise
 from jaxbiped.cli._report import Report as Report
 from jaxbiped.cli._trade import Trade
 from jaxbiped.cli._walk import Walk

@@ -91,8 +91,7 @@ def _compliant_numbers(scene: Any, walk: "jb.Trajectory[Any]") -> JsonObject:
 
 def footstep_rows(steps: Any) -> list[dict[str, float]]:
     """The footsteps of a walk on compliant feet, each ready for JSON."""
-    names = ("time_s", "period_s", "length_m", "speed_m_s", "peak_normal_N", "max_penetration_m",
-             "double_support_s")  # fmt: skip
+    names = (*_AT_LEAST, "peak_normal_N", "max_penetration_m", "double_support_s")
     return _rows({name: np.asarray(getattr(steps, name)) for name in names})
 
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
 from jaxbiped.models import MODELS
+from jaxbiped.models._published_walkers import knees
 
 SEED = "seed"
 
@@ -38,16 +39,7 @@ WALKERS: dict[str, NamedWalker] = {
         "legs of thigh and shank with stops at the knees, McGeer's proportions",
         lambda _: jb.models.mcgeer(knees=True).walker,
         own_parameters=True,
-        start={
-            "theta_thigh_1": 0.10,
-            "theta_shank_1": -0.39,
-            "theta_thigh_2": 0.06,
-            "theta_shank_2": 0.26,
-            "omega_thigh_1": 2.63,
-            "omega_shank_1": 4.12,
-            "omega_thigh_2": -0.99,
-            "omega_shank_2": -0.99,
-        },
+        start=knees((0.10, -0.39, 0.06, 0.26), (2.63, 4.12, -0.99, -0.99)),
     ),
     "with-torso": NamedWalker(
         "the seed's legs and a torso that bisects the angle between them",

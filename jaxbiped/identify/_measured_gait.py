@@ -1,7 +1,10 @@
-"""Measured gait: what was observed of a walker, with standard deviations."""
+"""Measured gaits: what was observed of walkers, with standard deviations; and files of them."""
 
 import dataclasses
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,12 +19,26 @@ from jaxbiped._checks import (
     check_type,
     holds_somewhere,
 )
+from jaxbiped._files import read_csv, read_json
+from jaxbiped._quantity import unit_scales
+from jaxbiped._types import JsonObject
+from jaxbiped.scene._parameter_access import parameter_quantities
+from jaxbiped.scene._scene import AbstractScene
 
 MEASURES = ("period", "step_length", "speed", "peak_normal")
 """Measures of a gait that may be given, as in `Measures`."""
 CLOCKS = ("mid-stance", None)
 _LONGEST = 20.0
 """Time beyond which milliseconds are suspected [s]."""
+_UNITS = dict(zip(MEASURES, ("s", "m", "m/s", "N"), strict=True))
+_KEYS = {f"{name}_{_UNITS[name].replace('/', '_')}": name for name in MEASURES}
+_ANGLES = {"times_s": "times", "deviation_rad": "deviation", "since": "since"}
+_ANGLE = re.compile(r"(theta_\w+)_rad")
+_COLUMN_UNITS = _UNITS | {"time": "s"}
+_BAR = "_error"
+_PLAIN = ("gait", "footsteps", "since")
+"""Columns without units."""
+_HEADER = re.compile(r"(?P<name>[^\[\]()]*?)\s*(?:[\[(](?P<unit>.*)[\])])?")
 
 
 @dataclasses.dataclass(frozen=True, init=False)
@@ -185,12 +202,8 @@ class MeasuredGait:
     @property
     def values(self) -> np.ndarray:
         """All measured values, one after the other, shape (n,)."""
-        return np.concatenate(
-            [
-                [value for value, _ in self.measures.values()],
-                [] if self.angles is None else self.angles.values,
-            ]
-        )
+        angles = [] if self.angles is None else self.angles.values
+        return np.concatenate([[value for value, _ in self.measures.values()], angles])
 
     @property
     def clocks(self) -> int:
@@ -210,3 +223,203 @@ def _is_masked(pair: object) -> bool:
     """Whether a value or its deviation is masked."""
     entries = pair if isinstance(pair, tuple | list | np.ndarray) else (pair,)
     return any(np.ma.is_masked(each) for each in (pair, *entries))
+
+
+def read_measured(path: str | Path, scene: AbstractScene | None = None) -> list[MeasuredGait]:
+    """Reads measured gaits from a JSON file, or from a CSV table whose header names units.
+
+    A JSON file holds `{"gaits": [{"conditions": {"slope": 0.02}, "period_s": [0.441, 0.001],
+    "step_length_m": …, "speed_m_s": …, "peak_normal_N": …, "angles": {"times_s": […],
+    "theta_1_rad": […], "theta_2_rad": […], "deviation_rad": 0.001, "since": "mid-stance"},
+    "footsteps": 1}, …]}`. Each measure has its value and its standard deviation, and the angle of a
+    body NAME is "theta_NAME_rad". Leave out what was not measured; a single missing angle is null.
+
+    A CSV file (`.csv`) has a row for each gait. Its columns are measures, their standard deviations
+    under the same name with `_error`, and conditions under the names of parameters. The header
+    gives units, among them s, ms, m, cm, mm, rad, deg, mrad, N and kN. Lines that begin with # are
+    skipped::
+
+        slope [deg],period [ms],period_error [ms],step_length [cm],step_length_error [cm]
+        1.15,441.5,1,18.0,0.2
+
+    Angles have a row for each time, with the columns `time` and `theta_BODY` for each body, and
+    `angle_error` for the standard deviation of all angles. `since` and `footsteps` are columns
+    without units. A value that is the same for the whole gait may be given once, in any row. If
+    there are several such gaits, a column `gait` distinguishes their rows. An empty cell means "not
+    measured".
+
+    Args:
+        path: path of the file.
+        scene: the walker. The units of conditions in a CSV file are compared with those of its
+            parameters; if it is omitted, they are not compared.
+
+    Returns:
+        The gaits, in the file's order.
+
+    Raises:
+        ArgumentError: the file cannot be read, is not JSON, or holds something else; in a table, a
+            column has no unit, or a cell is not a number.
+    """
+    if Path(path).suffix.lower() == ".csv":
+        return _gaits_of_table(read_csv("file", path), scene)
+    held = read_json("file", path)
+    gaits = held.get("gaits") if isinstance(held, dict) else None
+    if not isinstance(gaits, list) or not gaits or not all(isinstance(g, dict) for g in gaits):
+        raise ArgumentError(
+            f'file = {str(path)!r} is not allowed: it must hold {{"gaits": [{{…}}, …]}}, at least '
+            "one."
+        )
+    return [_gait_of_object(each) for each in gaits]
+
+
+def _gait_of_object(held: JsonObject) -> MeasuredGait:
+    measures: dict[str, Any] = {}
+    options: dict[str, Any] = {}
+    for key, value in held.items():
+        if key in _KEYS:
+            measures[_KEYS[key]] = tuple(value) if isinstance(value, list) else value
+        elif key == "angles" and isinstance(value, dict):
+            named = {key: found[1] for key in value if (found := _ANGLE.fullmatch(key))}
+            _check_keys("angles", value, [*_ANGLES, *named, "theta_BODY_rad"])
+            angles: dict[str, Any] = {
+                name: _masked_array(value.get(own)) for own, name in (_ANGLES | named).items()
+            }
+            options["angles"] = MeasuredAngles(**angles)
+        elif (key == "conditions" and isinstance(value, dict)) or key == "footsteps":
+            options[key] = value
+        else:
+            _check_keys("a gait", [key], [*_KEYS, "angles", "conditions", "footsteps"])
+            raise ArgumentError(f"{key} = {value!r} is not allowed: it must be an object.")
+    return MeasuredGait(measures, **options)
+
+
+def _masked_array(value: Any) -> Any:
+    """A list with its nulls masked; anything else as it is."""
+    if not isinstance(value, list) or None not in value:
+        return value
+    lost = [each is None for each in value]
+    return np.ma.array([0.0 if each is None else each for each in value], mask=lost)
+
+
+def _check_keys(where: str, keys: Iterable[str], allowed: Iterable[str]) -> None:
+    for key in keys:
+        if key not in allowed:
+            names = ", ".join(allowed)
+            raise ArgumentError(f"{key!r} is not known in {where}: choose from {names}.")
+
+
+class _Column(NamedTuple):
+    """A column: its name, its header, and how many SI units one of its units is."""
+
+    name: str
+    header: str
+    scale: float
+
+
+def _gaits_of_table(
+    table: list[tuple[int, list[str]]], scene: AbstractScene | None
+) -> list[MeasuredGait]:
+    """Measured gaits of a CSV file, whose conditions have the units of a scene's parameters."""
+    (_, header), *lines = table
+    quantities = {} if scene is None else parameter_quantities(scene)
+    units = {name: each.unit for name, each in quantities.items()}
+    columns = [_column(cell, units) for cell in header]
+    names = [each.name for each in columns]
+    for name in names:
+        if names.count(name) > 1:
+            raise ArgumentError(
+                f"the column {name!r} is there {names.count(name)} times: give one."
+            )
+    groups: dict[Any, list[tuple[int, dict[str, Any]]]] = {}
+    for number, (line, cells) in enumerate(lines):
+        row = {c.name: _value(c, cell, line) for c, cell in zip(columns, cells, strict=True)}
+        label = row.get("gait", "time" in row or number)
+        groups.setdefault(label, []).append((line, row))
+    gaits = []
+    for rows in groups.values():
+        try:
+            gaits.append(_gait_of_rows(names, [row for _, row in rows]))
+        except ArgumentError as error:
+            raise ArgumentError(f"line {rows[0][0]}: {error}") from None
+    return gaits
+
+
+def _column(header: str, units: Mapping[str, str]) -> _Column:
+    """A column by its header; of a condition the unit is that of the parameter, where known."""
+    found = _HEADER.fullmatch(header)
+    name, unit = (header, None) if found is None else (found["name"], found["unit"])
+    if name in _PLAIN:
+        return _Column(name, header, 1.0)
+    stem = name.removesuffix(_BAR)
+    angle = stem == "angle" or name.startswith("theta_")
+    wanted = "rad" if angle else _COLUMN_UNITS.get(stem)
+    if wanted is None:
+        if units:
+            check_choice("a column", name, (*_PLAIN, *_COLUMN_UNITS, "theta_BODY", *units))
+        wanted = units.get(name)
+    if unit is None:
+        if wanted in ("", "1"):
+            return _Column(name, header, 1.0)
+        example = f"{name} [{wanted or 'rad'}]"
+        raise ArgumentError(f"the column {header!r} names no unit: write it as {example!r}.")
+    unit = "" if unit.strip() in ("1", "-", "–") else unit.strip()
+    allowed = unit_scales(wanted, unit)
+    if unit not in allowed:
+        raise ArgumentError(
+            f"the column {header!r} is not allowed: its unit must be one of {', '.join(allowed)}."
+        )
+    return _Column(name, header, allowed[unit])
+
+
+def _value(column: _Column, cell: str, line: int) -> Any:
+    """A cell in SI units; None for an empty one."""
+    if not cell:
+        return None
+    if column.name in ("gait", "since"):
+        return cell
+    try:
+        return int(cell) if column.name == "footsteps" else float(cell) * column.scale
+    except ValueError:
+        raise ArgumentError(
+            f"line {line}: {column.header} = {cell!r} is not allowed: it must be a number."
+        ) from None
+
+
+def _gait_of_rows(names: list[str], rows: list[dict[str, Any]]) -> MeasuredGait:
+    angles = [name for name in names if name.startswith("theta_")]
+    per_row = ["gait", "time", *angles]
+    known = {name: _same(name, rows) for name in names if name not in per_row}
+    measures = dict(_measures({n: x for n, x in known.items() if x is not None}))
+    others = {"footsteps", "since", "angle_error", *MEASURES, *(f"{n}{_BAR}" for n in MEASURES)}
+    conditions = {n: x for n, x in known.items() if n not in others and x is not None}
+    seen = None
+    if angles:
+        if known.get("angle_error") is None or "time" not in names:
+            raise ArgumentError("angles need the columns 'time [s]' and 'angle_error [rad]'.")
+        columns = {name: _masked_array([row[name] for row in rows]) for name in ("time", *angles)}
+        seen = MeasuredAngles(
+            columns.pop("time"), known["angle_error"], since=known.get("since"), **columns
+        )
+    return MeasuredGait(measures, conditions, seen, known.get("footsteps"))
+
+
+def _same(name: str, rows: list[dict[str, Any]]) -> Any:
+    """What is said once of a gait; None where it is nowhere."""
+    said = list(dict.fromkeys(row[name] for row in rows if row[name] is not None))
+    if len(said) > 1:
+        raise ArgumentError(
+            f"{name} is {said[0]!r} and {said[1]!r} in rows of one gait: it must be one number; a "
+            "column 'gait' separates gaits."
+        )
+    return said[0] if said else None
+
+
+def _measures(known: Mapping[str, Any]) -> Iterator[tuple[str, tuple[float, float]]]:
+    for name in MEASURES:
+        if name in known:
+            if f"{name}{_BAR}" not in known:
+                raise ArgumentError(
+                    f"{name} has no standard deviation: give it in a column "
+                    f"'{name}{_BAR} [{_UNITS[name]}]'."
+                )
+            yield name, (known[name], known[f"{name}{_BAR}"])

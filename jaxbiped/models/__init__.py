@@ -1,7 +1,7 @@
 """Published walkers: functions that return the papers' walkers as ready scenes, and their table."""
 
-from jaxbiped.models._catalogue import MODELS as MODELS
-from jaxbiped.models._catalogue import Model as Model
+from jaxbiped.models._published_walkers import MODELS as MODELS
+from jaxbiped.models._published_walkers import Model as Model
 from jaxbiped.models._published_walkers import bhounsule as bhounsule
 from jaxbiped.models._published_walkers import garcia as garcia
 from jaxbiped.models._published_walkers import goswami as goswami

@@ -1,10 +1,12 @@
-"""Published walkers: with straight legs and with knees, a torso, and a wheel without a rim.
+"""Published walkers, straight-legged, kneed, with a torso, a rimless wheel; and their table.
 
 Scenes are made with public names alone, so that a look at the walkers' names does not load JAX.
 """
 
+import functools
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jaxbiped as jb
 from jaxbiped._checks import check_at_least, check_finite, check_positive, check_within
@@ -88,9 +90,7 @@ def goswami(
     check_positive("mu", mu)
     check_positive("beta", beta)
     mass = 20.0 / (2.0 + mu)
-    walker = jb.Walker(
-        m=mass, J=0.0, l=1.0, d=beta / (1.0 + beta), r=0.0, hip_mass=mu * mass
-    )  # fmt: skip
+    walker = jb.Walker(m=mass, J=0.0, l=1.0, d=beta / (1.0 + beta), r=0.0, hip_mass=mu * mass)
     return jb.RigidScene(walker, jb.Ground(slope=slope, g=9.8))
 
 
@@ -260,3 +260,107 @@ def rimless_wheel(
         turn={"wheel": spokes},
     )
     return jb.RigidScene(wheel, jb.Ground(slope=slope, g=1.0))
+
+
+class Model(NamedTuple):
+    """A published walker.
+
+    Attributes:
+        words: description and source.
+        make: its function in `jaxbiped.models`; without arguments, it returns the paper's scene.
+        starts: arguments of `scene.state` for a state near each gait, by the gait's name: angles
+            [rad], rates, held parts and standing feet.
+        rigid: whether its scene is a `RigidScene`; otherwise it is a `Scene`.
+    """
+
+    words: str
+    make: Callable[..., Any]
+    starts: Mapping[str, Mapping[str, Any]]
+    rigid: bool = True
+
+
+def _struck(angle: float, swing: float, stance: float) -> dict[str, float]:
+    """Behind a heel strike: the angle between slope's normal and stance leg, and both rates."""
+    return {"theta_1": -angle, "theta_2": angle, "omega_1": swing, "omega_2": stance}
+
+
+_SHORT = (0.193937369810184, -0.203866927442010)
+
+
+def knees(angles: Sequence[float], rates: Sequence[float]) -> dict[str, float]:
+    """Angles [rad] and rates of the bodies of two legs with knees: thigh 1, shank 1, thigh 2, …"""
+    bodies = ("thigh_1", "shank_1", "thigh_2", "shank_2")
+    named = {f"theta_{name}": x for name, x in zip(bodies, angles, strict=True)}
+    return named | {f"omega_{name}": x for name, x in zip(bodies, rates, strict=True)}
+
+
+_BENT = knees((0.14, -0.20, -0.086, 0.118), (3.4, 1.7, -0.88, -0.88))
+_STRAIGHT = knees((-0.2386, -0.2386, 0.2386, 0.2386), (-0.0571, -0.0571, -1.1096, -1.1096))
+
+MODELS: dict[str, Model] = {
+    "garcia": Model(
+        "the simplest walker: a mass on massless legs (Garcia et al. 1998)",
+        garcia,
+        {
+            "long": _struck(
+                0.200310900544287, -0.199832473004977 + 0.015822999948318, -0.199832473004977
+            ),
+            "short": _struck(_SHORT[0], _SHORT[1] * math.cos(2.0 * _SHORT[0]), _SHORT[1]),
+        },
+    ),
+    "goswami": Model(
+        "compass gait: point masses on legs and hip (Goswami et al. 1998)",
+        goswami,
+        {"gait": _struck(0.2710, -0.3772, -1.0918)},
+    ),
+    "mcgeer": Model(
+        "straight legs on round feet (McGeer 1990)",
+        mcgeer,
+        {"gait": _struck(0.3084, -0.2807, -0.4031)},
+    ),
+    "mcgeer-kneed": Model(
+        "legs with knees on round, compliant feet (McGeer 1990)",
+        functools.partial(mcgeer, knees=True),
+        {"gait": _BENT | {"standing": "shank_2"}},
+        rigid=False,
+    ),
+    "hsu-chen": Model(
+        "legs with knees that lock, on point feet (Hsu Chen 2007)",
+        hsu_chen,
+        {"gait": _STRAIGHT | {"held": "shank_2"}},
+    ),
+    "rimless-wheel": Model(
+        "a wheel without a rim (McGeer 1990)",
+        rimless_wheel,
+        {"gait": {"theta_wheel": 3.0 * math.pi / 8.0, "omega_wheel": -0.4}},
+    ),
+    "wisse": Model(
+        "a torso that bisects the legs' angle (Wisse et al. 2004)",
+        wisse,
+        {"gait": _struck(0.3033, -0.5348, -1.0653)},
+    ),
+    "kuo": Model(
+        "the simplest walker pushing off on level ground (Kuo 2002)",
+        kuo,
+        {"gait": _struck(0.1946, -0.1878, -0.2030)},
+    ),
+    "bhounsule": Model(
+        "point feet of passivewalker.m (Bhounsule 2009)",
+        bhounsule,
+        {
+            "gait": _struck(
+                0.200161072169750, -0.199906060087682 + 0.015805473227965, -0.199906060087682
+            )
+        },
+    ),
+    "bhounsule-round": Model(
+        "round feet of passivewalker.m (Bhounsule 2009)",
+        functools.partial(bhounsule, round_feet=True),
+        {
+            "gait": _struck(
+                0.189472782205104, -0.239124222551699 + 0.053691703909393, -0.239124222551699
+            )
+        },
+    ),
+}
+"""Published walkers by name, as commands take them."""

@@ -35,7 +35,7 @@ from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure
-from jaxbiped.sweep.starts._samples import sample
+from jaxbiped.sweep.starts._starts import sample
 from jaxbiped.variational._hybrid_system import independent_names
 
 _SETTLED = 1e-4

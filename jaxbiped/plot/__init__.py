@@ -22,6 +22,7 @@ from jaxbiped.plot._fit_charts import fit as fit
 from jaxbiped.plot._fit_charts import fit_data as fit_data
 from jaxbiped.plot._fit_charts import optimisation as optimisation
 from jaxbiped.plot._gait_charts import elasticities as elasticities
+from jaxbiped.plot._gait_charts import multipliers as multipliers
 from jaxbiped.plot._laws import bristle_law as bristle_law
 from jaxbiped.plot._laws import friction_law as friction_law
 from jaxbiped.plot._laws import normal_law as normal_law
@@ -34,7 +35,6 @@ from jaxbiped.plot._motion_pictures import animate as animate
 from jaxbiped.plot._motion_pictures import animation_html as animation_html
 from jaxbiped.plot._motion_pictures import gait_strobe as gait_strobe
 from jaxbiped.plot._motion_pictures import save_animation as save_animation
-from jaxbiped.plot._multiplier_charts import multipliers as multipliers
 from jaxbiped.plot._notebook import notebook_html as notebook_html
 from jaxbiped.plot._notebook import walker as walker
 from jaxbiped.plot._parameter_charts import basin_fractions as basin_fractions

@@ -11,10 +11,9 @@ from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._samples import evaluate_along
 from jaxbiped.plot import style
-from jaxbiped.plot._samples import sample, state_at
+from jaxbiped.plot._samples import Channels, Tolerances, adaptive_knots, sample, state_at
 from jaxbiped.plot._skeleton import Sole, skeleton_of
 from jaxbiped.plot._symbols import NORMAL_FORCE, PENETRATION, TANGENTIAL_FORCE, TIME
-from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 

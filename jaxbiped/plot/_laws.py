@@ -156,12 +156,8 @@ def _draw_rates(ax: Axes, law: AbstractNormalLaw, depth: float, rates: Sequence[
         colour, dashes = _RATE_COLOURS[k % 4], _RATE_STYLES[k % 4]
         if len(rates) == 1:
             colour, dashes = style.GROUND_COLOUR, "-"
-        look: dict[str, Any] = {
-            "linestyle": dashes,
-            "linewidth": 1.4,
-            "label": f"{rate:.3g} m/s".replace("-", "−"),
-        }
-        ax.plot(1e3 * depths, force, color=colour, **look)
+        label = f"{rate:.3g} m/s".replace("-", "−")
+        ax.plot(1e3 * depths, force, color=colour, linestyle=dashes, linewidth=1.4, label=label)
     ax.margins(x=0.0)
     style.dress(ax, law_name(law), PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis(), panel=True)
     style.legend(ax, title="rate of penetration", title_fontsize="small")

@@ -19,9 +19,9 @@ from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import QUANTITIES, Gait
 from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.plot import style
+from jaxbiped.plot._gait_charts import multipliers
 from jaxbiped.plot._motion_curves import gait_orbit
 from jaxbiped.plot._motion_pictures import corners_of, draw_bodies
-from jaxbiped.plot._multiplier_charts import multipliers
 from jaxbiped.plot._parameter_charts import branch
 from jaxbiped.plot._samples import AnyScene
 from jaxbiped.plot._skeleton import skeleton_of

@@ -84,18 +84,18 @@ def branch(
     check_choice("measure", measure, (*_MEASURES, *components))
     ax = style.axes_or_new(ax, 6.8, 4.6)
     counts = sorted({each.footsteps for each in given})
-    for each in given:
-        k = counts.index(each.footsteps)
-        _draw_lines(ax, each, given, measure, _look(k))
+    for curve in given:
+        k = counts.index(curve.footsteps)
+        _draw_lines(ax, curve, given, measure, _look(k))
         look: dict[str, Any] = {"color": style.GROUND_COLOUR, "markersize": 6 * 0.75**k}
-        for event in each.bifurcations:
-            for height in _values(measure, each, event.point):
+        for event in curve.bifurcations:
+            for height in _values(measure, curve, event.point):
                 ax.plot(event.value, height, EVENT_MARKS[event.kind][0], zorder=3, **look)
     if given[0].axis.log:
         ax.set_xscale("log")
     if measure == "spectral_radius":
-        for each in given:
-            _draw_errors(ax, each, style.colour_of(counts.index(each.footsteps)))
+        for curve in given:
+            _draw_errors(ax, curve, style.colour_of(counts.index(curve.footsteps)))
         ax.axhline(1.0, color="black", linewidth=0.9, zorder=0.5, label="radius 1")
     quantity = _MEASURES.get(measure) or state_quantity(measure) or Quantity(measure, "", "SI")
     along = parameter_quantities(given[0].scene)[given[0].along]
@@ -138,7 +138,7 @@ def bifurcation_curves(curves: Sequence[BifurcationCurve], *, ax: Axes | None = 
     return style.figure_of(ax)
 
 
-def _values(measure: str, each: Branch, point: BranchPoint) -> np.ndarray:
+def _values(measure: str, curve: Branch, point: BranchPoint) -> np.ndarray:
     """The measure of each footstep of a gait; the spectral radius is that of the cycle."""
     if measure == "spectral_radius":
         return np.abs(point.multipliers[:1])
@@ -148,8 +148,8 @@ def _values(measure: str, each: Branch, point: BranchPoint) -> np.ndarray:
         return steps.step_length / steps.period
     if measure in CycleFootsteps._fields:
         values: np.ndarray = getattr(steps, measure)
-        return values if measure == "peak_normal" else values * len(values) / each.footsteps
-    return steps.recurring[:, recurring_names(each.state_type).index(measure)]
+        return values if measure == "peak_normal" else values * len(values) / curve.footsteps
+    return steps.recurring[:, recurring_names(curve.state_type).index(measure)]
 
 
 def _doubling_of(child: Branch, given: list[Branch]) -> list[tuple[Branch, BranchPoint]]:
@@ -167,19 +167,19 @@ def _look(k: int) -> dict[str, Any]:
     return {"color": style.colour_of(k), "linewidth": max(0.8, 1.6 * 0.75**k)}
 
 
-def _draw_errors(ax: Axes, each: Branch, colour: str) -> None:
+def _draw_errors(ax: Axes, curve: Branch, colour: str) -> None:
     """A band of the leading multiplier's errors, where they are known."""
-    sizes = np.abs(each.multipliers[:, 0])
-    errors = np.array([point.multiplier_errors[0] for point in each.points])
+    sizes = np.abs(curve.multipliers[:, 0])
+    errors = np.array([point.multiplier_errors[0] for point in curve.points])
     look: dict[str, Any] = {"color": colour, "alpha": 0.25, "linewidth": 0.0, "zorder": 0.8}
-    ax.fill_between(each.values, sizes - errors, sizes + errors, **look)
+    ax.fill_between(curve.values, sizes - errors, sizes + errors, **look)
 
 
 def _draw_lines(
-    ax: Axes, each: Branch, given: list[Branch], measure: str, look: dict[str, Any]
+    ax: Axes, curve: Branch, given: list[Branch], measure: str, look: dict[str, Any]
 ) -> None:
     """Lines between neighbours; a bifurcation belongs to the gaits on either side of it."""
-    pairs = _doubling_of(each, given) + [(each, point) for point in each.points]
+    pairs = _doubling_of(curve, given) + [(curve, point) for point in curve.points]
     special = {event.value for one, _ in pairs for event in one.bifurcations}
     x, rows = [point.value for _, point in pairs], [_values(measure, *pair) for pair in pairs]
     # Footsteps of a doubled cycle follow those of the cycle twice over.
@@ -196,8 +196,8 @@ def _draw_lines(
 
 def _entries(given: list[Branch], counts: list[int]) -> Iterator[Line2D]:
     """Of the legend: kinds of stability, footsteps of cycles where they differ, bifurcations."""
-    grey, points = style.GROUND_COLOUR, [point for each in given for point in each.points]
-    events = [event for each in given for event in each.bifurcations]
+    grey, points = style.GROUND_COLOUR, [point for curve in given for point in curve.points]
+    events = [event for curve in given for event in curve.bifurcations]
     # That gaits are undecided at bifurcations alone goes without saying.
     special = {event.value for event in events}
     stable = {p.stable for p in points if p.stable is not None or p.value not in special}

@@ -1,8 +1,8 @@
-"""Motions to draw: trajectories sampled on times fit for that, and rigid walks."""
+"""Motions to draw: sampled on times fit for that, as few as possible where numbers are sent."""
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, TypeAlias, cast
 
 import jax.tree_util as jtu
@@ -29,6 +29,11 @@ _EVEN = 2048
 """Evenly spaced times; a fixed number, so that evaluating them compiles once."""
 _IN_A_STEP = 64
 """Evenly spaced times in each footstep of a rigid walk, however long the walk."""
+Channels = dict[str, np.ndarray]
+"""What is shown of a motion, by name; arrays of shape (n,)."""
+_ROUNDS = 6
+_PARTS = 4
+_PASSES = 10
 
 
 class SampledMotion(NamedTuple):
@@ -228,26 +233,26 @@ def rigid_motion(scene: RigidScene, walk: Trajectory[Any]) -> RigidMotion:
 
 
 def _exchanged_back(
-    structure: Structure, found: dict[str, np.ndarray], rows: np.ndarray
+    structure: Structure, values: dict[str, np.ndarray], rows: np.ndarray
 ) -> dict[str, np.ndarray]:
     """What bodies and feet have, under the names that they have in the first footstep."""
-    changed, odd = dict(found), rows % 2 == 1
+    changed, odd = dict(values), rows % 2 == 1
     for j, twin in enumerate(structure.body_twins or ()):
         for word in ("theta", "omega"):
-            own, other = (f"{word}_{structure.bodies[k]}" for k in (j, twin))
-            if own in found:
-                changed[own] = np.where(odd, found[other], found[own])
+            name, other = (f"{word}_{structure.bodies[k]}" for k in (j, twin))
+            if name in values:
+                changed[name] = np.where(odd, values[other], values[name])
     turn = structure.turn
-    if turn is not None and (name := f"theta_{structure.bodies[turn.body]}") in found:
-        changed[name] = found[name] - 2.0 * np.pi / turn.order * rows
+    if turn is not None and (name := f"theta_{structure.bodies[turn.body]}") in values:
+        changed[name] = values[name] - 2.0 * np.pi / turn.order * rows
     for word in ("normal", "tangential"):
         names = [f"{word}_{k + 1}" for k in range(len(structure.feet))]
-        if names[0] in found:
+        if names[0] in values:
             changed |= {name: np.zeros(len(rows)) for name in names}
             for row in np.unique(rows):
                 for k, name in zip(structure.feet_renamed(-int(row)), names, strict=True):
-                    own = names[k]
-                    changed[own] = np.where(rows == row, found[name], changed[own])
+                    first = names[k]
+                    changed[first] = np.where(rows == row, values[name], changed[first])
     return changed
 
 
@@ -272,3 +277,90 @@ def _states_of_walks(scene: RigidScene, starts: Any, durations: np.ndarray) -> A
 
     found = in_parts(walked, (starts, np.maximum(durations, shortest)), _AT_ONCE)
     return jtu.tree_map(as_array, found)
+
+
+class Tolerances(NamedTuple):
+    """How exactly channels are to be interpolated.
+
+    Attributes:
+        cubic: of each coordinate its rate's name and the error allowed, in the coordinate's unit.
+        linear: of other channels the error allowed, where there are such.
+        shortest: interval that is not split further [s].
+    """
+
+    cubic: Mapping[str, tuple[str, float]]
+    linear: Mapping[str, float]
+    shortest: float
+
+
+def adaptive_knots(
+    evaluate: Callable[[np.ndarray], Channels], first: np.ndarray, tolerances: Tolerances
+) -> tuple[np.ndarray, Channels]:
+    """Increasing times [s], shape (n,), and the channels at them.
+
+    Intervals of the `first` times, which must see everything that happens, are quartered until
+    interpolation has the channels right at the quarters; then knots are left out that their
+    neighbours make up for.
+    """
+    t, values = first, evaluate(first)
+    fresh = np.diff(t) > tolerances.shortest
+    shares = np.arange(1, _PARTS) / _PARTS
+    for _ in range(_ROUNDS):
+        left = np.repeat(np.flatnonzero(fresh), _PARTS - 1)
+        if not left.size:
+            break
+        at = t[left] + np.resize(shares, left.size) * (t[left + 1] - t[left])
+        found = evaluate(at)
+        error = _error(t, values, left, left + 1, at, found, tolerances)
+        wrong = error.reshape(-1, _PARTS - 1).max(axis=1) > 1.0
+        parts = np.ones(len(t) - 1, dtype=int)
+        parts[fresh] = _PARTS
+        split = np.zeros(len(t) - 1, dtype=bool)
+        split[np.flatnonzero(fresh)[wrong]] = True
+        fresh = np.repeat(split, parts)
+        t = np.insert(t, left + 1, at)
+        values = {name: np.insert(values[name], left + 1, found[name]) for name in values}
+        fresh &= np.diff(t) > tolerances.shortest
+    return _necessary_knots(t, values, tolerances)
+
+
+def _necessary_knots(
+    t: np.ndarray, values: Channels, tolerances: Tolerances
+) -> tuple[np.ndarray, Channels]:
+    for _ in range(_PASSES):
+        inner = np.arange(1, len(t) - 1, 2)
+        there = {name: values[name][inner] for name in values}
+        error = _error(t, values, inner - 1, inner + 1, t[inner], there, tolerances)
+        needless = inner[error < 0.5]
+        if needless.size < 0.02 * len(t):
+            break
+        t = np.delete(t, needless)
+        values = {name: np.delete(values[name], needless) for name in values}
+    return t, values
+
+
+def _error(
+    t: np.ndarray,
+    values: Channels,
+    left: np.ndarray,
+    right: np.ndarray,
+    at: np.ndarray,
+    there: Channels,
+    tolerances: Tolerances,
+) -> np.ndarray:
+    """The largest error of interpolation at times between knots, in parts of what is allowed."""
+    width = t[right] - t[left]
+    share = (at - t[left]) / width
+    worst = np.zeros(len(at))
+    for name, (rate, allowed) in tolerances.cubic.items():
+        start, end = values[name][left], values[name][right]
+        first, last, rise = width * values[rate][left], width * values[rate][right], end - start
+        square, cube = 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise
+        drawn = start + share * (first + share * (square + share * cube))
+        error = np.abs(drawn - there[name])
+        worst = np.maximum(worst, error / allowed)
+    for name in values.keys() & tolerances.linear.keys():
+        start, end = values[name][left], values[name][right]
+        error = np.abs(start + share * (end - start) - there[name])
+        worst = np.maximum(worst, error / tolerances.linear[name])
+    return worst

@@ -1,5 +1,6 @@
 """Style that all figures share: colours, markers, labels of axes, and where legends go."""
 
+import math
 import re
 from typing import Any, NamedTuple
 
@@ -7,17 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
+from jaxbiped.basins._labels import Label
 from jaxbiped.plot._figure_style import has_titles as has_titles
 from jaxbiped.plot._figure_style import is_narrow as is_narrow
 from jaxbiped.plot._figure_style import letter_size as letter_size
 from jaxbiped.plot._figure_style import make_room
 from jaxbiped.plot._figure_style import new_figure as new_figure
 from jaxbiped.plot._figure_style import panels_abreast as panels_abreast
-from jaxbiped.plot._label_looks import GAIT_SUFFIX as GAIT_SUFFIX
-from jaxbiped.plot._label_looks import in_order as in_order
-from jaxbiped.plot._label_looks import label_colour as label_colour
-from jaxbiped.plot._label_looks import label_marker as label_marker
-from jaxbiped.plot._label_looks import walking_pattern as walking_pattern
 
 _GROUPS = (
     ("#0072B2", "#56B4E9"),
@@ -57,11 +54,10 @@ _ENERGY_COLOURS = {
 
 
 def view_colours() -> dict[str, str]:
-    """The viewer's colours, `light-…` and `dark-…`, by what they stand for."""
+    """The viewer's colours by what they stand for, each for a light page and a dark one (CSS)."""
     pairs = {f"leg-{leg}": pair for leg, pair in enumerate(_GROUPS, 1)}
     pairs |= _ENERGY_COLOURS | {"ground": (GROUND_COLOUR, "#B9B9B9")}
-    pages = ("light", "dark")
-    return {f"{pages[k]}-{name}": pair[k] for k in (0, 1) for name, pair in pairs.items()}
+    return {name: f"light-dark({light}, {dark})" for name, (light, dark) in pairs.items()}
 
 
 MARKERS = "osD^vPX"
@@ -253,3 +249,63 @@ def legend_right(ax: Axes, **options: Any) -> None:
         legend_below(ax, columns=len(entries), handles=entries)
         return
     legend(ax, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **options)
+
+
+_LABEL_COLOURS = {
+    str(Label.FELL_FORWARD): "#D55E00",
+    str(Label.FELL_BACK): "#F9C653",
+    str(Label.STOPPED): "#2CC596",
+    str(Label.STUMBLED): "#EAAACE",
+    str(Label.SLID): "#F2E850",
+    str(Label.OUT_OF_STEPS): "#484848",
+    str(Label.SOLVER_FAILED): "#000000",
+    str(Label.UNRESOLVED): "#2A2A2A",
+    str(Label.TIMED_OUT): "#9A9A9A",
+    str(Label.PENDING): "#F2F2F2",
+}
+"""Okabe and Ito's colours, greys where nothing is known, all of different lightness: they can be
+distinguished by colour-blind readers, and in print without colour."""
+_BLUES = ("#0072B2", "#56B4E9", "#0B3C5D", "#A6D8F5", "#1F5E96", "#1E90FF")
+"""Walking: shades by gait, or else by the cycle's length; they repeat after six."""
+_WALKING_MARKERS = "os8hpH"
+_WALKING_PATTERNS = ("", "....", "ooo", "xxx", "+++", "***")
+_MARKERS = "D^vPX*<>d."
+_ORDER = list(_LABEL_COLOURS)
+GAIT_SUFFIX = ", gait {gait}"
+"""What follows the word for walking if several gaits are distinguished."""
+
+
+def label_colour(name: str) -> str:
+    """The colour of a label's name (`label_name`); grey for a name that is not known."""
+    ends, place = _kind(name)
+    return _LABEL_COLOURS.get(name, "#BBBBBB") if ends else _BLUES[place % len(_BLUES)]
+
+
+def in_order(names: set[str]) -> list[str]:
+    """Names in one order for all legends: walking, then the endings, pending last."""
+    kinds = {name: _kind(name) for name in names}
+    return sorted(names, key=lambda name: (kinds[name][0], math.prod(kinds[name]), name))
+
+
+def walking_pattern(name: str) -> str:
+    """The pattern over what walks in a further gait or a longer cycle; "" for all else.
+
+    Blues alone have other labels' lightness.
+    """
+    ends, place = _kind(name)
+    return "" if ends else _WALKING_PATTERNS[place % len(_WALKING_PATTERNS)]
+
+
+def label_marker(name: str) -> str:
+    """The marker of a label's name on a line, by which it is known without colour."""
+    ends, place = _kind(name)
+    markers = _MARKERS if ends else _WALKING_MARKERS
+    return markers[place % len(markers)]
+
+
+def _kind(name: str) -> tuple[bool, int]:
+    """Whether it is an ending, and its place among these; or that of its gait or cycle's length."""
+    if not name.startswith(str(Label.WALKING)):
+        return True, _ORDER.index(name) if name in _ORDER else len(_ORDER)
+    numbers = re.findall(r"\d+", name) or [1]
+    return False, int(numbers[-1]) - (len(numbers) == 1)

@@ -1,9 +1,13 @@
-"""Family of a scene's gaits: how they change with its parameters, and the search for them."""
+"""Family of a scene's gaits over its parameters: their search, and how far each attracts starts.
+
+A start that comes within the radius of certain attraction need be followed no further.
+"""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
+import jax
 import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
@@ -11,24 +15,236 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject, as_float
+from jaxbiped.basins._label_oracle import spread_directions
+from jaxbiped.basins._labels import Label
+from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._footfalls import leg_depth
+from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
+from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._parameter_access import SomeScene, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.sweep._attractor import (
-    Attractor,
-    attractor_without_radius,
-    component_scales,
-    with_radius,
-)
+from jaxbiped.solve._accuracy import sizes_of
 from jaxbiped.sweep._convergence_test import NO_GAIT, Goals
-from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves
+from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts, passes_a_stop
+from jaxbiped.variational._hybrid_system import projection_of, section_of
 
+_SHELLS = 1e-5 * 1.5 ** np.arange(30)
+"""Distances that are tried."""
+_STRIDE = 5
+"""Every so many shells are tried first, then those between the last that is good and the next."""
+_HALVED, _MOST_CYCLES = 0.5, 16
+"""Samples are followed until the linear model leaves this share of their distance, or so long."""
+_NOISE = 100.0
+"""Distance that the solver may make of none in a cycle, in units of its tolerance."""
+_DIRECTIONS = 128
+_SHALLOW = 1e-9
+"""Depth of a foot in units of length up to which it just touches."""
+_SHARE = 0.7
+"""Of the largest distance from which every sample came nearer."""
 _SAME = 1e-5
 """Distance in the components' sizes up to which two states on the section are of one gait, where
 its convergence is quick."""
 
 Guesses = Mapping[int, Sequence[tuple[int, Sequence[float]]]]
 """By row of a family: footsteps in a cycle and states, without `ROOT_x`, from which to search."""
+
+
+class Attractor(NamedTuple):
+    """A stable gait of a scene; its state without `ROOT_x` has m components.
+
+    Attributes:
+        cycle_footsteps: number of footsteps of its cycle.
+        duration: duration of the cycle [s].
+        step_length: advance along the slope in a cycle [m].
+        state: state on the section, a `State` or `RigidState` of numbers.
+        multipliers: Floquet multipliers, largest first, shape (m − 1,).
+        metric: W, shape (m − 1, m): near the gait, |W (x − x*)| falls by the factor `contraction`
+            in a cycle.
+        contraction: factor by which that distance falls, below 1.
+        radius: distance within which every start is taken to converge, because a whole sample of
+            starts on shells up to there came nearer (see `with_radius`). Negative if it was not
+            measured, or if none came nearer.
+        model: B, shape (m − 1, m − 1): to first order, a cycle multiplies W (x − x*) by B.
+        slowest: ℓ, shape (2, m): |ℓ (x − x*)| is the offset along the leading multiplier's
+            direction, in the metric.
+        crossings: states on the section at every footstep of the cycle, shape (cycle_footsteps, m).
+    """
+
+    cycle_footsteps: int
+    duration: float
+    step_length: float
+    state: PyTree
+    multipliers: np.ndarray
+    metric: np.ndarray
+    contraction: float
+    radius: float
+    model: np.ndarray
+    slowest: np.ndarray
+    crossings: np.ndarray
+
+    @property
+    def point(self) -> np.ndarray:
+        """Its state on the section without `ROOT_x`, shape (m,)."""
+        return np.stack(recurring_leaves(self.state))
+
+    @property
+    def goal(self) -> tuple[npt.ArrayLike, ...]:
+        """Its entry in the first fields of `Goals`, all but the scales."""
+        return (self.point, self.metric, self.model, self.slowest, self.contraction, self.radius)
+
+    def distance(self, states: np.ndarray) -> np.ndarray:
+        """Distance in the metric, (n,), of states on the section without `ROOT_x`, (n, m)."""
+        return np.linalg.norm((states - self.point) @ self.metric.T, axis=1)
+
+
+def attractor_without_radius(scene: Scene | RigidScene, gait: Gait) -> Attractor:
+    """A gait's metric, from its return map's derivative; its radius is not known yet.
+
+    The metric is Lyapunov's for the derivative A on the section: with a contraction q between the
+    spectral radius and 1, P = Σ (A/q)ᵏᵀ S (A/q)ᵏ gives |A e| ≤ q |e|, S measuring each component
+    in its own size (`component_scales`).
+
+    Raises:
+        ArgumentError: the search found none, or the gait is not stable.
+    """
+    import scipy.linalg
+
+    if int(gait.ending) != int(Search.FOUND) or not bool(gait.stable):
+        raise ArgumentError(
+            f"gait = {gait.outcome} with spectral radius {float(gait.measures.spectral_radius):g} "
+            "is not allowed: starts converge only to a gait that was found and is stable."
+        )
+    state = jtu.tree_map(np.asarray, gait.measures.state)
+    tangents = section_tangents(scene, state)
+    size = len(state) - 1
+    slopes = tangents.T @ np.asarray(gait.return_jacobian)[:size] @ tangents
+    contraction = 0.5 * (1.0 + float(gait.measures.spectral_radius))
+    weights = tangents.T @ np.diag(component_scales(scene, state) ** -2.0) @ tangents
+    squared = scipy.linalg.solve_discrete_lyapunov(slopes.T / contraction, weights)
+    factor = np.linalg.cholesky(0.5 * (squared + squared.T))
+    values, vectors = np.linalg.eig(slopes)
+    first = np.argmax(np.abs(values))
+    left = np.linalg.pinv(vectors)[first] * np.linalg.norm(factor.T @ vectors[:, first])
+    return Attractor(
+        cycle_footsteps=int(gait.cycle_footsteps),
+        duration=float(gait.measures.period),
+        step_length=float(gait.measures.step_length),
+        state=state,
+        multipliers=np.asarray(gait.multipliers),
+        metric=factor.T @ tangents.T,
+        contraction=contraction,
+        radius=-1.0,
+        model=factor.T @ slopes @ np.linalg.inv(factor.T),
+        slowest=np.stack([left.real, left.imag]) @ tangents.T,
+        crossings=np.stack(recurring_leaves(gait.orbit[1]), axis=-1)[:, 0],
+    )
+
+
+def section_tangents(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
+    """Orthonormal directions in which the section extends at a state, shape (m, m − 1)."""
+    import scipy.linalg
+
+    slope = _section_slope(section_of(scene, None), scene, jtu.tree_map(as_float, state))
+    normal = np.stack(recurring_leaves(slope))
+    return scipy.linalg.null_space(normal[None])
+
+
+@cached_jit
+def _section_slope(section: AbstractSection, scene: Scene | RigidScene, state: PyTree) -> PyTree:
+    return jax.grad(lambda y: section.value(scene, y))(state)
+
+
+def component_scales(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
+    """Size of each component of a state without `ROOT_x`, shape (m,), SI units.
+
+    Angles 1, velocities √(g l), rates √(g/l), the root point's height the penetration of the
+    deepest foot of the stance leg.
+    """
+    _, sizes = sizes_of(scene, state)
+    if scene.compliant:
+        structure = scene.mechanism.structure
+        found = leg_depth(structure, feet(cast(Scene, scene), state), structure.stance_leg)
+        depth, length = abs(float(found)), float(scene.mechanism.height)
+        # A start whose foot just touches tells no depth.
+        height = depth if depth > _SHALLOW * length else length
+        sizes = sizes._replace(**{structure.coordinates[1]: height})
+    return np.array(recurring_leaves(sizes))
+
+
+def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort) -> Attractor:
+    """The attractor with its radius measured: all starts of one shell after another.
+
+    On each shell starts lie in many directions. The radius is a share of the last distance up to
+    which every one of them returned and had come nearer, by at least half of what the metric
+    promises. Where that is little in a cycle they are followed for several: on the way to a gait
+    with a multiplier near −1, or a pair near the circle, a distance may well grow for once.
+    """
+    rho = float(np.max(np.abs(attractor.multipliers)))
+    needed = np.ceil(np.log(_HALVED) / np.log(np.clip(rho, 1e-9, 1.0 - 1e-9)))
+    cycles = int(np.clip(needed, 1, _MOST_CYCLES))
+
+    def leading(shells: np.ndarray) -> int:
+        """How many of the shells, from the first on, are drawn in."""
+        return int(np.cumprod(_draws_in(scene, attractor, shells, cycles, effort)).sum())
+
+    good = _STRIDE * leading(_SHELLS[_STRIDE - 1 :: _STRIDE])
+    between = _SHELLS[good : good + _STRIDE - 1]
+    good += leading(between) if len(between) else 0
+    return attractor._replace(radius=_SHARE * float(_SHELLS[good - 1]) if good else -1.0)
+
+
+def _draws_in(
+    scene: Scene | RigidScene,
+    attractor: Attractor,
+    shells: np.ndarray,
+    cycles: int,
+    effort: Effort,
+) -> np.ndarray:
+    """Whether all samples at each of these distances are nearer after so many cycles.
+
+    What is held stays so in all of them, and those that pass a stop do not count.
+    """
+    import scipy.linalg
+
+    size = len(attractor.state) - 1
+    directions = spread_directions(_DIRECTIONS, size - 1)
+    # The metric maps the section one to one: offsets whose images lie on shells.
+    tangents = section_tangents(scene, attractor.state)
+    back = tangents @ np.linalg.inv(attractor.metric @ tangents)
+    held = np.eye(size) - projection_of(scene, attractor.state)
+    if held.any():
+        own = tangents @ scipy.linalg.null_space(held @ tangents)
+        reached = scipy.linalg.orth(attractor.metric @ own)
+        directions = spread_directions(_DIRECTIONS, reached.shape[1]) @ reached.T
+    offsets = (shells[:, None, None] * directions).reshape(-1, size - 1) @ back.T
+    count = len(offsets)
+    leaves = list((attractor.point + offsets).T)
+    starts = state_of_recurring(type(attractor.state), leaves, np.zeros(count))
+    # Followed wherever they go: the linear model decides nothing.
+    nothing = np.full_like(attractor.model, np.inf)
+    aim = attractor._replace(model=nothing, contraction=1.0, radius=-1.0)
+    scales = component_scales(scene, attractor.state)
+    goals = Goals(*[*(np.stack([each]) for each in aim.goal), scales])
+    strikes = cycles * attractor.cycle_footsteps + (1 if scene.compliant else 0)
+    found = follow_starts(
+        scene,
+        starts,
+        broadcast_leaves(goals, count),
+        (attractor.cycle_footsteps,),
+        effort._replace(footsteps=strikes, gap_share=0.0),
+    )
+    returned = (found.label == int(Label.UNRESOLVED)) & np.isfinite(found.final).all(axis=1)
+    after = attractor.distance(np.where(returned[:, None], found.final, attractor.point))
+    left = attractor.contraction**cycles
+    noise = _NOISE * effort.rtol * (1.0 - left) / (1.0 - attractor.contraction)
+    allowed = np.maximum(0.5 * (1.0 + left) * np.repeat(shells, len(directions)), noise)
+    impossible = passes_a_stop(scene, starts._asdict())
+    nearer: np.ndarray = np.asarray(returned & (after <= allowed) | impossible)
+    return np.asarray(nearer.reshape(len(shells), -1).all(axis=1))
 
 
 class Family(NamedTuple):

@@ -26,9 +26,8 @@ from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
-from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
+from jaxbiped.sweep._follow_starts import Effort, Labelled, broadcast_leaves, follow_starts
 from jaxbiped.sweep._gait_family import Family
-from jaxbiped.sweep._labelling_loop import Labelled
 
 _FINER = 10.0
 """From one tolerance to the next."""

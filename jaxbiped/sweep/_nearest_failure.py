@@ -16,9 +16,8 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.sweep._attractor import Attractor
 from jaxbiped.sweep._follow_starts import passes_a_stop
-from jaxbiped.sweep._gait_family import scene_with
+from jaxbiped.sweep._gait_family import Attractor, scene_with
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.variational._hybrid_system import admissible_directions
 

@@ -18,7 +18,7 @@ from jaxbiped._files import strict_json
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import Doubt, Label, Witness
-from jaxbiped.sweep._labelling_loop import Labelled
+from jaxbiped.sweep._follow_starts import Labelled
 from jaxbiped.sweep._store_files import SETTINGS, continue_store, note, open_store, writing
 from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
 

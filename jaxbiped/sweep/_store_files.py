@@ -58,7 +58,6 @@ def continue_store(
             another version, or may not be written.
         ResourceError: its disk is full or fails.
     """
-    check_store(path)
     with writing(path):
         new = is_new(path)
         if new:
@@ -120,12 +119,46 @@ def _is_close(old: Any, new: Any, name: str) -> bool:
 
 
 def store_path(store: str | Path | None) -> Path | None:
-    """The path that a user gives for a store, None for one in memory; raises as `check_store`."""
+    """The path that a user gives for a store, None for one in memory.
+
+    Raises:
+        ArgumentError: no path, a kind of address that nothing here opens, or a place where no store
+            can be made or continued.
+        ResourceError: a package that is missing for it, or a disk that fails.
+    """
     if store is None:
         return None
-    path = store_address(store)
-    check_store(path)
+    text = str(store)
+    remote = "://" in text and not text.startswith("file:")
+    path = _remote_path(text) if remote else user_path(store, "store").absolute()
+    with writing(path):
+        is_new(path)
+    home = next(each for each in [path, *path.parents] if remote or each.is_dir())
+    if not remote and not os.access(home, os.W_OK | os.X_OK):
+        raise ArgumentError(
+            f"store = {str(path)!r} cannot be written: its folder must be writable."
+        )
     return path
+
+
+def _remote_path(text: str) -> Path:
+    """The path of an address; raises as `store_path`."""
+    try:
+        from upath import UPath
+
+        address: Any = UPath(text, use_listings_cache=False)
+        _ = address.fs  # imports its driver
+    except ImportError:
+        raise ResourceError(
+            f"store = {text!r} needs a package that is missing: pip install jaxbiped[s3], or the "
+            "package of fsspec for another kind of address."
+        ) from None
+    except ValueError:
+        raise ArgumentError(
+            f"store = {text!r} is not allowed: it must be a directory, or an address that fsspec "
+            "opens, such as s3://bucket/basin.zarr."
+        ) from None
+    return cast("Path", address)
 
 
 def what_is_kept(path: Path | None) -> str:
@@ -133,19 +166,6 @@ def what_is_kept(path: Path | None) -> str:
     if path is None:
         return "without a store nothing is kept"
     return f"what is done is in {path.name!r}, where the same call continues"
-
-
-def check_store(path: Path) -> None:
-    """Raises `ArgumentError` where no store can be made or continued at this path."""
-    with writing(path):
-        is_new(path)
-    if is_remote(path):
-        return
-    home = next(each for each in [path, *path.absolute().parents] if each.is_dir())
-    if not os.access(home, os.W_OK | os.X_OK):
-        raise ArgumentError(
-            f"store = {str(path)!r} cannot be written: its folder must be writable."
-        )
 
 
 def open_store(path: Path) -> "xarray.Dataset":
@@ -239,34 +259,6 @@ def is_new(path: Path) -> bool:
 
 _CLIENTS = ("botocore", "aiobotocore", "aiohttp", "google", "gcsfs", "azure", "adlfs", "fsspec")
 """Packages whose errors are those of a service."""
-
-
-def store_address(store: str | Path) -> Path:
-    """The path that a user gives for a store.
-
-    Raises:
-        ArgumentError: no path, or a kind of address that nothing here opens.
-        ResourceError: a package that is missing for it.
-    """
-    text = str(store)
-    if "://" not in text or text.startswith("file:"):
-        return user_path(store, "store").absolute()
-    try:
-        from upath import UPath
-
-        address: Any = UPath(text, use_listings_cache=False)
-        _ = address.fs  # imports its driver
-    except ImportError:
-        raise ResourceError(
-            f"store = {text!r} needs a package that is missing: pip install jaxbiped[s3], or the "
-            "package of fsspec for another kind of address."
-        ) from None
-    except ValueError:
-        raise ArgumentError(
-            f"store = {text!r} is not allowed: it must be a directory, or an address that fsspec "
-            "opens, such as s3://bucket/basin.zarr."
-        ) from None
-    return cast("Path", address)
 
 
 def is_remote(path: Path) -> bool:

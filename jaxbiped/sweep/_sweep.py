@@ -143,11 +143,11 @@ def sweep(
             now.update(int(sizes[number]))
     if look_for_gaits:
         with stage("seeking gaits from unresolved starts", show=progress, kept=kept):
-            known = _resolve(known, layout, results)
+            known = _resolve(known, results)
     told: dict[str, str | float] = {}
     if doubts:
         with stage("labelling at finer tolerances", show=progress, kept=kept):
-            errors = tightened(known, layout, results, executor, int(workers))
+            errors = tightened(known, results, executor, int(workers))
         errors.warn()
         told[ERRORS] = json.dumps(errors.numbers())
     results.note(
@@ -172,15 +172,15 @@ def _gaits_by_coordinate(known: Labelling) -> list[JsonObject]:
     return rows
 
 
-def _resolve(labelling: Labelling, layout: Layout, results: Store) -> Labelling:
+def _resolve(labelling: Labelling, results: Store) -> Labelling:
     """Seeks gaits from starts that are unresolved but repeat a cycle; labels the unresolved anew.
 
     Where they were sought is noted first: a run that is killed here finds the same ones again,
     whatever is labelled anew by then.
     """
-    noted = results.noted(_GUESSES)
+    layout, noted = results.layout, results.noted(_GUESSES)
     if noted is None:
-        guesses = _guesses(labelling, layout, results)
+        guesses = _guesses(labelling, results)
         results.note({_GUESSES: json.dumps(guesses)})
     else:
         guesses = {int(row): each for row, each in json.loads(noted).items()}
@@ -204,8 +204,9 @@ def _resolve(labelling: Labelling, layout: Layout, results: Store) -> Labelling:
     return known
 
 
-def _guesses(labelling: Labelling, layout: Layout, results: Store) -> Guesses:
+def _guesses(labelling: Labelling, results: Store) -> Guesses:
     """From some of the starts that are open, evenly spread over all of them."""
+    layout = results.layout
     counts = np.array([len(_open(results, chunk)) for chunk in range(layout.chunks)])
     before = np.cumsum(counts) - counts
     total = int(counts.sum())
@@ -228,11 +229,7 @@ def _open(results: Store, chunk: int) -> np.ndarray:
 
 
 def tightened(
-    labelling: Labelling,
-    layout: Layout,
-    results: Store,
-    executor: Executor | None,
-    workers: int,
+    labelling: Labelling, results: Store, executor: Executor | None, workers: int
 ) -> LabelErrors:
     """Labels all starts at finer tolerances until their errors are certainly what is wanted.
 
@@ -241,7 +238,8 @@ def tightened(
     Each round is noted before it begins: a run that is killed goes on with it. Estimates count all
     starts, so that no label depends on the chunks.
     """
-    wanted, compliant = labelling.effort.wanted, labelling.scene.compliant
+    layout, wanted = results.layout, labelling.effort.wanted
+    least = FINEST_FIRST[labelling.scene.compliant]
     assert wanted is not None
     tolerances = json.loads(results.noted(_TOLERANCES) or json.dumps([labelling.effort.rtol]))
     while True:
@@ -256,11 +254,11 @@ def tightened(
         for chunk in range(layout.chunks):
             seen += tally_disagreements(**results.read(chunk, tuple(DOUBT_FIELDS)))
         errors = estimate_label_errors(seen, wanted=wanted, rtol=tolerances[-1])
-        finest = tolerances[-1] <= 1.001 * FINEST_FIRST[compliant]
+        finest = tolerances[-1] <= 1.001 * least
         too_few = errors.wrong <= wanted and errors.starts < errors.fewest
         if errors.met or too_few or finest or len(tolerances) >= _ROUNDS:
             return errors
-        tolerances.append(max(tolerances[-1] / _FINER, FINEST_FIRST[compliant]))
+        tolerances.append(max(tolerances[-1] / _FINER, least))
         results.note({_TOLERANCES: json.dumps(tolerances)})
 
 

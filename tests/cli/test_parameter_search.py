@@ -5,7 +5,7 @@ import json
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._optimise import _bounds
+from jaxbiped.cli._parameter_search import _bounds
 from tests.cli.commands import interrupt_after, numbers_of, one_line, outputs_of, run
 from tests.drawn import assert_is_drawn, points_of
 

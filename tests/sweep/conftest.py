@@ -5,7 +5,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.basins._labels import Label
-from jaxbiped.sweep._labelling_loop import Labelled
+from jaxbiped.sweep._follow_starts import Labelled
 
 
 @pytest.fixture

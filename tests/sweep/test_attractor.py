@@ -11,7 +11,7 @@ import jaxbiped as jb
 from jaxbiped.basins import FatalShock
 from jaxbiped.basins._labels import Label
 from jaxbiped.sweep import _nearest_failure
-from jaxbiped.sweep._attractor import attractor_without_radius, component_scales
+from jaxbiped.sweep._gait_family import attractor_without_radius, component_scales
 from jaxbiped.sweep._labelling_preparation import effort_of
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, with_attractor

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped.basins._labels import Witness
+from jaxbiped.sweep._follow_starts import Labelled
 from jaxbiped.sweep._labelling import relabel_doubtful
-from jaxbiped.sweep._labelling_loop import Labelled
 from jaxbiped.sweep._labelling_preparation import effort_of
 from jaxbiped.sweep._sweep import tally_disagreements
 from tests.sweep.walkers import same

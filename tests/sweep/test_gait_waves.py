@@ -7,7 +7,7 @@ import pytest
 import xarray
 
 import jaxbiped as jb
-from jaxbiped.sweep import _gait_sweep, _gait_waves
+from jaxbiped.sweep import _gait_sweep
 from jaxbiped.sweep._gait_sweep import find_each
 from jaxbiped.sweep._store_files import consolidate
 
@@ -82,14 +82,14 @@ def test_a_killed_sweep_continues_to_the_same_bits(swept, tmp_path, monkeypatch)
 
 def test_what_a_wave_misses_its_neighbours_find(swept, monkeypatch):
     """Guesses that lead nowhere cost a point its wave, not its gait."""
-    honest = _gait_waves.extrapolated
+    honest = _gait_sweep.extrapolated
 
     def misled(states, wave):
         guesses = honest(states, wave)
         guesses[::3] = 0.0
         return guesses
 
-    monkeypatch.setattr(_gait_waves, "extrapolated", misled)
+    monkeypatch.setattr(_gait_sweep, "extrapolated", misled)
     again = jb.gait_sweep(jb.seed_scene(), OVER, **PLAIN)
     assert np.all(again.found_by.data.ravel()[1:] >= 0)
     np.testing.assert_allclose(again.period, swept.period, rtol=1e-6)
@@ -121,8 +121,7 @@ def test_a_store_of_another_sweep_or_that_kept_less_is_refused(tmp_path):
 
 def test_points_next_to_gaits_are_searched_without_a_guess_on_a_coarse_grid(monkeypatch):
     """Beside a fold, gaits that are far from their neighbours'; periods by continuation in K."""
-    for module in (_gait_sweep, _gait_waves):
-        monkeypatch.setattr(module, "LARGE", 16)
+    monkeypatch.setattr(_gait_sweep, "LARGE", 16)
     stiffness, damping = np.geomspace(1e4, 1e9, 15)[4:8], np.geomspace(1e5, 1e9, 9)[:5]
     with pytest.warns(RuntimeWarning, match="no gait was found at"):
         found = jb.gait_sweep(

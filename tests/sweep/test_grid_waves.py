@@ -8,7 +8,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped._progress import Stage
 from jaxbiped.sweep._gait_grid import extrapolated, interpolated, neighbours
-from jaxbiped.sweep._gait_waves import GaitWaves, rings, waves
+from jaxbiped.sweep._gait_sweep import GaitWaves, rings, waves
 
 SHAPES = [((100, 100), (37, 80)), ((97,), (3,)), ((30, 5, 7), (0, 4, 6)), ((8, 8), (7, 0))]
 

@@ -12,7 +12,7 @@ from jaxbiped.basins._labels import Label
 from jaxbiped.dynamics._contacts import contact_places, slip_distances
 from jaxbiped.solve._saved_outputs import LastStep
 from jaxbiped.sweep._convergence_test import NO_GAIT, UNDECIDED, Goals, after_arrival, empty_history
-from jaxbiped.sweep._labelling_loop import CompliantLabelling, Progress, Start, _outcome
+from jaxbiped.sweep._follow_starts import CompliantLabelling, Progress, Start, _outcome
 
 RADIUS, GAP, RTOL = 0.1, 1e-4, 1e-7
 ONWARD = jax.jit(after_arrival, static_argnums=3)

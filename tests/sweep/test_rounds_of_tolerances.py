@@ -53,7 +53,7 @@ def test_tolerances_are_tightened_until_the_errors_are_what_was_asked_for(
     monkeypatch.setattr(_sweep, "compute_chunks", labels)
     for chunk, fields in labels(labelling, layout, range(2), None, 1):
         results.write(chunk, fields)
-    told = tightened(labelling, layout, results, None, 1)
+    told = tightened(labelling, results, None, 1)
     assert solved == pytest.approx([1e-4, 1e-5, 1e-6][:rounds])
     assert told.met is (len(wrong) < 3)
     assert told.rtol == pytest.approx(10.0 ** (-3 - rounds))

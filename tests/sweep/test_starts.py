@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.sweep._follow_starts import passes_a_stop
-from jaxbiped.sweep.starts._samples import sequence_points
+from jaxbiped.sweep.starts._starts import sequence_points
 from jaxbiped.variational._hybrid_system import admissible_directions, independent_names
 from tests.dynamics.test_modes import ANGLES, RATES, hsu_chen
 from tests.sweep.walkers import gaitless, same

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import jaxbiped as jb
-from jaxbiped.sweep._store_files import store_address
+from jaxbiped.sweep._store_files import store_path
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results
 
@@ -92,11 +92,11 @@ def test_gaits_go_into_a_bucket(bucket):
 def test_a_missing_package_and_an_unknown_address_are_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "upath", None)
     with pytest.raises(jb.ResourceError, match=r"is missing: pip install jaxbiped\[s3\]"):
-        store_address("s3://walks/basin.zarr")
+        store_path("s3://walks/basin.zarr")
     monkeypatch.undo()
     pytest.importorskip("upath", reason="universal-pathlib is not installed")
     with pytest.raises(jb.ArgumentError, match="must be a directory, or an address"):
-        store_address("nothing://walks/basin.zarr")
+        store_path("nothing://walks/basin.zarr")
 
 
 def test_a_store_at_a_file_address_is_the_one_at_its_path(tmp_path, by_formula):

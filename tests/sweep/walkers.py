@@ -6,7 +6,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 import jaxbiped as jb
-from jaxbiped.sweep._attractor import component_scales
+from jaxbiped.sweep._gait_family import component_scales
 from jaxbiped.sweep._labelling_preparation import effort_of
 from jaxbiped.sweep._store import Store
 

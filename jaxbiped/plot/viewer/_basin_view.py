@@ -44,8 +44,7 @@ class BasinView(AbstractPage):
     def _frame(self) -> tuple[str, int]:
         return self.basin["title"], 900
 
-    def _repr_html_(self) -> str:
-        return self._in_frame()
+    _repr_html_ = AbstractPage._in_frame
 
 
 def view_basin(

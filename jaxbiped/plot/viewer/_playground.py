@@ -161,8 +161,7 @@ class Playground(AbstractPage):
     def _frame(self) -> tuple[str, int]:
         return "A walk that simulates itself", 1000
 
-    def _repr_html_(self) -> str:
-        return self._in_frame()
+    _repr_html_ = AbstractPage._in_frame
 
 
 def playground(scene: Scene, state: Any, *, footsteps: int = 5) -> Playground:

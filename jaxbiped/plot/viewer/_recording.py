@@ -21,9 +21,16 @@ from jaxbiped.dynamics._stance_motion import ground_force, turning_of
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._samples import evaluate_along, places_of_standing, sample
 from jaxbiped.plot._contact_charts import forces_in
-from jaxbiped.plot._samples import RigidMotion, end_time, rigid_motion, state_at
+from jaxbiped.plot._samples import (
+    Channels,
+    RigidMotion,
+    Tolerances,
+    adaptive_knots,
+    end_time,
+    rigid_motion,
+    state_at,
+)
 from jaxbiped.plot._skeleton import Skeleton, body_motion, motion_names, names_by_foot, skeleton_of
-from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory
 

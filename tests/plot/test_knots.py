@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxbiped.plot.viewer._knots import Tolerances, adaptive_knots
+from jaxbiped.plot._samples import Tolerances, adaptive_knots
 
 
 def _motion(t):

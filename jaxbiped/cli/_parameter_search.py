@@ -1,4 +1,4 @@
-"""`jaxbiped optimise`: the parameters of the best gait, and their certificate."""
+"""Searches for parameters: `jaxbiped optimise` for the best gait, `fit` for the measured ones."""
 
 import dataclasses
 import math
@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
+from tyro.conf import Positional
+
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._files import JsonObject
+from jaxbiped._files import JsonObject, read_json, read_text
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._declarations import names
 from jaxbiped.cli._gait import gait_figures
@@ -26,6 +28,18 @@ _STABLE = {True: "stable", False: "NOT STABLE", None: "undecided within the erro
 _REDUNDANT = (
     "formulation = redundant is not allowed here: how the hip is held makes no difference to a "
     "gait; choose minimal."
+)
+_ESTIMATE = {
+    "parameter": "{0[0]}",
+    "unit": "{0[1].unit}",
+    "estimate": "{0[2]:.6g}",
+    "standard error": "{0[3]:.6g}",
+    "95 % from": "{0[4][0]:.6g}",
+    "to": "{0[4][1]:.6g}",
+}
+_REDUNDANT_FIT = 'formulation = "redundant" is not allowed here: it must be "minimal".'
+_IS_MEASURED = options.Check(
+    lambda name, path: (read_text if path.suffix.lower() == ".csv" else read_json)(name, path)
 )
 
 
@@ -89,24 +103,24 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         vary = {"vary": _bounds(scene, self.vary), "subject_to": self.subject_to or None}
         how = self.arguments("optimise_gait") | vary
         del how["footsteps"]  # of the certificate's walk
-        found = jb.optimise_gait(scene, **how)
+        optimum = jb.optimise_gait(scene, **how)
         ended = jb.optimise.Outcome
         tests: dict[str, Any] = {"starts": 0, "footsteps": 0, "bifurcations_along": ()}
-        if found.outcome is not ended.INTERRUPTED:
+        if optimum.outcome is not ended.INTERRUPTED:
             tests = {"starts": self.basin, "bifurcations_along": along}
             tests |= {name: getattr(self, name) for name in _TESTS}
-        certificate = jb.optimise.certify(found, **tests)
+        certificate = jb.optimise.certify(optimum, **tests)
         sense = "minimise" if self.maximise is None else "maximise"
         goal = getattr(self, sense)
         report = Report(self.output.json, self.output.csv)
-        _print(report, scene, found, goal)
+        _print(report, scene, optimum, goal)
         report.say(*_certificate_lines(certificate))
-        figures = {"optimisation": lambda: jb.plot.optimisation(found)}
-        report.finish(_optimum_numbers(found, certificate, goal, sense), found.to_csv)
-        report.wrote(self.output.draw(figures | gait_figures(found.gait)))
-        if found.outcome is ended.INTERRUPTED or "interrupted" in certificate.failed.values():
+        figures = {"optimisation": lambda: jb.plot.optimisation(optimum)}
+        report.finish(_optimum_numbers(optimum, certificate, goal, sense), optimum.to_csv)
+        report.wrote(self.output.draw(figures | gait_figures(optimum.gait)))
+        if optimum.outcome is ended.INTERRUPTED or "interrupted" in certificate.failed.values():
             raise options.interrupted("the best design so far is what is reported")
-        return int(found.outcome in (ended.UNFINISHED, ended.INFEASIBLE))
+        return int(optimum.outcome in (ended.UNFINISHED, ended.INFEASIBLE))
 
 
 def _parts(text: str) -> dict[str, str]:
@@ -120,62 +134,62 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
     """Bounds by name from d=0.05:0.2,r,J."""
     from jaxbiped.continuation._critical_values import farthest_allowed
 
-    own, found = jb.parameter_values(scene), {}
+    values, pairs = jb.parameter_values(scene), {}
     units = units_of(jb.parameter_quantities(scene))
     for name, bounds in _parts(text).items():
         check_choice("vary", name, units)
         if bounds:
             low, high = numbers_in("vary", name, bounds, units[name], ":", 2)
-        elif (value := float(own[name])) != 0.0:
+        elif (value := float(values[name])) != 0.0:
             low, high = sorted(farthest_allowed(scene, name, value * x) for x in _USUAL_RANGE)
         else:
             raise ArgumentError(
                 f"vary = {name} needs bounds, as its value is 0: write {name}=low:high."
             )
-        found[name] = (low, high)
-    return found
+        pairs[name] = (low, high)
+    return pairs
 
 
 def _optimum_numbers(
-    found: "jb.optimise.Optimum", certificate: "jb.optimise.Certificate", goal: str, sense: str
+    optimum: "jb.optimise.Optimum", certificate: "jb.optimise.Certificate", goal: str, sense: str
 ) -> JsonObject:
     """What is known of an optimum in SI units, for `strict_json`."""
     return {
-        "outcome": str(found.outcome),
-        "message": found.message,
-        "variables": found.variables,
+        "outcome": str(optimum.outcome),
+        "message": optimum.message,
+        "variables": optimum.variables,
         "objective": {
             "name": goal,
             "sense": sense,
-            "value": found.objective,
-            "error": found.error,
+            "value": optimum.objective,
+            "error": optimum.error,
             "unit": jb.optimise.OBJECTIVES[goal].quantity.unit,
         },
         "measures": {
             name: {
                 "value": value,
-                "error": found.known.errors[name],
-                "beyond_range": name in found.known.beyond_range,
+                "error": optimum.known.errors[name],
+                "beyond_range": name in optimum.known.beyond_range,
             }
-            for name, value in found.known.values.items()
+            for name, value in optimum.known.values.items()
         },
-        "history": records(found.history),
-        "evaluations": found.evaluations,
-        "lost": found.lost,
-        "unmeasured": found.unmeasured,
+        "history": records(optimum.history),
+        "evaluations": optimum.evaluations,
+        "lost": optimum.lost,
+        "unmeasured": optimum.unmeasured,
         "certificate": _certificate_numbers(certificate),
     }
 
 
 def _certificate_numbers(certificate: "jb.optimise.Certificate") -> JsonObject:
-    told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
+    kkt, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
     basin, push = certificate.basin, certificate.fatal_push
     numbers = {
-        "kkt_residual": told.residual,
-        "kkt_residual_error": told.error,
-        "excess": told.excess,
-        "constraints": records(told.requirements),
-        "bounds": records(told.bounds),
+        "kkt_residual": kkt.residual,
+        "kkt_residual_error": kkt.error,
+        "excess": kkt.excess,
+        "constraints": records(kkt.requirements),
+        "bounds": records(kkt.bounds),
     } | records(certificate)
     del numbers["optimality"]
     return numbers | {
@@ -186,16 +200,16 @@ def _certificate_numbers(certificate: "jb.optimise.Certificate") -> JsonObject:
 
 
 def _print(
-    report: Report, scene: "jb.Scene | jb.RigidScene", found: "jb.optimise.Optimum", goal: str
+    report: Report, scene: "jb.Scene | jb.RigidScene", optimum: "jb.optimise.Optimum", goal: str
 ) -> None:
-    units, own = jb.parameter_quantities(scene), jb.parameter_values(scene)
+    units, values = jb.parameter_quantities(scene), jb.parameter_values(scene)
     variables = {
         "variable": "{0[0]}",
         "began": "{0[1]:.6g}",
         "best": "{0[2]:.6g}",
         "unit": "{0[3].unit_in_text}",
     }
-    rows = [(name, float(own[name]), x, units[name]) for name, x in found.variables.items()]
+    rows = [(name, float(values[name]), x, units[name]) for name, x in optimum.variables.items()]
     measures = {
         "measure": "{0[0]}",
         "began": "{0[1]}",
@@ -203,33 +217,33 @@ def _print(
         "error": "{0[3]}",
         "unit": "{0[4].quantity.unit_in_text}",
     }
-    report.say(columns(variables, rows), "", columns(measures, _measures(found)), "")
+    report.say(columns(variables, rows), "", columns(measures, _measures(optimum)), "")
     report.say(
-        f"{goal} {found.objective:.6g}, {found.outcome} after {len(found.history)} iterations and "
-        f"{found.evaluations} gaits ({found.message})"
+        f"{goal} {optimum.objective:.6g}, {optimum.outcome} after {len(optimum.history)} "
+        f"iterations and {optimum.evaluations} gaits ({optimum.message})"
     )
 
 
-def _measures(found: "jb.optimise.Optimum") -> Iterator[tuple[object, ...]]:
+def _measures(optimum: "jb.optimise.Optimum") -> Iterator[tuple[object, ...]]:
     """Each measure, its first value, its best one and the error, or more than a range holds."""
-    first = found.history[0].measures if found.history else {}
-    for name, value in found.known.values.items():
+    first = optimum.history[0].measures if optimum.history else {}
+    for name, value in optimum.known.values.items():
         if name in jb.optimise.OBJECTIVES:
             began = f"{first[name]:.6g}" if name in first else "–"
-            best, error = f"{value:.6g}", f"{found.known.errors[name]:.1e}"
-            if name in found.known.beyond_range:
+            best, error = f"{value:.6g}", f"{optimum.known.errors[name]:.1e}"
+            if name in optimum.known.beyond_range:
                 best, error = f"> {best}", "–"
             yield name, began, best, error, jb.optimise.OBJECTIVES[name]
 
 
 def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
-    told, basin, walk = certificate.optimality, certificate.basin, certificate.walk
-    yield "optimality: residual {:.1e} ± {:.1e}, requirements missed by {:.1e}".format(*told[:3])
-    for each in (*told.requirements, *told.bounds):
-        if each.active:
+    kkt, basin, walk = certificate.optimality, certificate.basin, certificate.walk
+    yield "optimality: residual {:.1e} ± {:.1e}, requirements missed by {:.1e}".format(*kkt[:3])
+    for limit in (*kkt.requirements, *kkt.bounds):
+        if limit.active:
             yield (
-                f"held by {each.name} at {each.bound:.6g}: multiplier {each.multiplier:.4g} ± "
-                f"{each.multiplier_error:.1e}"
+                f"held by {limit.name} at {limit.bound:.6g}: multiplier {limit.multiplier:.4g} ± "
+                f"{limit.multiplier_error:.1e}"
             )
     pairs = zip(certificate.multipliers, certificate.multiplier_errors, strict=True)
     sizes = ", ".join(f"{abs(size):.4f} ± {error:.0e}" for size, error in list(pairs)[:3])
@@ -262,3 +276,57 @@ def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
             f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "
             f"{other.length_difference:.1e}, spectral radius by {other.radius_difference:.1e}"
         )
+
+
+class Fit(options.Command, of=("fit_gait",)):
+    """Fit parameters to measured gaits; print estimates, errors and undetermined parameters."""
+
+    file: Annotated[Positional[Path], _IS_MEASURED]
+    """File of measured gaits, CSV or JSON (see jaxbiped.identify.read_measured)."""
+    vary: str
+    """Names of the parameters to fit, separated by commas: K,c,mu_kinetic."""
+    scene: Annotated[SceneOptions, minimal(_REDUNDANT_FIT)]
+    accuracy: options.GaitAccuracy
+    engine: options.Engine
+    max_evaluations: options.Count
+    output: options.OutputOptions
+
+    def check_names(self, scene: SceneOptions) -> None:
+        """Raises `ArgumentError` for parameters that the scene lacks."""
+        for name in self.names:
+            scene.check_parameter("vary", name)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters to fit."""
+        return tuple(name.strip() for name in self.vary.split(",") if name.strip())
+
+    def run(self) -> int:
+        scene = self.scene.scene()
+        assert not isinstance(scene, jb.RedundantScene)
+        self.output.make_folder()
+        measured, how = jb.identify.read_measured(self.file, scene), self.arguments("fit_gait")
+        fit = jb.fit_gait(scene, self.names, measured, **how)
+        report = Report(self.output.json, self.output.csv)
+        parts = (jb.parameter_quantities(scene), fit.estimates, fit.standard_errors, fit.intervals)
+        report.say(
+            columns(_ESTIMATE, [(name, *(part[name] for part in parts)) for name in self.names])
+        )
+        report.say(
+            f"{fit.ending} after {fit.evaluations} scenes; chi squared {fit.chi_squared:.3g} at "
+            f"{fit.freedom} degrees of freedom (p = {fit.p_value:.2g})"
+        )
+        if fit.undetermined:
+            report.say(f"these data do not determine {', '.join(fit.undetermined)}")
+        if fit.one_sided:
+            report.say(f"limited on one side only: {', '.join(fit.one_sided)}")
+        if fit.at_bounds:
+            report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
+        numbers = vars(fit) | {"ending": str(fit.ending), "intervals_95": fit.intervals}
+        del numbers["intervals"]
+        also = {"chi_squared": fit.chi_squared, "p_value": fit.p_value}
+        report.finish(numbers | also, fit.to_csv)
+        report.wrote(self.output.draw({"fit": lambda: jb.plot.fit(fit)}))
+        if fit.ending is jb.identify.FitEnding.INTERRUPTED:
+            raise options.interrupted("the best estimates so far are what is reported")
+        return 0 if fit.ending is jb.identify.FitEnding.CONVERGED else 1
