@@ -202,7 +202,7 @@ class MeasuredGait:
     @property
     def values(self) -> np.ndarray:
         """All measured values, one after the other, shape (n,)."""
-        angles = [] if self.angles is None else self.angles.values
+        angles: npt.ArrayLike = [] if self.angles is None else self.angles.values
         return np.concatenate([[value for value, _ in self.measures.values()], angles])
 
     @property
