@@ -297,7 +297,10 @@ def run_optax(
     return RunEnding(False, "Iteration limit reached")
 
 
-_RUNS = (run_trust_region, run_slsqp, run_trust_constr, run_optax)
-BY_NAME: dict[str, Callable[[Functions, np.ndarray, int, Callback], RunEnding]] = dict(
-    zip(OPTIMISERS, _RUNS, strict=True)
+_RUNS: tuple[Callable[[Functions, np.ndarray, int, Callback], RunEnding], ...] = (
+    run_trust_region,
+    run_slsqp,
+    run_trust_constr,
+    run_optax,
 )
+BY_NAME = dict(zip(OPTIMISERS, _RUNS, strict=True))
