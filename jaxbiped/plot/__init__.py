@@ -42,10 +42,10 @@ from jaxbiped.plot._parameter_charts import bifurcation_curves as bifurcation_cu
 from jaxbiped.plot._parameter_charts import branch as branch
 from jaxbiped.plot._work_precision import constraint_runs as constraint_runs
 from jaxbiped.plot._work_precision import work_precision as work_precision
-from jaxbiped.plot.viewer._basin_view import BasinView as BasinView
-from jaxbiped.plot.viewer._basin_view import view_basin as view_basin
 from jaxbiped.plot.viewer._playground import Playground as Playground
 from jaxbiped.plot.viewer._playground import playground as playground
+from jaxbiped.plot.viewer._view import BasinView as BasinView
 from jaxbiped.plot.viewer._view import View as View
 from jaxbiped.plot.viewer._view import side_by_side as side_by_side
 from jaxbiped.plot.viewer._view import view as view
+from jaxbiped.plot.viewer._view import view_basin as view_basin

@@ -16,7 +16,7 @@ from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw as AbstractNorm
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw as AbstractBristleLaw
 
 # Normal laws.
-from jaxbiped.scene.laws.normal._hertz import Hertz as Hertz
+from jaxbiped.scene.laws.normal._viscoelastic import Hertz as Hertz
 from jaxbiped.scene.laws.normal._viscoelastic import KelvinVoigt as KelvinVoigt
 from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer as RistowSchafer
 from jaxbiped.scene.laws.normal._ristow_schafer import SmoothRistowSchafer as SmoothRistowSchafer
@@ -43,5 +43,5 @@ from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS as FRICTION_LAWS
 from jaxbiped.scene.laws._abstract_laws import NORMAL_LAWS as NORMAL_LAWS
 from jaxbiped.scene.laws._catalogue import friction_law_like as friction_law_like
 from jaxbiped.scene.laws._catalogue import normal_law_like as normal_law_like
-from jaxbiped.scene.laws.normal._hertz import hertz_stiffness as hertz_stiffness
+from jaxbiped.scene.laws.normal._viscoelastic import hertz_stiffness as hertz_stiffness
 from jaxbiped.scene.laws.normal._hunt_crossley import RESTITUTION_FORMULAS as RESTITUTION_FORMULAS

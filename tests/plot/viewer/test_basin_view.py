@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.plot.viewer._basin_view import _even_choice
+from jaxbiped.plot.viewer._view import _even_choice
 from tests.drawn import sent_in
 
 pytestmark = pytest.mark.slow
