@@ -56,11 +56,7 @@ def test_bars_of_derivatives_hold_in_nearly_all_cases(gaits):
 
 
 def test_draft_tells_measures_to_a_hundredth_in_about_two_fifths_of_the_steps():
-    """Of all steps of six gaits .429, of twelve .428.
-
-    It is .40 without the steps that let stiff errors fade before a touchdown, which are as many at
-    any tolerance; with them derivatives behind it are ten times as exact.
-    """
+    """Of all steps of six gaits: single ones have .386 to .431 of them, sixteen .404 in all."""
     steps = {"draft": 0, "balanced": 0}
     for slope in SLOPES[::2]:
         scene = jb.seed_scene(slope=slope)
@@ -71,4 +67,4 @@ def test_draft_tells_measures_to_a_hundredth_in_about_two_fifths_of_the_steps():
         for name in ("period", "step_length", "speed", "peak_normal", "spectral_radius"):
             told, true = (float(getattr(each.measures, name)) for each in (draft, balanced))
             assert told == pytest.approx(true, rel=1e-2), (slope, name)
-    assert steps["draft"] <= 0.435 * steps["balanced"]
+    assert steps["draft"] <= 0.42 * steps["balanced"]
