@@ -75,17 +75,6 @@ class StepCubic(NamedTuple):
         lowest = side * self.at(self.turning_point())
         return approaches & (lowest < _NEAR * jnp.minimum(side * self.start, side * self.end))
 
-    def steady_zero(self) -> Scalar:
-        """How far beyond the end it comes to zero at its slope there, at most 1.
-
-        1 where it leaves zero or has slowed to less than half its first slope: what fades away
-        comes to zero at no time.
-        """
-        steady = self.end_slope * self.start_slope > 0.5 * self.start_slope**2
-        nears = steady & (self.end * self.end_slope < 0.0)
-        shares = jnp.where(nears, -self.end / jnp.where(nears, self.end_slope, 1.0), 1.0)
-        return jnp.minimum(shares, 1.0)
-
     def _bends(self) -> tuple[Scalar, Scalar]:
         """Coefficients of the second and of the third power."""
         second = 3.0 * (self.end - self.start) - 2.0 * self.start_slope - self.end_slope

@@ -36,14 +36,11 @@ class Turns(NamedTuple):
             (booleans), shape (k,).
         places: the part of the step that lies before, shape (k,).
         graze: whether one turns so near zero that derivatives are not determined (boolean).
-        ahead: shares of the step after which those at which the field jumps or is infinitely steep
-            are zero if they go on as they do at its end; 1 and more where they do not come near.
     """
 
     touches: Scalar
     places: Scalar
     graze: Scalar
-    ahead: Scalar
 
 
 def _may_turn(old: Switch, new: Switch) -> Scalar:
@@ -90,14 +87,8 @@ def turns_of(
             known_to = known_to + jnp.abs(normal) * error
         return jnp.any(turning & (jnp.abs(cubic.at(places)) <= known_to))
 
-    jumps = jnp.stack([jnp.asarray(new.live & (not new.corner)) for _, new in both])
     turns = jnp.any(turning)
-    return Turns(
-        touches=live & cubic.may_touch(),
-        places=places,
-        graze=turns & fusion_barrier(turns, graze),
-        ahead=jnp.where(jumps, cubic.steady_zero(), 1.0),
-    )
+    return Turns(live & cubic.may_touch(), places, turns & fusion_barrier(turns, graze))
 
 
 def grazes(

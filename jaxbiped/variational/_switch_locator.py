@@ -39,10 +39,6 @@ _LAST, _LEFT = 1e-8, 0.1
 """Longest last step to the section or a largest load where there are switches [s], and the share of
 the way that each step before leaves. A step's error in a stiff component of the state turns the
 rates by that error times the component's own rate, and so moves the time of a load."""
-_SETTLED, _HALF, _CLOSE = 1e-6, 0.5, 0.4
-"""The same before a jump of the field, where columns change by those rates: the error of a stiff
-component needs about its own time to fade. A jump is close if so small a share of the step lies
-between its end and the jump."""
 
 
 class SwitchLocatorState(NamedTuple):
@@ -133,19 +129,14 @@ class SwitchLocator(AbstractWrappedControl):
         far = span - before_first > jnp.maximum(_OVERSHOOT * before_first, 4.0 * MARGIN)
         is_far = crossed.read & (before_first > _LAST)
         again = crossed.any & (far | is_far | ((crossed.which != 0) & (span > 2.0 * NEAR)))
-        is_close = ~crossed.any & (crossed.ahead < _CLOSE) & (span > _SETTLED)
         past_first = before_first * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
         # Whatever else comes first, the step ends on this side of the switch.
-        settles = (crossed.which > 0) & (before_switch > _SETTLED)
-        left = jnp.where(settles, _HALF, _BEFORE)
-        short_of_switch = jnp.minimum(past_first, before_switch * (1.0 - left))
+        short_of_switch = jnp.minimum(past_first, before_switch * (1.0 - _BEFORE))
         approaches = (crossed.which != 0) & (before_switch > NEAR)
         past_first = jnp.where(is_far, before_first * (1.0 - _LEFT), past_first)
-        before_target = jnp.where(approaches, short_of_switch, past_first)
-        before_jump = span * (1.0 + crossed.ahead) * (1.0 - _HALF)
-        target = t0 + jnp.where(is_close, before_jump, before_target)
+        target = t0 + jnp.where(approaches, short_of_switch, past_first)
         target = cast(Scalar, jax.lax.stop_gradient(target))
-        adapted = try_again(attempt, adapted, again | is_close, target)
+        adapted = try_again(attempt, adapted, again, target)
         inner, keep = adapted.memory, adapted.keep
         landed = self._landed(inner, keep, crossed, scene, after, attempt.y1, known)
         landed = landed._replace(past=jnp.asarray(span - before_switch))
@@ -240,7 +231,6 @@ class SwitchLocator(AbstractWrappedControl):
             none if turns is None else turns.graze,
             which,
             read & any_crossed,
-            jnp.ones_like(span) if turns is None else jnp.min(turns.ahead),
         )
         return found, part, place
 
@@ -302,7 +292,6 @@ class _Crossed(NamedTuple):
     graze: Scalar
     which: Scalar
     read: Scalar
-    ahead: Scalar
 
     @property
     def field(self) -> Scalar:

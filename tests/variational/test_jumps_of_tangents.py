@@ -291,31 +291,6 @@ def test_a_switch_that_turns_within_a_step_is_told_by_how_near_it_comes(lowest, 
     assert float(found.places[0]) == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize(
-    ("end", "rates", "corner", "ahead"),
-    [
-        (0.2, (-1.0, -0.8), False, 0.125),
-        (-0.2, (1.0, 0.8), False, 0.125),
-        (0.2, (-1.0, -0.4), False, 1.0),
-        (0.2, (-1.0, 0.8), False, 1.0),
-        (0.2, (1.0, 0.8), False, 1.0),
-        (3.0, (-1.0, -0.8), False, 1.0),
-        (0.2, (-1.0, -0.8), True, 1.0),
-    ],
-    ids=["falls", "rises", "fades", "turned", "leaves", "far", "corner"],
-)
-def test_how_far_ahead_of_a_step_a_jump_of_the_field_lies(end, rates, corner, ahead):
-    """A ball that comes towards the ground steadily, in steps of two seconds."""
-    height = lambda y: (Switch(y[0], jnp.asarray(True), corner=corner),)
-    ends = [
-        tuple(map(jnp.asarray, each))
-        for each in ((end - 2.0 * rates[0], rates[0]), (end, rates[1]))
-    ]
-    errors = (jnp.zeros(()), jnp.zeros(()))
-    found = turns_of(lambda y: (y[1], jnp.zeros(())), height, jnp.asarray(2.0), *ends, errors)
-    assert float(found.ahead[0]) == pytest.approx(ahead)
-
-
 def test_radau_is_exact_for_polynomials_and_its_clock_runs_in_the_root_of_time():
     nodes = RADAU.sum(axis=1)
     assert nodes[-1] == pytest.approx(1.0)
