@@ -12,9 +12,10 @@ from jaxbiped.continuation._bifurcations import (
     critical_multiplier,
     multiplier_test,
 )
+from jaxbiped.continuation._continue_gait import _events_at
 from jaxbiped.continuation._deflation import _DeflatedNewton
 from jaxbiped.continuation._switch_branch import DoublingCascade, doubling_cascade
-from jaxbiped.continuation._trace import _closes, is_bound, leaves_range
+from jaxbiped.continuation._trace import BranchEnd, BranchStop, _closes, is_bound, leaves_range
 from jaxbiped.gait._pseudo_arclength import CurvePoint
 
 
@@ -145,3 +146,14 @@ def test_a_deflated_step_is_that_of_the_residual_over_the_squared_distance():
     whole = factor * slope + np.outer(f(x), -2.0 * away / square**2)
     expected = np.linalg.solve(whole, -factor * f(x))
     np.testing.assert_allclose(found, expected * min(1.0, 0.1 / np.linalg.norm(expected)))
+
+
+@pytest.mark.parametrize(("forward", "left"), [(True, [0, 1]), (False, [1, 2])])
+def test_a_limit_at_the_end_that_goes_on_is_no_event_any_more(forward, left):
+    kinds = (BranchEvent.LIMIT, BranchEvent.PERIOD_DOUBLING, BranchEvent.LIMIT)
+    points = [SimpleNamespace(place=np.array([float(k)])) for k in range(3)]
+    events = [SimpleNamespace(kind=k, point=p) for k, p in zip(kinds, points, strict=True)]
+    stop = BranchStop(BranchEnd.WALK_ENDS, "fell", 0.0)
+    branch = SimpleNamespace(bifurcations=tuple(events), stops=(stop, stop))
+    assert _events_at(branch, points, forward=forward) == [events[k] for k in left]
+    assert _events_at(branch, points[1:2], forward=forward) == [events[1]]

@@ -1,6 +1,7 @@
 """Stops and flat feet on rigid feet, against maximal coordinates with what is held as loads."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from jaxbiped.dynamics._stance_motion import turning_of
 from jaxbiped.scene._bodies import Body, Foot, Point
 from jaxbiped.scene._joint_parts import HOLDS, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._modes import Mode, rigid_modes
+from jaxbiped.scene._modes import Mode, _touch_within, rigid_modes
 from tests.dynamics.test_rolling_mechanisms import (
     a_state,
     floats,
@@ -349,3 +350,14 @@ def test_two_feet_that_stand_on_one_point_are_refused(radius, ahead, side_by_sid
     else:
         with pytest.raises(jb.ArgumentError, match=r"feet leg_1\.heel and leg_1\.toe are not all"):
             jb.RigidScene(walker, jb.Ground(slope=SLOPE))
+
+
+@pytest.mark.parametrize("height", [1e-3, 1.0, 1e3])
+def test_whether_two_feet_stand_on_one_point_does_not_depend_on_the_walkers_size(height):
+    def touch(apart, radius=0.0):
+        """Whether circles so many heights apart do, of which one has a radius."""
+        feet = Foot("a", centre=-apart * height, radius=radius * height), Foot("a", centre=0.0)
+        return bool(_touch_within(SimpleNamespace(height=height), *feet))
+
+    assert touch(1e-5) and not touch(1e-4)
+    assert touch(1.0, radius=1.0) and not touch(1.0, radius=0.5)

@@ -184,6 +184,11 @@ REFUSED = {
     "can turn without any inertia where all angles": lambda: two_legs(
         bodies=tuple(Body(f"leg_{i}", mass=1, inertia=0, centre=0.1) for i in (1, 2))
     ),
+    "Body('leg_1') can turn without any inertia where all angles": lambda: two_legs(
+        bodies=tuple(
+            Body(f"leg_{i}", mass=1, inertia=np.array([1e-3, 0.0]), centre=0.1) for i in (1, 2)
+        )
+    ),
     "1e-4 kg m^2": lambda: Mechanism(
         bodies=(LEGS[0], Body("sole", mass=0, inertia=0, centre=0, parent="leg_1", at=0.2)),
         feet=(Foot("sole", centre=0.1),),
