@@ -359,5 +359,7 @@ def test_whether_two_feet_stand_on_one_point_does_not_depend_on_the_walkers_size
         feet = Foot("a", centre=-apart * height, radius=radius * height), Foot("a", centre=0.0)
         return bool(_touch_within(SimpleNamespace(height=height), *feet))
 
-    assert touch(1e-5) and not touch(1e-4)
-    assert touch(1.0, radius=1.0) and not touch(1.0, radius=0.5)
+    assert touch(1e-5)
+    assert not touch(1e-4)
+    assert touch(1.0, radius=1.0)
+    assert not touch(1.0, radius=0.5)
