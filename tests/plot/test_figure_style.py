@@ -254,3 +254,18 @@ def test_axes_of_equal_scales_leave_room_for_their_title_in_the_file(tmp_path):
     figure.savefig(tmp_path / "both.png")
     top = right.get_tightbbox(figure.canvas.get_renderer()).y1
     assert top <= figure.bbox.y1
+
+
+@pytest.mark.parametrize(("columns", "below"), [(1, True), (2, False)])
+def test_a_legend_stands_beside_the_axes_or_below_them_in_one_column_of_a_paper(columns, below):
+    with plot.figure_style("paper", columns=columns):
+        ax = style.axes_or_new(None, 7.0, 3.0)
+        for name in ("walking", "fallen"):
+            ax.plot([0.0, 1.0], [0.0, 1.0], label=name)
+        style.legend_right(ax)
+        figure = style.figure_of(ax)
+        figure.draw_without_rendering()
+    entries, frame = ax.get_legend().get_window_extent(), ax.get_window_extent()
+    assert bool(entries.y1 < frame.y0) is below
+    assert bool(entries.x0 > frame.x1) is not below
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["walking", "fallen"]

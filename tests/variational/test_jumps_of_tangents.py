@@ -280,9 +280,12 @@ def test_second_tangents_on_a_section_are_derivatives_of_the_arrival():
     ("lowest", "touches", "graze"), [(1e-3, True, False), (1e-9, True, True), (0.5, False, False)]
 )
 def test_a_switch_that_turns_within_a_step_is_told_by_how_near_it_comes(lowest, touches, graze):
-    """A ball pulled up: its height falls to its lowest halfway through the step and rises again."""
+    """A ball pulled up: its height falls to its lowest halfway through the step and rises again.
+
+    Its speed, the other switch, does not turn.
+    """
     rates = lambda y: (y[1], jnp.asarray(2.0))
-    height = lambda y: (Switch(y[0], jnp.asarray(True)),)
+    height = lambda y: (Switch(y[0], jnp.asarray(True)), Switch(y[1], jnp.asarray(True)))
     ends = [(jnp.asarray(1.0 + lowest), jnp.asarray(v)) for v in (-2.0, 2.0)]
     errors = (jnp.asarray(1e-7), jnp.asarray(1e-7))
     found = turns_of(rates, height, jnp.asarray(2.0), *ends, errors)
