@@ -42,7 +42,10 @@ def test_endings():
     assert walk(-6.0, footsteps=5).outcome is jb.Ending.FELL_FORWARD
     assert walk(0.6, footsteps=5).outcome is jb.Ending.FELL_BACK
     assert walk(-0.6, 0.0, footsteps=5).outcome is jb.Ending.FELL_BACK
-    assert walk(-1.6, footsteps=5, max_solver_steps=20).outcome is jb.Ending.OUT_OF_STEPS
+    for most in (20, 21):
+        cut = walk(-1.6, footsteps=5, max_solver_steps=most)
+        assert cut.outcome is jb.Ending.OUT_OF_STEPS
+        assert int(cut.accepted) + int(cut.rejected) == most
     bounded = walk(-1.64274847822, duration=1.0)
     assert bounded.outcome is jb.Ending.WALKING
     assert (float(bounded.t[-1]), int(bounded.arrivals.total)) == (1.0, 2)
