@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tests.mutants.mutations import ROOT
-from tests.mutants.operators import Slip, slips
+from tests.mutants.operators import ASSERTED, Slip, slips
 
 PACKAGE = ROOT / "jaxbiped"
 _WORDS = ("__repr__", "__str__", "_repr_html_", "_repr_svg_", "__all__")
@@ -153,6 +153,8 @@ def _is_left_alone(node: ast.AST) -> bool:
         return True
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return True
+    if isinstance(node, ast.keyword):
+        return node.arg in ASSERTED
     if isinstance(node, ast.If):
         return "TYPE_CHECKING" in ast.unparse(node.test)
     if isinstance(node, _FUNCTIONS):

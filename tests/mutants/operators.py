@@ -157,11 +157,15 @@ def _is_value(node: ast.expr) -> bool:
     return not words and not isinstance(node, ast.Starred | ast.Lambda | ast.JoinedStr)
 
 
+ASSERTED = ("strict",)
+"""Named arguments that assert what holds, as that `zip` is given as many of everything."""
+
+
 def default(node: ast.AST) -> Iterator[Slip]:
     """A named argument is missing, so that its default holds."""
     if isinstance(node, ast.Call):
         for k, keyword in enumerate(node.keywords):
-            if keyword.arg is not None:
+            if keyword.arg is not None and keyword.arg not in ASSERTED:
                 left = [*node.keywords[:k], *node.keywords[k + 1 :]]
                 yield Slip("default", _changed(node, keywords=left))
 

@@ -214,3 +214,10 @@ def test_the_interval_of_a_share_is_wilsons():
         for end in interval(caught, of):
             spread = end * (1 - end) / of
             assert (share - end) ** 2 == pytest.approx(1.959964**2 * spread, abs=1e-12)
+
+
+def test_assertions_are_left_alone():
+    source = "def f(a, b):\n    return dict(zip(a, b, strict=True), key=len(a) + 1)\n"
+    drawn = [slip.kind for site in sites(source, "f.py") for slip in slips(site.node)]
+    assert sorted(set(drawn)) == ["arguments", "constant", "default", "sign", "term"]
+    assert "True" not in {ast.unparse(site.node) for site in sites(source, "f.py")}

@@ -110,6 +110,7 @@ def test_motors_and_losses_of_a_rigid_walk_are_those_of_its_ledger():
     np.testing.assert_allclose(held - held[0], given, rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.nightly
 def test_motors_of_a_compliant_walk_are_those_of_its_ledger(seed_walk):
     scene = dataclasses.replace(
         seed_walk[0], actuation=(jb.actuation.HipTorque(0.02), jb.actuation.FootPreload(5e-4))
