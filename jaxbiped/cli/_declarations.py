@@ -22,6 +22,7 @@ _EXPORT = re.compile(r"^from (\S+) import \(?\s*(\w+) as", re.MULTILINE)
 _STATEMENT = re.compile(r"^[^\s)\]}#]", re.MULTILINE)
 _NAMED = re.compile(r'^class (\w+)|^    name: ClassVar.* = "(.+)"$', re.MULTILINE)
 _FIELD = re.compile(r'^(?:class (\w+)|(\S)|    (\w+): |    """(.*?)""")', re.MULTILINE | re.DOTALL)
+_NO_FIELD = re.compile(r"ClassVar|AbstractVar")
 _ENTRY = re.compile(r"^ {4}((?:\w+, )*\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)
 _SENTENCE_END = re.compile(r"\. (?=[A-Z])")
 _SYMBOL = re.compile(r" [^\x00-\x7f]+\b")
@@ -61,7 +62,7 @@ def fields(name: str) -> dict[str, Argument]:
     for part in _with_bases(*_definition(name)):
         said = _entries(part)
         for node in part.body:
-            if isinstance(node, ast.AnnAssign) and "ClassVar" not in ast.unparse(node.annotation):
+            if isinstance(node, ast.AnnAssign) and not _NO_FIELD.match(ast.unparse(node.annotation)):
                 own, default, info = ast.unparse(node.target), None, None
                 if isinstance(node.value, ast.Call):
                     expression = compile(ast.Expression(node.value), name, "eval")
