@@ -62,7 +62,9 @@ def fields(name: str) -> dict[str, Argument]:
     for part in _with_bases(*_definition(name)):
         said = _entries(part)
         for node in part.body:
-            if isinstance(node, ast.AnnAssign) and not _NO_FIELD.match(ast.unparse(node.annotation)):
+            if not isinstance(node, ast.AnnAssign):
+                continue
+            if not _NO_FIELD.match(ast.unparse(node.annotation)):
                 own, default, info = ast.unparse(node.target), None, None
                 if isinstance(node.value, ast.Call):
                     expression = compile(ast.Expression(node.value), name, "eval")
