@@ -23,6 +23,12 @@ from jaxbiped.scene._placement import angles_and_rates_named, feet_named, foot_m
 from jaxbiped.scene._structure import Angle, Indices, Structure
 
 PRESSED, UNTIL_STRIKE, THROUGH_STRIKE = HOLDS
+AT_LIMIT = 1e-6
+"""Distance from a limit [rad], and rate in rad/s, up to which a stop may be held."""
+_DRIFT = 1e-2
+"""The same of a state that a walk ended at."""
+_LEVEL = 1e-9
+"""Difference of height of two feet, in units of the walker's height, up to which both stand."""
 
 
 class Limit(NamedTuple):
@@ -304,14 +310,6 @@ def check_stands(structure: Structure, standing: str | Sequence[str] | None) -> 
         which = "one leg stands" if len(able) > 1 else "the second of each pair stands"
         raise ArgumentError(f"standing = {standing!r} is not allowed: {which}, {told}.")
     return named
-
-
-AT_LIMIT = 1e-6
-"""Distance from a limit [rad], and rate in rad/s, up to which a stop may be held."""
-_DRIFT = 1e-2
-"""The same of a state that a walk ended at."""
-_LEVEL = 1e-9
-"""Difference of height of two feet, in units of the walker's height, up to which both stand."""
 
 
 def starting_mode(
