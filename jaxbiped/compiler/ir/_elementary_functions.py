@@ -1,7 +1,7 @@
 """Elementary functions and powers from plain arithmetic, as parts of a graph.
 
 Every function holds over all 64-bit numbers, infinities and NaN included, as IEEE 754 and C have
-it, for devices without a C library too; tests/lanes measures the errors in units in the last place.
+it, for devices without a C library too. The tests measure errors in units in the last place.
 """
 
 import math
