@@ -250,7 +250,7 @@ def _draw(options, pairs):
         ax.plot(bar[shown], error[shown], ".", markersize=3, label=name)
     ends = np.array([1e-14, 1e2])
     ax.plot(ends, ends, "k-", linewidth=0.8, label="error = bar")
-    words = "error bar [SI units of the number]", "true error [SI units of the number]"
+    words = "error bar (SI units of the number)", "true error (SI units of the number)"
     label(ax, *words, log="xy")
     ax.legend()
     return options.save(ax.figure, "accuracy_coverage.png")

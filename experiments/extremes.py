@@ -18,9 +18,9 @@ COLOURS = ("tab:green", "tab:blue", "tab:gray", "tab:red", "tab:orange")
 WITHIN = 1e-2
 """Relative error of a derivative at a graze from which it is wrong."""
 UNITS = {
-    "K": "[N/mⁿ]", "c": "[N s/m²]", "n": "[–]", "v0": "[m/s]", "xi": "[s/m]", "mu": "[–]",
-    "slope": "[rad]", "hip mass": "[kg]", "mass": "[kg]", "inertia": "[of the seed's]", "r": "[m]",
-    "d": "[m]", "size": "[of the seed's]", "g": "[m/s²]",
+    "K": "(N/mⁿ)", "c": "(N s/m²)", "n": "", "v0": "(m/s)", "xi": "(s/m)", "mu": "",
+    "slope": "(rad)", "hip mass": "(kg)", "mass": "(kg)", "inertia": "(of the seed's)", "r": "(m)",
+    "d": "(m)", "size": "(of the seed's)", "g": "(m/s²)",
 }  # fmt: skip
 
 

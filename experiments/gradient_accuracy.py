@@ -43,10 +43,10 @@ STEPPINGS = {
 }
 """Whether steps end at switches, and whether columns enter the norm."""
 ERRORS = {
-    "state": "state [m, rad, m/s, rad/s]",
-    "period_s": "period [s]",
+    "state": "state (m, rad, m/s, rad/s)",
+    "period_s": "period (s)",
     "unit_multiplier": "multiplier that is exactly 1",
-    "period_slope": "d period / d log K [relative]",
+    "period_slope": "d period / d log K (relative)",
 }
 
 

@@ -86,7 +86,7 @@ def draw_ways(ax, rows, names, words):
         if own:
             draw_way(ax, name, own, color=f"C{k}", **ring)
     ax.axhline(1.0, color="black", linewidth=0.8)
-    label(ax, f"relative error of the {words} [1]", "relative error of its gradient [1]")
+    label(ax, f"relative error of the {words}", "relative error of its gradient")
 
 
 def draw_ball(options, rows):

@@ -186,7 +186,7 @@ def draw(options, places, codes, changed, rows, count):
         said = "the reference ran out of steps" if unknown else str(jb.basins.Label(int(code)))
         left.plot(theta[own], omega[own], ".", markersize=6 if unknown else 1.5, label=said)
     left.plot(theta[changed], omega[changed], "kx", markersize=6, label="draft and tight differ")
-    label(left, *(f"{name} [{unit}]" for name, unit in zip(AXES, UNITS, strict=True)))
+    label(left, *(f"{name} ({unit})" for name, unit in zip(AXES, UNITS, strict=True)))
     left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=8)
     shares = {row["way"]: row["changed"] / count for row in rows}
     for solver in SOLVERS:

@@ -155,7 +155,7 @@ def draw(options, rows, alone):
     words = "simulations in the batch", f"simulations of {DURATION:g} s a second"
     label(left, *words, "batches on two cores, errors of about 2e-5", log="xy")
     draw_by(right, "way", (row | {"ms": 1e3 * row["seconds"]} for row in alone), "error", "ms")
-    words = "largest error of the final state (SI units)", "time of one simulation [ms]"
+    words = "largest error of the final state (SI units)", "time of one simulation (ms)"
     label(right, *words, "one walk", log="xy")
     for axes in (left, right):
         axes.legend()

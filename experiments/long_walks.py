@@ -65,7 +65,7 @@ def draw(options, period, durations):
     ax = new_figure(7.0, 3.8).subplots()
     off = np.abs(durations / period - 1.0)
     ax.plot(np.arange(1, len(off) + 1), np.maximum(off, 1e-16), ",", rasterized=True)
-    label(ax, "footstep [1]", "duration's difference from the period [relative]", log="y")
+    label(ax, "footstep", "duration's difference from the period (relative)", log="y")
     ax.set_ylim(1e-12, 10.0 * float(np.max(off)))
     return options.save(ax.figure, "long_walks.png")
 

@@ -208,10 +208,10 @@ def draw(options: Options, rows, chains):
     left, right = new_figure(10.0, 4.0).subplots(1, 2)
     draw_by(left, "way", rows, "error_median", "simulated_s_per_cpu_s")
     label(left, "median error of the final state (SI units)", "simulated seconds (s per CPU s)",
-          "five links", log="xy")  # fmt: skip
+          "Five links", log="xy")  # fmt: skip
     left.legend(frameon=False)
     right.plot(*np.array([[row["bodies"], row["operations"]] for row in chains]).T, "o-")
-    label(right, "bodies of a chain", "operations of a step", "cost of a step", log="xy")
+    label(right, "bodies of a chain", "operations of a step", "Cost of a step", log="xy")
     return options.save(left.figure, "mechanism_speed.png")
 
 

@@ -75,7 +75,7 @@ def along(name, count, measures):
 def draw_map(options, swept):
     left, right = new_figure(10.5, 4.4).subplots(1, 2)
     panel(left, swept, "spectral_radius", "spectral radius ρ")
-    panel(right, swept, "period", "period [s]")
+    panel(right, swept, "period", "period (s)")
     left.figure.suptitle("Gaits of the seed's walker on 0.02 rad; white cross: its own K and c")
     return options.save(left.figure, "radius_map.png")
 
@@ -87,7 +87,7 @@ def panel(axes, swept, name, title):
     axes.clabel(lines, fontsize=7)
     axes.plot(SEED["K"], SEED["c"], "x", color="w", ms=8, mew=2)
     axes.set(xscale="log", yscale="log", title=title)
-    axes.set(xlabel=f"K [{UNITS['K']}]", ylabel=f"c [{UNITS['c']}]")
+    axes.set(xlabel=f"K ({UNITS['K']})", ylabel=f"c ({UNITS['c']})")
     axes.figure.colorbar(image, ax=axes, label=title)
 
 
@@ -107,7 +107,7 @@ def draw_lines(options, found):
             axes.axhline(0.0, color="#595959", linewidth=0.8)
             axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
             axes.grid(alpha=0.3)
-        axes.set_xlabel(f"{name} [{UNITS[name]}]")
+        axes.set_xlabel(f"{name} ({UNITS[name]})")
     for axes, key in zip(grid[:, 0], measures, strict=True):
         axes.set_ylabel(f"elasticity of\n{key.replace('_', ' ')}")
     return options.save(grid[0, 0].figure, "elasticities.png")

@@ -170,7 +170,7 @@ def draw(options, rows, differences):
         if np.any(own > 0.0):
             ax.plot(np.sort(own)[::-1], np.arange(1, len(own) + 1) / len(own), label=row["name"])
     same = sum(not np.any(own > 0.0) for own in differences) - 1
-    words = "difference of the final state [relative]", "share of walks that differ by more"
+    words = "difference of the final state (relative)", "share of walks that differ by more"
     label(ax, *words, f"{same} other settings: the same to the last bit", log="xy")
     ax.legend()
     return options.save(ax.figure, "reproducibility.png")

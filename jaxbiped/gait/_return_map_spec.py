@@ -13,8 +13,8 @@ from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.dynamics._surfaces import AbstractSection
-from jaxbiped.scene._ground import check_pulls
-from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, is_rigid
+from jaxbiped.scene._ground import check_legs_admitted_alike, check_pulls
+from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, Scene, is_rigid
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
 from jaxbiped.solve._solvers import solver_named, with_projection
@@ -158,6 +158,10 @@ def return_map_spec(
         ArgumentError: a section, solver or engine that is unknown or cannot do this.
     """
     note_code(args, section, solver, system)
+    if isinstance(args, Scene | RedundantScene):
+        structure = args.mechanism.structure
+        images = structure.leg_twins or range(len(structure.legs))
+        check_legs_admitted_alike(args.clearance, structure.legs, images)
     section = section_of(args, section)
     method = orbit_solver(solver, rigid=is_rigid(args))
     obstacle = lane_obstacle(method, section, (args, state))

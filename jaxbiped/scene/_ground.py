@@ -1,14 +1,18 @@
 """The ground, a plane slope in gravity with or without a step, and which feet may touch it."""
 
 import abc
+import contextlib
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, are_zero_together, warn
+from jaxbiped._jax_versions import untraced
 from jaxbiped._parameter_declaration import AbstractPart, parameter
 from jaxbiped._types import Parameter, Scalar, is_traced
 from jaxbiped.scene._bodies import check_name
@@ -129,3 +133,35 @@ class OneFoot(AbstractClearance):
 
     def admits(self, leg: str, leg_rate: Scalar) -> bool | None:
         return None if leg == self.leg else False
+
+
+def check_legs_admitted_alike(rule: Any, legs: Sequence[str], images: Sequence[int]) -> None:
+    """Raises `ArgumentError` for a clearance rule that tells a leg from its image by the mirror.
+
+    The rule is asked at random rates; one with numbers that JAX traces is not asked.
+
+    Args:
+        rule: the clearance rule.
+        legs: names of the legs.
+        images: number of each leg's image.
+    """
+    if isinstance(rule, StanceRotation | AlwaysTouching) or is_traced(rule):
+        return
+
+    def admitted(rate: Scalar) -> Scalar:
+        answers = [rule.admits(leg, rate) for leg in legs]
+        return jnp.asarray([True if answer is None else answer for answer in answers])
+
+    rates = 10.0 * np.random.default_rng(0).standard_normal(100)
+    table = np.ones((1, len(legs)), bool)
+    with contextlib.suppress(Exception), untraced():  # a rule that fails is refused where it acts
+        table = np.asarray(jax.vmap(admitted)(rates), bool)
+    unlike = np.argwhere(table != table[:, list(images)])
+    if unlike.size:
+        place, leg = map(int, unlike[0])
+        raise ArgumentError(
+            f"clearance = {type(rule).__name__} admits leg {legs[leg]!r} and leg "
+            f"{legs[images[leg]]!r} differently at a rate of {rates[place]:.3g} rad/s, which is "
+            "not allowed for a cycle whose legs are exchanged by the mirror: treat both alike, or "
+            "leave the mirror out."
+        )

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -111,3 +112,28 @@ def test_a_scene_is_checked_again_when_its_law_reads_something_else():
     shares[0] = 0.2
     with pytest.raises(jb.ArgumentError, match="image by the mirror"):
         jb.rigid_walk(scene, start, duration=0.1)
+
+
+class Reluctant(jb.laws.AbstractClearance):
+    """A rule that one leg obeys as in the paper, and another at its own rates."""
+
+    leg: str = eqx.field(static=True)
+    rate: float
+
+    def admits(self, leg, leg_rate):
+        return leg_rate < (self.rate if leg == self.leg else 0.0)
+
+
+@pytest.mark.parametrize("formulation", ["minimal", "redundant"])
+def test_a_clearance_rule_that_knows_a_leg_has_no_step(formulation):
+    scene, state = jb.seed_scene(), jb.seed_state()
+    rules = {"Reluctant": Reluctant("1", -0.2), "OneFoot": jb.laws.OneFoot(1)}
+    for name, rule in rules.items():
+        kept = dataclasses.replace(scene, clearance=rule)
+        if formulation == "redundant":
+            kept = jb.RedundantScene(kept)
+        for door in (jb.find_gait, jb.return_map):
+            with pytest.raises(jb.ArgumentError, match=f"= {name} admits leg '1' and leg '2'"):
+                door(kept, state)
+    alike = dataclasses.replace(scene, clearance=Reluctant("1", 0.0))
+    jax.eval_shape(lambda y: jb.return_map(alike, y), state)
