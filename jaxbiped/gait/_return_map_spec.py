@@ -13,7 +13,8 @@ from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.dynamics._surfaces import AbstractSection
-from jaxbiped.scene._ground import check_legs_admitted_alike, check_pulls
+from jaxbiped.scene._clearance import check_legs_admitted_alike
+from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, Scene, is_rigid
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle

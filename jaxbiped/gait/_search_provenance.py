@@ -12,7 +12,7 @@ from jaxbiped._ending import Ending, NamedCode
 from jaxbiped._summary import call_text
 from jaxbiped._types import Scalar, is_traced
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search, takes_steps
-from jaxbiped.scene._ground import AlwaysTouching
+from jaxbiped.scene._clearance import AlwaysTouching
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._state_types import WalkerState

@@ -5,7 +5,8 @@ import inspect
 
 from jaxbiped._checks import check_choice, check_type
 from jaxbiped._types import Parameter
-from jaxbiped.scene._ground import Ground, StanceRotation
+from jaxbiped.scene._clearance import StanceRotation
+from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Kneed, Walker
 from jaxbiped.scene.laws.friction._bristles import LuGre

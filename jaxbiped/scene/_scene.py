@@ -14,7 +14,8 @@ from jaxbiped._summary import in_short, notebook_html
 from jaxbiped._types import Parameter
 from jaxbiped.constraints._constraint_methods import Index1, method_named
 from jaxbiped.constraints._linkage import ORIENTATIONS, Linkage
-from jaxbiped.scene._ground import AbstractClearance, AlwaysTouching, Ground, OneFoot, warn_if_steep
+from jaxbiped.scene._clearance import AbstractClearance, AlwaysTouching, OneFoot
+from jaxbiped.scene._ground import Ground, warn_if_steep
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._linkages import check_loaded_bodies, walker_linkage
 from jaxbiped.scene._mechanism import Mechanism, mechanism_of

@@ -10,7 +10,7 @@ from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._summary import in_short
 from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene._bodies import Body, Foot, Point
-from jaxbiped.scene._ground import AbstractClearance, StanceRotation
+from jaxbiped.scene._clearance import AbstractClearance, StanceRotation
 from jaxbiped.scene._joint_parts import HOLDS, Coupling, Spring, Stop, Weights
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw

@@ -28,7 +28,7 @@ from jaxbiped.dynamics._footfalls import (
 )
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._surfaces import FALL_ANGLE, lean, rate_unit, uprightness
-from jaxbiped.scene._ground import AbstractClearance, StanceRotation
+from jaxbiped.scene._clearance import AbstractClearance, StanceRotation
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.scene._structure import Structure

@@ -7,10 +7,10 @@ below, in this order.
 
 from jaxbiped._parameter_declaration import parameter as parameter
 from jaxbiped._quantity import Quantity as Quantity
-from jaxbiped.scene._ground import AbstractClearance as AbstractClearance
-from jaxbiped.scene._ground import AlwaysTouching as AlwaysTouching
-from jaxbiped.scene._ground import OneFoot as OneFoot
-from jaxbiped.scene._ground import StanceRotation as StanceRotation
+from jaxbiped.scene._clearance import AbstractClearance as AbstractClearance
+from jaxbiped.scene._clearance import AlwaysTouching as AlwaysTouching
+from jaxbiped.scene._clearance import OneFoot as OneFoot
+from jaxbiped.scene._clearance import StanceRotation as StanceRotation
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw as AbstractFrictionLaw
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw as AbstractNormalLaw
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw as AbstractBristleLaw
