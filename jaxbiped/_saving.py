@@ -13,6 +13,7 @@ import importlib
 import io
 import json
 import math
+import pkgutil
 import sys
 import zipfile
 from collections.abc import Callable, Mapping
@@ -121,13 +122,19 @@ class Encoder:
 
 
 def _home(thing: Any) -> str:
-    """The outermost package that exports a class or function, else its module, which may move."""
-    parts, name = str(thing.__module__).split("."), thing.__qualname__
-    for depth in range(1, len(parts)):
-        package = sys.modules[".".join(parts[:depth])]
-        if name in dir(package) and getattr(package, name) is thing:
-            return package.__name__
-    return str(thing.__module__)
+    """The outermost public package that exports a class or function, else its module, which may
+    move.
+    """
+    own, name = str(thing.__module__), thing.__qualname__
+    root, public = own.partition(".")[0], []
+    for each, module in list(sys.modules.items()):
+        inside = each.partition(".")[0] == root and hasattr(module, "__path__")
+        if inside and "._" not in each and name in dir(module):
+            public.append(each)
+    for each in sorted(public, key=lambda each: (each.count("."), each)):
+        if getattr(sys.modules[each], name) is thing:
+            return each
+    return own
 
 
 def _is_kept(dtype: np.dtype) -> bool:
@@ -244,12 +251,22 @@ def _imported(module: str, name: str) -> Any:
     # Nothing that can be saved lies in the standard library, and a file may come from anybody.
     if module.partition(".")[0] in sys.stdlib_module_names:
         return None
-    try:
-        thing: Any = importlib.import_module(module)
+    with contextlib.suppress(ImportError, AttributeError):
         # Types of states are found by one name, which has no points.
-        return functools.reduce(getattr, name.split("."), thing)
-    except (ImportError, AttributeError):
-        return None
+        return functools.reduce(getattr, name.split("."), importlib.import_module(module))
+    return _moved(module, name) if module.startswith("jaxbiped.") else None
+
+
+def _moved(module: str, name: str) -> Any:
+    """What an earlier version had in another module of a subpackage; None if it is gone."""
+    package = ".".join(module.split(".")[:2]) if module.count(".") > 1 else "jaxbiped"
+    with contextlib.suppress(ImportError):
+        home = importlib.import_module(package)
+        for _, each, _ in pkgutil.walk_packages(home.__path__, f"{package}."):
+            thing = getattr(importlib.import_module(each), name, None)
+            if getattr(thing, "__module__", "") == each:
+                return thing
+    return None
 
 
 def _has_default(field: Any) -> bool:

@@ -6,6 +6,7 @@ import datetime
 import functools
 import json
 import math
+import re
 import subprocess
 import sys
 import zipfile
@@ -292,6 +293,19 @@ def test_another_version_is_named_where_it_made_other_classes(tmp_path):
     })  # fmt: skip
     with pytest.raises(jb.ArgumentError, match=r"written by jaxbiped 9.0; this is \d"):
         jb.load(path)
+
+
+def test_classes_may_move_within_the_package(tmp_path):
+    path, scene = tmp_path / "it.npz", SCENES["own law"]
+    jb.save(path, scene)
+    with zipfile.ZipFile(path) as archive:
+        text = archive.read("contents.json").decode()
+    # By what users import, and never by a private module.
+    assert "jaxbiped.scene.laws:StanceRotation" in text
+    assert "._" not in "".join(re.findall(r'"(jaxbiped[.\w]*:\w+)"', text))
+    # As files had it before.
+    rewritten(path, replace("scene.laws:StanceRotation", "scene._no_such_module:StanceRotation"))
+    assert jb.load(path).clearance == scene.clearance
 
 
 def test_a_file_that_is_none_of_ours_is_one_sentence(tmp_path):

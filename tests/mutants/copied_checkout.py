@@ -5,6 +5,7 @@ import json
 import math
 import multiprocessing
 import os
+import re
 import resource
 import shutil
 import signal
@@ -77,7 +78,8 @@ class CopiedCheckout:
         said = output.read_text(errors="replace")
         if longest is not None and run.exitcode == -signal.SIGXCPU:
             raise OutOfTime(said.rpartition("\n")[2].strip())  # its result is not there yet
-        if run.exitcode == 4 and "while loading conftest" not in said:
+        collected = not re.search(r"while loading conftest|\d errors? in ", said)
+        if run.exitcode == 4 and collected:
             raise RuntimeError(f"pytest did not take {' '.join(paths)}: {said[-300:]}")
         for line in said.splitlines():
             if line.startswith(("FAILED ", "ERROR ")):
