@@ -288,6 +288,12 @@ def near_miss(value: object, names: Iterable[object]) -> str:
     return f" (perhaps {near[0]} is meant)" if near else ""
 
 
+def check_function(name: str, value: object) -> None:
+    """Raises `ArgumentError` unless `value` can be called."""
+    if not callable(value):
+        raise ArgumentError(f"{name} = {value!r} is not allowed: it must be a function.")
+
+
 def check_type(name: str, value: object, *kinds: type) -> None:
     """Raises `ArgumentError` unless `value` is an instance of one of `kinds`."""
     if not isinstance(value, kinds):

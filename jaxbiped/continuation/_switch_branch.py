@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type
+from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type, check_unbatched
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._continue_gait import ContinuationSetup, setup_of
@@ -77,6 +77,7 @@ def switch_branch(
     """
     check_type("branch", branch, Branch)
     check_positive("largest_step", largest_step)
+    check_unbatched("largest_step", largest_step)
     check_count("max_points", max_points)
     found = _first_doubling(branch) if doubling is None else doubling
     if found is None or found.kind is not BranchEvent.PERIOD_DOUBLING:

@@ -321,7 +321,7 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
         ArgumentError: an argument is not allowed; raised before anything is compiled.
     """
     scene = check_scene(scene, Scene, RigidScene)
-    shapes = {jnp.shape(leaf) for leaf in jtu.tree_leaves(starts)}
+    shapes = {np.shape(leaf) for leaf in jtu.tree_leaves(starts)}
     if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
         raise ArgumentError(
             f"starts has leaves of shapes {sorted(shapes)}: they must all be (n,), n at least 1."

@@ -1,13 +1,13 @@
 """Gait measures as a function of the scene that JAX can differentiate."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jax.lax import stop_gradient
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._types import Scalar, as_float, is_traced
 from jaxbiped.dynamics._state import cyclic_names, recurring_names
 from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._find_gait import find_gait
@@ -58,13 +58,14 @@ def gait_measures(
         raise ArgumentError(
             f"gradient = {gradient!r} is not allowed: choose Implicit(), Forward() or Reverse()."
         )
+    check_type("scene", scene, Scene, RigidScene, RedundantScene)
     scene = jtu.tree_map(as_float, scene)
     implicit = isinstance(gradient, Implicit)
     if implicit:
         scene = _differentiated_once(scene)
     gait = find_gait(
-        jax.lax.stop_gradient(scene),
-        None if guess is None else jax.lax.stop_gradient(guess),
+        stop_gradient(scene),
+        jtu.tree_map(lambda leaf: stop_gradient(leaf) if is_traced(leaf) else leaf, guess),
         footsteps=footsteps,
         section=section,
         parameters=None if implicit else (),

@@ -9,7 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_count
+from jaxbiped._checks import ArgumentError, check_count, check_type
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.dynamics._surfaces import AbstractSection
@@ -159,6 +159,8 @@ def return_map_spec(
         ArgumentError: a section, solver or engine that is unknown or cannot do this.
     """
     note_code(args, section, solver, system)
+    if system is not None:
+        check_type("system", system, AbstractSystem)
     if isinstance(args, Scene | RedundantScene):
         structure = args.mechanism.structure
         images = structure.leg_twins or range(len(structure.legs))

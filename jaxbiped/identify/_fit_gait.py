@@ -127,6 +127,7 @@ def _check_bounds(
     scene: AnyScene, vary: Sequence[str] | Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
     """Bounds by name; without any, those between which the parameter keeps its sign."""
+    check_type("vary", vary, Sequence, Mapping)
     if isinstance(vary, str) or not len(vary):
         raise ArgumentError(f"vary = {vary!r} is not allowed: name the parameters to fit.")
     own, bounds = parameter_values(scene), {}

@@ -10,7 +10,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_count, check_within
+from jaxbiped._checks import ArgumentError, check_choice, check_within
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import state_of_recurring, state_type
 from jaxbiped.gait._find_gait import find_gait
@@ -138,13 +138,11 @@ def ensemble_of(
     For the worst case the corners of this box come along.
 
     Raises:
-        ArgumentError: an unknown parameter or criterion, one that is zero, or a scatter not
+        ArgumentError: an unknown parameter, one that is zero, or a scatter not
             between 0 and 1.
     """
     from scipy.stats import qmc
 
-    check_choice("criterion", criterion, CRITERIA)
-    check_count("members", members)
     own = parameter_values(scene)
     for name, share in scatter.items():
         check_choice("scatter", name, own)

@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite
+from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
 from jaxbiped._quantity import si_number
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
@@ -144,10 +144,13 @@ def requirements_of(scene: Scene | RigidScene, subject_to: SubjectTo) -> tuple[R
     """
     if subject_to is None:
         return ()
+    check_type("subject_to", subject_to, str, Mapping, Sequence)
     if isinstance(subject_to, Mapping):
         pairs = [(name, _pair(name, bounds)) for name, bounds in subject_to.items()]
     else:
         words = [subject_to] if isinstance(subject_to, str) else subject_to
+        for text in words:
+            check_type("subject_to", text, str)
         pairs = [_parse(text) for text in words]
     gathered: dict[str, tuple[float | None, float | None]] = {}
     for name, (low, high) in pairs:

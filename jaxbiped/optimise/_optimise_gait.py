@@ -20,7 +20,7 @@ from jaxbiped._types import JsonObject
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
 from jaxbiped.gait._search_starts import state_of_guess
-from jaxbiped.optimise._design_gaits import Ensemble, GaitSettings, ensemble_of
+from jaxbiped.optimise._design_gaits import CRITERIA, Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._design_problem import (
     DesignProblem,
     SubjectTo,
@@ -136,6 +136,11 @@ def optimise_gait(
     near = state_of_guess(scene, guess)
     arrivals_of(scene, footsteps)  # refused where they are no whole cycles
     check_count("restarts", restarts, 0)
+    check_count("seed", seed, 0)
+    check_choice("criterion", criterion, CRITERIA)
+    check_count("members", members)
+    if scatter is not None:
+        check_type("scatter", scatter, Mapping)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     if requirements and optimiser not in OPTIMISERS[:3]:
         raise ArgumentError(

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import diffrax
 from jaxtyping import Array, PyTree
 
-from jaxbiped._checks import check_type, warn
+from jaxbiped._checks import check_function, check_type, warn
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Parameter
 from jaxbiped.dynamics._constrained_motion import LinkageState
@@ -123,6 +123,10 @@ def simulate(
         >>> str(walk.outcome), float(walk.t[-1])
         ('walking', 0.1)
     """
+    if extremes is not None:
+        check_function("extremes", extremes)
+    if adjoint is not None:
+        check_type("adjoint", adjoint, diffrax.AbstractAdjoint)
     usual = "end" if isinstance(scene, RigidScene) else "steps"
     asked = Options(
         duration=duration,

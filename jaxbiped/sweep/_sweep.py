@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_count, check_type
+from jaxbiped._checks import ArgumentError, check_count, check_function, check_type
 from jaxbiped._files import JsonObject
 from jaxbiped._identity import provenance
 from jaxbiped._progress import stage
@@ -108,6 +108,8 @@ def sweep(
     check_type("starts", starts, AbstractStarts)
     check_count("chunk", chunk)
     check_count("workers", workers)
+    if executor is not None:
+        check_function("executor.submit", getattr(executor, "submit", None))
     if not starts.size:
         raise ArgumentError("starts is empty: give at least one.")
     path = store_path(store)
