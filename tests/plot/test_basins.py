@@ -205,6 +205,8 @@ def test_stacked_fractions_add_up_to_one():
         (lambda: basin([[0, 99]], X, Y, **AXES), ("labels", "99", "Label")),
         (lambda: basin(CODES, Y, X, **AXES), ("x", "(2,)", "(3,)", "(4,)")),
         (lambda: basin(CODES, X[::-1], Y, **AXES), ("x", "increase")),
+        (lambda: basin(CODES, [1.0, 3.0, 2.0], Y, **AXES), ("x", "increase")),
+        (lambda: basin(CODES, X, **AXES), ("x, y and names are needed",)),
         (lambda: basin(CODES, X, [0.0, np.nan], **AXES), ("y", "nan", "finite")),
         (lambda: basin(CODES[:1], X, [0.0], **AXES), ("y", "one centre", "edges")),
         (
