@@ -182,7 +182,7 @@ BY_HAND = {
     "data of a fit": _fit_data,
     "data of a fit in a paper": lambda: _paper(_fit_data),
     "optimisation": lambda: plot.optimisation(make_optimum()),
-    "optimisation of a sum in a row of long panels": _optimum_of_a_sum,
+    "optimisation of a sum": _optimum_of_a_sum,
     "optimisation in a paper": lambda: _paper(lambda: plot.optimisation(make_optimum())),
     "elasticities": lambda: plot.elasticities(make_gait(), ("period", "peak_normal")),
     "elasticities, long names": lambda: plot.elasticities(_long_names(), ("period", "speed")),
