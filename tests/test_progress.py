@@ -31,6 +31,7 @@ def test_a_file_gets_what_takes_long_in_commands_and_what_was_asked_for():
     assert ended.returncode == 0, ended.stderr
     first = ended.stderr.splitlines()[0]
     assert re.fullmatch(r"asked: [123] of 4 gaits, [012] found …", first)
+    assert len(ended.stderr.splitlines()) <= 6  # after times that double, and at the end
     last = ended.stderr.splitlines()[-1]
     times = r"\[\d+ s, 0 s left(, \d+ gaits/s)?\]"
     assert re.fullmatch(rf"asked: 4 of 4 gaits, 3 found {times}\.", last)
@@ -78,6 +79,12 @@ def test_stages_within_are_named_on_the_outermost_line_and_by_an_interrupt():
     assert note == f"Interrupted: {told}."
     with _progress.stage("next") as after:  # nothing of the interrupted ones is left
         assert after.words() == "next"
+
+
+def test_an_interrupt_says_what_it_leaves():
+    with pytest.raises(KeyboardInterrupt) as caught, _progress.stage("a", kept="all is stored"):
+        raise KeyboardInterrupt
+    assert caught.value.__notes__ == ["Interrupted: a.", "All is stored."]
 
 
 _CELL = f"{_SCRIPT}\nwork('in a notebook', total=4, unit='gaits')"

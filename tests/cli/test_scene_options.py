@@ -57,6 +57,9 @@ def test_flags_make_the_actuators():
     assert (float(torque.torque), torque.reaction) == (0.1, "trunk")
     assert [float(x) for x in spline.torque] == [0.1, 0.7, 0.3]
     assert float(spline.first) == -0.1
+    sprung = ActuationOptions(hip_spring=("k=1", "theta_0=0"))
+    turned = SceneOptions(driven=sprung, set=("theta_0=5deg",)).scene()
+    assert float(turned.actuation[0].theta_0) == pytest.approx(math.radians(5.0))
     rigid = SceneOptions(model="rigid", driven=ActuationOptions(push_off=("impulse=0.2",))).scene()
     assert float(rigid.actuation[0].impulse) == 0.2
     redundant = SceneOptions(formulation="redundant", driven=asked).scene()

@@ -132,6 +132,19 @@ def test_samples_of_a_legend_show_all_dashes_of_each_line():
                 assert length > 1.2 * sum(line._dash_pattern[1] or (0.0,))
 
 
+def test_small_letters_leave_room_for_more_entries_above_the_axes():
+    """Four entries of twenty letters need 6.8 inches at ten points and 5.4 at eight."""
+    for name, above in (("screen", False), ("paper", True)):
+        with plot.figure_style(name, columns=2):
+            ax = style.axes_or_new(None, 7.0, 3.0)
+            for letter in "abcd":
+                ax.plot([0.0, 1.0], label=20 * letter)
+            style.legend_above(ax)
+            ax.figure.draw_without_rendering()
+        legend, axes = ax.get_legend().get_window_extent(), ax.get_window_extent()
+        assert bool(legend.y0 > axes.y1) is above
+
+
 def test_figures_below_the_context_have_their_own_style_again():
     with plot.figure_style("paper"):
         with plot.figure_style("paper", columns=2):

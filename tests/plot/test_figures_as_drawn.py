@@ -121,6 +121,10 @@ def _optimum_of_a_sum():
     return plot.optimisation(dataclasses.replace(found, history=history, objective=7.0))
 
 
+def _three_elasticities():
+    return plot.elasticities(make_gait(), ("period", "speed", "peak_normal"))
+
+
 def _unstable_gait():
     errors = np.array([0.1, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4])
     values = (-1.6, 0.4 + 0.3j, 0.4 - 0.3j, 0.02, 0.0, 0.0)
@@ -181,12 +185,11 @@ BY_HAND = {
     "fit in a paper": lambda: _paper(lambda: plot.fit(_undetermined_fit())),
     "data of a fit": _fit_data,
     "data of a fit in a paper": lambda: _paper(_fit_data),
-    "optimisation": lambda: plot.optimisation(make_optimum()),
-    "optimisation of a sum": _optimum_of_a_sum,
+    "optimisation": _optimum_of_a_sum,
     "optimisation in a paper": lambda: _paper(lambda: plot.optimisation(make_optimum())),
     "elasticities": lambda: plot.elasticities(make_gait(), ("period", "peak_normal")),
     "elasticities, long names": lambda: plot.elasticities(_long_names(), ("period", "speed")),
-    "elasticities in a paper": lambda: _paper(lambda: plot.elasticities(make_gait(), "period")),
+    "elasticities in a paper": lambda: _paper(_three_elasticities, columns=2),
     "multipliers": lambda: plot.multipliers(make_gait()),
     "multipliers, unstable": lambda: plot.multipliers(_unstable_gait()),
     "multipliers in a paper": lambda: _paper(lambda: plot.multipliers(_unstable_gait())),
@@ -197,7 +200,9 @@ BY_HAND = {
     "constraint methods": lambda: plot.constraint_runs(_runs()),
     "constraint methods in a paper": lambda: _paper(lambda: plot.constraint_runs(_runs())),
     "friction": _laws_of_friction,
-    "friction in a paper": lambda: _paper(lambda: plot.friction_law(jb.seed_scene().friction)),
+    "friction in a paper": lambda: _paper(
+        lambda: plot.friction_law(jb.seed_scene(v0=2e-5).friction)
+    ),
     "bristles": _bristles,
     "walker": lambda: plot.walker(jb.models.hsu_chen()),
     "walker with feet of two spheres": lambda: plot.walker(jb.models.wisse()),

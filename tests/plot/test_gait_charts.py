@@ -142,6 +142,8 @@ def test_errors_that_are_not_known_are_said_and_names_stay_in_the_axes():
 def test_another_result_is_refused_in_one_sentence(draw):
     with pytest.raises(jb.ArgumentError, match=r"is not allowed: it must be an? "):
         draw(jb.seed_scene())
+    with pytest.raises(jb.ArgumentError, match=r"must be a Gait or a BranchPoint or a Branch\.$"):
+        multipliers(3)
 
 
 def test_multipliers_of_a_branchs_point():
