@@ -122,7 +122,8 @@ def _optimum_of_a_sum():
 
 
 def _three_elasticities():
-    return plot.elasticities(make_gait(), ("period", "speed", "peak_normal"))
+    quantities = tuple(jb.laws.Quantity(name, f"${name[0]}$") for name in ("K", "c", "l", "mass"))
+    return plot.elasticities(make_gait(quantities=quantities), ("period", "speed", "peak_normal"))
 
 
 def _unstable_gait():

@@ -258,6 +258,17 @@ def test_tornado_of_all_measures_and_unknown_last():
     assert axes[3].texts[-1].get_text() == "unknown"
 
 
+@pytest.mark.parametrize("name", ["K", "torso.K"])
+def test_in_a_paper_symbols_stand_alone_unless_they_are_of_a_body(name):
+    quantities = tuple(jb.laws.Quantity(f"word {k}", f"${k}$") for k in "Kclm")
+    gait = _gait(parameters=(name, *PARAMETERS[1:]), quantities=quantities)
+    with jb.plot.figure_style("paper"):
+        (ax,) = elasticities(gait, "period").axes
+    words = [label.get_text() for label in ax.get_yticklabels()]
+    alone = ["$l$", "$c$", "$K$", "$m$"]
+    assert words == (alone if name == "K" else [f"word {k[1]}, {k}" for k in alone])
+
+
 def test_measures_without_a_known_elasticity_are_left_out_unless_asked_for():
     gait = _gait()
     unknown = gait.elasticities._replace(spectral_radius=np.array([np.nan, np.nan, np.nan, 0.0]))
