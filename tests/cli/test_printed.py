@@ -27,6 +27,8 @@ from jaxbiped.continuation import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._critical_values import NearestBifurcation
 from jaxbiped.optimise._certificate import Certificate, OtherEngine, PushedWalk
 from jaxbiped.trade import Row, Truth
+from tests.cli.commands import run
+from tests.plot.test_fit_charts import _fit as make_fit
 from tests.plot.test_fit_charts import _optimum as make_optimum
 from tests.plot.test_gait_charts import _gait as make_gait
 from tests.plot.test_parameter_charts import DOUBLING, POINTS, make_branch
@@ -280,6 +282,33 @@ def _written():
 def test_a_command_prints_what_was_looked_at(name):
     recorded = RECORD.read_text(encoding="utf-8").split(f"===== {name}\n")[1]
     assert printed(name).rstrip() == recorded.partition("\n=====")[0].rstrip()
+
+
+def test_what_a_fit_leaves_open_is_printed(tmp_path, capsys, monkeypatch):
+    path = tmp_path / "measured.json"
+    path.write_text('{"gaits": [{"period_s": [0.44, 0.001]}]}')
+    open_ends = dict(undetermined=("d",), one_sided=("J", "K"), at_bounds=("K",))
+    for changes, lines in (
+        (
+            open_ends,
+            [
+                "these data do not determine d",
+                "limited on one side only: J, K",
+                "held by a bound: K",
+            ],
+        ),
+        (dict(undetermined=(), at_bounds=()), []),
+    ):
+        monkeypatch.setattr(jb, "fit_gait", lambda *_, changes=changes, **__: make_fit(**changes))
+        assert run("fit", path, "--vary", "K,J,d") == 0
+        assert capsys.readouterr().out.splitlines() == [
+            "parameter    unit  estimate  standard error  95 % from       to",
+            "        K   N/m^n     60000             600      58800    61800",
+            "        J  kg m^2      0.01          0.0002     0.0095   0.0105",
+            "        d       m       0.1         unknown    unknown  unknown",
+            "converged after 9 scenes; chi squared 5.25 at 2 degrees of freedom (p = 0.072)",
+            *lines,
+        ]
 
 
 if __name__ == "__main__":

@@ -189,7 +189,9 @@ BY_HAND = {
     "optimisation": _optimum_of_a_sum,
     "optimisation in a paper": lambda: _paper(lambda: plot.optimisation(make_optimum())),
     "elasticities": lambda: plot.elasticities(make_gait(), ("period", "peak_normal")),
-    "elasticities, long names": lambda: plot.elasticities(_long_names(), ("period", "speed")),
+    "elasticities, long names in a paper": lambda: _paper(
+        lambda: plot.elasticities(_long_names(), ("period", "speed", "step_length")), columns=2
+    ),
     "elasticities in a paper": lambda: _paper(_three_elasticities, columns=2),
     "multipliers": lambda: plot.multipliers(make_gait()),
     "multipliers, unstable": lambda: plot.multipliers(_unstable_gait()),
@@ -249,7 +251,7 @@ def assert_same(here, there, place, near=0.0):
 
 
 def _described(name, figure, **options):
-    return figure_numbers(figure, data="in a paper" not in name and "long" not in name, **options)
+    return figure_numbers(figure, data="in a paper" not in name, **options)
 
 
 def _dumped(described):
