@@ -1,5 +1,6 @@
 """Stages of calls, against what takes long, who watches, and what an interrupt says."""
 
+import io
 import os
 import re
 import subprocess
@@ -59,6 +60,18 @@ def test_a_terminal_gets_one_line_which_an_unasked_bar_takes_away():
     assert "\n" not in seen["None"]
     last = seen["True"].rstrip("\r\n").split("\r")[-1]
     assert last.startswith("searching: |████████████| 4 of 4 gaits, 3 found")
+
+
+def test_a_line_that_is_written_over_is_seen_at_once(monkeypatch):
+    seen = []
+
+    class Terminal(io.StringIO):
+        def flush(self):
+            seen.append(self.getvalue())
+
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    _progress._terminal_writer(kept=False)(_progress.Stage("walking", None, "", 0), False)
+    assert seen[-1].endswith("walking [0 s]")
 
 
 def _wide():

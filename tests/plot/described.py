@@ -305,6 +305,7 @@ def _axes(ax: Axes, counted: bool, data: bool) -> dict[str, Any]:
     patches = [_patch(ax, each) for each in ax.patches]
     drawn = [_collection(ax, each, counted) for each in ax.collections]
     artists: dict[str, Any] = {"lines": lines, "patches": patches, "collections": drawn}
+    artists["texts"] = [_text(ax, each) for each in ax.texts]
     hidden = [side for side, spine in ax.spines.items() if not spine.get_visible()]
     return _without_usual(
         on=bool(ax.axison),
@@ -319,7 +320,6 @@ def _axes(ax: Axes, counted: bool, data: bool) -> dict[str, Any]:
         + [str(known[0].get("grid_color", "")).lower(), known[0].get("grid_linewidth")],
         below=str(ax.get_axisbelow()),
         hidden=" ".join(sorted(hidden)),
-        texts=[_text(ax, each) for each in ax.texts],
         legend=None if ax.get_legend() is None else _legend(ax.get_legend(), lines + patches),
         **artists if data else {},
     )

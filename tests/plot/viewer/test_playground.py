@@ -12,7 +12,13 @@ from selenium.webdriver.support.ui import WebDriverWait
 import jaxbiped as jb
 from jaxbiped.compiler import LANES
 from jaxbiped.compiler.runtime._processors import InputTable
-from jaxbiped.plot.viewer._playground import STEPS, _sliders, played_request, recorded_names
+from jaxbiped.plot.viewer._playground import (
+    STEPS,
+    _shown_numbers,
+    _sliders,
+    played_request,
+    recorded_names,
+)
 from jaxbiped.plot.viewer._view import page_of, script
 from tests.mechanisms import scene_of, start_of
 
@@ -93,6 +99,15 @@ def test_sliders_move_all_that_a_scene_moves(playground):
     paths, _ = jtu.tree_flatten_with_path(played_request(scene, state, FOOTSTEPS).inputs)
     names = [jtu.keystr(path) for path, _ in paths]
     assert all(names[slider["input"]] == slider["leaf"] for slider in playground.sliders)
+
+
+@pytest.mark.parametrize("changes", [{}, {"friction": jb.laws.Frictionless()},
+                                     {"actuation": jb.actuation.HipTorque(0.1)}])  # fmt: skip
+def test_all_that_is_recorded_has_its_name(changes):
+    scene = dataclasses.replace(jb.seed_scene(), **changes)
+    shown = jax.eval_shape(lambda state: _shown_numbers(scene, state), jb.seed_state())
+    assert len(shown) == len(recorded_names(scene)) - 1  # beside the time
+    assert ("power" in recorded_names(scene)) == ("actuation" in changes)
 
 
 def test_sliders_are_of_the_scene_and_of_one_body_of_each_pair():
