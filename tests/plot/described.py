@@ -29,7 +29,7 @@ USUAL: dict[str, tuple[Any, ...]] = {
     **dict.fromkeys(("edge", "face", "title"), (None, "")),
     **dict.fromkeys(("label", "words"), ("",)),
     **dict.fromkeys(("ticks", "x", "y"), ({},)),
-    **dict.fromkeys(("frame", "integer", "named"), (False,)),
+    **dict.fromkeys(("integer", "named"), (False,)),
     **dict.fromkeys(("aspect", "most"), ("auto",)),
     **dict.fromkeys(("clip", "on"), (True,)),
     "adjustable": ("box",),
@@ -41,6 +41,7 @@ USUAL: dict[str, tuple[Any, ...]] = {
     "dashes": (None, "solid", [None]),
     "dpi": (120,),
     "font": (10.0,),
+    "frame": (False, 0.8),
     "grid": ([True, True, "#e6e6e6", 0.6], [False, False, "", None]),
     "hidden": ("right top",),
     "kind": ("Rectangle",),
@@ -64,12 +65,24 @@ def figure_numbers(figure: Figure, *, counted: bool = True, data: bool = True) -
 
     Without `counted` how many points a curve has is left out, without `data` all but the words.
     """
-    return _without_usual(
-        size=_rounded([figure.get_figwidth(), figure.get_figheight()]),
-        dpi=figure.dpi,
-        legends=[_legend(each, []) for each in figure.legends],
-        axes=[_axes(ax, counted, data) for ax in figure.axes],
+    return _with_whole_numbers(
+        _without_usual(
+            size=_rounded([figure.get_figwidth(), figure.get_figheight()]),
+            dpi=figure.dpi,
+            legends=[_legend(each, []) for each in figure.legends],
+            axes=[_axes(ax, counted, data) for ax in figure.axes],
+        )
     )
+
+
+def _with_whole_numbers(described: Any) -> Any:
+    """Without the points of numbers that need none: a shorter file."""
+    if isinstance(described, dict):
+        return {name: _with_whole_numbers(each) for name, each in described.items()}
+    if isinstance(described, list):
+        return [_with_whole_numbers(each) for each in described]
+    whole = isinstance(described, float) and described.is_integer()
+    return int(described) if whole else described
 
 
 def _rounded(values: Any, digits: int = 4) -> Any:
@@ -125,7 +138,7 @@ def _order(artist: Any, usual: int) -> dict[str, Any]:
 
 def _line_look(line: Line2D) -> dict[str, Any]:
     marked = line.get_marker() not in ("None", None, "")
-    dashes = line._unscaled_dash_pattern[1]  # which no public name tells
+    offset, dashes = line._unscaled_dash_pattern  # which no public name tells
     drawn = line.get_linestyle() not in ("None", "", " ")
     colour = _colour(line.get_color())
     face, edge = _colour(line.get_markerfacecolor()), _colour(line.get_markeredgecolor())
@@ -133,7 +146,7 @@ def _line_look(line: Line2D) -> dict[str, Any]:
         label=_name(line),
         colour=colour,
         alpha=line.get_alpha(),
-        dashes=None if dashes is None else _rounded(dashes),
+        dashes=None if dashes is None else _rounded([*dashes, *[offset] * bool(offset)]),
         width=_rounded(line.get_linewidth()) if drawn else 0.0,
         marker=str(line.get_marker()),
         size=_rounded(line.get_markersize()) if marked else 0.0,
@@ -318,6 +331,7 @@ def _axes(ax: Axes, counted: bool, data: bool) -> dict[str, Any]:
         adjustable=ax.get_adjustable(),
         grid=[bool(each.get("gridOn", False)) for each in known]
         + [str(known[0].get("grid_color", "")).lower(), known[0].get("grid_linewidth")],
+        frame=_rounded(ax.spines["left"].get_linewidth()),
         below=str(ax.get_axisbelow()),
         hidden=" ".join(sorted(hidden)),
         legend=None if ax.get_legend() is None else _legend(ax.get_legend(), lines + patches),

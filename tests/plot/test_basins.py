@@ -77,6 +77,12 @@ def test_rare_labels_are_not_rounded_away():
     rare[0, 0] = 1
     (ax,) = basin(rare, np.arange(200.0), np.arange(200.0), **AXES).axes
     assert legend_of(ax) == ["walking: > 99.99 %", "fell forward: < 0.01 %"]
+    rare[0, :20] = 1
+    (ax,) = basin(rare, np.arange(200.0), np.arange(200.0), **AXES).axes
+    assert legend_of(ax) == ["walking: 99.95 %", "fell forward: 0.05 %"]
+    rare[0, :] = 1
+    (ax,) = basin(rare, np.arange(200.0), np.arange(200.0), **AXES).axes
+    assert legend_of(ax) == ["walking: 99.5 %", "fell forward: 0.5 %"]
 
 
 def test_pending_cells_are_hatched_and_the_gait_is_marked():

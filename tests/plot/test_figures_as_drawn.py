@@ -100,7 +100,7 @@ def _undetermined_fit():
     )
 
 
-def _fit_data():
+def _fit_data(count=2):
     points = [branch_point(0.02 * k, 0.5 - k, length=0.1 * k) for k in (1, 2, 3)]
     branch = make_branch(points, log=True)
     seen = [
@@ -111,7 +111,7 @@ def _fit_data():
         )
     ]
     own = float(jb.parameter_values(branch.scene)["J"])
-    return plot.fit_data(make_fit(estimates={"J": own}), seen, branch)
+    return plot.fit_data(make_fit(estimates={"J": own}), seen[:count], branch)
 
 
 def _optimum_of_a_sum():
@@ -185,7 +185,7 @@ BY_HAND = {
     "fit": lambda: plot.fit(make_fit()),
     "fit in a paper": lambda: _paper(lambda: plot.fit(_undetermined_fit())),
     "data of a fit": _fit_data,
-    "data of a fit in a paper": lambda: _paper(_fit_data),
+    "data of a fit in a paper": lambda: _paper(lambda: _fit_data(1)),
     "optimisation": _optimum_of_a_sum,
     "optimisation in a paper": lambda: _paper(lambda: plot.optimisation(make_optimum())),
     "elasticities": lambda: plot.elasticities(make_gait(), ("period", "peak_normal")),
@@ -218,7 +218,7 @@ OF_A_WALK = {
     "penetrations": plot.penetrations,
     "contact forces": plot.contact_forces,
     "contact forces in a paper": lambda *walk: _paper(lambda: plot.contact_forces(*walk)),
-    "strobe": lambda *walk: plot.gait_strobe(*walk, start=0.5, stop=1.1, count=3),
+    "strobe": lambda *walk: plot.gait_strobe(*walk, start=0.5, stop=1.7, count=3),
     "animation": lambda *walk: _still(plot.animate(*walk, frames_per_second=2.0)),
 }
 

@@ -269,6 +269,15 @@ def test_in_a_paper_symbols_stand_alone_unless_they_are_of_a_body(name):
     assert words == (alone if name == "K" else [f"word {k[1]}, {k}" for k in alone])
 
 
+def test_elasticities_that_are_all_zero_have_a_scale_all_the_same():
+    zero = _measures((4,))._replace(period=np.zeros(4))
+    (ax,) = elasticities(
+        _gait(elasticities=zero, sensitivities=zero, sensitivity_errors=zero), "period"
+    ).axes
+    assert ax.get_xlim() == pytest.approx((-1e-3, 1e-3))
+    assert ax.get_xticks() == pytest.approx([0.0, -1e-3, 1e-3])
+
+
 def test_measures_without_a_known_elasticity_are_left_out_unless_asked_for():
     gait = _gait()
     unknown = gait.elasticities._replace(spectral_radius=np.array([np.nan, np.nan, np.nan, 0.0]))
