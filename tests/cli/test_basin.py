@@ -119,6 +119,7 @@ def test_the_share_of_wrong_labels_is_asked_for_and_told(tmp_path, capsys):
     axes = ("--x", "theta_stance=0.1:0.4:8", "--y", "omega_stance=-2:-1:8")
     outputs = outputs_of(tmp_path, "basin", *arguments, *axes)
     errors = outputs.numbers["label_errors"]
+    assert outputs.code == 1  # it is not met
     assert (errors["starts"], errors["wanted"], errors["met"]) == (64, 1e-2, False)
     told = capsys.readouterr().out
     assert "fewer than 512 starts cannot confirm it" in told
