@@ -213,7 +213,7 @@ BY_HAND = {
 LAWS = {"normal law": _kelvin_voigt, "normal law in a paper": lambda: _paper(_kelvin_voigt)}
 OF_A_WALK = {
     "leg angles": plot.leg_angles,
-    "time series": lambda *walk: plot.time_series(*walk, "theta_1", "theta_2"),
+    "time series": lambda *walk: plot.time_series(*walk, "theta_2", "theta_1"),
     "phase portrait": lambda *walk: plot.phase_portrait(*walk, legs=(1, 2)),
     "penetrations": plot.penetrations,
     "contact forces": plot.contact_forces,
