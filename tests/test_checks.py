@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._checks import warn
+from jaxbiped._checks import check_type, warn
 from jaxbiped._files import check_writable_directory, user_path
 
 
@@ -30,6 +30,7 @@ from jaxbiped._files import check_writable_directory, user_path
         (lambda: jb.seed_scene(xi=-1.0), ("xi", "-1")),
         (lambda: jb.seed_scene(hip_mass="heavy"), ("hip_mass", "heavy", "number")),
         (lambda: jb.seed_scene(slope="0.02"), ("slope", "'0.02'", "not a number")),
+        (lambda: jb.seed_scene(m=object()), ("m", "object", "not a number")),
         (lambda: jb.seed_scene(m=True), ("m", "True", "not a number")),
         (lambda: jb.seed_scene(m=np.bool_(True)), ("m", "True", "not a number")),
         (lambda: jb.seed_scene(m=jnp.asarray(True)), ("m", "True", "not a number")),
@@ -104,6 +105,17 @@ def test_batches_are_told_of_vmap(run, scene, state, name):
     with pytest.raises(jb.ArgumentError, match=r"jax\.vmap") as caught:
         run(scene, state)
     assert f"{name} has the shape (2,)" in str(caught.value)
+
+
+def test_a_type_that_is_asked_for_has_its_article():
+    for kinds, said in (
+        ((jb.Ending, jb.State), "it must be an Ending or a State."),
+        ((jb.Scene,), "it must be a Scene."),
+    ):
+        with pytest.raises(jb.ArgumentError, match=f"^it = 3 is not allowed: {said}$"):
+            check_type("it", 3, *kinds)
+    with pytest.raises(jb.ArgumentError, match=r"^it = a str is not allowed"):
+        check_type("it", 80 * "long", jb.Scene)
 
 
 def test_traced_values_pass():

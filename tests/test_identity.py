@@ -68,6 +68,22 @@ def test_a_class_that_moved_within_the_package_is_the_same_model(module):
     assert difference_of(older, told("mylaws._normal.RistowSchafer")) is not None
 
 
+def test_what_counts_as_alike_is_asked_of_both_values_and_their_name():
+    asked = []
+
+    def alike(old, new, name):
+        asked.append((old, new, name))
+        return name == "scene.slope"
+
+    old = {"scene": {"slope": 0.02, "K": [1, 2]}}
+    assert difference_of(old, {"scene": {"slope": 0.021, "K": [1, 2]}}, "", alike) is None
+    assert asked == [(0.02, 0.021, "scene.slope")]
+    told = difference_of(old, {"scene": {"slope": 0.02, "K": [1, 3]}}, "", alike)
+    assert told == "scene.K[1] = 2 there, 3 here"
+    assert difference_of({}, {"a": 1}) == "a is not in the store"
+    assert difference_of({"a": 1}, {}) == "a is only in the store"
+
+
 def test_functions_are_known_by_module_name_and_what_is_bound():
     def of(k):
         return identity(functools.partial(max, k))

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped._jax_versions import called_program, scan_counts
+from jaxbiped._jax_versions import called_program, scan_counts, tanh
 from tests.compiler.host_code.host_runs import check_against_xla
 from tests.compiler.one_shot import evaluate
 from tests.import_graph import PACKAGE
@@ -94,13 +94,14 @@ POINTS = np.array([-0.75, -0.3, 1e-9, 0.3, 0.999999])
     ("function", "expected"),
     [
         (jax.grad(jnp.tanh), lambda x: 1.0 / np.cosh(x) ** 2),
+        (jax.grad(tanh), lambda x: 1.0 / np.cosh(x) ** 2),
         (lambda x: jnp.log2(jnp.abs(x)), lambda x: np.log2(np.abs(x))),
         (lambda x: jnp.polyval(jnp.array([2.0, 3.0, 4.0]), x), lambda x: (2 * x + 3) * x + 4),
         (jax.grad(lambda x: jnp.hypot(x, 2.0)), lambda x: x / np.hypot(x, 2.0)),
         (jax.grad(lambda x: jnp.maximum(x, 0.25)), lambda x: 1.0 * (x > 0.25)),
         (jax.grad(lambda x: jnp.minimum(x, x * x)), lambda x: np.where(x < 0, 1.0, 2.0 * x)),
     ],
-    ids=["tanh", "log2", "polynomial", "hypot", "max", "min"],
+    ids=["tanh", "own tanh", "log2", "polynomial", "hypot", "max", "min"],
 )
 def test_primitives_of_single_versions(function, expected):
     np.testing.assert_allclose(evaluate(function, POINTS), expected(POINTS), rtol=2e-15)

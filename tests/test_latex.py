@@ -87,6 +87,8 @@ def test_columns_have_room_for_their_numbers():
         column("a_b", [0.1, -20.25], [1e-3, 0.5], "m"),
         column("plain", [1.0, math.nan]),
     ]
+    mixed = latex_table([column("mixed", [1.0, 22.5, -0.125])], {}, upright=False)
+    assert r"\begin{tabular}{S[table-format=-2.3]}" in mixed
     text = latex_table(columns, {"plain": "$x$"}, upright=False)
     assert (
         text.replace(", table-align-uncertainty=false", "")

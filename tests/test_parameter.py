@@ -11,7 +11,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._parameter_declaration import parameter_infos
-from jaxbiped._quantity import Quantity, si_number
+from jaxbiped._quantity import ParameterInfo, Quantity, si_number
 
 SEED = jb.seed_scene()
 NORMALS = {
@@ -202,6 +202,9 @@ def test_of_a_plain_field_the_name_is_known():
         ("-.5 °", "rad", math.radians(-0.5)), ("1e3mrad", "rad", 1.0),
         ("90deg/s", "rad/s", math.pi / 2),
         ("12.5cm", "m", 0.125), ("3.6km/h", "m/s", 1.0), ("500 ms", "s", 0.5), ("250g", "kg", 0.25),
+        ("3us", "s", 3e-6), ("3 µs", "s", 3e-6), ("4ms", "s", 4e-3), ("7mm", "m", 7e-3),
+        ("5cm/s", "m/s", 0.05), ("6mm/s", "m/s", 6e-3), ("2kN", "N", 2e3), ("3mrad", "rad", 3e-3),
+        ("180°/s", "rad/s", math.pi), ("7kg", "kg", 7.0), ("36km/h", None, 10.0),
         ("2 N/m^n", "N/m^n", 2.0), ("inf", "s", math.inf), ("20mm", None, 0.02),
     ],
 )  # fmt: skip
@@ -220,3 +223,24 @@ def test_a_number_may_have_a_unit(text, unit, number):
 def test_a_number_of_another_unit_is_none(text, unit, said):
     with pytest.raises(ValueError, match=re.escape(said) + "$"):
         si_number(text, unit)
+
+
+@pytest.mark.parametrize(
+    ("limits", "bad", "said"),
+    [
+        ({}, math.inf, "a = inf is not allowed: it must be a finite number."),
+        ({"positive": True}, 0.0, "a = 0 is not allowed: it must be a finite number above 0 kg."),
+        (
+            {"minimum": 0.0},
+            -1.0,
+            "a = -1 is not allowed: it must be a finite number of at least 0 kg.",
+        ),
+        ({"minimum": 1.0}, 0.5, "a = 0.5 is not allowed: it must be at least 1."),
+        ({"size_below": 2.0}, -2.0, "a = -2 is not allowed: it must be between -2 and 2 (kg)."),
+    ],
+)
+def test_each_limit_of_a_parameter_has_its_sentence(limits, bad, said):
+    info = ParameterInfo(Quantity("mass", "$m$", "kg"), **limits)
+    info.check("a", 1.5)
+    with pytest.raises(jb.ArgumentError, match=f"^{re.escape(said)}$"):
+        info.check("a", bad)

@@ -1,5 +1,6 @@
 """Stages of calls, against what takes long, who watches, and what an interrupt says."""
 
+import io
 import os
 import re
 import subprocess
@@ -31,6 +32,7 @@ def test_a_file_gets_what_takes_long_in_commands_and_what_was_asked_for():
     assert ended.returncode == 0, ended.stderr
     first = ended.stderr.splitlines()[0]
     assert re.fullmatch(r"asked: [123] of 4 gaits, [012] found …", first)
+    assert len(ended.stderr.splitlines()) <= 6  # after times that double, and at the end
     last = ended.stderr.splitlines()[-1]
     times = r"\[\d+ s, 0 s left(, \d+ gaits/s)?\]"
     assert re.fullmatch(rf"asked: 4 of 4 gaits, 3 found {times}\.", last)
@@ -60,6 +62,18 @@ def test_a_terminal_gets_one_line_which_an_unasked_bar_takes_away():
     assert last.startswith("searching: |████████████| 4 of 4 gaits, 3 found")
 
 
+def test_a_line_that_is_written_over_is_seen_at_once(monkeypatch):
+    seen = []
+
+    class Terminal(io.StringIO):
+        def flush(self):
+            seen.append(self.getvalue())
+
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    _progress._terminal_writer(kept=False)(_progress.Stage("walking", None, "", 0), False)
+    assert seen[-1].endswith("walking [0 s]")
+
+
 def _wide():
     return {**os.environ, "COLUMNS": "120"}
 
@@ -78,6 +92,12 @@ def test_stages_within_are_named_on_the_outermost_line_and_by_an_interrupt():
     assert note == f"Interrupted: {told}."
     with _progress.stage("next") as after:  # nothing of the interrupted ones is left
         assert after.words() == "next"
+
+
+def test_an_interrupt_says_what_it_leaves():
+    with pytest.raises(KeyboardInterrupt) as caught, _progress.stage("a", kept="all is stored"):
+        raise KeyboardInterrupt
+    assert caught.value.__notes__ == ["Interrupted: a.", "All is stored."]
 
 
 _CELL = f"{_SCRIPT}\nwork('in a notebook', total=4, unit='gaits')"

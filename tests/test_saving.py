@@ -223,6 +223,15 @@ def test_what_stops_amid_an_array_leaves_the_old_file_alone(tmp_path, monkeypatc
     assert jb.load(tmp_path / "it.npz")["one"].tolist() == [1.0, 1.0, 1.0]
 
 
+def test_a_failure_without_a_number_is_told_in_its_own_words(tmp_path, monkeypatch):
+    def stop(*args, **options):
+        raise OSError("The line is dead")
+
+    monkeypatch.setattr(np.lib.format, "write_array", stop)
+    with pytest.raises((jb.ArgumentError, jb.ResourceError), match=r"\(the line is dead\)"):
+        jb.save(tmp_path / "it.npz", np.zeros(3))
+
+
 @pytest.mark.parametrize(
     ("value", "said"),
     [

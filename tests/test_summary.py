@@ -41,7 +41,8 @@ def test_what_is_traced_prints_as_well():
 
 
 @pytest.mark.parametrize(
-    ("size", "said"), [(0, "0 B"), (999, "999 B"), (1500, "1.5 kB"), (2.5e9, "2.5 GB")]
+    ("size", "said"),
+    [(0, "0 B"), (999, "999 B"), (1000, "1 kB"), (1500, "1.5 kB"), (2.5e9, "2.5 GB")],
 )
 def test_memory_in_powers_of_a_thousand(size, said):
     assert _memory(size) == said

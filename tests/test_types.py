@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from jax._src import monitoring
 
-from jaxbiped._types import as_array, as_float, by_numpy
+from jaxbiped._types import as_array, as_float, by_numpy, in_parts
 
 
 @pytest.fixture
@@ -35,6 +35,21 @@ def test_by_numpy_nothing_is_compiled(compiled):
     assert isinstance(found, jax.Array)
     np.testing.assert_allclose(found, jnp.sqrt(a / b), rtol=1e-15)
     assert compiled != []
+
+
+@pytest.mark.parametrize(("count", "calls"), [(0, 1), (1, 1), (4, 1), (5, 2), (9, 3)])
+def test_parts_are_of_one_size_and_no_more_than_needed(count, calls):
+    """Rows are told once and in their order, however the last part is filled up."""
+    sizes = []
+
+    def doubled(tree):
+        sizes.append(len(tree["a"]))
+        return {"twice": 2.0 * tree["a"]}
+
+    rows = np.arange(2.0 * count).reshape(count, 2)
+    found = in_parts(doubled, {"a": rows}, 4)
+    np.testing.assert_array_equal(found["twice"], 2.0 * rows)
+    assert sizes == [4] * calls
 
 
 def test_what_is_traced_stays_in_the_trace():

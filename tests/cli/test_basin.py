@@ -97,7 +97,9 @@ def test_given_starts(tmp_path, capsys):
     text = "\n".join([HEADER, *(",".join(map(repr, row)) for row in rows)])
     (tmp_path / "starts.csv").write_text(text + "\n")
     # One of three starts fails to be solved.
-    numbers = numbers_of(capsys, "basin", "--starts", tmp_path / "starts.csv", code=1)
+    given = ("basin", "--starts", tmp_path / "starts.csv", "--out", tmp_path / "out")
+    numbers = numbers_of(capsys, *given, code=1)
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["basin.nc"]
     assert numbers["labels"] == ["walking period-1", "stopped", "solver failed"]
 
 
@@ -115,7 +117,9 @@ def test_samples_over_a_rigid_walker_and_its_slope(capsys):
 def test_the_share_of_wrong_labels_is_asked_for_and_told(tmp_path, capsys):
     arguments = ("--model", "rigid", "--accuracy", "1e-2", "--store", tmp_path / "store")
     axes = ("--x", "theta_stance=0.1:0.4:8", "--y", "omega_stance=-2:-1:8")
-    errors = outputs_of(tmp_path, "basin", *arguments, *axes).numbers["label_errors"]
+    outputs = outputs_of(tmp_path, "basin", *arguments, *axes)
+    errors = outputs.numbers["label_errors"]
+    assert outputs.code == 1  # it is not met
     assert (errors["starts"], errors["wanted"], errors["met"]) == (64, 1e-2, False)
     told = capsys.readouterr().out
     assert "fewer than 512 starts cannot confirm it" in told
@@ -124,6 +128,10 @@ def test_the_share_of_wrong_labels_is_asked_for_and_told(tmp_path, capsys):
     found = xr.open_zarr(tmp_path / "store")
     assert errors["relabelled"] == int((found.doubt > 0).sum())
     assert jb.basins.label_errors(found).numbers() == errors
+    names = jb.basins.label_names(found.label.values, found.cycle_footsteps.values)
+    doubt = found.doubt.values == int(jb.basins.Doubt.REMAINS)
+    for name, part in jb.basins.fractions(names, doubt=doubt).items():
+        assert outputs.numbers["fractions"][name] == [part.estimate, part.low, part.high]
 
 
 def test_a_full_disk_is_no_argument_of_ours(tmp_path, monkeypatch, capsys):

@@ -80,6 +80,9 @@ def test_runs_that_take_long_are_not_repeated(monkeypatch):
     asked.clear()
     assert time_run(lambda: asked.append(1), repeats=100)[1] == pytest.approx(0.3)
     assert len(asked) == 4
+    now = iter([0.0, 0.3, 1.0, 1.1, 2.0, 2.2])
+    monkeypatch.setattr(command.time, "perf_counter", lambda: next(now))
+    assert time_run(lambda: None, repeats=3)[1] == pytest.approx(0.1)
 
 
 @pytest.mark.nightly

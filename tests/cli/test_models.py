@@ -1,5 +1,6 @@
 """`jaxbiped models` and what is modelled, against the registries."""
 
+import numpy as np
 import pytest
 from reference.rigid import rigid_walker
 
@@ -34,6 +35,7 @@ def test_rigid_walk_and_gait(tmp_path, capsys):
     code, folder, _, numbers = outputs_of(tmp_path, "walk", *flags)
     assert code == 0
     assert (numbers["ending"], numbers["model"]) == ("walking", "rigid")
+    assert (numbers["footsteps"], numbers["warnings"]) == (len(numbers["steps"]), [])
     assert numbers["steps"][-1]["period_s"] == pytest.approx(0.4438, abs=2e-4)
     assert numbers["steps"][-1]["length_m"] == pytest.approx(0.1904, abs=2e-4)
     pictures = ("leg_angles.png", "phase_portrait.png", "strobe.png", "walk.html")
@@ -52,7 +54,12 @@ def test_rigid_walk_and_gait(tmp_path, capsys):
     assert set(numbers["state"]) == set(jb.dynamics.RigidState._fields)
     # By multipliers of Lagrange for the rolling foot, along an integration of their own.
     state = jb.dynamics.RigidState(**numbers["state"])
-    needed = rigid_walker(SceneOptions(model="rigid").scene()).needed_friction(state[1:])
+    walker = rigid_walker(SceneOptions(model="rigid").scene())
+    needed = walker.needed_friction(state[1:])
     assert numbers["assumptions"]["needed_friction"] == pytest.approx(needed, rel=1e-9)
+    solved = walker.until_strike(np.array(state[1:]))
+    _, normal = walker.force(solved.sol(np.linspace(0.0, solved.t_events[0][0], 1001)))
+    least = numbers["assumptions"]["least_normal_N"]
+    assert least == pytest.approx(np.min(normal), rel=1e-6)
     said = f"a real foot needs a friction coefficient of {needed:.3f}"
     assert said in capsys.readouterr().out

@@ -119,3 +119,7 @@ def test_bounds_that_are_not_given_are_half_and_twice_the_value_as_far_as_it_may
     assert bounds["d"] == (0.05, 0.2)
     assert bounds["l"] == pytest.approx((0.3, 0.8), rel=1e-3)
     assert list(bounds) == ["J", "d", "l"]
+    with pytest.raises(jb.ArgumentError, match="vary = 'q' is not known: choose one of m, J"):
+        _bounds(scene, "q")
+    with pytest.raises(jb.ArgumentError, match="vary = hip_mass needs bounds, as its value is 0"):
+        _bounds(scene, "hip_mass")

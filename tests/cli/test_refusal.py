@@ -117,7 +117,7 @@ gait --hip-torque torque=much | torque must be a number, and 'much' is not a num
 continue --along slop | along = 'slop' is not known
 continue --from 0.1 --to 0.1 | the range is empty
 basin --x knee=0:1:3 | coordinate = 'knee' is not known
-basin --starts nowhere.csv | starts = 'nowhere.csv' cannot be read
+basin --starts nowhere.csv | starts = 'nowhere.csv' cannot be read (no such file
 optimise --maximise speed --model rigid --vary q | vary = 'q' is not known
 optimise --maximise speed --model rigid --vary d=0.2 | write d=low:high
 continue --along slpe | along = 'slpe' is not known | perhaps slope is meant

@@ -22,6 +22,7 @@ def test_flags_build_the_scene():
     rigid = SceneOptions(model="rigid", slope=0.03, hip_mass=1.0).scene()
     assert isinstance(rigid, jb.RigidScene)
     assert float(rigid.ground.slope) == 0.03
+    assert float(rigid.walker.hip_mass) == 1.0
     held = SceneOptions(formulation="redundant", method="baumgarte", orientation="euler").scene()
     assert isinstance(held, jb.RedundantScene)
     assert isinstance(held.method, jb.constraints.Baumgarte)
@@ -57,6 +58,9 @@ def test_flags_make_the_actuators():
     assert (float(torque.torque), torque.reaction) == (0.1, "trunk")
     assert [float(x) for x in spline.torque] == [0.1, 0.7, 0.3]
     assert float(spline.first) == -0.1
+    sprung = ActuationOptions(hip_spring=("k=1", "theta_0=0"))
+    turned = SceneOptions(driven=sprung, set=("theta_0=5deg",)).scene()
+    assert float(turned.actuation[0].theta_0) == pytest.approx(math.radians(5.0))
     rigid = SceneOptions(model="rigid", driven=ActuationOptions(push_off=("impulse=0.2",))).scene()
     assert float(rigid.actuation[0].impulse) == 0.2
     redundant = SceneOptions(formulation="redundant", driven=asked).scene()
@@ -81,6 +85,7 @@ def test_a_driven_gait_tells_its_cost(capsys):
     assert numbers["cost_of_transport"] == pytest.approx(expected, rel=1e-6)
     assert numbers["elasticities"]["impulse"]["speed_m_s"] > 0.1
     assert numbers_of(capsys, "walk", *level, "--duration", "4")["motor_work_J"] > 5.0 * work
+    assert "cost_of_transport" not in numbers_of(capsys, "walk", *level, "--duration", "0.05")
 
 
 @pytest.mark.slow

@@ -4,7 +4,9 @@ import json
 
 import pytest
 
+import jaxbiped as jb
 from jaxbiped import trade
+from jaxbiped.cli._trade import Trade
 from jaxbiped.trade import Row, Truth
 from tests.cli.commands import one_line, outputs_of, run
 from tests.drawn import assert_is_drawn
@@ -75,3 +77,16 @@ def test_a_scene_without_a_gait_is_told_by_the_code(monkeypatch, capsys):
     monkeypatch.setattr(trade, "GaitTrade", _NoGait)
     assert run("trade") == 1
     assert "gait: the references found none" in capsys.readouterr().out
+
+
+def test_the_settings_of_a_walk_are_the_tolerances_of_its_accuracies():
+    scene, state = jb.seed_scene(), jb.seed_state()
+    settings = dict(Trade()._settings("walk", scene))
+    for name in jb.ACCURACIES:
+        request = jb.Simulation.prepare(scene, state, duration=1.0, accuracy=name)
+        assert settings.pop(name) == float(request.rtol)
+    assert settings == {}
+    assert list(dict(Trade(full=True)._settings("gait", scene)))[3:5] == [
+        "rtol=0.001",
+        "rtol=0.0001",
+    ]

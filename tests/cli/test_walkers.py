@@ -51,6 +51,8 @@ def test_a_file_s_walker_is_modelled(name, file):
     assert float(scene.ground.slope) == 0.03
     assert isinstance(SceneOptions(walker=f"{file}:{name}").scene().clearance,
                       jb.laws.AlwaysTouching)  # fmt: skip
+    start = StartOptions(state=("theta_leg_1=0.2",)).start(scene, f"{file}:{name}")
+    assert float(start.theta_leg_1) == 0.2
 
 
 @pytest.mark.parametrize(

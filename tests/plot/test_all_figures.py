@@ -72,6 +72,12 @@ def test_a_batch_is_refused(draw, seed_walk):
         draw(scene, batch)
 
 
+@pytest.mark.parametrize("draw", [*FIGURES, plot.animate, plot.time_series, plot.view])
+def test_a_walk_of_another_scene_is_refused(draw, seed_walk):
+    with pytest.raises(jb.ArgumentError, match="was simulated with another one"):
+        draw(jb.seed_scene(slope=0.03), seed_walk[1])
+
+
 def test_pyplot_is_left_alone():
     code = (
         "import sys, jaxbiped; assert 'matplotlib' not in sys.modules;"

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray
+from matplotlib.figure import Figure
 
 from jaxbiped.plot import basin
 from tests.drawn import legend_of
@@ -78,6 +79,25 @@ def test_gaits_off_the_slice_are_called_projected(settings):
     first = "gait 0" if settings == "{}" else "gait 0, projected"
     assert legend_of(ax)[-2:] == [first, "gait 1, projected"]
     np.testing.assert_array_equal(_stars(ax, "P"), [[[0.6, 1.0]]])
+
+
+def test_one_gait_off_the_slice_makes_the_curve_projected():
+    """A rate that the slice holds, and one gait of three that has another."""
+    axes = {"slope": np.array([0.01, 0.02, 0.03]), "theta_swing": np.linspace(0.0, 1.0, 5)}
+    for rate, label in ((1.0, "gait, projected"), (0.5, "gait")):
+        rows = [_row(_gait(0.2, 0.5), slope=0.01), _row(_gait(0.4, rate), slope=0.02)]
+        (ax,) = basin(_dataset(rows, axes).assign_coords(omega_swing=0.5)).axes
+        assert legend_of(ax)[-1] == label
+        np.testing.assert_allclose(_stars(ax)[0], [[0.01, 0.2], [0.02, 0.4]])
+
+
+@pytest.mark.parametrize("turned", ["x", "y"])
+def test_a_gait_is_marked_where_an_axis_runs_the_other_way(turned):
+    given = Figure().add_subplot()
+    getattr(given, f"invert_{turned}axis")()
+    (ax,) = basin(_dataset([_row(_gait(0.3, -1.0))]), ax=given).axes
+    assert getattr(ax, f"{turned}axis_inverted")()
+    np.testing.assert_array_equal(_stars(ax), [[[0.3, -1.0]]])
 
 
 def test_numbers_of_gaits_are_said_where_cycles_are_alike():

@@ -77,6 +77,12 @@ def test_rare_labels_are_not_rounded_away():
     rare[0, 0] = 1
     (ax,) = basin(rare, np.arange(200.0), np.arange(200.0), **AXES).axes
     assert legend_of(ax) == ["walking: > 99.99 %", "fell forward: < 0.01 %"]
+    rare[0, :20] = 1
+    (ax,) = basin(rare, np.arange(200.0), np.arange(200.0), **AXES).axes
+    assert legend_of(ax) == ["walking: 99.95 %", "fell forward: 0.05 %"]
+    rare[0, :] = 1
+    (ax,) = basin(rare, np.arange(200.0), np.arange(200.0), **AXES).axes
+    assert legend_of(ax) == ["walking: 99.5 %", "fell forward: 0.5 %"]
 
 
 def test_pending_cells_are_hatched_and_the_gait_is_marked():
@@ -205,6 +211,8 @@ def test_stacked_fractions_add_up_to_one():
         (lambda: basin([[0, 99]], X, Y, **AXES), ("labels", "99", "Label")),
         (lambda: basin(CODES, Y, X, **AXES), ("x", "(2,)", "(3,)", "(4,)")),
         (lambda: basin(CODES, X[::-1], Y, **AXES), ("x", "increase")),
+        (lambda: basin(CODES, [1.0, 3.0, 2.0], Y, **AXES), ("x", "increase")),
+        (lambda: basin(CODES, X, **AXES), ("x, y and names are needed",)),
         (lambda: basin(CODES, X, [0.0, np.nan], **AXES), ("y", "nan", "finite")),
         (lambda: basin(CODES[:1], X, [0.0], **AXES), ("y", "one centre", "edges")),
         (

@@ -13,7 +13,7 @@ import jaxbiped as jb
 from jaxbiped import plot
 from jaxbiped.plot import style
 from jaxbiped.plot._contact_charts import sampled_forces
-from tests.drawn import assert_is_drawn
+from tests.drawn import assert_is_drawn, assert_ticks_apart
 
 WIDTHS = {1: 3.4, 2: 7.0}
 
@@ -90,6 +90,11 @@ def test_a_papers_letters_have_eight_points_also_of_ticks_made_as_it_is_drawn():
     (ax,) = figure.axes
     labels = [*ax.get_xticklabels(), *ax.get_yticklabels(), ax.xaxis.label, ax.yaxis.label]
     assert {label.get_fontsize() for label in labels} == {8.0}
+    assert {spine.get_linewidth() for spine in ax.spines.values()} == {0.6}
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.minorticks_on()
+        for ticks, width in ((axis.get_major_ticks(), 0.6), (axis.get_minor_ticks(), 0.4)):
+            assert {tick.tick1line.get_markeredgewidth() for tick in ticks} <= {width}
     assert ax.get_title(loc="left") == ""
     assert _law().axes[0].get_title(loc="left") == "Bengisu and Akay"
     assert _law().get_figwidth() == 6.4
@@ -130,6 +135,40 @@ def test_samples_of_a_legend_show_all_dashes_of_each_line():
             for line in legend.get_lines():
                 length = np.ptp(line.get_xdata())
                 assert length > 1.2 * sum(line._dash_pattern[1] or (0.0,))
+
+
+def test_small_letters_leave_room_for_more_entries_above_the_axes():
+    """Four entries of twenty letters need 6.8 inches at ten points and 5.4 at eight."""
+    for name, above in (("screen", False), ("paper", True)):
+        with plot.figure_style(name, columns=2):
+            ax = style.axes_or_new(None, 7.0, 3.0)
+            for letter in "abcd":
+                ax.plot([0.0, 1.0], label=20 * letter)
+            style.legend_above(ax)
+            ax.figure.draw_without_rendering()
+        legend, axes = ax.get_legend().get_window_extent(), ax.get_window_extent()
+        assert bool(legend.y0 > axes.y1) is above
+
+
+@pytest.mark.parametrize(("title", "above"), [("", True), (30 * "t", False)])
+def test_a_long_title_leaves_no_room_for_entries_beside_it(title, above):
+    """Four entries of ten letters need 4.4 inches, thirty letters of a title 2, of 6."""
+    ax = style.axes_or_new(None, 7.0, 3.0)
+    for letter in "abcd":
+        ax.plot([0.0, 1.0], label=10 * letter)
+    style.set_title(ax, title)
+    style.legend_above(ax)
+    ax.figure.draw_without_rendering()
+    legend, axes = ax.get_legend().get_window_extent(), ax.get_window_extent()
+    assert bool(legend.y0 > axes.y1) is above
+
+
+@pytest.mark.parametrize("kind", ["screen", "paper"])
+@pytest.mark.parametrize("v0", [2e-5, 4e-5, 1e-4])
+def test_marks_of_slip_speeds_are_apart(kind, v0):
+    with plot.figure_style(kind):
+        figure = plot.friction_law(jb.seed_scene(v0=v0).friction)
+    assert_ticks_apart(figure)
 
 
 def test_figures_below_the_context_have_their_own_style_again():

@@ -142,6 +142,8 @@ def test_errors_that_are_not_known_are_said_and_names_stay_in_the_axes():
 def test_another_result_is_refused_in_one_sentence(draw):
     with pytest.raises(jb.ArgumentError, match=r"is not allowed: it must be an? "):
         draw(jb.seed_scene())
+    with pytest.raises(jb.ArgumentError, match=r"must be a Gait or a BranchPoint or a Branch\.$"):
+        multipliers(3)
 
 
 def test_multipliers_of_a_branchs_point():
@@ -254,6 +256,26 @@ def test_tornado_of_all_measures_and_unknown_last():
     names = [label.get_text() for label in axes[3].get_yticklabels()]
     assert [name.rpartition(", ")[2] for name in names] == ["$l$", "$c$", "$m_S$", "$K$"]
     assert axes[3].texts[-1].get_text() == "unknown"
+
+
+@pytest.mark.parametrize("name", ["K", "torso.K"])
+def test_in_a_paper_symbols_stand_alone_unless_they_are_of_a_body(name):
+    quantities = tuple(jb.laws.Quantity(f"word {k}", f"${k}$") for k in "Kclm")
+    gait = _gait(parameters=(name, *PARAMETERS[1:]), quantities=quantities)
+    with jb.plot.figure_style("paper"):
+        (ax,) = elasticities(gait, "period").axes
+    words = [label.get_text() for label in ax.get_yticklabels()]
+    alone = ["$l$", "$c$", "$K$", "$m$"]
+    assert words == (alone if name == "K" else [f"word {k[1]}, {k}" for k in alone])
+
+
+def test_elasticities_that_are_all_zero_have_a_scale_all_the_same():
+    zero = _measures((4,))._replace(period=np.zeros(4))
+    (ax,) = elasticities(
+        _gait(elasticities=zero, sensitivities=zero, sensitivity_errors=zero), "period"
+    ).axes
+    assert ax.get_xlim() == pytest.approx((-1e-3, 1e-3))
+    assert ax.get_xticks() == pytest.approx([0.0, -1e-3, 1e-3])
 
 
 def test_measures_without_a_known_elasticity_are_left_out_unless_asked_for():

@@ -52,6 +52,9 @@ def test_the_loop_has_the_area_of_the_energy_lost(name):
 def test_an_elastic_law_has_one_curve_and_gives_all_back():
     left, right = plot.normal_law(jb.laws.Hertz(K=1e6)).axes
     assert len(left.lines) == 1
+    assert legend_of(left) == ["0 m/s"]
+    weak = plot.normal_law(jb.laws.KelvinVoigt(1e6, 0.5)).axes[0]
+    assert len(weak.lines) == 4  # however small the damping
     assert right.get_title(loc="left").endswith("restitution 1.000")
 
 

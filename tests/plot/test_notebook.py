@@ -55,6 +55,7 @@ def test_a_gait_shows_its_measures_with_their_errors_and_its_multipliers(gait):
     assert error == pytest.approx(float(gait.measure_errors.period), rel=0.5)
     (picture,) = shown.pictures
     assert len(picture.getcolors(100_000)) > 20  # something is drawn
+    assert picture.size == (640, 336)  # both charts, of 8 by 4.2 inches at 80 dots per inch
 
 
 def test_what_is_not_found_and_what_is_many_have_no_picture(gait):

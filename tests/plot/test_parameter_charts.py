@@ -127,6 +127,17 @@ def test_curves_of_bifurcations():
         bifurcation_curves([curve, curve._replace(along=("slope", "c"))])
 
 
+@pytest.mark.parametrize(("ends", "scale"), [((2.0, 19.0), "linear"), ((2.0, 21.0), "log"),
+                                             ((-1.0, 21.0), "linear")])  # fmt: skip
+def test_a_range_of_more_than_a_decade_above_zero_is_logarithmic(ends, scale):
+    values = np.stack([[0.1, 0.2], ends], axis=1)
+    curve = BifurcationCurve(
+        BranchEvent.FOLD, ("slope", "K"), ("rad", "N/m"), values, (), np.ones(2), np.zeros(2),
+        (STOP, STOP),
+    )  # fmt: skip
+    assert bifurcation_curves([curve]).axes[0].get_xscale() == scale
+
+
 def test_what_cannot_be_drawn():
     with pytest.raises(jb.ArgumentError, match="must have a point"):
         branch(make_branch([]))

@@ -1,9 +1,12 @@
 """Motions of rigid walks as they are drawn, against feet that stay where they stand."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped._types import rows_of
 from jaxbiped.plot._samples import DrawnMotion, rigid_motion
 from jaxbiped.plot._skeleton import poses
 
@@ -74,6 +77,13 @@ def test_figures_draw_rigid_walks(wheel):
     ):
         with pytest.raises(jb.ArgumentError, match="RigidScene is not allowed"):
             refused(scene, walk)
+    kept = walk.arrivals._replace(
+        t=walk.arrivals.t[:1], state=rows_of(walk.arrivals.state, slice(1)), total=np.asarray(1)
+    )
+    one = dataclasses.replace(walk, arrivals=kept)
+    assert rigid_motion(scene, one).began.tolist() == [float(kept.t[0])]
+    with pytest.raises(jb.ArgumentError, match="no heel strikes"):
+        rigid_motion(scene, dataclasses.replace(one, t=kept.t))
     none = jb.simulate(scene, walk.final, duration=0.1)
     with pytest.raises(jb.ArgumentError, match="no heel strikes"):
         jb.plot.leg_angles(scene, none)
@@ -93,3 +103,5 @@ def test_no_turn_of_a_long_rigid_walk_is_passed_over():
     rates = np.maximum(motion["omega_1"], motion["omega_2"])
     largest = [rates[rows == row].max() for row in range(len(began) - 1)]
     np.testing.assert_allclose(largest, truth, rtol=1e-4)
+    for name in ("theta_1", "theta_2"):  # legs go on where they were, at every strike
+        assert np.abs(np.diff(motion[name])).max() < 0.05

@@ -88,6 +88,29 @@ def test_lines_go_from_hinge_to_hinge_round_feet_and_to_lonely_mass_centres():
     assert rim.path == ((0.0, 0.0), (1.0, 1.0), (0.0, 0.0), (1.0, 2.0), (0.0, 0.0))
 
 
+def test_the_page_is_sent_all_that_it_draws():
+    """Two feet of one leg, and a torso that stands above the hip."""
+    sent = skeleton_of(WALKERS["flat"]).numbers()
+    assert (sent["root"], sent["noun"], sent["above"]) == ("hip", "body", 0.0)
+    assert sent["height"] == pytest.approx(0.36 + 0.03 + 0.01)
+    assert sent["parts"][3] == {
+        "name": "foot_2", "label": "foot_2", "look": "leg-2 deep-1", "parent": 1,
+        "hinge": (0.36, 0.0), "centre": (0.02, 0.0),
+        "path": ((0.0, 0.0), (0.03, -0.04), (0.03, 0.08), (0.0, 0.0)),
+    }  # fmt: skip
+    assert sent["feet"][3] == {
+        "label": "foot_2.toe", "look": "leg-2 deep-1", "part": 3, "leg": 1, "centre": (0.03, 0.08),
+        "radius": 0.01,
+    }  # fmt: skip
+    assert sent["legs"] == [
+        {"label": "foot_1", "look": "leg-1"}, {"label": "foot_2", "look": "leg-2"}
+    ]  # fmt: skip
+    torso = skeleton_of(WALKERS["torso"]).numbers()
+    assert torso["above"] == pytest.approx(0.10)
+    assert torso["parts"][2]["look"] == "leg-3"
+    assert skeleton_of(jb.seed_scene().mechanism).numbers()["noun"] == "leg"
+
+
 def test_what_belongs_to_a_leg_has_its_colour():
     parts = {part.name: part.look for part in skeleton_of(WALKERS["five"]).parts}
     assert [parts[f"thigh_{i}"].colour for i in (1, 2)] == list(LEG_COLOURS[:2])

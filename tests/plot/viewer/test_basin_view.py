@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.plot._skeleton import motion_names
 from jaxbiped.plot.viewer._view import _even_choice
 from tests.drawn import sent_in
 
@@ -45,6 +46,8 @@ def test_cells_are_the_labels(basin):
     sent = sent_in(view.html())
     cells = np.frombuffer(base64.b64decode(sent["basin"]["cells"]), np.uint8)
     assert [sent["basin"]["names"][k] for k in cells] == names.ravel().tolist()
+    motion = set(motion_names(jb.seed_scene().mechanism.structure))
+    assert {frozenset(each.channels) for each in view.recordings if each} == {frozenset(motion)}
 
 
 def test_a_start_that_is_picked_shows_its_walk(basin, browser, tmp_path):

@@ -12,7 +12,13 @@ from selenium.webdriver.support.ui import WebDriverWait
 import jaxbiped as jb
 from jaxbiped.compiler import LANES
 from jaxbiped.compiler.runtime._processors import InputTable
-from jaxbiped.plot.viewer._playground import STEPS, played_request, recorded_names
+from jaxbiped.plot.viewer._playground import (
+    STEPS,
+    _shown_numbers,
+    _sliders,
+    played_request,
+    recorded_names,
+)
 from jaxbiped.plot.viewer._view import page_of, script
 from tests.mechanisms import scene_of, start_of
 
@@ -93,6 +99,36 @@ def test_sliders_move_all_that_a_scene_moves(playground):
     paths, _ = jtu.tree_flatten_with_path(played_request(scene, state, FOOTSTEPS).inputs)
     names = [jtu.keystr(path) for path, _ in paths]
     assert all(names[slider["input"]] == slider["leaf"] for slider in playground.sliders)
+
+
+@pytest.mark.parametrize("changes", [{}, {"friction": jb.laws.Frictionless()},
+                                     {"actuation": jb.actuation.HipTorque(0.1)}])  # fmt: skip
+def test_all_that_is_recorded_has_its_name(changes):
+    scene = dataclasses.replace(jb.seed_scene(), **changes)
+    shown = jax.eval_shape(lambda state: _shown_numbers(scene, state), jb.seed_state())
+    assert len(shown) == len(recorded_names(scene)) - 1  # beside the time
+    assert ("power" in recorded_names(scene)) == ("actuation" in changes)
+
+
+def test_sliders_are_of_the_scene_and_of_one_body_of_each_pair():
+    """A stiffness by the tenth or ten times, the rest by what a walker feels."""
+    inputs = {".scene.normal.K": 1e6, ".state.omega_shank_1": 2.0, ".state.theta_thigh_2": 0.1,
+              ".state.theta_thigh_1": -0.1, ".scene.ground.slope": 0.03}  # fmt: skip
+    slope, stiffness, angle, rate = _sliders(scene_of("kneed"), inputs)
+    shown = ("leaf", "input", "words", "unit", "least", "most", "value", "power")
+    assert tuple(slope) == shown
+    assert list(slope.values()) == [
+        ".scene.ground.slope", 4, "Slope", "rad", pytest.approx(0.01), pytest.approx(0.05), 0.03,
+        False,
+    ]  # fmt: skip
+    assert [stiffness[name] for name in shown[3:]] == ["N/mⁿ", 5.0, 7.0, 6.0, True]
+    assert (angle["words"], angle["input"]) == ("Angle of thigh_1", 3)
+    assert (angle["least"], angle["most"]) == pytest.approx((-0.25, 0.05))
+    assert (rate["words"], rate["least"], rate["most"]) == ("Rate of shank_1", 0.5, 3.5)
+    unpaired = {".state.theta_leg_1": 0.1, ".state.theta_leg_2": 0.2}
+    assert [each["leaf"] for each in _sliders(scene_of("unequal"), unpaired)] == [
+        ".state.theta_leg_1"
+    ]
 
 
 def test_a_slider_leads_to_another_walk(playground, browser, tmp_path):

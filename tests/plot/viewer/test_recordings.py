@@ -11,6 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 import jaxbiped as jb
 from jaxbiped.plot._samples import DrawnMotion
 from jaxbiped.plot._skeleton import motion_names, poses
+from jaxbiped.plot.viewer._recording import recording
 from tests.mechanisms import BISECTING, FEET, LEGS, PAIR, scene_of, start_of
 
 pytestmark = pytest.mark.slow
@@ -122,6 +123,18 @@ def test_motors_of_a_compliant_walk_are_those_of_its_ledger(seed_walk):
     assert played.channels["lost"][-1] == pytest.approx(lost, rel=1e-4)
 
 
+@pytest.mark.parametrize(("name", "first", "kept"), [("theta_1", 3, 3), ("hip_vx", 1, 2)])
+def test_a_walk_is_shown_as_far_as_its_states_are_numbers(name, first, kept):
+    """Two knots at least, which a page can draw."""
+    scene, t = jb.seed_scene(), np.linspace(0.0, 1.0, 6)
+    channels = {each: t + 1.0 for each in motion_names(scene.mechanism.structure)}
+    channels |= {"normal_1": np.full(6, np.nan), name: np.where(np.arange(6) < first, 1.0, np.inf)}
+    found = recording(scene, "walk", jb.Ending.SOLVER_FAILED, t, channels, [])
+    assert (found.ending, found.driven, found.slope) == ("solver failed", False, 0.02)
+    assert found.t.tolist() == t[:kept].tolist()
+    assert {len(values) for values in found.channels.values()} == {kept}
+
+
 def test_footprints_are_the_heel_strikes(seed_walk):
     scene, walk = seed_walk
     prints = recorded(scene, walk).footprints
@@ -150,6 +163,9 @@ def test_a_rigid_walk_keeps_its_legs():
     later = recorded(scene, walk)
     assert later.t[0] == strikes[0]
     assert later.t[-1] == found.t[-1]
+    assert "elastic" not in found.channels  # nothing in it holds any
+    # Even times are apart by a twentieth of the time in which a leg falls.
+    assert np.diff(found.t).max() <= 0.05 * np.sqrt(0.4 / 9.8) * (1.0 + 1e-9)
     with pytest.raises(jb.ArgumentError, match="no heel strikes"):
         recorded(scene, jb.rigid_walk(scene, start, footsteps=3))
 

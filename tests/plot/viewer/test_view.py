@@ -30,6 +30,11 @@ def test_the_page_asks_for_nothing():
     assert re.findall(r"(?:src|href)=\"(?!data:)", page) == []
 
 
+def test_only_a_page_that_computes_may_run_webassembly():
+    assert "script-src 'unsafe-inline';" in page_of({}, "walk")
+    assert "script-src 'unsafe-inline' 'wasm-unsafe-eval';" in page_of({}, "walk", computes=True)
+
+
 def test_every_module_is_in_the_page_once_and_no_name_is_taken_twice():
     modules = [path for path in ASSETS if path.suffix == ".js"]
     whole = script(*_view._MODULES, "page")
