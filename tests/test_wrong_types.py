@@ -51,3 +51,23 @@ def test_what_no_option_takes_is_one_sentence(door, name):
         with pytest.raises(jb.ArgumentError) as refused:
             function(*arguments, **keywords)
         assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda other: jb.starts.coordinate_names(other),
+        lambda other: jb.starts.grid(other, {"m": [1.0]}),
+        lambda other: jb.starts.sample(other, {"m": (1.0, 2.0)}, 4),
+        lambda other: jb.optimise.bifurcation_distance(other, other),
+        lambda other: jb.continuation.resume_branch(other),
+        lambda other: jb.continuation.doubling_cascade(other),
+        lambda other: jb.measure.cost_of_transport(other, other),
+        lambda other: jb.measure.operation_counts(other),
+        lambda other: jb.dynamics.energies(other, START),
+        lambda other: jb.dynamics.powers(other, START),
+    ],
+)
+def test_a_walker_is_no_scene(ask):
+    with pytest.raises(jb.ArgumentError, match=r"(scene|branch) .*(is|which is) not allowed"):
+        ask(RIGID.walker)

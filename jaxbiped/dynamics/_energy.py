@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, TypeAlias, cast
 
 import jax.numpy as jnp
 
+from jaxbiped._checks import check_type
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import (
@@ -99,6 +100,7 @@ def energies(scene: AbstractWalkerScene, state: Any) -> Energies:
     Raises:
         ArgumentError: the state is another scene's.
     """
+    check_type("scene", scene, AbstractWalkerScene)
     laws: Any = scene
     ground, whole = scene.ground, _placed(scene, state)
     kinetic = elastic = moment_x = moment_z = jnp.zeros_like(state[0])
@@ -165,6 +167,7 @@ def powers(scene: AbstractWalkerScene, state: Any) -> Powers:
     Raises:
         ArgumentError: the state is another scene's.
     """
+    check_type("scene", scene, AbstractWalkerScene)
     laws: Any = scene
     ground, whole = scene.ground, _placed(scene, state)
     indentation = damper = friction = momentum_x = momentum_z = jnp.zeros_like(state[0])

@@ -24,13 +24,13 @@ from jaxbiped.scene._state_types import SomeState, State, is_redundant, state_ty
 @functools.singledispatch
 def state_type(scene: object) -> type[PyTree]:
     """The type of a scene's states, a NamedTuple of scalar leaves."""
-    raise TypeError(f"{type(scene).__name__} has no formulation.")
+    raise ArgumentError(f"scene is a {type(scene).__name__}, which is not allowed: give a scene.")
 
 
 @functools.singledispatch
 def field_of(scene: object) -> VectorField:
     """A scene's vector field f(t, state, scene), in the form that `diffrax.ODETerm` takes."""
-    raise TypeError(f"{type(scene).__name__} has no formulation.")
+    raise ArgumentError(f"scene is a {type(scene).__name__}, which is not allowed: give a scene.")
 
 
 def seed_state() -> State:

@@ -69,6 +69,7 @@ def cost_of_transport(
         >>> jb.measure.cost_of_transport(scene, walk).cost.round(3)
         array([0.02])
     """
+    check_type("scene", scene, Scene, RigidScene)
     weight = float(scene.mechanism.total_mass) * float(scene.ground.g)
     if isinstance(scene, RigidScene):
         if times is not None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._checks import check_choice
+from jaxbiped._checks import check_choice, check_type
 from jaxbiped._types import as_float
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent, advance, locate_near
 from jaxbiped.continuation._branch_point import axis_of, start_of
@@ -103,6 +103,7 @@ def bifurcation_distance(
         ArgumentError: an argument is not allowed, or a parameter other than the slope is zero,
             which no factor changes; raised before anything is compiled.
     """
+    check_type("scene", scene, Scene, RigidScene)
     check_choice("kind", kind, KINDS)
     check_choice("along", along, parameter_names(scene))
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)

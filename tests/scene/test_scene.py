@@ -111,9 +111,9 @@ def test_parameters_are_those_of_the_minimal_scene(scene):
 def test_what_is_no_scene_is_of_no_kind():
     assert not is_compliant(3.0)
     assert not is_rigid(None)
-    with pytest.raises(TypeError, match="float has no formulation"):
+    with pytest.raises(jb.ArgumentError, match="scene is a float"):
         state_type(3.0)
-    with pytest.raises(TypeError, match="float has no formulation"):
+    with pytest.raises(jb.ArgumentError, match="scene is a float"):
         field_of(3.0)
 
 
