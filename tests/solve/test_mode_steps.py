@@ -101,7 +101,7 @@ def parabola(start, middle):
     return Polynomial([start, -4.0 * (start - middle), 4.0 * (start - middle)])
 
 
-DIPS, COMES_NEAR = parabola(0.8, -0.2), parabola(1.5 * RTOL, 0.1 * RTOL)
+DIPS, COMES_NEAR = parabola(1.0, -0.2), parabola(1.5 * RTOL, 0.1 * RTOL)
 RISES = Polynomial([0.0, 0.8, -1.0])
 AT_REST = Polynomial([0.0, 0.0, 1.0])
 """Gaps: open, then closed and open again; nearly closed; open from closed, and closed again."""
@@ -117,6 +117,7 @@ AT_REST = Polynomial([0.0, 0.0, 1.0])
         (COMES_NEAR, 1.0, False, True, False),
         (parabola(0.8, 0.4), 0.1, False, False, False),
         (RISES, 0.1, True, False, False),
+        (Polynomial([0.0, 0.8, -0.8 - 0.5 * RTOL]), 0.1, True, False, False),
         (AT_REST, 0.1, False, False, False),
         (-AT_REST, 0.1, True, False, False),
         (-RTOL * AT_REST, 0.1, True, False, False),
