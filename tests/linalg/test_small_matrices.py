@@ -175,7 +175,7 @@ def test_what_hardly_differs_from_other_rows_of_a_symmetric_system_is_left_out()
     for apart, kept in ((0.0, False), (1e-9, False), (1e-7, True)):
         matrix[2, 2] = 2.0 + apart
         factors = symmetric_factors([list(row) for row in jnp.asarray(matrix)], 1e-8)
-        found = np.array(factors.solve(list(jnp.asarray(right + [0.0, 0.0, apart]))))
+        found = np.array(factors.solve(list(jnp.asarray(right + np.array([0.0, 0.0, apart])))))
         assert (found[2] != 0.0) == kept
         # What the third row says beyond the first is that its own unknown is 1.
         others = np.linalg.solve(matrix[:2, :2], right[:2] - kept * matrix[:2, 2])
