@@ -122,3 +122,21 @@ def test_what_is_not_allowed_is_one_sentence(build, said):
     with pytest.raises(jb.ArgumentError) as refused:
         build()
     assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("method", "name"),
+    [
+        (jb.constraints.Baumgarte, "a"),
+        (jb.constraints.Baumgarte, "b"),
+        (jb.constraints.Index1Augmented, "omega"),
+        (jb.constraints.Index1Augmented, "zeta"),
+        (jb.constraints.Augmented, "omega"),
+        (jb.constraints.Augmented, "zeta"),
+    ],
+)
+def test_zero_is_the_least_that_frequencies_and_damping_may_be(method, name):
+    for value in (0.0, 0.5):
+        assert float(getattr(method(**{name: value}), name)) == value
+    with pytest.raises(jb.ArgumentError, match=f"{name} = -0.5 is not allowed"):
+        method(**{name: -0.5})

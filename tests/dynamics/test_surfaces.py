@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._surfaces import switches
+from jaxbiped.dynamics._surfaces import straight_legs, switches
 from jaxbiped.scene.laws._catalogue import normal_law_like
 from jaxbiped.variational._hybrid_system import Rolling
-from tests.mechanisms import scene_of, start_of
+from tests.mechanisms import FEET, LEGS, PAIR, scene_of, start_of
 
 SEED = jb.seed_scene()
 LOW = jb.seed_state()._replace(
@@ -103,3 +103,30 @@ def test_a_rigid_walker_arrives_where_the_foot_ahead_comes_down(stands):
     assert bool(counts)
     behind = state._replace(theta_1=-state.theta_1, theta_2=-state.theta_2)
     assert not bool(Rolling().arrival(jb.HeelStrike(), rigid, behind)[1])
+
+
+def test_legs_are_straight_where_each_is_one_body_on_the_hip_with_its_foot_along_it():
+    """Such a walker has fallen for good once it leans: its uprightness is then a leg's angle."""
+    assert straight_legs(SEED.mechanism) == (0, 1)
+    ahead = tuple(jb.Foot(f"leg_{i}", centre=(0.32, 0.01), radius=0.08) for i in (1, 2))
+    flat = tuple(
+        jb.Foot(f"leg_{i}", name=name, centre=(0.4, side), radius=0.0)
+        for i in (1, 2)
+        for name, side in (("heel", -0.02), ("toe", 0.05))
+    )
+    for feet, legs in ((FEET, (0, 1)), (ahead, None), (flat, None)):
+        assert straight_legs(jb.Mechanism(bodies=LEGS, feet=feet, mirror=PAIR)) == legs
+    assert straight_legs(scene_of("kneed").mechanism) is None
+
+
+@pytest.mark.parametrize(("other", "own"), [(-0.2, 0.15), (0.15, -0.2)])
+def test_a_heel_strike_counts_where_the_foot_comes_down_ahead_of_the_other(other, own):
+    """The leg that lands is then called the second; a leg off the ground lands nowhere."""
+    for height in (0.38, 0.6):
+        state = LOW._replace(
+            hip_z=jnp.asarray(height), theta_1=jnp.asarray(other), theta_2=jnp.asarray(own)
+        )
+        lands = float(jb.dynamics.feet(SEED, state)[1].penetration) > 0.0
+        assert lands == (height == 0.38)
+        is_ahead = np.sin(own) > np.sin(other)
+        assert bool(jb.HeelStrike().counts(SEED, state)) == (lands and is_ahead)

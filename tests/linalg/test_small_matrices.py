@@ -5,7 +5,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.linalg._small_matrices import Eigensystem, eigensystem, factorise, inverse
+from jaxbiped.linalg._small_matrices import (
+    Eigensystem,
+    eigensystem,
+    factorise,
+    inverse,
+    singular_pairs,
+    solution,
+    symmetric_factors,
+)
 
 BATCH = 50
 
@@ -133,3 +141,51 @@ def test_pairs_of_conjugates_under_vmap():
     np.testing.assert_allclose(found.left @ found.right, ones, atol=1e-10)
     rebuilt = (found.right * found.values[:, None]) @ found.left
     np.testing.assert_allclose(rebuilt, matrices, atol=1e-10)
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_a_solution_on_whole_arrays(size):
+    rng = np.random.default_rng(size)
+    dense = rng.normal(size=(size, size))
+    for matrix in (dense, np.roll(np.diag(np.diag(dense)), 1, axis=0)):
+        right = rng.normal(size=size)
+        found = jax.jit(solution)(jnp.asarray(matrix), jnp.asarray(right))
+        np.testing.assert_allclose(found, np.linalg.solve(matrix, right), rtol=1e-11)
+
+
+@pytest.mark.parametrize("size", [1, 2, 4])
+def test_a_symmetric_system(size):
+    """Only its lower half is read; L D Lᵀ is the matrix."""
+    rng = np.random.default_rng(size)
+    half, right = rng.normal(size=(size, size)), rng.normal(size=size)
+    matrix = half @ half.T + np.eye(size)
+    factors = symmetric_factors([list(row) for row in jnp.asarray(np.tril(matrix))])
+    lower = np.eye(size)
+    for i, row in enumerate(factors.lower):
+        lower[i, :i] = row
+    np.testing.assert_allclose((lower / np.array(factors.inverse)) @ lower.T, matrix, rtol=1e-12)
+    found = factors.solve(list(jnp.asarray(right)))
+    np.testing.assert_allclose(found, np.linalg.solve(matrix, right), rtol=1e-11)
+
+
+def test_what_hardly_differs_from_other_rows_of_a_symmetric_system_is_left_out():
+    """The third row repeats the first, but for less than the share; then but for more."""
+    matrix = np.array([[2.0, 0.5, 2.0], [0.5, 1.0, 0.5], [2.0, 0.5, 2.0]])
+    right = np.array([1.0, -0.4, 1.0])
+    for apart, kept in ((0.0, False), (1e-9, False), (1e-7, True)):
+        matrix[2, 2] = 2.0 + apart
+        factors = symmetric_factors([list(row) for row in jnp.asarray(matrix)], 1e-8)
+        found = np.array(factors.solve(list(jnp.asarray(right + np.array([0.0, 0.0, apart])))))
+        assert (found[2] != 0.0) == kept
+        # What the third row says beyond the first is that its own unknown is 1.
+        others = np.linalg.solve(matrix[:2, :2], right[:2] - kept * matrix[:2, 2])
+        np.testing.assert_allclose(found, [*others, float(kept)], rtol=1e-6)
+
+
+def test_singular_pairs_of_tall_matrices_under_vmap():
+    matrices = np.random.default_rng(2).normal(size=(3, 4, 2))
+    left, values, right = map(np.asarray, jax.vmap(singular_pairs)(jnp.asarray(matrices)))
+    assert left.shape == (3, 4, 2)
+    np.testing.assert_allclose((left * values[:, None]) @ right, matrices, atol=1e-13)
+    expected = np.linalg.svd(matrices, compute_uv=False)
+    np.testing.assert_allclose(values, expected, rtol=1e-12)

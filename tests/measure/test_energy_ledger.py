@@ -7,7 +7,7 @@ from reference.walks import walk as independent_walk
 import jaxbiped as jb
 from jaxbiped.dynamics._energy import Energies
 from jaxbiped.measure import _energy_ledger
-from jaxbiped.measure._samples import ModeChanges
+from jaxbiped.measure._samples import NODES, ModeChanges
 
 SCENE = jb.ladder()["rigid"]
 
@@ -88,3 +88,24 @@ def test_what_a_change_of_mode_takes_is_the_energy_beside_it(monkeypatch):
     known = np.array([True, True, True, False])
     found = _energy_ledger._stop_losses(SCENE, None, np.ones(4), ModeChanges(*changes, known))
     np.testing.assert_allclose(found, [2.0, 0.0, 0.625, np.nan], atol=1e-12)
+
+
+def test_works_of_powers_that_jump_and_bend_within_a_footstep(monkeypatch):
+    """Closed forms; in the second footstep everything is twice as strong."""
+    periods, strengths = np.array([0.7, 0.9]), np.array([1.0, 2.0])
+
+    def powers(_, numbers, begins, widths):
+        times = begins[:, None] + widths[:, None] * 0.5 * (1.0 + NODES)
+        total, lost = np.abs(times - 0.31), np.maximum(times - 0.42, 0.0)
+        jumps, steady = np.where(times > 0.4, 2.0, -1.0), times
+        return strengths[numbers][:, None] * np.array([total, lost, jumps, steady])
+
+    monkeypatch.setattr(_energy_ledger, "_sampled_powers", powers)
+    monkeypatch.setattr(_energy_ledger, "is_driven", lambda scene: True)
+    monkeypatch.setattr(_energy_ledger, "rows_of", lambda starts, number: number)
+    change = ModeChanges(np.array([1]), np.array([0.4]), np.array([True, True]))
+    found = _energy_ledger._works(SCENE, None, periods, change)
+    total = 0.5 * (0.31**2 + (periods - 0.31) ** 2)
+    motors = 2.0 * (periods - 0.4) + 0.5 * periods**2
+    lost = 0.5 * (periods - 0.42) ** 2
+    np.testing.assert_allclose(found, strengths * np.array([total, motors, lost]), rtol=1e-7)

@@ -241,6 +241,8 @@ def test_a_start_outside_the_bounds_is_moved_onto_them():
         ({"minimise": "speed"}, r"either maximise or minimise"),
         ({"subject_to": ["speed<0.4", "speed>0.5"]}, r"contradict each other"),
         ({"subject_to": "speed"}, r"is not understood"),
+        ({"subject_to": "speed<inf"}, r"subject_to = inf"),
+        ({"subject_to": {"speed": (None, np.nan)}}, r"subject_to\['speed'\] = nan"),
         ({"subject_to": {"speed": (None, None)}}, r"None for none"),
         ({"subject_to": "speed<0.5", "optimiser": "optax"}, r"not allowed with optax"),
         ({"optimiser": "magic"}, r"optimiser = 'magic'"),

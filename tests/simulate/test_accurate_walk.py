@@ -176,3 +176,17 @@ def test_the_embedded_method_is_one_order_lower():
         assert own < 0.5 * other
         gaps.append(other)
     assert np.log2(gaps[0] / gaps[1]) == pytest.approx(8.0, abs=0.4)
+
+
+def test_an_error_of_a_step_is_the_difference_of_the_two_orders_in_units_of_the_tolerance():
+    """Relative, and absolute by a hundredth; the root mean square over angles and rates."""
+    scene, rtol, step = rigid_seed(), 1e-7, 0.05
+    rates = rolling_rates(scene, START)
+    (end, error, _), (other, *_) = (
+        rolling_step(scene, START, rates, step, rtol, embedded=embedded)
+        for embedded in (False, True)
+    )
+    ends = np.array([START, end, other], dtype=float)[:, 1:5]
+    allowed = rtol * (0.01 + np.max(np.abs(ends[:2]), axis=0))
+    expected = np.sqrt(np.mean(((ends[1] - ends[2]) / allowed) ** 2))
+    assert float(error) == pytest.approx(expected, rel=1e-4)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.simulate._start import check_times
 from tests.linkages import hanging, one_leg, pinned_pendulum
 from tests.rigid_walkers import rigid_seed
 
@@ -76,6 +77,9 @@ CASES = [
     ),
     (walked, dict(save="last"), "save = 'last' is not known: choose one of steps, end"),
     (walked, dict(save=jnp.array([0.2, 0.1])), "save"),
+    (walked, dict(save=jnp.array([0.1, 0.3, 0.2])), "must be increasing times from 0 to 1"),
+    (walked, dict(save=jnp.array([-0.1, 0.3])), "must be increasing times from 0 to 1"),
+    (walked, dict(save=jnp.array([[0.1, 0.3]])), "must be increasing times from 0 to 1"),
     (walked, dict(save=jnp.array([0.5, 1.5])), "must be increasing times from 0 to 1"),
     (walked, dict(save=jb.MidStance(), engine="fast"), "choose one of auto, xla, lanes"),
     (walked, dict(engine="lanes", solver="kvaerno3"), "Kvaerno3 is not one of its solvers"),
@@ -148,3 +152,8 @@ def test_an_accuracy_by_a_number_is_refused_where_nothing_is_known_yet(walk, sta
 
     with pytest.raises(jb.ArgumentError, match="under jit, vmap or differentiation"):
         jax.jit(walked)(-0.25)
+
+
+@pytest.mark.parametrize("times", [[0.0, 1.0], [0.5, 0.5], [1.0], []])
+def test_times_from_the_first_to_the_last_moment_are_allowed(times):
+    check_times(jnp.array(times), 1.0)

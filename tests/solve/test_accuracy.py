@@ -14,6 +14,10 @@ from jaxbiped.solve._accuracy import (
     ACCURACIES,
     check_precision,
     recurring_inverse_units,
+    recurring_sizes,
+    relative_to_scene,
+    rms_norm,
+    sizes_of,
     tolerances,
     units_of,
 )
@@ -202,3 +206,40 @@ def test_a_contact_is_too_stiff_for_a_precision_where_rounding_a_leg_carries_the
     check(0.9)
     with pytest.raises(jb.ArgumentError, match=r"by 1\.1 times the walker's weight"):
         check(1.1)
+
+
+def test_sizes_are_a_leg_and_the_root_of_leg_over_gravity():
+    scene = jb.seed_scene(l=0.9, g=1.6)
+    time, sizes = sizes_of(scene, START)
+    pace = np.sqrt(0.9 / 1.6)
+    expected = [0.9, 0.9, 1.0, 1.0, *[0.9 / pace] * 2, *[1.0 / pace] * 2]
+    assert time == pytest.approx(pace)
+    np.testing.assert_allclose(sizes, expected)
+    np.testing.assert_allclose(recurring_sizes(scene, START), expected[1:])
+    weightless, floating = sizes_of(jb.seed_scene(l=0.9, g=0.0), START)
+    assert (weightless, floating.hip_vx, floating.omega_1) == (1.0, 0.9, 1.0)
+    units = units_of(scene, START)
+    np.testing.assert_allclose(
+        units.inverse,
+        1.0
+        / np.array(expected)
+        * [*[0.4] * 2, 1.0, 1.0, *[0.4 / np.sqrt(0.4 / 9.8)] * 2, *[1.0 / np.sqrt(0.4 / 9.8)] * 2],
+    )
+    assert float(units_of(jb.seed_scene(g=0.0), START).time) == 1.0
+
+
+def test_the_largest_error_is_that_of_a_time_or_of_any_leaf():
+    scene, nothing = jb.seed_scene(l=0.9, g=1.6), jb.State(*[np.zeros(2)] * 8)
+    pace = np.sqrt(0.9 / 1.6)
+    assert relative_to_scene(scene, np.zeros(0), nothing) == 0.0
+    assert relative_to_scene(scene, np.array([1e-6, 3e-6]), nothing) == pytest.approx(3e-6 / pace)
+    for name, size in (("hip_x", 0.9), ("theta_2", 1.0), ("hip_vz", 0.9 / pace)):
+        errors = nothing._replace(**{name: np.array([1e-3, 5e-3])})
+        assert relative_to_scene(scene, np.array([1e-6]), errors) == pytest.approx(5e-3 / size)
+    unknown = nothing._replace(omega_1=np.array([0.0, np.nan]))
+    assert relative_to_scene(scene, np.array([1e-6]), unknown) == np.inf
+
+
+def test_a_norm_is_the_root_of_the_mean_square_over_all_leaves():
+    found = rms_norm({"a": jnp.array([3.0, 4.0]), "b": jnp.asarray(1.0)})
+    assert float(found) == pytest.approx(np.sqrt(26.0 / 3.0))

@@ -1,5 +1,7 @@
 """Modes of a rigid walk in order of time, against a list of changes that is written down."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -25,3 +27,16 @@ def test_a_batch_of_walks_has_no_names():
     many = type(walk)(walk.t[None], walk.mode[None], walk.total, walk.feet, walk.stands, walk.modes)
     with pytest.raises(jb.ArgumentError, match="one of a batch at a time"):
         _ = many.names
+
+
+def test_a_walk_knows_its_modes_and_how_long_they_lasted():
+    history = history_of(hsu_chen(), BEGIN, CHANGES, np.int64(2))
+    nothing = jb.Trajectory(
+        **dict.fromkeys(field.name for field in dataclasses.fields(jb.Trajectory))
+        | {"t": np.array([0.0, 0.65])}
+    )
+    assert nothing.modes == ()
+    assert nothing.mode_durations.shape == (0,)
+    walk = dataclasses.replace(nothing, mode_history=history)
+    assert walk.modes == history.names
+    np.testing.assert_allclose(walk.mode_durations, [0.25, 0.15, 0.25], rtol=1e-12)

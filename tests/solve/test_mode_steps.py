@@ -4,11 +4,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from numpy.polynomial import Polynomial
 
-from jaxbiped.solve._rolling_step import SurfaceCourse, mode_events, onto_surface
+from jaxbiped.solve._rolling_step import (
+    ModeEvents,
+    StepEvents,
+    SurfaceCourse,
+    mode_events,
+    onto_surface,
+    with_changes,
+)
 
 RTOL, STEP = 1e-6, 0.5
-told = jax.jit(lambda before, after: mode_events(STEP, before, after, RTOL, jnp.asarray(0.1)))
+told = jax.jit(lambda before, after, length=0.1: mode_events(STEP, before, after, RTOL, length))
 onto = jax.jit(lambda at, which: onto_surface(at, which, jnp.asarray(RTOL), jnp.asarray(STEP)))
 
 
@@ -78,3 +86,81 @@ def test_a_gap_is_met_from_farther_away_by_what_is_known_of_its_bend(bend):
         SurfaceCourse(*(jnp.array([each]) for each in (1e2 * value, rate, True, bend))),
     ):
         assert not bool(onto(far, 0).near)
+
+
+def gap(curve, live=True):
+    """A gap that is a polynomial of the share of a step of STEP, at both of its ends."""
+    slope, bend = curve.deriv() / STEP, curve.deriv(2) / STEP**2
+    return [
+        SurfaceCourse(*(jnp.array([each]) for each in (curve(s), slope(s), live, bend(s))))
+        for s in (0.0, 1.0)
+    ]
+
+
+def parabola(start, middle):
+    return Polynomial([start, -4.0 * (start - middle), 4.0 * (start - middle)])
+
+
+DIPS, COMES_NEAR = parabola(1.0, -0.2), parabola(1.5 * RTOL, 0.1 * RTOL)
+RISES = Polynomial([0.0, 0.8, -1.0])
+AT_REST = Polynomial([0.0, 0.0, 1.0])
+"""Gaps: open, then closed and open again; nearly closed; open from closed, and closed again."""
+
+
+@pytest.mark.parametrize(
+    ("curve", "length", "crosses", "unclear", "grazes"),
+    [
+        (DIPS, 0.1, False, True, False),
+        (DIPS, 1.0, False, True, False),
+        (parabola(0.8, 0.2), 0.1, False, False, False),
+        (COMES_NEAR, 0.1, False, False, True),
+        (COMES_NEAR, 1.0, False, True, False),
+        (parabola(0.8, 0.4), 0.1, False, False, False),
+        (RISES, 0.1, True, False, False),
+        (Polynomial([0.0, 0.8, -0.8 - 0.5 * RTOL]), 0.1, True, False, False),
+        (AT_REST, 0.1, False, False, False),
+        (-AT_REST, 0.1, True, False, False),
+        (-RTOL * AT_REST, 0.1, True, False, False),
+        (Polynomial([0.0, 0.8, -0.5]), 0.1, False, False, False),
+        (Polynomial([0.5 * RTOL, -1.0, 1.0]), 0.1, False, False, False),
+    ],
+)
+def test_a_gap_that_bends_is_followed_through_a_step(curve, length, crosses, unclear, grazes):
+    found = told(*gap(curve), length)
+    seen = bool(found.crosses), bool(found.unclear), bool(found.grazes)
+    assert seen == (crosses, unclear, grazes)
+    dead = told(*gap(curve, live=False), length)
+    assert not bool(dead.crosses | dead.unclear | dead.grazes)
+
+
+def test_what_begins_on_its_surface_is_followed_from_behind():
+    """Along the tangent at the end, from a gap of −0.2 that falls by 1.2 a step."""
+    found = told(*gap(RISES), 0.1)
+    assert float(found.place) == pytest.approx(1.0 - 0.2 / 1.2, rel=1e-12)
+
+
+def test_what_comes_behind_the_first_change_of_mode_does_not_happen():
+    yes, no = jnp.asarray(True), jnp.asarray(False)
+    strike = StepEvents(yes, no, jnp.asarray(0.5), no, yes, no)
+    fall = StepEvents(no, yes, jnp.asarray(0.5), no, yes, no)
+    nothing = StepEvents(no, no, jnp.asarray(1.0), no, yes, yes)
+    for happens, crosses, place, changes in (
+        (strike, yes, 0.3, True),
+        (strike, yes, 0.7, False),
+        (strike, no, 0.3, False),
+        (fall, yes, 0.3, True),
+        (fall, yes, 0.7, False),
+        (nothing, yes, 0.7, True),
+    ):
+        modes = ModeEvents(crosses, jnp.asarray(0), jnp.asarray(place), no, no)
+        found = with_changes(happens, modes)
+        assert bool(found.changes) == changes
+        kept = [flag and not changes for flag in map(bool, (happens.strikes, happens.falls))]
+        assert [bool(found.strikes), bool(found.falls)] == kept
+        assert float(found.place) == (place if changes else float(happens.place))
+        assert bool(found.above)
+        assert bool(found.grazes) == (bool(happens.grazes) and not changes)
+    for flags in ((yes, no), (no, yes), (no, no)):
+        modes = ModeEvents(no, jnp.asarray(0), jnp.asarray(1.0), flags[0], no)
+        found = with_changes(strike._replace(unclear=flags[1]), modes)
+        assert bool(found.unclear) == any(map(bool, flags))

@@ -11,6 +11,7 @@ import jaxbiped as jb
 from jaxbiped.dynamics._surfaces import Switch
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._step_size import step_control
+from jaxbiped.solve.controllers._wrapped_control import Adapted, Attempt
 from jaxbiped.variational._collocated_step import RADAU, KnownStep
 from jaxbiped.variational._flow import (
     SIDES,
@@ -23,8 +24,14 @@ from jaxbiped.variational._flow import (
 )
 from jaxbiped.variational._grazing import turns_of
 from jaxbiped.variational._hybrid_system import RedundantWalking, Rolling, Walking
-from jaxbiped.variational._saltation import saltation_at
-from jaxbiped.variational._solve_to_section import TangentSolver, VariationalField
+from jaxbiped.variational._saltation import at_fixed_time, meet, meeting_at, saltation_at
+from jaxbiped.variational._solve_to_section import (
+    TangentControl,
+    TangentSolver,
+    VariationalField,
+    _nodes,
+    worst_norm,
+)
 from jaxbiped.variational._switch_locator import SwitchLocator
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch
 from tests.systems import Plain
@@ -325,3 +332,79 @@ def test_systems_of_walkers_exchange_legs_and_carry_the_larger_load():
         both = float(forces[0].normal), float(forces[1].normal)
         assert float(largest) == max(both) > min(both) == 0.0
     assert Walking.cyclic_coordinates == Rolling.cyclic_coordinates == (0,)
+
+
+def test_displaced_motions_meet_a_switch_later_by_their_distance_over_its_rate():
+    """Columns of two directions and of the level; the switches are the level, a speed, a sum."""
+    height, speed = 0.6, -3.0
+    state = jnp.asarray(height), jnp.asarray(speed)
+    normals = {1: ([1.0, 0.0], -1.0), 2: ([0.0, 1.0], 0.0), 3: ([1.0, 1.0], 0.0)}
+    columns = jnp.asarray([[0.3, -0.2], [0.1, 0.7]])
+    by_level, shifts, size = jnp.asarray([[0.4, 0.9]]), jnp.asarray([0.05, -0.06]), 2.5
+    rates = np.array([speed, BEFORE])
+    for which, (normal, along) in normals.items():
+        met = meeting_at(WATCH, state, seeded(1), jnp.asarray(which))
+        rate = np.dot(normal, rates)
+        np.testing.assert_allclose(met.by_state, np.array(normal) / rate)
+        np.testing.assert_allclose(met.by_parameter, [along / rate], atol=1e-15)
+        np.testing.assert_allclose(met.rates, rates)
+        found, later = meet(met, (columns, by_level), (shifts, shifts[:1]), jnp.asarray([size]))
+        delays = -(np.asarray(columns) @ normal) / rate
+        delay = -(np.asarray(by_level[0]) @ normal + along * size) / rate
+        np.testing.assert_allclose(later[0], shifts + delays)
+        np.testing.assert_allclose(later[1], shifts[:1] + delay)
+        np.testing.assert_allclose(found[0], columns + np.outer(delays, rates), atol=1e-14)
+        np.testing.assert_allclose(found[1], by_level + delay * rates, atol=1e-14)
+    # Where no parameter moves there is nothing to add.
+    alone = met._replace(by_parameter=jnp.zeros(0))
+    none = jnp.zeros((0, 2)), jnp.zeros(0)
+    found, later = meet(alone, (columns, none[0]), (shifts, none[1]), jnp.zeros(0))
+    assert [each.shape for each in (*found, *later)] == [(2, 2), (0, 2), (2,), (0,)]
+    np.testing.assert_allclose(later[0], shifts + delays)
+    fixed = at_fixed_time(state, (columns, by_level), (shifts, shifts[:1]))
+    np.testing.assert_allclose(fixed[0], columns - np.outer(shifts, [height, speed]))
+    np.testing.assert_allclose(fixed[1], by_level - 0.05 * np.array([height, speed]))
+
+
+def test_nodes_are_the_steps_that_a_solve_took_and_its_arrival():
+    times = jnp.asarray([0.0, 0.1, 0.3, jnp.inf])
+    states = jnp.arange(4.0), 10.0 + jnp.arange(4.0)
+    arrival = Tangents((jnp.asarray(2.5), jnp.asarray(12.5)), jnp.zeros((2, 1)))
+    found = _nodes(times, states, jnp.asarray(0.25), arrival)
+    assert int(found.steps) == 2
+    np.testing.assert_array_equal(found.start, [0.0, 0.0, 10.0])
+    np.testing.assert_array_equal(found.ends.values[:2], [[0.1, 1.0, 11.0], [0.3, 2.0, 12.0]])
+    assert int(found.ends.counts) == 2
+    np.testing.assert_array_equal(found.arrival, [0.25, 2.5, 12.5])
+
+
+class Noting:
+    """A controller that keeps what it is asked."""
+
+    atol = 1e-9
+
+    def adapt_step_size(self, *attempt):
+        self.asked = Attempt(*attempt)
+        return (None,) * len(Adapted._fields)
+
+
+def test_a_column_s_error_counts_against_its_entry_a_share_of_its_largest_and_its_floor():
+    noting, inverse = Noting(), jnp.asarray([2.0, 0.5])
+    begins = jnp.asarray([[0.3, -4.0], [-0.2, 0.0]])
+    ends, errors = jnp.asarray([[0.1, 1.0], [0.6, -6.0]]), jnp.asarray([[1e-6, 2e-6], [-3e-6, 0.0]])
+    y0, y1, error = (Tangents((jnp.ones(()),) * 2, columns) for columns in (begins, ends, errors))
+    args = Seeded((), jnp.zeros((0, 2)), jnp.asarray([0.01, 0.0]), ())
+    control = TangentControl(noting, 1e-4, inverse)
+    control.adapt(Attempt(0.0, 0.1, y0, y1, args, error, 3, None))
+    size = np.array([[0.6, 8.0], [0.3, 3.0]])
+    allowed = 1e-4 * (size + 0.1 * np.array([0.6, 8.0]) + np.array([0.01, 0.0]))
+    expected = np.array(errors) * np.array([[2.0], [0.5]]) / allowed
+    np.testing.assert_allclose(noting.asked.error.columns / noting.atol, expected, rtol=1e-12)
+    assert noting.asked.error.state == error.state
+    for y, given in ((noting.asked.y0, y0), (noting.asked.y1, y1)):
+        np.testing.assert_array_equal(y.columns, 0.0)
+        assert y.state == given.state
+    of_columns = np.sqrt((np.array(errors) ** 2).mean(axis=0)).max()
+    small = error._replace(state=(jnp.asarray(1e-7),) * 2)
+    assert float(worst_norm(small)) == pytest.approx(of_columns)
+    assert float(worst_norm(error)) == 1.0

@@ -54,6 +54,16 @@ def test_the_driver_knows_the_size_of_blocks():
     assert ".minnctapersm 3" in other
 
 
+@pytest.mark.parametrize(
+    ("capability", "version"), [((8, 0), "7.0"), ((9, 0), "7.8"), ((10, 0), "8.6")]
+)
+def test_the_text_is_in_the_first_ptx_that_knows_the_architecture(capability, version):
+    """So that drivers as old as the device read it. NVIDIA's notes on releases of PTX say which."""
+    lines = ptx_text(kernel().device_text(), ARCHITECTURES[capability]).splitlines()
+    assert f".version {version}" in lines
+    assert f".target sm_{10 * capability[0]}" in lines
+
+
 def test_a_warp_refills_together():
     ptx = ptx_text(kernel().device_text(), ARCHITECTURES[9, 0])
     # Whether to stop, whether any is done, whether any is left.
