@@ -11,6 +11,7 @@ from jaxbiped._checks import (
     check_choice,
     check_count,
     check_positive,
+    check_type,
     check_unbatched,
     check_within,
 )
@@ -346,6 +347,7 @@ def resume_branch(
     Raises:
         ArgumentError: an argument is not allowed, or the gait at the point does not return.
     """
+    check_type("branch", branch, Branch)
     check_choice("direction", direction, ("forward", "backward"))
     check_positive("largest_step", largest_step)
     check_count("max_points", max_points)

@@ -108,6 +108,7 @@ def doubling_cascade(
     Raises:
         ArgumentError: an argument is not allowed, or there is no doubled gait near a doubling.
     """
+    check_type("branch", branch, Branch)
     check_count("doublings", doublings)
     here = _first_doubling(branch) if doubling is None else doubling
     if here is None:
