@@ -5,7 +5,15 @@ import itertools
 import numpy as np
 import pytest
 
-from jaxbiped.gait._pseudo_arclength import Change, Curve, StepControl, correct, follow, locate
+from jaxbiped.gait._pseudo_arclength import (
+    Change,
+    Curve,
+    StepControl,
+    _interpolated,
+    correct,
+    follow,
+    locate,
+)
 
 UNITS = (1.0, 1.0)
 SIZES = [UNITS, (4.0, 1.0), (0.25, 1.0), (4.0, 0.2)]
@@ -141,3 +149,31 @@ def test_a_zero_is_located_between_two_points(sizes):
     found = locate(curve, begin, step.found, test)
     assert found.place == pytest.approx((np.sqrt(0.99), 0.1), abs=1e-6)
     assert found.tangent @ found.place == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("sizes", SIZES)
+def test_a_zero_is_interpolated_between_points_beside_it(sizes):
+    curve = circle(sizes)
+    begin = correct(curve, np.array([1.0, 0.0])).found
+    step = next(follow(curve, begin, CONTROL._replace(first=0.3, largest=0.3, aside=np.inf)))
+    test = lambda point: point.place[1] - 0.15
+    found = _interpolated(curve, begin, step.found, 0.148, test, 0.05)
+    assert found.place == pytest.approx((np.sqrt(1.0 - 0.15**2), 0.15), abs=1e-5)
+    assert found.tangent == pytest.approx((-0.15, np.sqrt(1.0 - 0.15**2)), abs=1e-4)
+    assert found.change.seen == pytest.approx(tuple(found.place * sizes))
+    assert _interpolated(curve, begin, step.found, 0.25, test, 0.01) is None
+
+
+def test_of_several_components_the_parameter_is_the_last():
+    """(s², s³) in sizes of their own: a guess's own s is kept."""
+    sizes = np.array([4.0, 0.5, 1.0])
+
+    def change(point, s):
+        x, y = point
+        by_point, by_s = np.diag([-1.0, -1.0]), np.array([2.0 * s, 3.0 * s * s])
+        return Change(np.array([s * s - x, s**3 - y]), by_point, by_s, 0, None)
+
+    there = correct(Curve(change, sizes, 1e-9), np.array([0.0, 0.1, 0.7])).found
+    np.testing.assert_allclose(there.place, np.array([0.49, 0.343, 0.7]) / sizes, atol=1e-12)
+    along = np.array([1.4, 1.47, 1.0]) / sizes
+    np.testing.assert_allclose(there.tangent, along / np.linalg.norm(along), atol=1e-9)
