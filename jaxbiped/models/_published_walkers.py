@@ -337,7 +337,7 @@ MODELS: dict[str, Model] = {
     "wisse": Model(
         "a torso that bisects the legs' angle (Wisse et al. 2004)",
         wisse,
-        {"gait": _struck(0.3033, -0.5348, -1.0653)},
+        {"gait": _struck(0.2645, -0.6111, -0.9789)},
     ),
     "kuo": Model(
         "the simplest walker pushing off on level ground (Kuo 2002)",

@@ -123,3 +123,20 @@ def test_a_branch_ends_where_it_cannot_be_followed(jump, ends, end, code, place)
     )
     assert (branch.end, branch.code) == (end, code)
     assert branch.s[branch.farthest] == pytest.approx(place, abs=1e-3)
+
+
+def test_a_branch_of_several_components_is_in_their_own_units():
+    """(s, s², 3 − s) from s = 1/4, whatever sizes arclength is measured in."""
+
+    def change(point, s):
+        x, y, z = point
+        value = np.array([s - x, x * x - y, 3.0 - s - z])
+        by_point = np.array([[-1.0, 0.0, 0.0], [2.0 * x, -1.0, 0.0], [0.0, 0.0, -1.0]])
+        return Change(value, by_point, np.array([1.0, 0.0, -1.0]), 0)
+
+    for scales in (np.ones(3), np.array([2.0, 0.5, 4.0])):
+        branch = follow_branch(change, np.array([0.25, 0.0625, 2.75]), 0.25, scales=scales)
+        assert branch.end is BranchEnd.REACHED
+        assert branch.s[[0, -1]] == pytest.approx([0.25, 1.0], abs=1e-12)
+        expected = np.stack([branch.s, branch.s**2, 3.0 - branch.s], axis=1)
+        np.testing.assert_allclose(branch.points, expected, atol=1e-6)

@@ -1,5 +1,6 @@
 """Published walkers, against what was printed of them and against equations written by hand."""
 
+import itertools
 import math
 
 import numpy as np
@@ -29,7 +30,39 @@ BY_HAND = {
         straight_legs(0.5, 0.02, 0.5), hip_mass=1.0, l=1.0, r=0.2, slope=0.01, g=1.0
     ),
 }  # fmt: skip
+CHENS_KNEES = Knees((0.5, 0.5, 0.325), (0.05, 0.5, 0.125), hip_mass=0.5, slope=0.0504, g=9.81)
 RIGID = {(name, gait) for name in BY_HAND for gait in MODELS[name].starts}
+PUBLISHED = {
+    "garcia": dict(m=1e-13, J=0.0, l=1.0, d=1.0, r=0.0, hip_mass=1.0, slope=0.009, g=1.0),
+    "goswami": dict(m=5.0, J=0.0, l=1.0, d=0.5, r=0.0, hip_mass=10.0, slope=THREE, g=9.8),
+    "mcgeer": dict(m=1.0, J=0.1024, l=1.0, d=0.37, r=0.3, hip_mass=0.0, slope=0.03, g=1.0),
+    "mcgeer-kneed": dict(
+        m_thigh=0.2, J_thigh=5.8e-4, l_thigh=0.184, d_thigh=0.08,
+        m_shank=0.124, J_shank=6.9e-4, l_shank=0.216, d_shank=0.096, w_shank=-0.004,
+        r=0.08, hip_mass=1.352, epsilon=0.2, slope=0.0456, g=9.8,
+        K=1e6, c=1e7, n=1.5, mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0,
+    ) | {"stop.K": 300.0, "stop.c": 3000.0, "stop.n": 1.0},
+    "hsu-chen": dict(
+        m_thigh=0.5, J_thigh=0.0, l_thigh=0.5, d_thigh=0.325,
+        m_shank=0.05, J_shank=0.0, l_shank=0.5, d_shank=0.125, w_shank=0.0,
+        r=0.0, hip_mass=0.5, epsilon=0.0, slope=0.0504, g=9.81,
+    ),
+    "rimless-wheel": {
+        "wheel.mass": 1.0, "wheel.inertia": 0.5, "wheel.foot.centre": 1.0,
+        "wheel.foot.centre_ahead": 0.0, "slope": 0.08, "g": 1.0,
+    },
+    "wisse": {f"walker.{name}": value for name, value in dict(
+        m=5.0, J=0.0, l=1.0, d=0.5, r=0.0, hip_mass=7.0).items()
+    } | dict(m_torso=3.0, J_torso=0.0, h=0.3, slope=TWO, g=9.8),
+    "kuo": dict(
+        m=1e-13, J=0.0, l=1.0, d=1.0, r=0.0, hip_mass=1.0, impulse=0.04, slope=0.0, g=1.0
+    ),
+    "bhounsule": dict(m=1.0, J=0.0, l=1.0, d=1.0, r=0.0, hip_mass=1000.0, slope=0.009, g=1.0),
+    "bhounsule-round": dict(m=0.5, J=0.02, l=1.2, d=0.5, r=0.2, hip_mass=1.0, slope=0.01, g=1.0),
+}  # fmt: skip
+"""Every number of each walker, as its page and its source have them."""
+DIGITS = {"garcia": 1e-11, "bhounsule": 1e-11, "bhounsule-round": 3e-3}
+"""To which starts repeat themselves that are not printed in four digits."""
 
 
 def found(name, gait):
@@ -41,10 +74,52 @@ def found(name, gait):
     return result
 
 
+ALPHA = math.pi / 8.0
+"""Half the angle between the spokes of the wheel."""
+
+
+def wheel_rate(inertia):
+    """The wheel's rate behind an impact, which takes what falling from spoke to spoke gains."""
+    eta = (inertia + math.cos(2.0 * ALPHA)) / (inertia + 1.0)
+    gain = 4.0 * math.sin(ALPHA) * math.sin(0.08) / (1.0 + inertia)
+    return eta * math.sqrt(gain / (1.0 - eta**2))
+
+
 def point_of(gait):
     """Angle of the stance leg and both rates."""
     state = gait.measures.state
     return np.array([state.theta_2, state.omega_1, state.omega_2], dtype=float)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_number_of_a_walker_is_its_source_s(name):
+    model = MODELS[name]
+    values = jb.parameter_values(model.make())
+    assert {key: float(value) for key, value in values.items()} == pytest.approx(PUBLISHED[name])
+    assert isinstance(model.make(), jb.RigidScene if model.rigid else jb.Scene)
+
+
+@pytest.mark.parametrize(("name", "gait"), sorted(RIGID))
+def test_a_start_repeats_itself_by_equations_by_hand(name, gait):
+    """To its printed digits; passivewalker.m has another heel strike with round feet."""
+    start = MODELS[name].starts[gait]
+    point = np.array([start["theta_2"], start["omega_1"], start["omega_2"]])
+    behind = BY_HAND[name].footstep(point)[0]
+    assert start["theta_1"] == -start["theta_2"]
+    np.testing.assert_allclose(behind, point, rtol=0.0, atol=DIGITS.get(name, 2e-4))
+
+
+def test_the_starts_of_knees_and_of_the_wheel_repeat_themselves():
+    start = MODELS["hsu-chen"].starts["gait"]
+    for kind, leg in itertools.product(("theta", "omega"), (1, 2)):
+        assert start[f"{kind}_thigh_{leg}"] == start[f"{kind}_shank_{leg}"]
+    assert start["theta_thigh_1"] == -start["theta_thigh_2"]
+    assert start["held"] == "shank_2"
+    point = [start[name] for name in ("theta_thigh_2", "omega_thigh_1", "omega_thigh_2")]
+    np.testing.assert_allclose(CHENS_KNEES.footstep(point)[0], point, rtol=0.0, atol=2e-4)
+    start = MODELS["rimless-wheel"].starts["gait"]
+    assert start["theta_wheel"] == pytest.approx(math.pi / 2.0 - math.pi / 8.0)
+    assert start["omega_wheel"] == pytest.approx(-wheel_rate(0.5), abs=0.02)
 
 
 @pytest.mark.slow
@@ -142,6 +217,12 @@ def test_a_walker_s_masses_are_the_paper_s_ratios():
     assert values["d"] / (1.0 - values["d"]) == pytest.approx(0.5)
 
 
+def test_a_torso_takes_its_mass_from_the_hip():
+    values = jb.parameter_values(jb.models.wisse(torso_mass=4.0, torso_height=0.2).walker)
+    assert values["walker.hip_mass"] == pytest.approx(6.0)
+    assert (float(values["m_torso"]), float(values["h"])) == (4.0, 0.2)
+
+
 def test_the_kneed_walkers_start_leads_to_the_gait_of_a_search_without_it():
     """Its feet are compliant: the gait was found without a guess, its period is 0.536145 s."""
     model = MODELS["mcgeer-kneed"]
@@ -194,8 +275,7 @@ def test_hsu_chen_s_gait():
     ours = [float(state.theta_thigh_2), float(state.omega_thigh_1), float(state.omega_thigh_2)]
     np.testing.assert_allclose(ours, (0.1877 + slope, -0.0399, -1.1014), rtol=0.0, atol=0.02)
     assert float(gait.measures.period) == pytest.approx(0.559, rel=0.02)
-    by_hand = Knees((0.5, 0.5, 0.325), (0.05, 0.5, 0.125), hip_mass=0.5, slope=slope, g=9.81)
-    point, period, multipliers = by_hand.gait(ours)
+    point, period, multipliers = CHENS_KNEES.gait(ours)
     # What holds begins on its limit, not a picosecond behind it.
     np.testing.assert_allclose(ours, point, rtol=0.0, atol=2e-12)
     assert float(gait.measures.period) == pytest.approx(period, abs=1e-12)
@@ -209,20 +289,17 @@ def test_a_rimless_wheel_s_multiplier_in_closed_form(inertia):
     scene = rimless_wheel(inertia=inertia)
     names = ("wheel.mass", "wheel.inertia", "wheel.foot.centre")
     gait = jb.find_gait(scene, accuracy="tight", parameters=names)
-    cosine, whole = math.cos(2.0 * math.pi / 8.0), inertia + 1.0
+    cosine, whole = math.cos(2.0 * ALPHA), inertia + 1.0
     eta = (inertia + cosine) / whole
     assert gait.outcome is jb.gait.Search.FOUND
     np.testing.assert_allclose(np.abs(gait.multipliers).max(), eta**2, rtol=0.0, atol=1e-10)
-    # Behind an impact: what falling from spoke to spoke gains is what the impact takes.
-    alpha = math.pi / 8.0
-    gain = 4.0 * math.sin(alpha) * math.sin(0.08) / (1.0 + inertia)
-    rate = eta * math.sqrt(gain / (1.0 - eta**2))
-    assert abs(float(gait.measures.state.omega_wheel)) == pytest.approx(rate, abs=1e-10)
+    rate = abs(float(gait.measures.state.omega_wheel))
+    assert rate == pytest.approx(wheel_rate(inertia), abs=1e-10)
     # All spokes are one length: the multiplier depends on inertia/(mass · length²) alone.
     falls = 2.0 * eta * (cosine - 1.0) * inertia / whole**2
     expected = falls, -falls / inertia, 2.0 * falls
     np.testing.assert_allclose(gait.sensitivities.spectral_radius, expected, rtol=0.0, atol=1e-8)
-    expected = 0.0, 0.0, 2.0 * math.sin(alpha)
+    expected = 0.0, 0.0, 2.0 * math.sin(ALPHA)
     np.testing.assert_allclose(gait.sensitivities.step_length, expected, rtol=0.0, atol=1e-9)
 
 

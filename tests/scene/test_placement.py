@@ -111,3 +111,18 @@ def test_rounding_does_not_tell_whether_the_standing_foot_touches(angle):
     scene = jb.seed_scene()
     state = scene.state(theta_1=-angle, theta_2=angle, omega_2=-1.0, standing="2")
     assert 0.0 < float(jb.dynamics.feet(scene, state)[1].penetration) < 1e-15
+
+
+@pytest.mark.parametrize("shape", [(), (2,)])
+def test_a_body_that_turns_without_inertia_is_named_in_many_scenes_too(shape):
+    """A thigh without mass on the hip of a torso, and a shank that is a mass point."""
+    point = dict(mass=np.ones(shape), inertia=np.zeros(shape))
+    for turning, bodies in (
+        ("leg", (jb.Body("leg", centre=0.0, **point), TORSO)),
+        ("thigh", (
+            jb.Body("thigh", mass=0.0, inertia=0.0, centre=0.1),
+            jb.Body("leg", parent="thigh", at=0.2, centre=0.1, **point), TORSO,
+        )),
+    ):  # fmt: skip
+        with pytest.raises(jb.ArgumentError, match=rf"^Body\('{turning}'\) can turn without"):
+            jb.Mechanism(bodies=bodies, feet=(jb.Foot("leg", centre=0.3),))

@@ -104,3 +104,29 @@ def test_settings_tell_scene_family_and_effort():
     (gait,) = settings["gaits"][0]["gaits"]
     assert (gait["cycle_footsteps"], gait["radius"]) == (1, 1e-2)
     assert settings["scene"]["slope"] == pytest.approx(float(jnp.asarray(0.009)))
+
+
+def test_the_normal_is_the_gradient_of_the_distance_after_the_footsteps_that_are_left(monkeypatch):
+    """A linear map: |W (Aᵏ e)|² / 2 has the gradient (Aᵏ)ᵀ Wᵀ W Aᵏ e; without a footstep none."""
+    random = np.random.default_rng(3)
+    slopes = 0.5 * random.standard_normal((4, 4))
+    knows = with_attractor(LABELLING).family.rows[0][0]
+    fails = np.array([[0, 0, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [4, 0, 0, 0, 0, 0]])
+    counts = []
+
+    def arrivals(scene, kind, points):
+        off = np.asarray(points) - knows.point
+        changes, codes = np.tile(slopes, (len(off), 1, 1)), np.zeros(len(off), dtype=int)
+        codes[:3] = fails[:, min(len(counts), 5)]
+        counts.append(1)
+        return changes, (knows.point + off @ slopes.T, codes)
+
+    monkeypatch.setattr(_nearest_failure, "_arrivals", arrivals)
+    starts = knows.point + 0.01 * random.standard_normal((3, 4))
+    found = _nearest_failure.boundary_normal(SCENE, knows)(starts)
+    for row, steps in ((0, len(counts)), (1, 2)):
+        power = np.linalg.matrix_power(slopes, steps)
+        squared = power.T @ knows.metric.T @ knows.metric @ power
+        np.testing.assert_allclose(found[row], squared @ (starts - knows.point)[row], rtol=1e-10)
+    assert np.isnan(found[2]).all()
+    assert _nearest_failure.boundary_normal(SCENE, knows)(np.zeros((0, 4))).shape == (0, 4)
