@@ -161,8 +161,10 @@ def check_finite(name: str, value: object) -> None:
     _require(name, value, "a finite number", lambda x: x == x)
 
 
-def check_positive(name: str, value: object, unit: str = "") -> None:
-    """Raises `ArgumentError` unless every entry of `value` is finite and above zero."""
+def check_positive(name: str, value: object, unit: str = "", *, one: bool = False) -> None:
+    """Raises `ArgumentError` unless every entry of `value`, or its `one`, is finite and above 0."""
+    if one:
+        check_unbatched(name, value)
     _require(name, value, f"a finite number above 0 {unit}".rstrip(), lambda x: x > 0)
 
 

@@ -9,14 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxbiped._checks import (
-    ArgumentError,
-    check_choice,
-    check_count,
-    check_positive,
-    check_type,
-    check_unbatched,
-)
+from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive, check_type
 from jaxbiped.continuation._bifurcations import (
     BifurcationPoint,
     BranchEvent,
@@ -110,8 +103,7 @@ def bifurcation_curve(
     second = axis_of(branch.scene, along, bounds, log)
     if along == branch.along:
         raise ArgumentError(f"along = {along!r} is not allowed: the branch itself follows it.")
-    check_positive("largest_step", largest_step)
-    check_unbatched("largest_step", largest_step)
+    check_positive("largest_step", largest_step, one=True)
     check_count("max_points", max_points)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     own = float(parameter_values(branch.scene)[along])

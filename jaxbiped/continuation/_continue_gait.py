@@ -244,8 +244,7 @@ def continue_gait(
     """
     check_followed(scene)
     axis = axis_of(scene, along, bounds, log)
-    check_positive("largest_step", largest_step)
-    check_unbatched("largest_step", largest_step)
+    check_positive("largest_step", largest_step, one=True)
     check_count("max_points", max_points)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     start = start_of(scene, axis)
@@ -350,8 +349,7 @@ def resume_branch(
     """
     check_type("branch", branch, Branch)
     check_choice("direction", direction, ("forward", "backward"))
-    check_positive("largest_step", largest_step)
-    check_unbatched("largest_step", largest_step)
+    check_positive("largest_step", largest_step, one=True)
     check_count("max_points", max_points)
     if not -len(branch) <= at < len(branch):
         raise ArgumentError(f"at = {at} is not allowed: the branch has {len(branch)} points.")

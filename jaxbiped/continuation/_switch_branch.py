@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type, check_unbatched
+from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._continue_gait import ContinuationSetup, setup_of
@@ -76,8 +76,7 @@ def switch_branch(
         ArgumentError: an argument is not allowed, or there is no doubled gait near the doubling.
     """
     check_type("branch", branch, Branch)
-    check_positive("largest_step", largest_step)
-    check_unbatched("largest_step", largest_step)
+    check_positive("largest_step", largest_step, one=True)
     check_count("max_points", max_points)
     found = _first_doubling(branch) if doubling is None else doubling
     if found is None or found.kind is not BranchEvent.PERIOD_DOUBLING:

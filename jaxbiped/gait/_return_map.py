@@ -17,14 +17,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import (
-    ArgumentError,
-    check_choice,
-    check_count,
-    check_positive,
-    check_type,
-    check_unbatched,
-)
+from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive, check_type
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Scalar, Time, as_float, in_64_bits, select
 from jaxbiped.dynamics._equivalent_states import minimal_state, redundant_state
@@ -388,8 +381,7 @@ def return_map(
     gradient = Forward() if gradient is None else gradient
     check_gradient(gradient)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
-    check_positive("max_time", max_time, "s")
-    check_unbatched("max_time", max_time)
+    check_positive("max_time", max_time, "s", one=True)
     if system is None:
         args = check_scene(args, Scene, RigidScene, RedundantScene)
         if not hasattr(state, "_fields"):
@@ -475,8 +467,7 @@ def linearise_return_map(
         check_type("args", args, Scene, RigidScene)
     for name, tolerance in (("rtol", rtol), ("tangent_rtol", tangent_rtol)):
         check_positive(name, tolerance)
-    check_positive("max_time", max_time, "s")
-    check_unbatched("max_time", max_time)
+    check_positive("max_time", max_time, "s", one=True)
     arrivals = arrivals_of(args, footsteps)
     check_count("max_solver_steps", max_solver_steps)
     _, active = select_parameters(args, parameters)

@@ -72,14 +72,9 @@ class OneFoot(AbstractClearance):
 
 
 def check_legs_admitted_alike(rule: Any, legs: Sequence[str], images: Sequence[int]) -> None:
-    """Raises `ArgumentError` for a clearance rule that tells a leg from its image by the mirror.
+    """Raises `ArgumentError` for a rule that, at random rates, tells a leg from its image.
 
-    The rule is asked at random rates; one with numbers that JAX traces is not asked.
-
-    Args:
-        rule: the clearance rule.
-        legs: names of the legs.
-        images: number of each leg's image.
+    The `images` are numbers of legs. A rule with numbers that JAX traces is not asked.
     """
     if isinstance(rule, StanceRotation | AlwaysTouching) or is_traced(rule):
         return
@@ -91,7 +86,7 @@ def check_legs_admitted_alike(rule: Any, legs: Sequence[str], images: Sequence[i
     rates = 10.0 * np.random.default_rng(0).standard_normal(100)
     table = np.ones((1, len(legs)), bool)
     with contextlib.suppress(Exception), untraced():  # a rule that fails is refused where it acts
-        table = np.asarray(jax.vmap(admitted)(rates), bool)
+        table = np.asarray(jax.vmap(admitted)(jnp.asarray(rates)), bool)
     unlike = np.argwhere(table != table[:, list(images)])
     if unlike.size:
         place, leg = map(int, unlike[0])

@@ -9,14 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import (
-    ArgumentError,
-    check_count,
-    check_positive,
-    check_type,
-    check_unbatched,
-    warn,
-)
+from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type, warn
 from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.basins._labels import Doubt, Label
 from jaxbiped.gait._gait import Gait
@@ -135,8 +128,7 @@ def effort_of(
     if wanted is not None:
         own = min(own, max(_FIRST * wanted, FINEST_FIRST[scene.compliant]))
     tolerance = resolve_slip_speed(own, scene) if rtol is None else rtol
-    check_positive("rtol", tolerance)
-    check_unbatched("rtol", tolerance)
+    check_positive("rtol", tolerance, one=True)
     method = solver_named(solver)
     if not isinstance(method, AbstractRosenbrock):
         raise ArgumentError(
