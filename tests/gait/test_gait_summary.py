@@ -103,6 +103,12 @@ def test_measures_and_their_errors_are_those_of_the_return(summary):
     assert gait.critical is jb.gait.Bifurcation.PERIOD_DOUBLING
 
 
+def test_a_dataset_has_the_units_of_the_state(summary):
+    dataset = summary(jnp.asarray(0)).to_dataset()
+    units = {name: dataset[f"state_{name}"].attrs["units"] for name in ("theta_2", "omega_2")}
+    assert units == {"theta_2": "rad", "omega_2": "rad/s"}
+
+
 def test_what_never_returned_is_not_a_number_and_at_no_bifurcation(summary):
     lost = summary(jnp.asarray(int(jb.gait.Search.NO_RETURN)))
     assert np.isnan(float(lost.measures.period))

@@ -151,6 +151,9 @@ REFUSED = {
         two_legs(), jb.Ground(slope=0.03)
     ).state(held="leg_1"),
     "names are unique": lambda: two_legs(bodies=(LEGS[0], LEGS[0])),
+    "stands before its parent 'torso'": lambda: two_legs(
+        bodies=(*LEGS, Body("torso", mass=1, inertia=1, centre=0, parent="torso"))
+    ),
     "parents come first": lambda: kneed(bodies=(*leg(1)[::-1], *leg(2))),
     "called 'heel'": lambda: two_legs(
         feet=tuple(Foot(f"leg_{i}", centre=0.3, name="heel") for i in (1, 1, 2, 2))

@@ -138,3 +138,11 @@ def test_refusals_are_one_sentence(make, message):
     with pytest.raises(jb.ArgumentError, match=message) as refused:
         make()
     assert str(refused.value).count("\n") == 0
+
+
+def test_a_preload_rises_by_default_at_a_tenth_of_a_radian_within_a_twentieth():
+    preload = A.FootPreload(extension=2e-3)
+    for angle, share in ((-0.1, 0.0), (-0.15, np.tanh(1.0)), (-0.05, -np.tanh(1.0))):
+        extension, rate = preload.set_point(angle, -1.0)
+        assert float(extension) == pytest.approx(1e-3 * (1.0 + share), rel=1e-12)
+        assert float(rate) == pytest.approx(1e-3 * (1.0 - share**2) / 0.05, rel=1e-12)
