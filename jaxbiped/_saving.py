@@ -125,16 +125,14 @@ def _home(thing: Any) -> str:
     """The outermost public package that exports a class or function, else its module, which may
     move.
     """
-    own, name = str(thing.__module__), thing.__qualname__
-    root, public = own.partition(".")[0], []
-    for each, module in list(sys.modules.items()):
-        inside = each.partition(".")[0] == root and hasattr(module, "__path__")
-        if inside and "._" not in each and name in dir(module):
-            public.append(each)
-    for each in sorted(public, key=lambda each: (each.count("."), each)):
-        if getattr(sys.modules[each], name) is thing:
-            return each
-    return own
+    name, root = thing.__qualname__, thing.__module__.partition(".")[0]
+    packages = [key for key, module in list(sys.modules.items()) if hasattr(module, "__path__")]
+    public = [key for key in packages if key.partition(".")[0] == root and "._" not in key]
+    for package in sorted(public, key=lambda key: (key.count("."), key)):
+        module = sys.modules[package]
+        if name in dir(module) and getattr(module, name) is thing:
+            return package
+    return str(thing.__module__)
 
 
 def _is_kept(dtype: np.dtype) -> bool:
@@ -261,10 +259,10 @@ def _moved(module: str, name: str) -> Any:
     """What an earlier version had in another module of a subpackage; None if it is gone."""
     package = ".".join(module.split(".")[:2]) if module.count(".") > 1 else "jaxbiped"
     with contextlib.suppress(ImportError):
-        home = importlib.import_module(package)
-        for _, each, _ in pkgutil.walk_packages(home.__path__, f"{package}."):
-            thing = getattr(importlib.import_module(each), name, None)
-            if getattr(thing, "__module__", "") == each:
+        searched = importlib.import_module(package)
+        for _, path, _ in pkgutil.walk_packages(searched.__path__, f"{package}."):
+            thing = getattr(importlib.import_module(path), name, None)
+            if getattr(thing, "__module__", "") == path:
                 return thing
     return None
 
