@@ -8,6 +8,7 @@ from numpy.polynomial import Polynomial
 
 from jaxbiped._ending import Ending
 from jaxbiped.dynamics._stance_motion import rolling_rates
+from jaxbiped.solve import _rigid_steps
 from jaxbiped.solve._rigid_steps import (
     ModeProgress,
     RigidProgress,
@@ -247,6 +248,14 @@ def test_a_fall_behind_a_change_of_mode_ends_no_step():
         assert bool(told.landing) == (code == 0)
 
 
+def test_a_fall_in_the_same_step_is_landed_on_before_a_change_that_was_due():
+    how = dict(modes=modes_of(2), changes=NOTHING, onto=dict(near=YES))
+    (told, _), _ = after([3.0] * 6, TIPS, error=1e-8, **how)
+    assert outcome(told) == {"landing", "falling"}
+    assert not bool(told.modes.changed)
+    assert int(told.modes.changing) == 0
+
+
 @jax.jit
 def landed(now, onto):
     return _landing(walk_for(), now, now.state, onto)
@@ -316,6 +325,41 @@ def test_the_next_strike_is_due_where_two_footsteps_lasted_alike(before, closing
     assert float(told.due) == (pytest.approx(2.902) if steady else np.inf)
     assert (int(told.landing), int(told.footsteps)) == (0, 4)
     np.testing.assert_array_equal(told.state, other)
+
+
+@pytest.mark.parametrize(("struck", "changed", "event"), [(NO, NO, 0), (YES, NO, 1), (NO, YES, 3)])
+def test_a_change_of_mode_is_noted_with_its_time_and_its_first_step(
+    monkeypatch, struck, changed, event
+):
+    """Of the second surface. The place moves with that of the foot that stands then."""
+
+    def in_the_mode(scene, state, slack, load_slack):
+        tolerances = state.omega_1 + slack / RTOL, state.omega_2 + load_slack / (1e-3 * RTOL)
+        leg = state.theta_1 + 0.5
+        return state._replace(theta_1=leg, omega_1=tolerances[0], omega_2=tolerances[1])
+
+    seen = course()._replace(values=jnp.array([3.0, 4.0]))
+    monkeypatch.setattr(_rigid_steps, "change_mode", in_the_mode)
+    monkeypatch.setattr(_rigid_steps, "course_of", lambda scene, state: seen)
+    monkeypatch.setattr(_rigid_steps, "root_place", lambda walk, state: state.theta_1)
+    state = simplest_state(*STABLE)
+    there = onto_of(jax.tree.map(lambda leaf: leaf + 0.25, state), rest=1e-3)
+    modes = modes_of(2, behind=1)._replace(changed=changed)
+    trial = progress(state, (), modes, landing=4, struck=struck, pace=0.7)
+    told = _rigid_steps._after_change(walk_for(), trial, there, course())
+    assert float(told.t) == pytest.approx(2.001 if changed else 2.0)
+    moved = np.add(there.state, [-0.5, 0.5, 0.0, 1.0, 1.0])
+    np.testing.assert_allclose(told.state, moved if changed else state, atol=1e-15)
+    assert int(told.landing) == (0 if changed else 4)
+    assert float(told.pace) == ([0.7, 0.1, 0.2, 0.3][event])
+    after = told.modes
+    assert int(after.changing) == (0 if changed else 2)
+    assert int(after.behind) == (event or 1)
+    np.testing.assert_allclose(after.met, [1.7, 2.001 if changed else 1.9])
+    np.testing.assert_array_equal(after.course.values, seen.values if event else [0.0, 0.0])
+    unknown = trial._replace(modes=trial.modes._replace(paces=jnp.zeros(3)))
+    told = _rigid_steps._after_change(walk_for(), unknown, there, course())
+    assert float(told.pace) == 0.7
 
 
 next_step = jax.jit(with_next_step)
