@@ -1,4 +1,4 @@
-"""Refusals of doors to gaits, sweeps, branches, fits and scenes, before anything is computed."""
+"""Refusals of doors to gaits, sweeps, branches, fits and scenes, against one sentence each."""
 
 import functools
 

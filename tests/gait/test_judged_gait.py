@@ -1,4 +1,4 @@
-"""Errors of a gait relative to what they are measured in, one quantity after the other."""
+"""Errors of a gait, against relative changes of one quantity after the other."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""Pseudo-arclength continuation of curves in closed form, in sizes of their own."""
+"""Pseudo-arclength continuation, against curves in closed form, in sizes of their own."""
 
 import itertools
 

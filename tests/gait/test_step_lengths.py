@@ -1,4 +1,4 @@
-"""Lengths of a cycle's footsteps, from landings that are written down."""
+"""Lengths of a cycle's footsteps, against landings that are written down."""
 
 from types import SimpleNamespace
 

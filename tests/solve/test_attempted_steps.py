@@ -1,4 +1,4 @@
-"""What an attempted step of a rigid walk ends with, of steps whose course is given."""
+"""Ends of an attempted step of a rigid walk, against steps whose course is given."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""What comes within a step of single support, of angles whose polynomials are given."""
+"""Events within a step of single support, against angles whose polynomials are given."""
 
 import diffrax
 import jax

@@ -1,4 +1,4 @@
-"""Families of gaits: which start has which, where searches begin, how far a gait draws in."""
+"""Families of gaits and where searches begin, against small families that are written down."""
 
 from types import SimpleNamespace
 
