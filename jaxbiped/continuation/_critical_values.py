@@ -245,13 +245,9 @@ def _of_fold(
 def fold_forcing(
     setup: ContinuationSetup, recurring: np.ndarray, value: float, names: tuple[str, ...]
 ) -> np.ndarray | None:
-    """How parameters push the return map out of a fold: w · ∂P/∂q, up to a common factor.
+    """How p parameters push the return map out of a fold: w · ∂P/∂q, up to a common factor.
 
-    Args:
-        setup: of the continuation.
-        recurring: components of the fold's state, shape (m,).
-        value: of the continued parameter there.
-        names: of p parameters.
+    The recurring components (m,) and the value of the continued parameter are those of the fold.
 
     Returns:
         Of the cycle and of a ten times looser one, shape (2, p); None where it does not return.

@@ -198,12 +198,7 @@ def with_driven_joints(
 ) -> Loads:
     """With the torques of springs, stops, latches, motors and actuators at the hip.
 
-    Args:
-        loads: what acts besides.
-        scene: whose parts they are.
-        motion: angles and rates of all bodies.
-        carriers: which legs carry, asked where there are motors.
-        hip: what actuators at the hip know, asked where there are any.
+    `carriers` is called only where there are motors, `hip` only where there are hip actuators.
     """
     mechanism, slope = scene.mechanism, scene.ground.slope
     loads = with_joint_loads(loads, mechanism, motion, slope, stops=scene.compliant)

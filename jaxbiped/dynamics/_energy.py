@@ -223,12 +223,8 @@ def _driving(
 ) -> _Driving:
     """Computes the powers of all that drives a walker on feet of either kind.
 
-    Args:
-        scene: whose parts drive.
-        motion: angles and rates of all bodies.
-        carriers: the lines of all legs, and the share of the load on each.
-        hip: what actuators at the hip know, asked where there are any.
-        pressing: powers of the feet's preloads [W].
+    `hip` is called only where there are actuators at the hip; `pressing` are the powers of the
+    feet's preloads [W].
     """
     total, motors = jnp.zeros_like(motion.x), list(pressing)
     parts = hip_actuators(scene)

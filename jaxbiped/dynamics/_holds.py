@@ -125,13 +125,7 @@ def _passes(count: int) -> int:
 
 
 def holds_of(stance: Stance, modes: Modes, factors: SparseFactors) -> Holds:
-    """The rows of a stance.
-
-    Args:
-        stance: on whatever foot.
-        modes: of its mechanism.
-        factors: of its mass matrix by the tree's free angles.
-    """
+    """The rows of a stance; `factors` are those of the mass matrix by the tree's free angles."""
     tree = stance.tree
     angles = [Angle(((tree.body, 1.0),))] if len(stance.feet) > 1 else []
     angles += [limit.gap for limit in modes.limits]

@@ -54,12 +54,8 @@ def force_balance(
 ) -> list[Scalar]:
     """F − M a of the free coordinates, zero where the accelerations are those under the loads.
 
-    Args:
-        structure: of the mechanism.
-        known: its composite bodies.
-        pose: where it is, and how it moves.
-        loads: what acts on it, but for forces of the motion itself and gravity.
-        accelerations: of the free coordinates, in the frame that falls freely.
+    Forces of the motion itself and gravity are not among the loads: accelerations are those in the
+    frame that falls freely.
     """
     moved = [*accelerations[:2], *of_all_bodies(structure, accelerations[2:], accelerations[0])]
     inertial = inertial_loads(structure, known, pose, moved)

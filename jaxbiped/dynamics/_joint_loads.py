@@ -96,12 +96,8 @@ def with_joint_loads(
 ) -> Loads:
     """With the torques of springs, stops and latches.
 
-    Args:
-        loads: what acts besides.
-        mechanism: whose joints they are.
-        motion: angles and rates of all bodies.
-        slope: angle of the vertical [rad]; None for stops and latches of rigid feet alone.
-        stops: whether they are elastic; on rigid feet they are plastic.
+    `slope` [rad] is None for stops and latches of rigid feet alone. `stops` tells whether these are
+    elastic; on rigid feet they are plastic.
     """
     kinds = (Spring, Stop, Latch) if stops else (Spring, Latch)
     for angle, part, value, rate in _moved_parts(mechanism, motion, slope, *kinds):
@@ -198,13 +194,9 @@ def _by_body(structure: Structure, values: Sequence[Scalar], like: Scalar) -> li
 def motion_of(
     mechanism: Mechanism, ground: Ground, places: list[Scalar], rates: list[Scalar]
 ) -> Motion:
-    """Angles and rates of all bodies from the coordinates of a state, those of the free ones.
+    """Angles and rates of all bodies from the coordinates of a state and their rates.
 
-    Args:
-        mechanism: what moves.
-        ground: whose slope the vertical follows.
-        places: x and z of the root point, then free angles.
-        rates: of these.
+    The coordinates are x and z of the root point, and then the free angles.
     """
     structure = mechanism.structure
     own = _by_body(structure, places[2:], places[0])

@@ -95,11 +95,7 @@ def with_torques(
 ) -> Loads:
     """With the torques of joint parts and of actuators.
 
-    Args:
-        loads: what acts besides.
-        scene: whose parts they are.
-        poses: as each body has them, with the same angles in all.
-        found: the feet.
+    Poses are as each body has them, with the same angles in all.
     """
     mechanism, motion = scene.mechanism, poses[0].motion
 
@@ -113,12 +109,12 @@ def with_torques(
     return with_driven_joints(loads, scene, motion, carriers, hip)
 
 
-def bristle_rates(
-    law: AbstractBristleLaw, scene: CompliantScene, state: CompliantState
-) -> dict[str, Scalar]:
-    """Rates of all feet's bristles by their names in the state [1/s]."""
-    rates = {}
-    names = scene.mechanism.structure.bristles
+def bristle_rates(scene: CompliantScene, state: CompliantState) -> dict[str, Scalar]:
+    """Rates of all feet's bristles by their names in the state [1/s]; none without bristles."""
+    rates: dict[str, Scalar] = {}
+    law, names = scene.friction, scene.mechanism.structure.bristles
+    if not isinstance(law, AbstractBristleLaw):
+        return rates
     for name, foot in zip(names, feet(scene, state), strict=True):
         load = foot_force(scene, foot).normal  # refuses a foot without a bristle
         assert foot.bristle is not None
@@ -148,10 +144,7 @@ def vector_field(t: Time, state: Any, scene: Scene) -> Any:
         for place, rate in zip(structure.coordinates, structure.rates, strict=True)
     }
     second = dict(zip(structure.rates, accelerated, strict=True))
-    memory = {}
-    if isinstance(scene.friction, AbstractBristleLaw):
-        memory = bristle_rates(scene.friction, scene, state)
-    return type(state)(**places, **second, **memory)
+    return type(state)(**places, **second, **bristle_rates(scene, state))
 
 
 class WalkerField(AbstractImplicitField):
@@ -174,9 +167,8 @@ class WalkerField(AbstractImplicitField):
         loads = _with_applied_loads(Loads.none(structure), args, at)
         balance = force_balance(structure, at.known, at.pose, loads, given)
         found = dict(zip(_places(structure, y), balance, strict=True))
-        if isinstance(args.friction, AbstractBristleLaw):
-            for name, rate in bristle_rates(args.friction, args, y).items():
-                found[y._fields.index(name)] = rate - getattr(rates, name)
+        for name, rate in bristle_rates(args, y).items():
+            found[y._fields.index(name)] = rate - getattr(rates, name)
         return found
 
 

@@ -37,7 +37,6 @@ from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._linkages import loaded_bodies
 from jaxbiped.scene._scene import CompliantScene, RedundantScene
 from jaxbiped.scene._state_types import state_type_of
-from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
 
 class HipForce(NamedTuple):
@@ -108,11 +107,8 @@ def redundant_field(t: Time, state: BodiesState, scene: RedundantScene) -> Bodie
         The rates of change [SI units per second], a state of the same kind and shape.
     """
     _, v = coordinates_of(scene, state)
-    moved = _linkage_motion(scene, state)
-    memory = {}
-    if isinstance(scene.friction, AbstractBristleLaw):
-        memory = bristle_rates(scene.friction, scene, state)
-    return with_coordinates(state, v, moved.accelerations)._replace(**memory)
+    moved = with_coordinates(state, v, _linkage_motion(scene, state).accelerations)
+    return moved._replace(**bristle_rates(scene, state))
 
 
 class BodiesField(AbstractImplicitField):

@@ -186,10 +186,7 @@ def surface_along(
 ) -> Surface:
     """A function of the angles in a motion: its value and its first two derivatives.
 
-    Args:
-        function: of the state, of whose angles alone it depends.
-        state: at which it is asked.
-        accelerations: of the angles [rad/s²].
+    It depends on no other part of the state; `accelerations` are those of the angles [rad/s²].
     """
     count = len(accelerations)
     angles, rates = tuple(state[1 : 1 + count]), tuple(state[1 + count : 1 + 2 * count])

@@ -134,9 +134,7 @@ def point_acceleration(
 ) -> Vector:
     """Acceleration of a point of a body relative to the root point [m/s²].
 
-    Args:
-        point: of any body.
-        rates, turning: rates and accelerations of all bodies' angles.
+    `rates` and `turning` are rates and accelerations of all bodies' angles.
     """
     x = z = jnp.zeros_like(turning[0])
     for link, arm in point.arms:

@@ -186,11 +186,8 @@ def inertial_loads(
 ) -> Loads:
     """Generalised forces of the motion itself, in the frame that falls freely (d'Alembert's).
 
-    Args:
-        structure: of the tree.
-        known: its composite bodies.
-        pose: with angles and rates.
-        accelerations: of the root point and of all angles; None for centrifugal forces alone.
+    Accelerations are those of the root point and of all angles; without them, the forces are the
+    centrifugal ones alone.
     """
     n = len(structure.bodies)
     moments = moments_of(known, pose)

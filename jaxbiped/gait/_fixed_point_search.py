@@ -237,11 +237,8 @@ def is_sound(
 ) -> Scalar:
     """Whether an orbit through a state on its section steps downhill and on the ground (boolean).
 
-    Args:
-        scene: the walker; what is none has nothing to be held to.
-        state: on the section, where a foot stands or comes down.
-        step_length: advance along the slope [m] in a cycle of so many `arrivals`.
-        period: duration of the cycle [s].
+    Step length [m] and period [s] are those of a cycle of so many `arrivals`. Nothing is required
+    of an orbit whose `scene` is not a walker.
     """
     if not isinstance(scene, AbstractWalkerScene):
         return jnp.asarray(True)
@@ -267,10 +264,8 @@ def takes_steps(scene: AbstractWalkerScene, step_length: Any, arrivals: Any) -> 
 def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: RealScalarLike) -> Scalar:
     """The least divisor k of n such that the crossing after k footsteps is the first one.
 
-    Args:
-        last: the n returns of the cycle, with their nodes.
-        error: estimated errors of the m components that it begins at, shape (m,).
-        rtol: the solve's relative tolerance.
+    `last` are the n returns of the cycle, with their nodes; `error` are the estimated errors of the
+    components that it begins at, shape (m,).
     """
     crossings = crossings_of(last)
     n = crossings.shape[0]

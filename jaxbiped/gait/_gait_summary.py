@@ -51,12 +51,8 @@ def summarise_gait(
 ) -> Gait:
     """The gait that a search found, with its stability and its derivatives.
 
-    Args:
-        problem: what was searched; its active parameters are those that are asked for.
-        found: what the search came to.
-        names: of the active parameters.
-        radius: whether the spectral radius is differentiated.
-        origin: how the search came to it.
+    They are those with respect to the problem's active parameters, whose names are given; `radius`
+    tells whether the spectral radius is differentiated, and `origin` how the search came to it.
     """
     path = nodes_of(found.last, problem.guess)  # of the search, whose steps are counted
     found = with_parameter_columns(problem, found)

@@ -88,12 +88,8 @@ def search_in_stages(
 ) -> Staged:
     """Searches on after Newton's method from the fitted start came to `first`.
 
-    Args:
-        search: Newton's method.
-        problem: of a walker's cycles.
-        scout: how to follow the branch: cycles of one footstep, in minimal coordinates.
-        first: what the first stage came to.
-        now: counts the searches, and keeps in words what they found.
+    The branch is followed with `scout`: cycles of one footstep, in minimal coordinates. `now`
+    counts the searches, and keeps in words what they found.
     """
     modelled: Scene | RigidScene = problem.args.minimal
     seen: list[Seen] = []

@@ -17,7 +17,7 @@ from jaxbiped.dynamics._contacts import legs_in
 from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._joint_loads import motion_of
 from jaxbiped.dynamics._state import seed_state, state_for, state_type
-from jaxbiped.dynamics._surfaces import AbstractSection
+from jaxbiped.dynamics._surfaces import AbstractSection, rate_unit
 from jaxbiped.dynamics._tree import pose_of
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._joint_parts import Stop
@@ -281,7 +281,7 @@ def _scattered(scene: Scene | RigidScene, scatter: Scalar) -> WalkerState:
     if bends:
         moved = moved._replace(bend=_BEND * jnp.abs(scatter[4]))
     started = _posed(scene, moved)
-    rate = jnp.sqrt(scene.ground.g / scene.mechanism.height)
+    rate = rate_unit(scene)
     for i, name in enumerate(_alone(scene)):
         angle, turning = scatter[4 + bends + 2 * i], rate * scatter[5 + bends + 2 * i]
         started = started._replace(**{f"theta_{name}": angle, f"omega_{name}": turning})

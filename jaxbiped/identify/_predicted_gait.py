@@ -193,13 +193,8 @@ def predict(
 ) -> Prediction:
     """The gait of a scene under these parameters, as far as it was measured.
 
-    Args:
-        scene: the walker.
-        measured: what is wanted, and under which conditions.
-        parameters: values of the k parameters by name.
-        sizes: by how much each moves, shape (k,).
-        guess: a state near the gait; None to search it.
-        accuracy, engine: as for `find_gait`.
+    `sizes` (k,) tell by how much each parameter moves; `guess` is a state near the gait, or None to
+    search it.
     """
     names = tuple(parameters)
 

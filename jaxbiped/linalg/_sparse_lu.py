@@ -58,9 +58,7 @@ class SparseFactors(eqx.Module):
 def elimination_order(rows: tuple[int, ...], places: set[Place]) -> tuple[int, ...]:
     """The order that makes fewest new entries, row by row; of equal ones the last row first.
 
-    Args:
-        rows: all rows, which are all columns too.
-        places: of the entries; that of (i, j) counts as one of (j, i).
+    The rows are also all columns, and the place of (i, j) counts as one of (j, i).
     """
     near = {i: {j for j in rows if j != i and ((i, j) in places or (j, i) in places)} for i in rows}
     left, order = set(rows), []

@@ -19,7 +19,7 @@ from jaxbiped.continuation._critical_values import (
     range_of,
 )
 from jaxbiped.dynamics._state import recurring_leaves, unit_of
-from jaxbiped.dynamics._surfaces import HeelStrike
+from jaxbiped.dynamics._surfaces import HeelStrike, rate_unit
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -243,8 +243,7 @@ def _labelling(scene: Scene | RigidScene, gait: Gait) -> Labelling | None:
 def _basin(knows: Labelling, gait: Gait, count: int, scatter: float, seed: int) -> Fraction:
     """The fraction that comes back of starts about the gait: on the ground, and beyond no stop."""
     scene, free = knows.scene, independent_names(knows.scene, gait.measures.state)
-    pace = float(np.sqrt(float(scene.ground.g) / float(scene.mechanism.height)))
-    halves = {"rad": scatter, "rad/s": scatter * pace}
+    halves = {"rad": scatter, "rad/s": scatter * float(rate_unit(scene))}
     bounds = {
         name: (float(centre) - halves[unit], float(centre) + halves[unit])
         for name, centre in gait.measures.state._asdict().items()

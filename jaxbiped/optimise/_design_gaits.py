@@ -68,12 +68,8 @@ def gaits_near(
 ) -> tuple[Scene | RigidScene, Gait, BothFunctionals]:
     """Gaits of n scenes that differ in some parameters.
 
-    Args:
-        scene: the walker.
-        values: of those parameters by name, shape (n,).
-        points: guesses of the recurring components, shape (n, m).
-        settings: how they are found.
-        wanted: measures whose functionals are told.
+    The parameters' values by name have the shape (n,), and the points, guesses of the recurring
+    components, (n, m). Functionals are those of the `wanted` measures.
 
     Returns:
         The scenes, the gaits and their functionals, leaves (n, …).

@@ -58,7 +58,7 @@ class AbstractJointPart(AbstractPart):
     """
 
     kind: ClassVar[str]
-    angle: eqx.AbstractVar[Angle]
+    angle: Angle = eqx.field(static=True, converter=angle_of)
     name: eqx.AbstractVar[str | None]
 
     def __check_init__(self) -> None:
@@ -106,7 +106,6 @@ class Spring(AbstractJointPart):
     """
 
     kind: ClassVar[str] = "spring"
-    angle: Angle = eqx.field(static=True, converter=angle_of)
     _: dataclasses.KW_ONLY
     stiffness: Parameter | None = parameter(
         "joint stiffness", "$k$", "N m/rad", minimum=0.0, default=None
@@ -151,7 +150,6 @@ class Stop(AbstractJointPart):
     """
 
     kind: ClassVar[str] = "stop"
-    angle: Angle = eqx.field(static=True, converter=angle_of)
     _: dataclasses.KW_ONLY
     upper: Parameter | None = parameter("upper limit", r"$\varphi_+$", "rad", default=None)
     lower: Parameter | None = parameter("lower limit", r"$\varphi_-$", "rad", default=None)
@@ -195,7 +193,6 @@ class Latch(AbstractJointPart):
     """
 
     kind: ClassVar[str] = "latch"
-    angle: Angle = eqx.field(static=True, converter=angle_of)
     _: dataclasses.KW_ONLY
     width: Parameter = parameter("width of the latch", "$w$", "rad", positive=True)
     torque: Parameter = parameter("torque of the latch", "$T$", "N m", minimum=0.0)
@@ -219,7 +216,6 @@ class Coupling(AbstractJointPart):
     """
 
     kind: ClassVar[str] = "coupling"
-    angle: Angle = eqx.field(static=True, converter=angle_of)
     _: dataclasses.KW_ONLY
     rest: Parameter | None = parameter("coupled angle", r"$\varphi_0$", "rad", default=None)
     name: str | None = eqx.field(static=True, default=None)
@@ -275,7 +271,6 @@ class Motor(AbstractJointPart):
     """
 
     kind: ClassVar[str] = "motor"
-    angle: Angle = eqx.field(static=True, converter=angle_of)
     law: Callable[[Any], Any] = eqx.field(converter=law_of)
     _: dataclasses.KW_ONLY
     by: str = eqx.field(static=True, default="role")

@@ -157,11 +157,7 @@ class Mode(NamedTuple):
 
 
 def modes_of(mechanism: Mechanism, feet: Mapping[int, Indices]) -> Modes:
-    """The modes of a mechanism.
-
-    Args:
-        mechanism: with its stops.
-        feet: numbers of the feet of each leg that may stand.
+    """The modes of a mechanism, from the feet of each leg that may stand.
 
     Raises:
         ArgumentError: a stop that locks an angle that does not lie within one leg.

@@ -344,11 +344,9 @@ def with_derivatives(
 
 
 def first_derivatives_only(leaves: PyTree, function: str) -> PyTree:
-    """The same numbers, of which there are no derivatives: what has first ones refuses second ones.
+    """The same numbers without derivatives: what has first ones of them refuses second ones.
 
-    Args:
-        leaves: those on which first derivatives depend.
-        function: whose they are.
+    `function` is the name of what has them, for the refusal.
     """
 
     @jax.custom_jvp

@@ -87,12 +87,8 @@ def refine(
 ) -> tuple[Result, ErrorEstimate]:
     """Tightens the tolerance until the estimated error is what is wanted, or nothing is gained.
 
-    Args:
-        attempt: a result at a relative tolerance, with its judged error.
-        wanted: relative error [–].
-        first: relative tolerance to begin with.
-        dtype: precision of the solve.
-        finest: finest relative tolerance of 64 bits.
+    `attempt` gives a result at a relative tolerance, with its judged error; the first tolerance is
+    `first`, and `finest` the finest one of 64 bits.
 
     Returns:
         The result of the least error, and its estimate; where that is too large a

@@ -22,6 +22,7 @@ from jaxbiped.dynamics._footfalls import (
     FootMotion,
     LegMotion,
     any_of,
+    leg_depth,
     leg_places,
     touches,
     touching_legs,
@@ -268,13 +269,10 @@ def ending_events(watch: tuple[str, ...]) -> dict[Ending, Callable[..., Scalar]]
 def ending_code(
     events: Mapping[Ending, Scalar], *, done: Scalar, out_of_steps: Scalar, timed_out: Scalar
 ) -> Scalar:
-    """The code of how a solve ended.
+    """The code of how a solve ended, from conditions (booleans).
 
-    Args:
-        events: for each failure, whether it happened (boolean).
-        done: whether the solve came to the end that was asked for.
-        out_of_steps: whether it came to its cap on steps.
-        timed_out: whether it waited too long for a footstep.
+    `events` tells for each failure whether it happened, `done` whether the solve came to the end
+    that was asked for, and `timed_out` whether it waited too long for a footstep.
     """
     code = jnp.asarray(int(Ending.SOLVER_FAILED))
     code = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), code)
@@ -350,17 +348,12 @@ def _contact(scene: Scene, foot: FootMotion, rate: Scalar) -> Scalar:
     return jnp.minimum(foot.penetration, -rate)
 
 
-def _depths(structure: Structure, found: Sequence[FootMotion]) -> list[Scalar]:
-    """Of each leg how deep its deepest foot is [m]."""
-    return [_most(*(found[k].penetration for k in leg)) for leg in structure.feet_of_leg]
-
-
 def _turning(scene: Scene, found: Sequence[FootMotion], legs: Sequence[LegMotion]) -> Scalar:
     """Above zero where a leg with a foot under the ground turns back; see `is_barred`."""
     if not isinstance(scene.clearance, StanceRotation):
         return jnp.full_like(legs[0].rate, -jnp.inf)
     slow = REST_RATE * rate_unit(scene)
-    depths = _depths(scene.mechanism.structure, found)
+    depths = [leg_depth(scene.mechanism.structure, found, i) for i in range(len(legs))]
     return _most(
         *(
             jnp.where(leg.rate < 0.0, -jnp.inf, _least(depth, slow - leg.rate))
@@ -382,9 +375,10 @@ def _rest(
         return jnp.minimum(_most(*held), still)
     slow = REST_RATE * rate_unit(scene)
     at_rest = []
-    for i, depth in enumerate(_depths(scene.mechanism.structure, found)):
+    for i, leg in enumerate(legs):
         others = (-each for k, each in enumerate(held) if k != i)
-        at_rest.append(_least(depth, legs[i].rate + slow, *others))
+        depth = leg_depth(scene.mechanism.structure, found, i)
+        at_rest.append(_least(depth, leg.rate + slow, *others))
     return _most(*at_rest)
 
 

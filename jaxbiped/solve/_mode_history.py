@@ -54,13 +54,10 @@ class ModeHistory(eqx.Module):
 
 
 def history_of(scene: RigidScene, begin: Scalar, rows: Numbers, total: Numbers) -> ModeHistory:
-    """The modes of a walk.
+    """The modes of a walk, from its first mode and the rows (n, c) for which there was room.
 
-    Args:
-        scene: what walked.
-        begin: its first mode.
-        rows: of a time and, last, a mode behind each change of mode and each heel strike, (n, c).
-        total: how many rows there are.
+    A row is written behind each change of mode and each heel strike, `total` in all: it begins with
+    the time and ends with the mode.
     """
     structure, modes = scene.mechanism.structure, rigid_modes(scene.mechanism)
     told = structure.feet_told

@@ -104,13 +104,9 @@ class ModeEvents(NamedTuple):
 def mode_events(
     step: Scalar, before: SurfaceCourse, after: SurfaceCourse, rtol: Scalar, length: Scalar
 ) -> ModeEvents:
-    """What happens within a step of one mode.
+    """What happens within a step of one mode, from the surfaces at its ends.
 
-    Args:
-        step: its length [s].
-        before, after: the surfaces at its ends.
-        rtol: relative tolerance.
-        length: its length in units of the one whose error is the tolerance.
+    `step` is its length [s]; `length` counts it in units of the one whose error is the tolerance.
     """
     known = _RESOLVED * rtol
     begins_off = before.live & (before.values > known)
@@ -174,11 +170,7 @@ class OntoSurface(NamedTuple):
 def onto_surface(at: SurfaceCourse, which: Scalar, rtol: Scalar, pace: Scalar) -> OntoSurface:
     """The way from a state to the surface of this number.
 
-    Args:
-        at: the surfaces there.
-        which: its number.
-        rtol: relative tolerance.
-        pace: a step whose error is about the tolerance [s].
+    `pace` is the length of a step whose error is about the tolerance [s].
     """
     straight = [jnp.zeros_like(pace)] * (len(at.values) - len(at.bends))
     every = zip(at.values, at.rates, [*at.bends, *straight], at.live, strict=True)
@@ -315,15 +307,9 @@ def events_within(
     length: Scalar,
     begins_on_section: Scalar,
 ) -> StepEvents:
-    """What happens within a step.
+    """What happens within a step, from states at both ends and rates that end with accelerations.
 
-    Args:
-        scene: what walks.
-        step: its length [s].
-        before, after: states at both ends, and rates there that end with the accelerations.
-        rtol: relative tolerance.
-        length: its length in units of the one whose error is the tolerance.
-        begins_on_section: whether it begins with a heel strike (boolean).
+    `step` is its length [s]; `length` counts it in units of the one whose error is the tolerance.
     """
 
     def course(function: Callable[[RigidScene, Any], Scalar]) -> Quintic:

@@ -133,11 +133,8 @@ def open_gait_grid(
 ) -> GaitGrid:
     """A grid without results, or what a store holds of it; see `continue_store`.
 
-    Args:
-        first: any gait of the sweep, for the shapes.
-        values, quantities: of the swept parameters.
-        settings, writer, any_version: as there.
-        path: of the store; None for one in memory.
+    Any gait of the sweep gives the shapes; `values` and `quantities` are those of the swept
+    parameters. Without a path, the grid is kept in memory.
     """
     state = type(first.measures.state)
     dataset = _empty(first, values, quantities).assign_attrs(

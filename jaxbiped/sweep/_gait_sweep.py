@@ -199,11 +199,9 @@ def find_each(
 ) -> Iterator[tuple[slice, Gait]]:
     """The gaits that lanes come to, batch by batch: which of the n, and these with a first axis.
 
-    Args:
-        scene: the walker.
-        values: of the parameters that differ, shape (n,) each.
-        starts: states without `ROOT_x`, shape (n, m), of the type `state`.
-        options: those of `find_gait`. Gaits have no orbits.
+    `values` are of the parameters that differ, shape (n,) each; `starts` are states without
+    `ROOT_x`, shape (n, m), of the type `state`; `options` are those of `find_gait`. Gaits have no
+    orbits.
     """
     count, first = len(starts), 0
     scene = jtu.tree_map(as_float, scene)

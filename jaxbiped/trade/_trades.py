@@ -233,8 +233,8 @@ def cheapest(rows: Iterable[Row], axis: str, error: float, cost: Cost) -> Row | 
         error: largest error allowed, in that axis's units.
         cost: of a row; None where it is not known.
     """
-    good = [row for row in rows if _reaches(row, axis, error) and cost(row) is not None]
-    return min(good, key=lambda row: _as_number(cost(row)), default=None)
+    good = [(spent, row) for off, spent, row in _priced(rows, axis, cost) if off <= error]
+    return min(good, key=lambda pair: pair[0], default=(None, None))[1]
 
 
 def cost_at(rows: Sequence[Row], axis: str, error: float, cost: Cost) -> float | None:
@@ -252,11 +252,7 @@ def cost_at(rows: Sequence[Row], axis: str, error: float, cost: Cost) -> float |
         The least cost at which the way passes that error, None where it never does. A way whose
         loosest setting has a smaller error costs what that costs.
     """
-    points = [
-        (np.log(_as_number(row.errors[axis])), np.log(_as_number(cost(row))))
-        for row in rows
-        if _reaches(row, axis, np.inf) and cost(row) is not None
-    ]
+    points = [(np.log(off), np.log(spent)) for off, spent, _ in _priced(rows, axis, cost)]
     if not points:
         return None
     aim = np.log(error)
@@ -267,13 +263,10 @@ def cost_at(rows: Sequence[Row], axis: str, error: float, cost: Cost) -> float |
     return float(np.exp(min(found))) if found else None
 
 
-def _reaches(row: Row, axis: str, error: float) -> bool:
-    reached = row.errors.get(axis)
-    return row.outcome == OK and reached is not None and 0.0 < reached <= error
-
-
-def _as_number(value: Any) -> float:
-    return float(value)
+def _priced(rows: Iterable[Row], axis: str, cost: Cost) -> list[tuple[float, float, Row]]:
+    """Error, cost and row of each solve that came to its end, with an error above 0 and a cost."""
+    pairs = [(row.errors.get(axis), cost(row), row) for row in rows if row.outcome == OK]
+    return [(off, spent, row) for off, spent, row in pairs if off and spent is not None]
 
 
 class WalkTrade(NamedTuple):

@@ -1,6 +1,5 @@
 """What the command line refuses, against one sentence on stderr and exit code 2."""
 
-import importlib
 import json
 from pathlib import Path
 
@@ -191,12 +190,6 @@ def test_each_sentence_names_what_is_wrong(refusal, capsys):
     command, *words = refusal
     line = refused(command, capsys)
     assert [word for word in words if word not in line] == []
-
-
-def test_the_package_of_extremes_says_where_the_study_is():
-    with pytest.raises(ImportError, match=r"jaxbiped\.extremes is no longer part") as raised:
-        importlib.import_module("jaxbiped.extremes")
-    assert str(raised.value).endswith(MOVED)
 
 
 def test_a_box_with_borders_and_colours_is_the_same_sentence():

@@ -129,15 +129,9 @@ def select_instruction(
     width: int,
     target: KernelTarget,
 ) -> str:
-    """Writes an operation; the name of its result.
+    """Writes an operation of the graph; the name of its result.
 
-    Args:
-        text: where to.
-        op: its name in the graph.
-        kinds: of the result, and of each operand.
-        operands: names of vectors of `width` lanes.
-        width: see above.
-        target: what it is written for.
+    `kinds` are those of the result and of each operand; operands are vectors of `width` lanes.
     """
     kind, of = kinds[0], vector(kinds[1], width)
     if op in _OF_FLOATS or op in _OF_WHOLES:
