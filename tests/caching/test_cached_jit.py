@@ -1,5 +1,7 @@
 """Compiled once for all processes, against the function: what is kept and found again."""
 
+import os
+import pickle
 import subprocess
 import sys
 
@@ -9,7 +11,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.caching._cached_jit import Skeleton, _without_noise, cached_jit
 from jaxbiped.caching._disk_cache import CACHE_VARIABLE, disk_use
 from jaxbiped.simulate._backends import by_xla
 from jaxbiped.solve.controllers._wrapped_control import just_before_end
@@ -187,3 +189,31 @@ def test_another_process_runs_what_one_compiled(tmp_path, monkeypatch):
     scene = jb.seed_scene(slope=0.022)
     walk = jb.simulate(scene, jb.seed_state(), footsteps=2, accuracy="draft")
     assert float(walk.t[-1]).hex() == other.split()[2]
+
+
+def test_one_wrong_alarm_of_xla_is_kept_away_and_all_else_arrives(capfd):
+    def alarmed():
+        with _without_noise():
+            for line in (b"before\n", b"E0000 cpu_aot_loader.cc:1] a feature\n", b"behind\n"):
+                os.write(2, line)
+            raise ValueError("as it was")
+
+    with pytest.raises(ValueError, match="as it was"):
+        alarmed()
+    os.write(2, b"later\n")
+    assert capfd.readouterr().err == "before\nbehind\nlater\n"
+
+
+def test_a_skeleton_is_filled_with_arrays_in_their_order():
+    tree = {"a": (jnp.ones(2), "word"), "b": [np.zeros((3, 1), np.float32), 4]}
+    skeleton, arrays = Skeleton.of(tree)
+    assert [each.shape for each in arrays] == [(2,), (3, 1)]
+    assert skeleton.tree["a"][1] == "word"
+    assert [(each.shape, each.dtype) for each in skeleton.places] == [
+        ((2,), np.dtype("float64")), ((3, 1), np.dtype("float32")),
+    ]  # fmt: skip
+    assert skeleton.filled([7, 8]) == {"a": (7, "word"), "b": [8, 4]}
+    again = pickle.loads(pickle.dumps(skeleton))
+    assert again == skeleton
+    shapes = skeleton.shapes()
+    assert (shapes["a"][0].shape, shapes["b"][1]) == ((2,), 4)

@@ -364,6 +364,41 @@ def test_a_pushed_walk_returns_to_the_gait_or_does_not(last, count, returned, mo
     np.testing.assert_allclose(asked["state"], [1.0, 0.2, 0.3, -1.01, -2.02])
 
 
+@pytest.mark.parametrize(("last", "returned"), [(0.25004, True), (0.3, False)])
+def test_a_pushed_walk_is_told_by_its_last_cycle_of_two_footsteps(last, returned, monkeypatch):
+    """Of one arrival each, whose times differ."""
+    legs = SimpleNamespace(structure=SimpleNamespace(cycle_footsteps=2))
+    times = np.append(np.cumsum([0.0, *[0.25, 0.35] * 4]), np.inf)
+    times[8] = times[7] + last + 0.1
+    told = SimpleNamespace(arrivals=SimpleNamespace(t=times))
+    monkeypatch.setattr(_certificate, "simulate", lambda *_, **__: told)
+    state = jb.dynamics.RigidState(1.0, 0.2, 0.3, -1.0, -2.0)
+    gait = SimpleNamespace(measures=SimpleNamespace(state=state, period=0.6))
+    found = _certificate._walk(SimpleNamespace(mechanism=legs, arrival_footsteps=1), gait, 10, 0.01)
+    assert found.period_difference == pytest.approx(abs((last + 0.35) / 0.6 - 1.0), abs=1e-12)
+    assert (found.footsteps, found.returned) == (9, returned)
+
+
+def test_another_engine_s_gait_is_compared_with_the_first(monkeypatch):
+    def gait(engine, period, length, radius):
+        pair = type("Pair", (tuple,), {"spectral_radius": radius})((period, length))
+        return SimpleNamespace(engine=engine, measures=pair, outcome=jb.gait.Search.FOUND)
+
+    asked = []
+
+    def again(scene, state, *, parameters, engine):
+        asked.append((parameters, engine))
+        return gait(engine, 0.51, 0.19, 0.3)
+
+    monkeypatch.setattr(_certificate, "find_gait", again)
+    for engine, other in (("lanes", "xla"), ("xla", "lanes")):
+        first = gait(engine, 0.5, 0.2, 0.45)
+        first.measures.state = None
+        found = _certificate._by_other(SCENE, first)
+        assert asked[-1] == ((), other)
+        assert found == (other, True, *map(pytest.approx, (0.02, 0.05, 0.15)))
+
+
 def test_the_merit_of_a_design_counts_what_it_misses():
     """An equality by its size, an inequality where it is below zero, the radius by its weight."""
     none = np.zeros((3, 2))

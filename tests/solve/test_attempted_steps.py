@@ -1,4 +1,4 @@
-"""Ends of an attempted step of a rigid walk, against steps whose course is given."""
+"""Attempted steps of a rigid walk, against what comes first in courses that are given."""
 
 import jax
 import jax.numpy as jnp

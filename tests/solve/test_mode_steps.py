@@ -84,6 +84,7 @@ def test_a_gap_is_met_from_farther_away_by_what_is_known_of_its_bend(bend):
         SurfaceCourse(*(jnp.array([each]) for each in (value, rate, True)), jnp.zeros(0)),
         SurfaceCourse(*(jnp.array([each]) for each in (value, rate, True, 1e4))),
         SurfaceCourse(*(jnp.array([each]) for each in (1e2 * value, rate, True, bend))),
+        SurfaceCourse(*(jnp.array([each]) for each in (-1.2e-3, rate, True, 0.0))),
     ):
         assert not bool(onto(far, 0).near)
 

@@ -1,4 +1,4 @@
-"""Events within a step of single support, against angles whose polynomials are given."""
+"""What comes within a step of single support, against the polynomials of its angles."""
 
 import diffrax
 import jax

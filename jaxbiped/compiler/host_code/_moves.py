@@ -59,7 +59,8 @@ def part_of(
     if value.held == ():
         return single_number(value, shape)
     base, places = w.full(value), list(indices)
-    if value.part is not None:
+    backwards = any(isinstance(p, slice) and (p.step or 1) < 0 for p in places)
+    if value.part is not None and not backwards:
         base, outer = value.part
         left = iter(places)
         places = [each if isinstance(each, int) else _within(each, next(left)) for each in outer]

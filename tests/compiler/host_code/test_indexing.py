@@ -30,6 +30,8 @@ CASES = {
     "set: rows": lambda x, i: x.at[i].set(1.0),
     "set: entries": lambda x, i: x.at[i, i].set(x[0, :3]),
     "set: one entry": lambda x, i: x.at[i[0], i[1]].set(-1.0),
+    "set: one sum": lambda x, i: x.at[i[0], i[1]].add(-1.0),
+    "set: no sum": lambda x, i: x.at[i[0] + 9, i[1]].add(-1.0),
     "set: one of a row": lambda x, i: x[0].at[i[0]].set(jnp.nan),
     "set: none": lambda x, i: x[0].at[i[0] + 20].set(-1.0),
     "set: beyond the end": lambda x, i: x.at[i + 2].set(-1.0),

@@ -273,6 +273,51 @@ def test_what_one_branch_alone_needs_is_computed_there():
     assert within.values[-1].op == "fadd"
 
 
+def test_what_a_branch_gives_and_nothing_else_uses_is_computed_there():
+    block = Block()
+    x, y, z = inputs(block)
+    (here,) = inputs(block, "h", Kind.BOOL)
+    given, otherwise = block.add("fmul", x, y), block.add("fmul", y, z)
+    (one,), inside = conditional(block, here, lambda b: (given,), (otherwise,))
+    sink_code([one])
+    assert given.block is inside
+    assert inside.values == [given]
+    assert otherwise.block is block
+
+
+def test_a_part_of_a_map_needs_its_own_value_and_its_own_row():
+    block = Block()
+    x, y, z = inputs(block)
+    rows = (x, y, z), (z, x, y)
+    inside = Block(block, loop=True)
+    entries = inside.region("taken", (rows,), [Kind.F64] * 2)
+    values = inside.add("fmul", entries[0], x), inside.add("fadd", entries[1], y)
+    parts = block.region("map", (3, inside, tuple(entries), values), [Kind.F64] * 6)
+    head, taken = parts[0].args[0], entries[0].args[0]
+    assert list(sources_of(head)) == list(sources_of(taken)) == []
+    for place, part in enumerate(parts):
+        assert list(sources_of(part)) == [head, values[place // 3]]
+    for row, entry in zip(rows, entries, strict=True):
+        assert list(sources_of(entry)) == [taken, *row]
+    alive = Liveness([parts[2]])
+    assert values[0] in alive
+    assert values[1] not in alive
+
+
+def test_a_loop_needs_its_starts_and_all_that_it_carries():
+    block = Block()
+    x, y, _ = inputs(block)
+    inside = Block(block, loop=True)
+    held = Value("held", (), Kind.F64, inside)
+    inside.values.append(held)
+    end = inside.add("fmul", held, y)
+    (part,) = block.region("repeat", (7, inside, (x,), (held,), (end,)), [Kind.F64])
+    assert list(sources_of(part.args[0])) == [x, held, end]
+    assert list(sources_of(part)) == [part.args[0]]
+    assert list(sources_of(held)) == []
+    assert all(each in Liveness([part]) for each in (x, y, held, end))
+
+
 def test_numbers_types_and_memory_in_llvm_s_words():
     assert literal(1.0, Kind.F64) == "0x3FF0000000000000"
     assert literal(-0.0, Kind.F32) == "0x8000000000000000"
