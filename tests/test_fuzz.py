@@ -16,7 +16,7 @@ def failures(seed, count, doors, seconds=None, only=None):
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_fields_of_features_drawn_together():
     assert failures(7, 4, ("field",)) == []
 

@@ -232,6 +232,7 @@ class Oscillator(Plain):
         return y[1], -((gain * args) ** 2) * y[0]
 
 
+@pytest.mark.nightly
 def test_a_system_and_a_section():
     section = jb.Section(lambda args, y: y[0] - settings.gain + 1.0)
     start = (jnp.asarray(-1.0), jnp.asarray(0.0))

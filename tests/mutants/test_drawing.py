@@ -139,6 +139,7 @@ def test_a_draw_is_that_of_its_seed(package):
     assert len(places) == len(set(places))
 
 
+@pytest.mark.nightly
 def test_sites_are_drawn_alike_wherever_they_are(package):
     """Not by files: the file with a few sites has its share of them."""
     sources = {path.name: path.read_text() for path in package.iterdir()}
