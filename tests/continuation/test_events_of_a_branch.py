@@ -1,6 +1,7 @@
 """Events of branches, errors, cascades and deflation, against numbers that are written down."""
 
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from jaxbiped.continuation._bifurcations import (
     critical_multiplier,
     multiplier_test,
 )
+from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._continue_gait import _events_at
 from jaxbiped.continuation._deflation import _DeflatedNewton
 from jaxbiped.continuation._switch_branch import DoublingCascade, doubling_cascade
@@ -95,7 +97,8 @@ def test_a_geometric_cascade_has_its_ratio_and_its_limit(monkeypatch):
 
     def branch(k):
         ends = [SimpleNamespace(place=np.array([0.0, v])) for v in (values[k - 1], values[k])]
-        return SimpleNamespace(points=ends, bifurcations=[doubling(k)], footsteps=2**k)
+        known = dict(points=ends, bifurcations=[doubling(k)], footsteps=2**k)
+        return Mock(spec=Branch, **known)
 
     following = iter([branch(1), branch(2), branch(3)])
     monkeypatch.setattr(_switch_branch, "_doubled_branch", lambda *_, **__: next(following))
