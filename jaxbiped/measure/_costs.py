@@ -10,7 +10,7 @@ from jaxbiped.dynamics._state import field_of, state_type
 from jaxbiped.measure._energy_ledger import ledger_and_motors, rigid_ledger
 from jaxbiped.measure._footsteps import heel_strikes, root_place
 from jaxbiped.measure._samples import evaluate_at, kept_strikes, places_of_standing
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
 
@@ -69,7 +69,7 @@ def cost_of_transport(
         >>> jb.measure.cost_of_transport(scene, walk).cost.round(3)
         array([0.02])
     """
-    check_type("scene", scene, Scene, RigidScene)
+    check_type("scene", scene, Scene, RigidScene, RedundantScene)
     weight = float(scene.mechanism.total_mass) * float(scene.ground.g)
     if isinstance(scene, RigidScene):
         if times is not None:
