@@ -76,7 +76,7 @@ def check_legs_admitted_alike(rule: Any, legs: Sequence[str], images: Sequence[i
 
     The `images` are numbers of legs. A rule with numbers that JAX traces is not asked.
     """
-    if isinstance(rule, StanceRotation | AlwaysTouching) or is_traced(rule):
+    if type(rule) in (StanceRotation, AlwaysTouching) or is_traced(rule):
         return
 
     def admitted(rate: Scalar) -> Scalar:

@@ -124,10 +124,18 @@ class Reluctant(jb.laws.AbstractClearance):
         return leg_rate < (self.rate if leg == self.leg else 0.0)
 
 
+class OneLegScuffs(jb.laws.StanceRotation):
+    """The paper's rule for one leg, and none for the other."""
+
+    def admits(self, leg, leg_rate):
+        return None if leg == "1" else super().admits(leg, leg_rate)
+
+
 @pytest.mark.parametrize("formulation", ["minimal", "redundant"])
 def test_a_clearance_rule_that_knows_a_leg_has_no_step(formulation):
     scene, state = jb.seed_scene(), jb.seed_state()
     rules = {"Reluctant": Reluctant("1", -0.2), "OneFoot": jb.laws.OneFoot(1)}
+    rules["OneLegScuffs"] = OneLegScuffs()
     for name, rule in rules.items():
         kept = dataclasses.replace(scene, clearance=rule)
         if formulation == "redundant":
