@@ -37,7 +37,7 @@ def force(z: Any, v: Any, K: Any, c: Any) -> Any:
     return jnp.where(z < 0.0, jnp.maximum(0.0, -K * z - c * v), 0.0)
 
 
-class Bouncing(jb.gait.AbstractSystem):
+class Bouncing(jb.hybrid.AbstractSystem):
     """The ball and a clock, (z, v, t): touchdown and release are its switches."""
 
     damped: bool = eqx.field(static=True, default=False)
@@ -47,13 +47,13 @@ class Bouncing(jb.gait.AbstractSystem):
         z, v, clock = y
         return v, force(z, v, args.K, args.c) - args.g, jnp.ones_like(clock)
 
-    def switches(self, args: Ball, y: Any) -> tuple[jb.dynamics.Switch, ...]:
+    def switches(self, args: Ball, y: Any) -> tuple[jb.hybrid.Switch, ...]:
         """Touchdown, where damping makes the force jump, and the floor's force leaving zero."""
         z, v, _ = y
-        touchdown = jb.dynamics.Switch(-z, True, force_jumps=self.damped)
+        touchdown = jb.hybrid.Switch(-z, True, force_jumps=self.damped)
         if not self.damped:
             return (touchdown,)
-        return touchdown, jb.dynamics.Switch(-args.K * z - args.c * v, z < 0.0)
+        return touchdown, jb.hybrid.Switch(-args.K * z - args.c * v, z < 0.0)
 
     def ending(self, args: Ball, y: Any) -> Any:
         """It never ends early."""

@@ -147,9 +147,8 @@ def draw_by(ax: Axes, key: str, rows: Iterable[Mapping[str, Any]], x: str, y: st
 
 
 def label(ax: Axes, x: str, y: str, title: str = "", *, log: str = "") -> None:
-    """Words of axes, a faint grid, and scales: "x", "y" or "xy" are logarithmic."""
+    """Words of axes, and their scales: "x", "y" or "xy" are logarithmic."""
     ax.set(xlabel=x, ylabel=y, title=title)
-    ax.grid(alpha=0.3)
     if "x" in log:
         ax.set_xscale("log")
     if "y" in log:

@@ -17,7 +17,7 @@ from _experiment import Options, experiment, label
 from tqdm import tqdm
 
 import jaxbiped as jb
-from jaxbiped.plot.style import new_figure
+from jaxbiped.plot.style import legend_below, new_figure
 
 SCENES = {"walks": 1000, "gaits": 1000, "rigid": 300, "named": 100, "named_rigid": 100}
 QUICK_SCENES = {"walks": 6, "gaits": 1, "rigid": 20, "named": 1, "named_rigid": 2}
@@ -29,6 +29,12 @@ SEED = 29
 VANISHING = 1e-6
 """Multipliers below this are zero to rounding, and their errors too: damping has wiped them out."""
 MEASURES = ("period", "step_length", "speed", "peak_normal")
+PANELS = {
+    "Walks": ("walks", "rigid"),
+    "Gaits": ("gaits",),
+    "Gaits at the balanced accuracy": ("named", "named_rigid"),
+}
+"""The kinds of scenes that a panel of the picture shows."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,16 +54,22 @@ def main(options: CoverageOptions):
         for index in tqdm(range(options.sized(SCENES, QUICK_SCENES)[kind]), unit=kind):
             random = np.random.default_rng((options.seed, place, index))
             found[kind].append(rows.row(f"{kind} {index}", one, random))
-    pairs = {}
-    for each in (scene for scenes in found.values() for scene in scenes):
-        for name, points in each["pairs"].items():
-            pairs.setdefault(name, []).append(np.reshape(points, (-1, 3)))
+    pairs = {kind: _together(scenes) for kind, scenes in found.items()}
+    every = {name: points for of_kind in pairs.values() for name, points in of_kind.items()}
     return {
         "seed": options.seed,
         **{kind: _counts(scenes) for kind, scenes in found.items()},
-        "coverage": {name: _coverage(scenes) for name, scenes in pairs.items()},
+        "coverage": {name: _coverage(points) for name, points in every.items()},
         "picture": _draw(options, pairs),
     }
+
+
+def _together(scenes):
+    """Errors, bars and floors (n, 3) of each number, scene by scene."""
+    pairs = {}
+    for name, points in (each for scene in scenes for each in scene["pairs"].items()):
+        pairs.setdefault(name, []).append(np.reshape(points, (-1, 3)))
+    return pairs
 
 
 def _around(random, value, spread, share=1.0):
@@ -243,17 +255,20 @@ def _judged(error, bar, own):
 
 
 def _draw(options, pairs):
-    ax = new_figure(5.5, 5.0).subplots()
-    for name, points in pairs.items():
-        error, bar, _ = np.concatenate(points).T
-        shown = (error > 0.0) & (bar > 0.0)
-        ax.plot(bar[shown], error[shown], ".", markersize=3, label=name)
-    ends = np.array([1e-14, 1e2])
-    ax.plot(ends, ends, "k-", linewidth=0.8, label="error = bar")
-    words = "error bar (SI units of the number)", "true error (SI units of the number)"
-    label(ax, *words, log="xy")
-    ax.legend()
-    return options.save(ax.figure, "accuracy_coverage.png")
+    """True errors over their bars: points above the line lie beyond their bars."""
+    figure = new_figure(12.0, 4.8)
+    panels = figure.subplots(1, len(PANELS), sharex=True, sharey=True)
+    for ax, (title, kinds) in zip(panels, PANELS.items(), strict=True):
+        for name, points in (each for kind in kinds for each in pairs[kind].items()):
+            error, bar, _ = np.concatenate(points).T
+            shown = (error > 0.0) & (bar > 0.0)
+            ax.plot(bar[shown], error[shown], ".", markersize=2, label=name)
+        ax.axline((1.0, 1.0), (2.0, 2.0), color="black", linewidth=0.8, label="error = bar")
+        words = "error bar (SI units of the number)", "true error (SI units of the number)"
+        label(ax, *words, title, log="xy")
+        ax.label_outer()
+        legend_below(ax, columns=2, markerscale=3.0)
+    return options.save(figure, "accuracy_coverage.png")
 
 
 KINDS = {

@@ -57,7 +57,7 @@ class Case(NamedTuple):
 
 
 # ruff: noqa: D102
-class Ball(jb.gait.AbstractSystem):
+class Ball(jb.hybrid.AbstractSystem):
     """A ball (y, v) in air with linear drag, which a paddle returns: v becomes 1 − 0.8 v."""
 
     def vector_field(self, t, y, args):

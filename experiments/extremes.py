@@ -11,16 +11,22 @@ from extreme_cases.catalogue import RANGES, catalogue
 from extreme_cases.gaits import GaitJudge, gaits
 from extreme_cases.grazing import grazing
 from extreme_cases.verdict import VERDICTS, by_group, counts, judge, reasons, study
+from matplotlib.ticker import MaxNLocator
 
 from jaxbiped.plot.style import new_figure
 
-COLOURS = ("tab:green", "tab:blue", "tab:gray", "tab:red", "tab:orange")
+COLOURS = ("#009E73", "#56B4E9", "#999999", "#D55E00", "#E69F00")
+"""Of the verdicts."""
 WITHIN = 1e-2
 """Relative error of a derivative at a graze from which it is wrong."""
-UNITS = {
-    "K": "(N/mⁿ)", "c": "(N s/m²)", "n": "", "v0": "(m/s)", "xi": "(s/m)", "mu": "",
-    "slope": "(rad)", "hip mass": "(kg)", "mass": "(kg)", "inertia": "(of the seed's)", "r": "(m)",
-    "d": "(m)", "size": "(of the seed's)", "g": "(m/s²)",
+WORDS = {
+    "K": "contact stiffness, $K$ (N/m$^n$)", "c": "contact damping, $c$ (N s/m²)",
+    "n": "contact exponent, $n$ (–)", "v0": "slip at the peak, $v_0$ (m/s)",
+    "xi": r"decay of friction, $\xi$ (s/m)", "mu": r"static friction, $\mu_0$ (–)",
+    "slope": r"slope, $\alpha$ (rad)", "hip mass": "hip mass, $m_S$ (kg)",
+    "mass": "leg mass, $m$ (kg)", "inertia": "leg inertia (of the seed's)",
+    "r": "foot radius, $r$ (m)", "d": "hip to mass centre, $d$ (m)",
+    "size": "size (of the seed's)", "g": "gravity, $g$ (m/s²)",
 }  # fmt: skip
 
 
@@ -108,15 +114,26 @@ def _draw(options, rows):
         for verdict, colour in zip(VERDICTS, COLOURS, strict=True):
             tall = [sum(row["verdict"] == verdict for row in values[value]) for value in order]
             words = verdict.replace("_", " ")
-            ax.bar(range(len(order)), tall, 1.0, bottom, color=colour, label=words)
+            ax.bar(range(len(order)), tall, 0.9, bottom, color=colour, label=words)
             bottom = bottom + tall
         shown = range(0, len(order), max(1, (len(order) + 2) // 3))
-        ax.set_xticks(list(shown), [f"{order[k]:.2g}" for k in shown])
-        ax.set(xlabel=f"{name} {UNITS[name]}", ylabel="cases")
+        ax.set_xticks(list(shown), [_as_text(order[k]) for k in shown])
+        ax.set(xlabel=WORDS[name], ylabel="cases")
+        ax.grid(axis="x", visible=False)
+        ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10], integer=True))
     for ax in figure.axes[len(axes) :]:
         ax.set_axis_off()
     last.legend(*axes[0].get_legend_handles_labels(), loc="center")
     return options.save(figure, "extremes.png")
+
+
+def _as_text(value):
+    """A value to two digits, with a power of ten where it has many zeros."""
+    mantissa, power = f"{value:.1e}".split("e")
+    if value == 0.0 or -3 <= int(power) <= 1:
+        return f"{value:.2g}".replace("-", "−")
+    digits = mantissa.removesuffix(".0")
+    return f"$10^{{{int(power)}}}$" if digits == "1" else rf"${digits} \cdot 10^{{{int(power)}}}$"
 
 
 if __name__ == "__main__":

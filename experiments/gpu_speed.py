@@ -123,13 +123,13 @@ def labels(sizes, footsteps, rounds):
 
 
 def draw(options, walked):
-    """Steps a second against the size of the batch."""
+    """Steps per second against the size of the batch."""
     ax = new_figure(6.0, 4.0).subplots()
     for engine in ("cuda", "lanes", "xla"):
         points = [(row["size"], row.get(f"{engine}_steps_per_s")) for row in walked]
         if points := [point for point in points if point[1]]:
             ax.plot(*zip(*points, strict=True), "o-", label=engine)
-    label(ax, "starts in the batch", "attempted steps a second", log="xy")
+    label(ax, "starts in the batch", "attempted steps (1/s)", log="xy")
     ax.legend()
     return options.save(ax.figure, "gpu_speed.png")
 

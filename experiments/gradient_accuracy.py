@@ -62,10 +62,10 @@ class Stepping(NamedTuple):
     lands: Any
 
 
-class Stepped(jb.gait.AbstractSystem):
+class Stepped(jb.hybrid.AbstractSystem):
     """The walker, its switches hidden from the solver or not."""
 
-    cyclic_coordinates = jb.gait.Walking.cyclic_coordinates
+    cyclic_coordinates = jb.hybrid.Walking.cyclic_coordinates
 
     def vector_field(self, t, y, args):
         """The walker's."""
@@ -74,12 +74,12 @@ class Stepped(jb.gait.AbstractSystem):
     def switches(self, args, y):
         """The walker's; where steps do not land, none is live."""
         lands = args.lands > 0.0
-        found = jb.dynamics.switches(args.scene, y)
+        found = jb.hybrid.switches(args.scene, y)
         return tuple(each._replace(live=each.live & lands) for each in found)
 
     def ending(self, args, y):
         """The walker's."""
-        return jb.gait.Walking().ending(args.scene, y)
+        return jb.hybrid.Walking().ending(args.scene, y)
 
     def reset_map(self, args, y):
         """Legs exchanged."""

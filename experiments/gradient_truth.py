@@ -18,7 +18,7 @@ from _gradient_ways import NOT_INSTALLED, OTHER_LAW, draw_way, row_of, versions
 from reference.footstep import LAWS, MID_STANCE, PARAMETERS, footstep
 from tqdm import tqdm
 
-from jaxbiped.plot.style import new_figure
+from jaxbiped.plot.style import legend, new_figure
 
 REPEATS = 3
 
@@ -86,7 +86,7 @@ def draw_ways(ax, rows, names, words):
         if own:
             draw_way(ax, name, own, color=f"C{k}", **ring)
     ax.axhline(1.0, color="black", linewidth=0.8)
-    label(ax, f"relative error of the {words}", "relative error of its gradient")
+    label(ax, f"error of the {words} (relative)", "error of its gradient (relative)")
 
 
 def draw_ball(options, rows):
@@ -106,7 +106,7 @@ def draw_ball(options, rows):
 def draw_footstep(options, rows):
     ax = new_figure(6.5, 5.4).subplots()
     draw_ways(ax, rows, by("way", rows), "footstep")
-    ax.legend(fontsize="small")
+    legend(ax, loc="lower right")
     return options.save(ax.figure, "footstep_truth.png")
 
 

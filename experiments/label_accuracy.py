@@ -20,7 +20,7 @@ from _scenes import rigid_seed
 from tqdm import tqdm
 
 import jaxbiped as jb
-from jaxbiped.plot.style import new_figure
+from jaxbiped.plot.style import label_colour, legend_below, new_figure
 
 STARTS, QUICK_STARTS = 10_000, 400
 DRAWS, QUICK_DRAWS = 3, 1
@@ -181,23 +181,25 @@ def coverage(rows, name, method, draws):
 def draw(options, places, codes, changed, rows, count):
     left, right = new_figure(11.0, 4.6).subplots(1, 2)
     theta, omega = places
-    for code in np.unique(codes):
-        own, unknown = codes == code, code == PENDING
-        said = "the reference ran out of steps" if unknown else str(jb.basins.Label(int(code)))
-        left.plot(theta[own], omega[own], ".", markersize=6 if unknown else 1.5, label=said)
+    for name in jb.basins.Label:
+        own, unknown = codes == int(name), name == PENDING
+        words = "the reference ran out of steps" if unknown else str(name)
+        look = dict(color="black", markersize=6) if unknown else dict(color=label_colour(words))
+        if own.any():
+            left.plot(theta[own], omega[own], ".", **dict(markersize=2) | look, label=words)
     left.plot(theta[changed], omega[changed], "kx", markersize=6, label="draft and tight differ")
     label(left, *(f"{name} ({unit})" for name, unit in zip(AXES, UNITS, strict=True)))
-    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=8)
+    legend_below(left, columns=3)
     shares = {row["way"]: row["changed"] / count for row in rows}
-    for solver in SOLVERS:
+    for solver, marker in zip(SOLVERS, "os", strict=True):
         x = np.array([rtol for rtol in TOLERANCES if f"{solver} {rtol:g}" in shares])
         y = np.array([shares[f"{solver} {rtol:g}"] for rtol in x])
-        right.plot(x, np.where(y > 0.0, y, np.nan), "o-", label=solver)
+        right.plot(x, np.where(y > 0.0, y, np.nan), f"{marker}-", label=solver)
     right.axhline(1.0 / count, color="0.6", linewidth=0.8, label="one label")
-    words = "relative tolerance", "share of labels that a finer solve changes"
+    words = "relative tolerance (–)", "share of labels that a finer solve changes (–)"
     label(right, *words, log="xy")
-    right.set(xlim=(min(TOLERANCES), max(TOLERANCES)), ylim=(0.5 / count, None))
-    right.legend()
+    right.set_ylim(bottom=0.5 / count)
+    legend_below(right, columns=3)
     return options.save(left.figure, "label_accuracy.png")
 
 

@@ -274,7 +274,7 @@ def draw_paths(options, paths):
         ax.set(yscale="log", xlabel="factor of the path, $s$")
         ax.set_title(MEASURES[key], loc="left")
         ax.grid(color="#DDDDDD")
-    figure.axes[0].set_ylabel("distance from the rigid gait, relative")
+    figure.axes[0].set_ylabel("distance from the rigid gait (relative)")
     named = figure.axes[0].get_legend_handles_labels()
     figure.legend(*named, loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle("Filled: below the rigid gait's; hollow: above it", fontsize=9)

@@ -22,6 +22,7 @@ from _mechanisms import Case, cases, kneed
 from _scalar_field import address_of
 from _timing import seconds_of, timed
 from _walks import perturbed, scattered, walker
+from matplotlib.ticker import LogLocator, NullFormatter
 from reference.numbalsoda_solves import lsoda_batch
 
 import jaxbiped as jb
@@ -209,9 +210,14 @@ def draw(options: Options, rows, chains):
     draw_by(left, "way", rows, "error_median", "simulated_s_per_cpu_s")
     label(left, "median error of the final state (SI units)", "simulated seconds (s per CPU s)",
           "Five links", log="xy")  # fmt: skip
-    left.legend(frameon=False)
-    right.plot(*np.array([[row["bodies"], row["operations"]] for row in chains]).T, "o-")
-    label(right, "bodies of a chain", "operations of a step", "Cost of a step", log="xy")
+    left.legend()
+    right.plot(*np.array([[row["bodies"], 1e-3 * row["operations"]] for row in chains]).T, "o-")
+    words = "bodies of a chain", "operations of a step (thousands)"
+    label(right, *words, "Cost of a step", log="xy")
+    for axis in (right.xaxis, right.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
     return options.save(left.figure, "mechanism_speed.png")
 
 

@@ -21,7 +21,7 @@ from _scenes import rigid_seed
 from _timing import timed
 
 import jaxbiped as jb
-from jaxbiped.plot.style import new_figure
+from jaxbiped.plot.style import legend_below, new_figure
 
 LEG = {"d": (0.05, 0.2), "r": (0.04, 0.12), "J": (0.003, 0.02)}
 LARGE = {**LEG, "r": (0.04, 0.16)}
@@ -130,15 +130,18 @@ def draw(options, own, best):
     left, right = new_figure(9.0, 4.0).subplots(1, 2)
     names = ("sensitivity_norm", "spectral_radius")
     left.plot(*([each.measures[name] for each in best.history] for name in names), "o-", ms=3.0)
-    left.axhline(0.5 * float(own.measures.spectral_radius), color="#595959", ls=":", lw=0.8)
-    left.set(xlabel="gait sensitivity norm", ylabel="spectral radius")
+    half = 0.5 * float(own.measures.spectral_radius)
+    left.axhline(half, color="#595959", ls=":", lw=1.2, label="half of the seed's")
+    left.set(xlabel=r"gait sensitivity norm, $\|G\|$ (–)", ylabel=r"spectral radius, $\rho$ (–)")
+    legend_below(left, columns=2)
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
     right.plot(np.cos(angle), np.sin(angle), color="#595959", lw=0.8)
     for gait, name, form in ((own, "seed", "o"), (best.gait, "optimum", "s")):
         values = np.asarray(gait.multipliers)
         right.plot(values.real, values.imag, form, ms=5.0, mfc="none", label=name)
-    right.set(xlabel="real part of a multiplier", ylabel="imaginary part", aspect="equal")
-    right.legend(frameon=False)
+    words = r"real part, Re $\lambda$ (–)", r"imaginary part, Im $\lambda$ (–)"
+    right.set(xlabel=words[0], ylabel=words[1], aspect="equal")
+    legend_below(right, columns=2)
     return options.save(left.figure, "optimise_speed.png")
 
 
@@ -203,13 +206,13 @@ def scattered(scene, scatter, count):
 def draw_robust(options, held, front):
     left, right = new_figure(9.0, 4.0).subplots(1, 2)
     left.plot(front.bounds, front.values("speed"), "o-", ms=4.0)
-    left.set(xlabel="bound of the spectral radius", ylabel="largest speed (m/s)")
+    left.set(xlabel="bound of the spectral radius (–)", ylabel="largest speed (m/s)")
     for kind, form in zip(KINDS, "os^", strict=True):
         tried = held["designs"][kind]["tried"]
         right.plot(tried["spectral_radius"], tried["speed"], form, ms=4.0, mfc="none", label=kind)
     right.axvline(BOUND, color="#595959", ls=":", lw=0.8)
-    right.set(xlabel="spectral radius under scatter", ylabel="speed (m/s)")
-    right.legend(frameon=False)
+    right.set(xlabel=r"spectral radius under scatter, $\rho$ (–)", ylabel="speed (m/s)")
+    legend_below(right, columns=3)
     return options.save(left.figure, "optimise_robust.png")
 
 

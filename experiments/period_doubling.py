@@ -141,13 +141,13 @@ def chaos(slopes, _, cycles):
 def draw(options, branches, slopes, angles, _):
     left, right = new_figure(13.0, 5.6).subplots(1, 2)
     plot.branch(branches, "theta_2", ax=left)
-    left.set_title("The simplest walker: stance angle after a strike", loc="left")
+    left.set_title("The simplest walker: stance angle after a strike")
     look = dict(color="#999999", markersize=1.2, label="strikes of walks", zorder=0)
     right.plot(np.repeat(slopes, angles.shape[1]), angles.ravel(), ".", **look)
     plot.branch(branches[1:], "theta_2", ax=right)
     right.set_xlim(slopes[0], slopes[-1])
     right.set_ylim(np.nanmin(angles) - 0.01, np.nanmax(angles) + 0.01)
-    right.set_title("The cascade, and where walks settle (grey)", loc="left")
+    right.set_title("The cascade, and where walks settle (grey)")
     return options.save(left.figure, "period_doubling.png")
 
 

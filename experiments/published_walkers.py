@@ -180,7 +180,7 @@ def draw(options, cascades):
     axes = figure.subplots(1, len(cascades), squeeze=False)[0]
     for ax, (name, cascade) in zip(axes, cascades.items(), strict=True):
         plot.branch(cascade.branches, "theta_2", ax=ax)
-        ax.set_title(f"{name}: stance angle behind a strike", loc="left")
+        ax.set_title(f"{name}: stance angle after a strike")
     return options.save(figure, "published_walkers.png")
 
 

@@ -80,7 +80,8 @@ def keep_picture(experiment: str, picture: Path) -> None:
     own = picture.stem.removeprefix(experiment).strip("_-")
     drawn = Image.open(picture).convert("RGB")
     drawn.thumbnail((WIDEST, WIDEST * 4))
-    few = drawn.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    how = dict(method=Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE)
+    few = drawn.quantize(COLOURS, **how)
     GALLERY.mkdir(exist_ok=True)
     few.save(GALLERY / f"{'-'.join(filter(None, (experiment, own)))}.png", optimize=True)
 

@@ -10,10 +10,9 @@ from _experiment import Options, experiment
 from _timing import timed
 
 import jaxbiped as jb
-from jaxbiped.plot.style import new_figure
+from jaxbiped.plot.style import legend_below, new_figure
 
 SEED = {"K": 1e6, "c": 1e7, "xi": 1e3}
-UNITS = {"K": "N/m$^{1.5}$", "c": "N s/m$^2$", "xi": "s/m"}
 POINTS, QUICK_POINTS = 100, 8
 FACTOR = 2.0
 """From the seed's value down and up."""
@@ -74,21 +73,27 @@ def along(name, count, measures):
 
 def draw_map(options, swept):
     left, right = new_figure(10.5, 4.4).subplots(1, 2)
-    panel(left, swept, "spectral_radius", "spectral radius ρ")
-    panel(right, swept, "period", "period (s)")
-    left.figure.suptitle("Gaits of the seed's walker on 0.02 rad; white cross: its own K and c")
+    panel(left, swept, "spectral_radius", r"spectral radius, $\rho$ (–)")
+    panel(right, swept, "period", "period, $T$ (s)")
     return options.save(left.figure, "radius_map.png")
 
 
-def panel(axes, swept, name, title):
+def words_of(name):
+    """Words, symbol and unit of a parameter."""
+    return jb.parameter_quantities(jb.seed_scene())[name].on_axis()
+
+
+def panel(axes, swept, name, words):
     values = swept[name].transpose("c", "K").data
     image = axes.pcolormesh(swept.K.data, swept.c.data, values, shading="nearest")
     lines = axes.contour(swept.K.data, swept.c.data, values, 8, colors="k", linewidths=0.6)
-    axes.clabel(lines, fontsize=7)
-    axes.plot(SEED["K"], SEED["c"], "x", color="w", ms=8, mew=2)
-    axes.set(xscale="log", yscale="log", title=title)
-    axes.set(xlabel=f"K ({UNITS['K']})", ylabel=f"c ({UNITS['c']})")
-    axes.figure.colorbar(image, ax=axes, label=title)
+    for text in axes.clabel(lines, fontsize="small"):
+        text.set_bbox(dict(facecolor="white", edgecolor="none", alpha=0.6, pad=0.5))
+    axes.plot(SEED["K"], SEED["c"], "*", ms=14, mfc="w", mec="k", label="the seed's walker")
+    axes.set(xscale="log", yscale="log", xlabel=words_of("K"), ylabel=words_of("c"))
+    axes.grid(False)
+    axes.figure.colorbar(image, ax=axes, label=words)
+    legend_below(axes, columns=1)
 
 
 def draw_lines(options, found):
@@ -106,10 +111,9 @@ def draw_lines(options, found):
             axes.axvline(SEED[name], color="#595959", linewidth=0.8, linestyle=":")
             axes.axhline(0.0, color="#595959", linewidth=0.8)
             axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
-            axes.grid(alpha=0.3)
-        axes.set_xlabel(f"{name} ({UNITS[name]})")
+        axes.set_xlabel(words_of(name))
     for axes, key in zip(grid[:, 0], measures, strict=True):
-        axes.set_ylabel(f"elasticity of\n{key.replace('_', ' ')}")
+        axes.set_ylabel(f"elasticity of\n{key.replace('_', ' ')} (–)")
     return options.save(grid[0, 0].figure, "elasticities.png")
 
 

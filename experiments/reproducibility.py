@@ -22,7 +22,7 @@ from reference.scipy_solves import scales
 from tqdm import tqdm
 
 import jaxbiped as jb
-from jaxbiped.plot.style import new_figure
+from jaxbiped.plot.style import legend, line_of, new_figure
 
 WALKS, QUICK_WALKS = 1000, 40
 BATCHES, QUICK_BATCHES = (1, 7, 64), (7,)
@@ -166,13 +166,14 @@ def compared(setting, own, other):
 def draw(options, rows, differences):
     """How many walks differ by more than what, of the settings that differ at all."""
     ax = new_figure(6.4, 4.2).subplots()
-    for row, own in zip(rows, differences, strict=True):
-        if np.any(own > 0.0):
-            ax.plot(np.sort(own)[::-1], np.arange(1, len(own) + 1) / len(own), label=row["name"])
-    same = sum(not np.any(own > 0.0) for own in differences) - 1
-    words = "difference of the final state (relative)", "share of walks that differ by more"
+    pairs = zip(rows, differences, strict=True)
+    differing = [(row["name"], np.sort(own)[::-1]) for row, own in pairs if np.any(own > 0.0)]
+    for k, (name, own) in enumerate(differing):
+        ax.plot(own, np.arange(1, len(own) + 1) / len(own), label=name, **line_of(k))
+    same = len(rows) - len(differing) - 1
+    words = "difference of the final state (relative)", "share of walks that differ by more (–)"
     label(ax, *words, f"{same} other settings: the same to the last bit", log="xy")
-    ax.legend()
+    legend(ax)
     return options.save(ax.figure, "reproducibility.png")
 
 

@@ -252,7 +252,7 @@ def draw(options, found, families):
                 few = values[:: max(1, len(values) // 3)]
                 axes.set_xticks(few, [f"{value:.2g}" for value in few])
         axes.set_title(TITLES.get(name, ""), fontsize=10)
-        axes.set(xlabel=f"{family.number} [{family.unit}]", ylabel="time per footstep [s]")
+        axes.set(xlabel=f"{family.number} ({family.unit})", ylabel="time per footstep (s)")
         axes.grid(alpha=0.3)
     handles = [
         plt.Line2D([], [], color=colour, marker=marker, ls="", label=verdict)

@@ -235,7 +235,7 @@ def draw_elasticities(options, found):
     ax.set_xticks(range(len(names)), [quantities[name].symbol for name in names])
     ax.set_yscale("symlog", linthresh=1e-3)
     ax.axhline(0.0, color="black", linewidth=0.8)
-    ax.set(xlabel="parameter", ylabel="elasticity of the critical slope")
+    ax.set(xlabel="parameter", ylabel="elasticity of the critical slope (–)")
     ax.legend()
     return options.save(ax.figure, "bifurcation_elasticities.png")
 

@@ -17,7 +17,7 @@ from _trade_store import Store
 from tqdm import tqdm
 
 import jaxbiped as jb
-from jaxbiped.plot.style import new_figure
+from jaxbiped.plot.style import legend_right, new_figure, set_title
 from jaxbiped.trade import cheapest, cost_at
 
 CASES = (
@@ -39,11 +39,11 @@ PANELS = (
     ("walk", "energy", "cpu_s", "Energy ledger"),
     ("batch", "state", "cpu_s", "State, a batch"),
     ("basin", "labels", "cpu_s", "Wrong labels of 4096 starts"),
-    ("basin", "walking", "cpu_s", "Starts of 4096 that are wrongly labelled as walking or not"),
-    ("slopes", "slopes", "cpu_s", "Derivatives of the state, with respect to K, c, ξ"),
+    ("basin", "walking", "cpu_s", "Wrong labels of 4096 starts: walking or not"),
+    ("slopes", "slopes", "cpu_s", "State's derivatives with respect to K, c, ξ"),
     ("gait", "period", "cpu_s", "Gait's period"),
     ("gait", "multiplier", "cpu_s", "Largest multiplier"),
-    ("gait", "gradient", "cpu_s", "Derivatives of the period, with respect to K, c, ξ"),
+    ("gait", "gradient", "cpu_s", "Period's derivatives with respect to K, c, ξ"),
     ("stepping", "gradient", "attempted", "Derivative of the period, by choice of steps"),
     ("smoothed laws", "state", "attempted", "State after 2 s, smoothed laws"),
     ("v0 ten times wider", "state", "attempted", "State after 2 s, v0 ten times wider"),
@@ -133,13 +133,13 @@ def draw(options, numbers):
 
     shown = [panel for panel in PANELS if has_errors(*panel[:2])]
     lines = -(-len(shown) // COLUMNS)
-    figure = new_figure(15.0, 4.4 * lines)
+    figure = new_figure(14.0, 3.9 * lines)
     axes = figure.subplots(lines, COLUMNS, squeeze=False).ravel()
     for ax, (group, axis, cost, title) in zip(axes, shown, strict=False):
         floor = floors.get(group, {}).get(axis)
         jb.plot.work_precision(rows[group], axis, cost=cost, floor=floor, ax=ax)
-        ax.set_title(title, loc="left")
-        ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7, frameon=False)
+        set_title(ax, title, panel=True)
+        legend_right(ax)
     for ax in axes[len(shown) :]:
         ax.set_visible(False)
     return options.save(figure, "trade.png")

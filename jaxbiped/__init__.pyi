@@ -10,6 +10,7 @@ from jaxbiped import constraints as constraints
 from jaxbiped import continuation as continuation
 from jaxbiped import dynamics as dynamics
 from jaxbiped import gait as gait
+from jaxbiped import hybrid as hybrid
 from jaxbiped import identify as identify
 from jaxbiped import measure as measure
 from jaxbiped import models as models
@@ -53,9 +54,9 @@ from jaxbiped.scene._walker import WithTorso as WithTorso
 from jaxbiped.scene._walker import Walker as Walker
 
 # States and the sections that they cross.
-from jaxbiped.dynamics._surfaces import HeelStrike as HeelStrike
-from jaxbiped.dynamics._surfaces import MidStance as MidStance
-from jaxbiped.dynamics._surfaces import Section as Section
+from jaxbiped.hybrid._sections import HeelStrike as HeelStrike
+from jaxbiped.hybrid._sections import MidStance as MidStance
+from jaxbiped.hybrid._sections import Section as Section
 from jaxbiped.scene._state_types import State as State
 from jaxbiped.dynamics._state import seed_state as seed_state
 

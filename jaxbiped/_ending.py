@@ -4,6 +4,7 @@ import enum
 from typing import Any, Self
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 
 
 class NamedCode(enum.IntEnum):
@@ -46,7 +47,8 @@ class Ending(NamedCode):
     - out of steps: the maximum number of solver steps was reached.
     - solver failed: the state is no longer finite.
     - timed out: no footstep, or no arrival at a section, occurred within the allowed time.
-    - finished: a linkage, which does not walk, reached the requested time.
+    - finished: a linkage or a hybrid system, which does not walk, reached the requested time.
+    - chatters: resets follow each other ever faster, or one leaves the state on its guard.
     """
 
     WALKING = 0
@@ -58,3 +60,24 @@ class Ending(NamedCode):
     SOLVER_FAILED = 6
     TIMED_OUT = 9  # 7 and 8 are labels that no single simulation ends with
     FINISHED = 10
+    CHATTERS = 11
+
+
+FIRST_OF_A_SYSTEM = 100
+"""Code of the first ending that a hybrid system names itself."""
+_SHARED = (Ending.OUT_OF_STEPS, Ending.SOLVER_FAILED, Ending.TIMED_OUT, Ending.CHATTERS)
+
+
+@bounded_cache(PROGRAMS)  # one class for one list of names
+def endings_named(names: tuple[str, ...] | None) -> type[NamedCode]:
+    """The endings of a hybrid system: those that any has, and those that it names.
+
+    Reaching the requested time is its ending 0, "finished". None: those of a walker.
+    """
+    if names is None:
+        return Ending
+    members = {"FINISHED": 0} | {ending.name: int(ending) for ending in _SHARED}
+    named = {name.upper().replace(" ", "_"): FIRST_OF_A_SYSTEM + k for k, name in enumerate(names)}
+    made: Any = NamedCode
+    kind: type[NamedCode] = made("Ending", members | named)
+    return kind

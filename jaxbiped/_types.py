@@ -1,6 +1,8 @@
 """Names for the shapes that annotations use, and what is done with trees of any shape."""
 
-from collections.abc import Callable
+import functools
+import operator
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias, TypeVar
 
 import jax
@@ -42,6 +44,11 @@ AT_ONCE = 4096
 
 VectorField: TypeAlias = Callable[[Time, PyTree, PyTree], PyTree]
 """Rates of change f(t, state, args), in the form that `diffrax.ODETerm` takes."""
+
+
+def any_of(values: Sequence[Scalar]) -> Scalar:
+    """Whether any of some conditions holds (boolean); at least one is given."""
+    return functools.reduce(operator.or_, values)
 
 
 def select(condition: Scalar, a: SomeTree, b: SomeTree) -> SomeTree:

@@ -14,7 +14,7 @@ import jax
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.caching._disk_cache import CACHE_VARIABLE
+from jaxbiped.compiler.runtime import _machine_code
 from tests.nightly import Share
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 
@@ -91,6 +91,8 @@ def pytest_configure(config):
     """One cache on disk for all workers: what one compiled others load. In CI it is new."""
     # Commands in the background of a script ignore interrupts, which tests raise.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    if config.option.nightly_share is None:
+        _machine_code.EFFORT = 0
     if "PYTEST_XDIST_WORKER" in os.environ:
         return
     if config.option.nightly_share is None:
@@ -100,13 +102,29 @@ def pytest_configure(config):
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
     else:
         folder = str(config.cache.mkdir("jaxbiped"))
-    os.environ[CACHE_VARIABLE] = folder
+    os.environ["JAXBIPED_CACHE"] = folder
 
 
 @pytest.fixture
 def no_disk_cache(monkeypatch):
     """For a test that changes what a program does behind its fingerprint's back."""
-    monkeypatch.setenv(CACHE_VARIABLE, "")
+    monkeypatch.setenv("JAXBIPED_CACHE", "")
+
+
+@pytest.fixture
+def stages_at_once(monkeypatch):
+    """Stages show themselves at once, and not after two seconds."""
+    monkeypatch.setattr("jaxbiped._progress._PATIENCE", 0.0)
+
+
+@pytest.fixture
+def xla_refuses(monkeypatch):
+    """From when it is called, nothing new is compiled by XLA."""
+
+    def refuse(*_):
+        raise AssertionError("compiled again")
+
+    return lambda: monkeypatch.setattr("jaxbiped.caching._cached_jit.trace_call", refuse)
 
 
 def pytest_collection_finish():

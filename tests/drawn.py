@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-_UNIT = re.compile(r"[(\[].+[)\]]|, relative")
+_UNIT = re.compile(r"\(.+\)")
 
 
 LEGS = np.array([[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00]])

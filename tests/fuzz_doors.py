@@ -95,7 +95,7 @@ def _surfaces(scene: Any, state: Any, wants: Wants) -> None:
     jb.dynamics.exchange_legs(scene, state)
     if not scene.compliant:
         return
-    jb.dynamics.switches(scene, state)
+    jb.hybrid.switches(scene, state)
     for section in (jb.MidStance(), jb.HeelStrike()):
         section.value(scene, state)
 

@@ -7,9 +7,9 @@ import jaxbiped as jb
 
 PACKAGE = Path(jb.__file__).parent
 LAYERS = [
-    "caching", "linalg", "compiler", "constraints", "scene", "dynamics", "solve", "variational",
-    "simulate", "models", "measure", "gait", "continuation", "identify", "basins", "sweep",
-    "optimise", "trade", "plot", "cli",
+    "caching", "linalg", "compiler", "constraints", "scene", "dynamics", "hybrid", "solve",
+    "variational", "simulate", "models", "measure", "gait", "continuation", "identify", "basins",
+    "sweep", "optimise", "trade", "plot", "cli",
 ]  # fmt: skip
 """Packages from the bottom up: each may import those before it."""
 BEGIN, END = "<!-- import graph: begin -->", "<!-- import graph: end -->"

@@ -3,9 +3,7 @@
 import dataclasses
 
 import jaxbiped as jb
-from jaxbiped.scene._bodies import Body, Foot
-from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
-from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped import Body, Coupling, Foot, Latch, Mechanism, Spring, Stop
 
 SLOPE, G = 0.03, 9.8
 LAWS = dict(

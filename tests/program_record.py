@@ -69,6 +69,10 @@ def compliant_walk(**how):
     jb.simulate(jb.seed_scene(slope=0.02), jb.seed_state(), duration=2.0, **how)
 
 
+def rigid_walk(save):
+    jb.simulate(*rigid_gait("garcia"), duration=8.0, save=save)
+
+
 def optimum(scene):
     jb.optimise_gait(scene, vary={"d": (0.05, 0.2)}, maximise="speed", iterations=2)
 
@@ -88,6 +92,8 @@ CALLS = {
     "rigid gait": lambda: jb.find_gait(rigid_seed(0.02)),
     "rigid labels": lambda: labels(rigid_seed(0.02)),
     "rigid optimum": lambda: optimum(rigid_seed(0.02)),
+    "rigid walk, times": lambda: rigid_walk(np.linspace(0.0, 1.0, 9)),
+    "rigid walk, mid-stance": lambda: rigid_walk(jb.MidStance()),
     "rigid batch": lambda: rigid_batch("garcia"),
     "kneed batch": lambda: rigid_batch("hsu_chen"),
     "kneed gait": lambda: jb.find_gait(jb.models.hsu_chen()),
@@ -111,7 +117,7 @@ def programs_of(call):
     finally:
         _kernel.Kernel._trace = trace
     rows = [described(kernel) for kernel in traced]
-    attempts = None if steps is None else int(np.sum(steps))
+    attempts = int(np.sum(steps)) if isinstance(steps, jax.Array) else None
     return {"programs": sorted(rows, key=lambda row: row["hash"]), "attempts": attempts}
 
 

@@ -6,9 +6,7 @@ from reference import mechanism_equations as maximal
 from reference.mechanism_equations import accelerations
 
 import jaxbiped as jb
-from jaxbiped.scene._bodies import Body, Foot
-from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
-from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped import Body, Coupling, Foot, Latch, Mechanism, Spring, Stop
 from tests.mechanism_numbers import bodies_of
 
 

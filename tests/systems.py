@@ -6,10 +6,11 @@ import jaxbiped as jb
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, search
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import precision_of
 
 
-class Plain(jb.gait.AbstractSystem):
+class Plain(jb.hybrid.AbstractSystem):
     """Without switches, endings or load; nothing is done to the state at an arrival."""
 
     def switches(self, args, y):
@@ -23,6 +24,11 @@ class Plain(jb.gait.AbstractSystem):
 
     def load(self, args, y):
         return None
+
+
+def map_of(system, section, *, steps=1, engine="xla"):
+    """The return map of a system, for `orbit_near`; a return takes 20 s at most."""
+    return ReturnMapSpec(system, section, jb.solvers.Rodas4(), 20.0, steps, 32768, engine)
 
 
 def orbit_near(spec, args, guess, active=(0,)):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.scene._scene_checks import check_scene
 
 SCENE, START = jb.seed_scene(), jb.seed_state()
 RIGID, ROLLING = jb.ladder()["rigid"], jb.dynamics.rigid_state(jb.seed_state())
@@ -89,7 +88,8 @@ def test_two_means_two(kind):
     by_float = jb.rigid_walk(put(RIGID, "m", 2.0), ROLLING, duration=2.0).final
     by_kind = jb.rigid_walk(rigid, ROLLING, duration=two).final
     assert jax.tree.all(jax.tree.map(np.array_equal, by_kind, by_float))
-    assert check_scene(rigid, jb.RigidScene).walker.m.dtype == np.float64
+    request = jb.Simulation.prepare(put(SCENE, "m", two), jb.seed_state(), duration=two)
+    assert request.scene.walker.m.dtype == np.float64
 
 
 def ends_alone(make, values):

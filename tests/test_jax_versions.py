@@ -21,10 +21,9 @@ PRIVATE = {
     ("_jax_versions.py", "jaxlib.lapack"),
     ("_jax_versions.py", "jaxlib.mlir.ir"),
     ("gait/_return_map.py", "equinox.internal"),
-    ("gait/_return_map.py", "equinox.internal"),
-    ("solve/_fusion_barrier.py", "equinox.internal"),
+    ("compiler/_fusion_barrier.py", "equinox.internal"),
     ("solve/rosenbrock/_rosenbrock_solver.py", "equinox.internal.ω"),
-    ("sweep/_follow_starts.py", "equinox.internal"),
+    ("sweep/_label_recorders.py", "equinox.internal"),
 }
 """Each name that no other package promises to keep, and where it is used."""
 

@@ -3,18 +3,41 @@
 import math
 import re
 from decimal import Decimal
-from types import SimpleNamespace
 
 import hypothesis
-import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import strategies as st
 
-from jaxbiped._tables import escape_latex, latex_number, latex_table, latex_unit
+from jaxbiped.measure import to_latex
 
 NUMBER = re.compile(r"(-?\d+)(?:\.(\d+))?(?:\((\d+)\))?(?:e(-?\d+))?")
 """As siunitx's manual has it: decimals, an uncertainty in its last digits, an exponent."""
 SIZES = st.floats(1e-12, 1e12)
+
+
+def dataset_of(*columns, dims=("row",)):
+    """A dataset of columns: names with values, error bars or none, and units."""
+    variables = {}
+    for name, values, errors, unit in (each + (None, "")[len(each) - 2 :] for each in columns):
+        attributes = {"long_name": name, "units": unit}
+        if errors is not None:
+            attributes["ancillary_variables"] = f"bars of {name}"
+            variables[f"bars of {name}"] = dims, errors
+        variables[name] = dims, values, attributes
+    return xr.Dataset(variables)
+
+
+def lines_of(*columns):
+    """Heading and rows of a table."""
+    text = to_latex(dataset_of(*columns), "row")
+    _, heading, rows = re.split(r"\\toprule\n|\\midrule\n", text)
+    return [line.removesuffix(r" \\") for line in (heading + rows).splitlines()[:-2]]
+
+
+def number_in(value, error):
+    """A value with its bar, as a cell of a table has it."""
+    return lines_of(("x", [value], None if error is None else [error]))[1]
 
 
 def read(text):
@@ -44,12 +67,13 @@ def read(text):
     ],
 )
 def test_a_value_and_its_bar(value, error, text):
-    assert latex_number(value, error) == text
+    assert number_in(value, error) == text
 
 
+@hypothesis.settings(deadline=None)
 @hypothesis.given(SIZES, SIZES, st.sampled_from([1.0, -1.0]))
 def test_a_bar_has_two_digits_and_nothing_is_lost(size, error, sign):
-    value, bar, last = read(latex_number(sign * size, error))
+    value, bar, last = read(number_in(sign * size, error))
     assert abs(value - Decimal(sign * size)) <= last / 2
     assert abs(bar - Decimal(error)) <= last / 2
     assert 10 <= bar / last <= 100
@@ -69,27 +93,25 @@ def test_a_bar_has_two_digits_and_nothing_is_lost(size, error, sign):
     ],
 )
 def test_units(unit, text):
-    assert latex_unit(unit) == text
+    (heading, _) = lines_of(("x", [1.0], None, unit))
+    assert heading == (f"{{x ({text})}}" if text else "{x}")
 
 
 def test_text_is_escaped_and_mathematics_is_not():
-    assert escape_latex(r"mu_k & 5 % $K_1$") == r"mu\_k \& 5 \% $K_1$"
-
-
-def column(name, values, errors=None, unit=""):
-    errors = None if errors is None else np.array(errors)
-    return SimpleNamespace(name=name, words=name, unit=unit, values=np.array(values), errors=errors)
+    assert lines_of((r"mu_k & 5 % $K_1$", [1.0]))[0] == r"{mu\_k \& 5 \% $K_1$}"
 
 
 def test_columns_have_room_for_their_numbers():
     columns = [
-        column("leg", ["1", "2"]),
-        column("a_b", [0.1, -20.25], [1e-3, 0.5], "m"),
-        column("plain", [1.0, math.nan]),
+        ("leg", ["1", "2"]),
+        ("a_b", [0.1, -20.25], [1e-3, 0.5], "m"),
+        ("plain", [1.0, math.nan]),
     ]
-    mixed = latex_table([column("mixed", [1.0, 22.5, -0.125])], {}, upright=False)
+    mixed = to_latex(dataset_of(("mixed", [1.0, 22.5, -0.125])), "row")
     assert r"\begin{tabular}{S[table-format=-2.3]}" in mixed
-    text = latex_table(columns, {"plain": "$x$"}, upright=False)
+    assert lines_of(*columns)[0] == r"{leg} & {a\_b (\unit{m})} & {plain}"
+    headings = {"leg": "leg", "a_b": r"a\_b", "plain": "$x$"}
+    text = to_latex(dataset_of(*columns), "row", columns=headings)
     assert (
         text.replace(", table-align-uncertainty=false", "")
         == r"""% needs \usepackage{booktabs} and \usepackage{siunitx}
@@ -106,8 +128,8 @@ def test_columns_have_room_for_their_numbers():
 
 
 def test_one_row_is_set_upright():
-    columns = [column("ending", ["found"]), column("period", [0.44], [0.01], "s")]
-    lines = latex_table(columns, {}, upright=True).splitlines()
+    dataset = dataset_of(("ending", "found"), ("period", 0.44, 0.01, "s"), dims=())
+    lines = to_latex(dataset, "").splitlines()
     look = "table-format=1.3(2), separate-uncertainty, table-align-uncertainty=false"
     assert lines[1] == rf"\begin{{tabular}}{{l S[{look}] l}}"
     assert lines[5:7] == [r"ending & {found} &  \\", r"period & 0.440(10) & \unit{s} \\"]

@@ -10,6 +10,7 @@ import jaxbiped as jb
 from tests.import_graph import LAYERS, PACKAGE, drawn, import_graph, imports_of, layer_of
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
+TESTS = sorted((PACKAGE.parent / "tests").rglob("*.py"))
 EXPERIMENTS = sorted((PACKAGE.parent / "experiments").rglob("*.py"))
 
 
@@ -28,6 +29,24 @@ def test_modules_are_short_and_arrows_point_one_way(path):
             assert module == "jaxbiped.compiler", f"past the compiler's front door: {module}"
 
 
+KNOW_A_WALKER = {
+    "solve/_rigid_program.py",  # the rigid loop: its steps, its events, and where it saves
+    "solve/_rigid_steps.py",
+    "solve/_rolling_step.py",
+    "solve/_trajectory.py",  # kinds of scenes and of states, in its types
+}
+
+
+def test_solves_know_systems_and_no_walker():
+    known = {
+        path.relative_to(PACKAGE).as_posix()
+        for package in ("solve", "variational")
+        for path in (PACKAGE / package).rglob("*.py")
+        if {layer_of(module) for module in imports_of(path)} & {"scene", "dynamics"}
+    }
+    assert known == KNOW_A_WALKER
+
+
 def test_every_package_has_a_layer():
     assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} == set(LAYERS)
 
@@ -38,7 +57,7 @@ def test_the_import_graph_of_the_architecture_is_up_to_date():
 
 
 def test_the_top_level_is_small():
-    assert len(jb.__all__) <= 70
+    assert len(jb.__all__) <= 71
 
 
 def test_importing_switches_to_64_bits():
@@ -75,6 +94,39 @@ def test_what_outlives_a_call_is_kept_by_the_caches(path):
         assert "jax.jit" not in map(ast.unparse, decorators), (
             "cached_jit, see jaxbiped/caching/_caches.py"
         )
+
+
+MOST_PRIVATE, MOST_PATCHED = 119, 56
+"""Numbers that may fall, and are then lowered here: a change behind a public function breaks none
+of the tests that ask the function."""
+
+
+def test_few_tests_know_private_modules():
+    private = [
+        path for path in TESTS if any("jaxbiped." in x and "._" in x for x in imports_of(path))
+    ]
+    assert sum(path.name.startswith("test_") for path in private) <= MOST_PRIVATE
+
+
+def _patches_of(path):
+    """Places where attributes of the package are replaced."""
+    tree, ours = ast.parse(path.read_text()), {"jaxbiped"}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            named = [
+                (getattr(node, "module", None) or x.name, x.asname or x.name) for x in node.names
+            ]
+            ours |= {name for module, name in named if module.partition(".")[0] == "jaxbiped"}
+        elif isinstance(node, ast.Assign) and "import_module('jaxbiped" in ast.unparse(node.value):
+            ours |= {ast.unparse(target) for target in node.targets}
+    for node in ast.walk(tree):
+        is_patch = getattr(getattr(node, "func", None), "attr", "") in ("setattr", "setitem")
+        if is_patch and ours & set(re.findall(r"\w+", ast.unparse(node.args[0]))):
+            yield node
+
+
+def test_few_attributes_are_patched():
+    assert sum(len(list(_patches_of(path))) for path in TESTS) <= MOST_PATCHED
 
 
 @pytest.mark.parametrize("path", EXPERIMENTS, ids=lambda path: path.name)

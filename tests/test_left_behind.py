@@ -13,10 +13,11 @@ from jaxbiped._checks import _RULES, traced_rules
 from jaxbiped._jax_versions import trace_ctx, untraced
 from jaxbiped._progress import _outermost, stage
 from jaxbiped.caching._cached_jit import _without_noise
-from jaxbiped.caching._disk_cache import CACHE_VARIABLE, read_entry, write_entry
+from jaxbiped.caching._disk_cache import read_entry, write_entry
+from jaxbiped.compiler import without_barriers
+from jaxbiped.compiler._fusion_barrier import _UP
 from jaxbiped.plot import figure_style
 from jaxbiped.plot._figure_style import _CHOSEN
-from jaxbiped.solve._fusion_barrier import _UP, without_barriers
 from jaxbiped.sweep._store_files import create_store
 
 CAUSES = [KeyboardInterrupt, OSError(28, "No space left on device"), ValueError("no")]
@@ -75,13 +76,13 @@ def test_axes_of_a_trace_are_there_again_behind_what_is_untraced():
 
 @pytest.mark.parametrize("step", ["replace", "fdopen"])
 def test_an_entry_of_the_disk_is_whole_or_not_there(tmp_path, monkeypatch, step):
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path))
     write_entry("xla", "a", b"before")
     monkeypatch.setattr(os, step, raising(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         write_entry("xla", "a", b"after")
     monkeypatch.undo()
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path))
     assert [path.name for path in (tmp_path / "xla").iterdir()] == ["a"]
     assert read_entry("xla", "a") == b"before"
 

@@ -10,8 +10,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped import cli
-from jaxbiped.cli import COMMANDS
-from jaxbiped.cli._options import Command
+from jaxbiped.cli import COMMANDS, Command
 from jaxbiped.compiler import BY_NAME, XLA, AbstractEngine
 from tests.saved_parts import Grip
 

@@ -11,7 +11,8 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._parameter_declaration import parameter_infos
-from jaxbiped._quantity import ParameterInfo, Quantity, si_number
+from jaxbiped._quantity import ParameterInfo, si_number
+from jaxbiped.scene.laws import Quantity
 
 SEED = jb.seed_scene()
 NORMALS = {

@@ -9,7 +9,11 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.continuation import (
+    Axis,
+    BifurcationPoint,
+    Branch,
     BranchEvent,
+    BranchStop,
     bifurcation_curve,
     bifurcation_sensitivities,
     doubling_cascade,
@@ -19,11 +23,7 @@ from jaxbiped.continuation import (
     resume_branch,
     switch_branch,
 )
-from jaxbiped.continuation._bifurcations import BifurcationPoint
-from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._branch_point import axis_of
-from jaxbiped.continuation._trace import BranchStop
-from jaxbiped.gait._search_provenance import BranchEnd
+from jaxbiped.gait import BranchEnd
 from jaxbiped.identify import MeasuredAngles, MeasuredGait
 from tests.mechanisms import FEET, LAWS, LEGS, PAIR, TORSO, WALKERS
 
@@ -41,11 +41,12 @@ MASS_POINTS = jb.Mechanism(
     mirror=PAIR,
 )
 FIT = functools.partial(jb.fit_gait, RIGID)
+BRANCH = functools.partial(jb.continue_gait, RIGID, "slope")
 LABEL = functools.partial(jb.labelling, RIGID)
 STOPS = (BranchStop(BranchEnd.REACHED, "the range ends", 0.01),) * 2
 NONE = Branch(
-    scene=RIGID, points=(), bifurcations=(), stops=STOPS, axis=axis_of(RIGID, "slope", (0.01, 0.1),
-    None), state_type=type(ROLLING), footsteps=1, accuracy="balanced", engine="auto",
+    scene=RIGID, points=(), bifurcations=(), stops=STOPS, axis=Axis("slope", 0.01, 0.1, False,
+    leaf=0), state_type=type(ROLLING), footsteps=1, accuracy="balanced", engine="auto",
 )  # fmt: skip
 
 
@@ -109,12 +110,12 @@ CASES = {
         lambda: jb.find_gait(jb.Scene(UNLIKE, GROUND, **LAWS), footsteps=3), "multiple of 2"
     ),
     # Branches.
-    "along": (lambda: axis_of(RIGID, "slop", (0.0, 1.0), None), "along = 'slop'"),
-    "one bound": (lambda: axis_of(RIGID, "slope", (0.1,), None), "give two numbers"),
-    "NaN": (lambda: axis_of(RIGID, "slope", (0.1, np.nan), None), r"bounds\[1\] = nan"),
-    "one value": (lambda: axis_of(RIGID, "slope", (0.1, 0.1), None), "the range is empty"),
-    "factors from 0": (lambda: axis_of(RIGID, "slope", (0.0, 0.1), True), r"bounds\[0\] = 0"),
-    "value of no scene": (lambda: axis_of(RIGID, "m", (-1.0, 0.1), None), "m = -1"),
+    "along": (lambda: jb.continue_gait(RIGID, "slop", bounds=(0.0, 1.0)), "along = 'slop'"),
+    "one bound": (lambda: BRANCH(bounds=(0.1,)), "give two numbers"),
+    "NaN": (lambda: BRANCH(bounds=(0.1, np.nan)), r"bounds\[1\] = nan"),
+    "one value": (lambda: BRANCH(bounds=(0.1, 0.1)), "the range is empty"),
+    "factors from 0": (lambda: BRANCH(bounds=(0.0, 0.1), log=True), r"bounds\[0\] = 0"),
+    "value of no scene": (lambda: jb.continue_gait(RIGID, "m", bounds=(-1.0, 0.1)), "m = -1"),
     "redundant branch": (
         lambda: jb.continue_gait(REDUNDANT, bounds=(0.01, 0.02)), "redundant coordinates"
     ),

@@ -19,7 +19,7 @@ import pytest
 import xarray
 
 import jaxbiped as jb
-from jaxbiped.models._published_walkers import MODELS
+from jaxbiped.models import MODELS
 from tests import mechanisms, saved_parts
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 

@@ -15,17 +15,31 @@ NUMBERS = {"Scalar", "Array", "PyTree", "RealScalarLike", "Parameter", "Numbers"
 FUNCTIONS = {"Callable", "VectorField", "Arrival"}
 MODULES_TOO = {"AbstractLinearisation.run", "Motor.law", "VariationalField.field"}
 """Functions that may be modules with numbers of their own."""
-WORDS_OR_SHAPES = {"Angle", "LaneRun", "Quantity", "Modes", "Structure", "Effort", "PyTreeDef"}
+WORDS_OR_SHAPES = {
+    "Angle",
+    "LaneRun",
+    "Quantity",
+    "Modes",
+    "Structure",
+    "Effort",
+    "ExplicitMethod",
+    "PyTreeDef",
+}
 """Types of what is the same whatever the numbers are."""
 STATIC_PARTS = {
+    "Branch.section",
     "ErrorEstimate.relative",  # floats of Python, which are known before anything runs
     "ErrorEstimate.rtol",
     "ErrorEstimate.wanted",
     "Flow.system",  # of a program that takes its numbers apart from it
+    "GuardedMotion.kind",
+    "GuardedMotion.time_unit",  # a property of a system's class
     "LinkAngle.weights",
     "Method.optimiser",  # of Optax: functions
     "OneFoot.leg",  # a name
+    "RigidSimulation.section",
     "Simulation.section",
+    "Watch.time_unit",
 }
 NOT_TRACED = "sweep/starts"
 """Whose modules only list starts, outside of any program."""

@@ -1,5 +1,6 @@
 """Summaries, against the walks, batches and sizes that they tell of."""
 
+import dataclasses
 import importlib.metadata
 
 import jax
@@ -8,7 +9,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._summary import _memory
 
 
 def _walk(ending, steps=5, dtype=jnp.float64):
@@ -41,11 +41,19 @@ def test_what_is_traced_prints_as_well():
 
 
 @pytest.mark.parametrize(
-    ("size", "said"),
-    [(0, "0 B"), (999, "999 B"), (1000, "1 kB"), (1500, "1.5 kB"), (2.5e9, "2.5 GB")],
+    ("numbers", "said"),
+    [(0, "24 B"), (121, "992 B"), (122, "1 kB"), (185, "1.5 kB"), (312_500_000, "2.5 GB")],
 )
-def test_memory_in_powers_of_a_thousand(size, said):
-    assert _memory(size) == said
+def test_memory_in_powers_of_a_thousand(numbers, said):
+    """Of so many numbers, and of the ending and two counts beside them."""
+    told = []
+
+    def tell(numbers):
+        told.append(repr(dataclasses.replace(_walk(0, steps=0), t=numbers)))
+        return numbers
+
+    jax.eval_shape(tell, jax.ShapeDtypeStruct((numbers,), jnp.float64))
+    assert told[0].endswith(f" {said})")
 
 
 def test_a_scene_and_its_parts_tell_their_numbers():

@@ -8,8 +8,6 @@ import pytest
 import xarray as xr
 
 import jaxbiped as jb
-from jaxbiped._quantity import Quantity
-from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.identify import FitEnding, GaitFit
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 
@@ -166,23 +164,21 @@ def test_rows_of_any_dataset_go_along_several_dimensions(seed_walk):
     assert "normal_force" not in alone
 
 
-class Bare(Tabular):
-    rows = "place"
-
-    def to_dataset(self):
-        entries = {
-            "pair": Entry(("place", "part"), [[1.0, 2.0], [3.0, 4.0]], Quantity("pair", "", "m"),
-                          [[0.1, 0.2], [0.3, 0.4]]),
-            "by_name": Entry(("place", "named"), [[1.0], [2.0]]),
-            "alone": Entry((), 5.0),
-        }  # fmt: skip
-        return xr.Dataset(variables_of(entries), {"named": ["a"]})
-
-
 def test_dimensions_without_labels_have_a_column_for_each_place():
-    assert Bare().to_csv().splitlines() == [
+    metres, bars = {"units": "m"}, {"ancillary_variables": "pair_error"}
+    pair, errors = np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([[0.1, 0.2], [0.3, 0.4]])
+    dataset = xr.Dataset(
+        {
+            "pair": (("place", "part"), pair, metres | bars),
+            "pair_error": (("place", "part"), errors, metres),
+            "by_name": (("place", "named"), [[1.0], [2.0]]),
+            "alone": ((), 5.0, {"units": ""}),
+        },
+        {"named": ["a"]},
+    )
+    assert jb.measure.to_csv(dataset, "place").splitlines() == [
         "pair_1 [m],pair_error_1 [m],pair_2 [m],pair_error_2 [m]",
         "1.0,0.1,2.0,0.2",
         "3.0,0.3,4.0,0.4",
     ]
-    assert Bare().to_csv(along="") == "alone [1]\n5.0\n"
+    assert jb.measure.to_csv(dataset, "") == "alone [1]\n5.0\n"

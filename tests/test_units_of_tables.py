@@ -1,45 +1,35 @@
 """Units in tables, against dimensions: a rate has its quantity's unit over a second, and so on."""
 
+import re
+
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._state import STATE_QUANTITIES
-from jaxbiped.optimise._objectives import OBJECTIVES
-from jaxbiped.plot import _parameter_charts, _symbols
-from jaxbiped.solve._accuracy import units_of
-from jaxbiped.sweep._store import FIELDS
-from jaxbiped.sweep.starts._coordinates import START_QUANTITIES, state_coordinates
+from jaxbiped.optimise import OBJECTIVES
+from tests.drawn import labels_of
+from tests.plot.test_parameter_charts import POINTS, make_branch
+from tests.sweep.walkers import ByFormula, as_kind, gaitless
 
-METRES, SECONDS, KILOGRAMS = 2.0, 3.0, 5.0
-"""Units of another system, in SI's."""
-SIZES = {"m": METRES, "s": SECONDS, "kg": KILOGRAMS, "rad": 1.0, "1": 1.0, "": 1.0,
-         "N": KILOGRAMS * METRES / SECONDS**2, "J": KILOGRAMS * METRES**2 / SECONDS**2}  # fmt: skip
-
-
-def size(unit):
-    """Of a unit such as "kg m^2/s", in the other system."""
-    found = 1.0
-    for k, part in enumerate(unit.split("/")):
-        for factor in part.split(" "):
-            base, _, power = factor.partition("^")
-            found *= SIZES[base] ** (float(power or 1.0) * (1.0 if k == 0 else -1.0))
-    return found
-
-
+SCENE = jb.seed_scene()
 RATES = {"hip_x": "hip_vx", "hip_z": "hip_vz", "theta_1": "omega_1", "theta_2": "omega_2"}
+ROLES = {"swing": "1", "stance": "2"}
 
 
-def test_rates_of_the_state_have_the_units_of_rates():
+@pytest.fixture(scope="module")
+def walk():
+    return jb.simulate(SCENE, jb.seed_state(), duration=0.1)
+
+
+def test_rates_of_the_state_have_the_units_of_rates(walk):
+    table = jb.measure.trajectory_dataset(SCENE, walk)
+    units = {name: table[name].attrs["units"] for name in jb.State._fields}
     for name, rate in RATES.items():
-        assert STATE_QUANTITIES[rate].unit == f"{STATE_QUANTITIES[name].unit}/s"
-    for name, leaf in state_coordinates(jb.seed_scene()).items():
-        own = START_QUANTITIES.get(name, STATE_QUANTITIES[leaf])
-        assert own.unit == STATE_QUANTITIES[leaf].unit
-    # By what errors are measured in: lengths, √(l/g) and their quotients.
-    scene = jb.with_parameters(jb.seed_scene(), {"l": 0.4 * METRES, "g": 9.8 * METRES / SECONDS**2})
-    inverse = units_of(scene, jb.seed_state()).inverse
-    for name, each in inverse._asdict().items():
-        assert 1.0 / float(each) == pytest.approx(size(STATE_QUANTITIES[name].unit)), name
+        assert units[rate] == f"{units[name]}/s"
+    for name, quantity in jb.starts.coordinate_quantities(SCENE).items():
+        word, _, role = name.rpartition("_")
+        leaf = f"{word}_{ROLES[role]}" if role in ROLES else name
+        if leaf in units:
+            assert quantity.unit == units.get(leaf), name
 
 
 BY_DIMENSION = {
@@ -49,12 +39,33 @@ BY_DIMENSION = {
 }  # fmt: skip
 
 
+def swept_units():
+    """Units of the fields of a sweep."""
+    labelling = as_kind(ByFormula, gaitless(SCENE, jb.seed_state()))
+    starts = jb.starts.grid(SCENE, {"theta_swing": [0.1]})
+    table = jb.sweep(labelling, starts, look_for_gaits=False)
+    own = (set(table.data_vars) & set(jb.labels.Labelled._fields)) - {"cycle_footsteps"}
+    return {name: table[name].attrs.get("units", "") for name in own}
+
+
+def unit_in(label):
+    """The unit that a label ends with, in brackets; a dash for none."""
+    return re.search(r"\(([^()]*)\)$", label)[1].replace("–", "")
+
+
+def branch_units():
+    """Units of the measures that figures of a branch draw."""
+    names = ("period", "step_length", "speed", "peak_normal", "spectral_radius")
+    figures = {name: jb.plot.branch(make_branch(POINTS), name) for name in names}
+    return {name: unit_in(figure.axes[0].get_ylabel()) for name, figure in figures.items()}
+
+
 @pytest.mark.parametrize(
     "table",
     [
         {name: each.quantity.unit for name, each in OBJECTIVES.items()},
-        {name: unit for name, (_, _, unit, _) in FIELDS.items() if name != "cycle_footsteps"},
-        {name: each.unit for name, each in _parameter_charts._MEASURES.items()},
+        swept_units(),
+        branch_units(),
     ],
     ids=["objectives", "fields of a sweep", "measures of a branch"],
 )
@@ -63,10 +74,15 @@ def test_measures_have_the_units_of_what_they_are(table):
         assert unit == BY_DIMENSION.get(name, ""), name
 
 
-def test_axes_of_figures_have_the_units_of_what_they_are():
-    told = {"TIME": "s", "HORIZONTAL": "m", "HEIGHT": "m", "PENETRATION": "m",
-            "NORMAL_FORCE": "N", "TANGENTIAL_FORCE": "N", "SLIP_SPEED": "m/s",
-            "FORCE_RATIO": ""}  # fmt: skip
-    for name, unit in told.items():
-        assert getattr(_symbols, name).unit == unit, name
-    assert (_symbols.angle_of("leg").unit, _symbols.rate_of("leg").unit) == ("rad", "rad/s")
+def test_axes_of_figures_have_the_units_of_what_they_are(walk):
+    units = {"time": "s", "penetration": "mm", "normal": "N", "tangential": "N", "speed": "m/s",
+             "angle": "rad", "rate": "rad/s", "friction over load": ""}  # fmt: skip
+    drawn = (
+        jb.plot.contact_forces(SCENE, walk), jb.plot.penetrations(SCENE, walk),
+        jb.plot.leg_angles(SCENE, walk), jb.plot.phase_portrait(SCENE, walk),
+        jb.plot.friction_law(SCENE.friction), jb.plot.normal_law(SCENE.normal),
+    )  # fmt: skip
+    labels = [label for figure in drawn for label in labels_of(figure)]
+    for word, unit in units.items():
+        found = {unit_in(label) for label in labels if word in label.partition(",")[0]}
+        assert found == {unit}, (word, labels)

@@ -1,5 +1,6 @@
 """Every option of the doors, against what no option takes: one sentence that names it."""
 
+import functools
 import inspect
 
 import jax
@@ -12,7 +13,14 @@ COMPLIANT, START = jb.seed_scene(), jb.seed_state()
 RIGID, ROLLING = jb.ladder()["rigid"], jb.dynamics.rigid_state(START)
 MANY = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), ROLLING)
 PERIOD = jb.identify.MeasuredGait({"period": (0.44, 1e-4)})
-LABEL = jb.labelling(RIGID)
+
+
+@functools.cache
+def _labelling():
+    """Made by a test, because all workers import this file."""
+    return jb.labelling(RIGID)
+
+
 DOORS = {
     "simulate": (jb.simulate, (COMPLIANT, START), dict(duration=0.05)),
     "simulate, rigid": (jb.simulate, (RIGID, ROLLING), dict(footsteps=1)),
@@ -23,7 +31,9 @@ DOORS = {
     "continue_gait": (jb.continue_gait, (RIGID, "slope"), dict(bounds=(0.0199, 0.0201))),
     "gait_sweep": (jb.gait_sweep, (RIGID, {"slope": [0.02]}), {}),
     "labelling": (jb.labelling, (RIGID,), {}),
-    "sweep": (jb.sweep, (LABEL, jb.starts.grid(RIGID, {"omega_swing": [1.0]})), {}),
+    "sweep": (
+        jb.sweep, lambda: (_labelling(), jb.starts.grid(RIGID, {"omega_swing": [1.0]})), {},
+    ),
     "optimise_gait": (
         jb.optimise_gait, (RIGID,), dict(vary={"d": (0.09, 0.11)}, maximise="speed"),
     ),
@@ -43,6 +53,7 @@ OPTIONS = [
 @pytest.mark.parametrize(("door", "name"), OPTIONS)
 def test_what_no_option_takes_is_one_sentence(door, name):
     function, given, named = DOORS[door]
+    given = given() if callable(given) else given
     place = list(inspect.signature(function).parameters).index(name)
     for wrong in (object(), [object()]):
         arguments = list(given)

@@ -14,7 +14,14 @@ from jaxbiped._checks import (
     check_finite,
     check_not_negative,
 )
-from jaxbiped.basins._labels import Label, check_known, check_label_grid, check_no_dataset
+from jaxbiped.basins._labels import (
+    Label,
+    check_known,
+    check_label_grid,
+    check_no_dataset,
+    endings_of,
+    word_of_code,
+)
 
 _RARE = 3
 """Counts up to which an interval's end is that of Poisson's distribution."""
@@ -138,7 +145,7 @@ def fractions(
     """
     _check_confidence(confidence)
     check_no_dataset(labels)
-    names = _names(np.asarray(labels))
+    names = _names(np.asarray(labels), endings_of(labels))
     unsure = np.zeros(np.shape(labels), bool) if doubt is None else np.asarray(doubt, dtype=bool)
     if unsure.shape != np.shape(labels):
         raise ArgumentError(
@@ -159,14 +166,14 @@ def fractions(
     return Fractions(found, Fraction(0.0 if total else np.nan, 0.0, float(most), 0))
 
 
-def _names(labels: np.ndarray) -> np.ndarray:
+def _names(labels: np.ndarray, endings: tuple[str, ...] | None) -> np.ndarray:
     if labels.size == 0:
         raise ArgumentError(f"labels has shape {labels.shape}: it must have at least one entry.")
     if labels.dtype.kind not in "iu":
         return labels.astype(str).ravel()
-    check_known(labels)
+    check_known(labels, endings)
     codes, place = np.unique(labels.ravel(), return_inverse=True)
-    return np.asarray([str(Label(code)) for code in codes])[place]
+    return np.asarray([word_of_code(code, endings) for code in codes])[place]
 
 
 def _check_confidence(value: float) -> None:

@@ -1,22 +1,28 @@
 """Labels: what became of a start, whether that is in doubt, and how many are likely wrong."""
 
 import enum
+import functools
 import json
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError, warn
-from jaxbiped._ending import Ending, NamedCode
+from jaxbiped._ending import FIRST_OF_A_SYSTEM, Ending, NamedCode, endings_named
 from jaxbiped._files import JsonObject
 
 if TYPE_CHECKING:
     import xarray
 
-WALKING_NAME = "walking period-{cycle_footsteps}"
-"""What a start that walks is called, by the footsteps in a cycle of its gait."""
+WALKING_NAME = "{motion} period-{cycle_footsteps}"
+"""What a start is called that converges to a gait, by the footsteps in a cycle of its gait."""
+PERIODIC = "periodic"
+"""What the motion of a hybrid system is called that converges to a cycle."""
+ENDINGS = "endings"
+"""Attribute of a dataset's labels that holds, as JSON, the names of a hybrid system's endings."""
 ERRORS = "label_errors"
 """Attribute that holds, as JSON, the estimated errors of labels."""
 _QUANTILE = 1.96
@@ -25,11 +31,11 @@ _QUANTILE = 1.96
 
 class Label(NamedCode):
     """What became of a start. `str(label)` is its name in words; every `Ending` of a walk is
-    a label.
+    a label. Codes from 100 on are the endings that a hybrid system names.
 
-    - walking: it converges to a periodic gait.
-    - fell forward, fell back, stopped, stumbled, out of steps, solver failed, timed out: as in
-      `Ending`.
+    - walking: it converges to a periodic gait. A hybrid system, which does not walk, is "periodic".
+    - fell forward, fell back, stopped, stumbled, out of steps, solver failed, timed out, chatters:
+      as in `Ending`.
     - slid: a foot slid along the ground by more than a leg's length between two footsteps.
     - unresolved: all the footsteps asked for were walked, and nothing was certain yet.
     - pending: not labelled yet.
@@ -45,50 +51,87 @@ class Label(NamedCode):
     SLID = 7
     UNRESOLVED = 8
     TIMED_OUT = Ending.TIMED_OUT.value
+    CHATTERS = Ending.CHATTERS.value
     PENDING = -1
 
 
-def label_name(label: int, cycle_footsteps: int = 0) -> str:
+def label_name(
+    label: int, cycle_footsteps: int = 0, *, endings: Sequence[str] | None = None
+) -> str:
     """A label in words, where it walks with the footsteps in a cycle of its gait.
 
     Args:
-        label: code of a `Label`.
+        label: code of a `Label`, or of an ending that a hybrid system names.
         cycle_footsteps: footsteps in the cycle of the gait.
+        endings: names of the endings of a hybrid system (`Labelled.endings`); None for a walker.
 
     Returns:
         The name.
 
     Raises:
-        ValueError: a code that no `Label` has.
+        ValueError: a code that no `Label` has, nor any of the endings.
 
     Examples:
         >>> import jaxbiped as jb
         >>> jb.basins.label_name(0, 2), jb.basins.label_name(1)
         ('walking period-2', 'fell forward')
     """
-    walks = label == Label.WALKING
-    return WALKING_NAME.format(cycle_footsteps=cycle_footsteps) if walks else str(Label(label))
+    if label == Label.WALKING:
+        motion = str(Label.WALKING) if endings is None else PERIODIC
+        return WALKING_NAME.format(motion=motion, cycle_footsteps=cycle_footsteps)
+    return word_of_code(label, endings)
 
 
-def label_names(label: npt.ArrayLike, cycle_footsteps: npt.ArrayLike) -> np.ndarray:
+def word_of_code(label: int, endings: Sequence[str] | None = None) -> str:
+    """The word for a code of `Label` or of an ending that a hybrid system names.
+
+    Raises:
+        ValueError: a code that no `Label` has, nor any of the endings.
+    """
+    if endings is None:
+        return str(Label(label))
+    if label == Label.WALKING:
+        return PERIODIC
+    return str(Label(label) if label < FIRST_OF_A_SYSTEM else endings_named(tuple(endings))(label))
+
+
+def label_names(
+    label: npt.ArrayLike,
+    cycle_footsteps: npt.ArrayLike,
+    *,
+    endings: Sequence[str] | None = None,
+) -> np.ndarray:
     """`label_name` of every entry; arrays of one shape.
 
     Args:
         label: codes of `Label`, any shape.
         cycle_footsteps: footsteps in the cycle of each gait, a shape that broadcasts with it.
+        endings: names of the endings of a hybrid system (`Labelled.endings`). Default: those that
+            `label` tells, if it is a variable of a sweep's dataset; else those of a walker.
 
     Returns:
         Names, of the broadcast shape.
 
     Raises:
-        ValueError: a code that no `Label` has.
+        ValueError: a code that no `Label` has, nor any of the endings.
 
     Examples:
         >>> import jaxbiped as jb
         >>> jb.basins.label_names([0, 7], [1, 0]).tolist()
         ['walking period-1', 'slid']
     """
-    return np.asarray(np.vectorize(label_name, otypes=[object])(label, cycle_footsteps))
+    endings = endings_of(label) if endings is None else endings
+    name = functools.partial(label_name, endings=endings)
+    return np.asarray(np.vectorize(name, otypes=[object])(label, cycle_footsteps))
+
+
+def endings_of(labels: object) -> tuple[str, ...] | None:
+    """Names of the endings of the hybrid system whose labels these are, as a dataset keeps them.
+
+    None for labels of a walker, and for those that tell nothing.
+    """
+    names = getattr(labels, "attrs", {}).get(ENDINGS)
+    return None if names is None else tuple(json.loads(names))
 
 
 class Doubt(enum.IntEnum):
@@ -156,11 +199,18 @@ def _lists_starts(labels: Any) -> bool:
     return hasattr(labels, "iloc") and np.ndim(labels) == 1
 
 
-def check_known(labels: np.ndarray) -> None:
-    """Raises `ArgumentError` for whole numbers that are no code of `Label`."""
-    unknown = sorted(set(np.unique(labels).tolist()) - set(map(int, Label)))
-    if unknown:
-        raise ArgumentError(f"labels holds {unknown[0]}: it must hold names or codes of Label.")
+def check_known(labels: np.ndarray, endings: Sequence[str] | None = None) -> None:
+    """Raises `ArgumentError` for whole numbers that are no code of `Label` or of the endings."""
+    codes = {*map(int, Label), *range(FIRST_OF_A_SYSTEM, FIRST_OF_A_SYSTEM + len(endings or ()))}
+    unknown = sorted(set(np.unique(labels).tolist()) - codes)
+    if not unknown:
+        return
+    if unknown[0] >= FIRST_OF_A_SYSTEM:
+        raise ArgumentError(
+            f"labels holds {unknown[0]}, an ending that a hybrid system names: give the names of "
+            "label_names, or the label of a sweep's dataset."
+        )
+    raise ArgumentError(f"labels holds {unknown[0]}: it must hold names or codes of Label.")
 
 
 class LabelErrors(NamedTuple):

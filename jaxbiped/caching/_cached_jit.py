@@ -212,6 +212,8 @@ _TRACES = [0]
 """How many traces go on just now; the last to end leaves things as they were found."""
 _FOUND: list[tuple[bool, float]] = []
 """Whether the collector was on, and how long a spell was, when the first of them began."""
+_FROZEN = threading.Event()
+"""Set once the user froze objects: to count them visits every one."""
 
 
 @contextlib.contextmanager
@@ -238,9 +240,12 @@ def long_trace() -> Iterator[None]:
             if not _TRACES[0]:
                 collects, spell = _FOUND.pop()
                 sys.setswitchinterval(spell)
-                if not gc.get_freeze_count():  # what the user froze stays frozen
-                    gc.freeze()
-                    gc.unfreeze()
+                if not _FROZEN.is_set():
+                    if gc.get_freeze_count():
+                        _FROZEN.set()  # what the user froze stays frozen
+                    else:
+                        gc.freeze()
+                        gc.unfreeze()
                 if collects:
                     gc.enable()
 

@@ -150,7 +150,7 @@ def _basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
 
 
 def _label_names(found: "xarray.Dataset") -> "np.ndarray":
-    return jb.basins.label_names(found.label.values, found.cycle_footsteps.values)
+    return jb.basins.label_names(found.label, found.cycle_footsteps.values)
 
 
 def _print(report: Report, numbers: JsonObject) -> None:

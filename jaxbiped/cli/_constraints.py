@@ -63,15 +63,6 @@ class Integrator(NamedTuple):
             )
         return Integrator(name, dt=value) if fixed else Integrator(name, rtol=value)
 
-    @property
-    def by_lanes(self) -> bool:
-        """Whether lanes have it: their programs are made in a seventh of the time of XLA's."""
-        import jax
-
-        solver = jb.solvers.SOLVERS[self.solver]()
-        able = self.dt is None and isinstance(solver, jb.solvers.AbstractRosenbrock)
-        return able and jax.default_backend() == "cpu"
-
 
 class ConstraintRun(NamedTuple):
     """One method with one integrator.
@@ -189,9 +180,9 @@ def compare_constraints(
     """Runs every method with every integrator from one start, compiled and timed apart.
 
     The truth is the minimal formulation's state at the end, at a tolerance of 1e-10. As many
-    programs as there are threads are compiled at once; nothing is while a run is timed. Lanes run
-    what they can, XLA the rest. Each run is given as it is done, the integrators with the quickest
-    programs first, the methods of each together. Of `repeats` runs the fastest counts.
+    programs as there are threads are compiled at once; nothing is while a run is timed. Each run is
+    given as it is done, the integrators with the quickest programs first, the methods of each
+    together. Of `repeats` runs the fastest counts.
     """
     from concurrent.futures import ThreadPoolExecutor
 
@@ -199,9 +190,7 @@ def compare_constraints(
 
     with stage("simulating the minimal formulation to compare with"):
         truth = final_truth(scene, state, duration)
-    quick_first = sorted(
-        integrators, key=lambda each: (not each.by_lanes, each.solver not in _EXPLICIT)
-    )
+    quick_first = sorted(integrators, key=lambda each: each.solver not in _EXPLICIT)
     every = [
         (name, jb.RedundantScene(scene, jb.constraints.CONSTRAINT_METHODS[name]()), integrator)
         for integrator in quick_first
@@ -243,10 +232,7 @@ def _compiled(
         extremes=jb.dynamics.violation,
         watch=(),  # stops for nothing but a failure
         max_solver_steps=_MOST_STEPS,
-        engine="lanes" if integrator.by_lanes else "xla",
     )
-    # XLA takes over where the scene holds an operation that lanes lack.
-    request = dataclasses.replace(request, replaceable=True)
     moment = dataclasses.replace(request, duration=as_float(1e-6 * duration))
     jax.block_until_ready(moment())
     return request

@@ -19,9 +19,9 @@ from jaxbiped.cli._options import OutputOptions
 from jaxbiped.constraints._constraint_methods import name_of
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._energy import is_driven
+from jaxbiped.hybrid._scales import unresolved_slip
 from jaxbiped.measure._footsteps import footstep_dataset
 from jaxbiped.measure._samples import evaluate_along, from_start, places_of_standing
-from jaxbiped.solve._accuracy import unresolved_slip
 from jaxbiped.solve._error_estimate import error_numbers
 
 _SHOWN = 60.0

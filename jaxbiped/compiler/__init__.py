@@ -5,6 +5,8 @@ engines that run a `Program`, `LANES`, `CUDA` and their twin `XLA`, each by `can
 `run(request)`.
 """
 
+from jaxbiped.compiler._fusion_barrier import fusion_barrier as fusion_barrier
+from jaxbiped.compiler._fusion_barrier import without_barriers as without_barriers
 from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES as ARCHITECTURES
 from jaxbiped.compiler.codegen._ptx_kernel import ptx_text as ptx_text
 from jaxbiped.compiler.host_code._host_jit import host_jit as host_jit

@@ -21,6 +21,8 @@ from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._gait import QUANTITIES
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
@@ -52,10 +54,11 @@ class Branch(eqx.Module, Tabular):
         state_type: type of the states on the section.
         footsteps: number of footsteps of a cycle.
         accuracy, engine: accuracy and engine with which it was followed.
+        section: section on which the cycles begin; None for the scene's own.
     """
 
     rows: ClassVar[str] = "point"
-    scene: Scene | RigidScene
+    scene: Scene | RigidScene | HybridSystem
     points: tuple[BranchPoint, ...]
     bifurcations: tuple[BifurcationPoint, ...]
     stops: tuple[BranchStop, BranchStop]
@@ -64,6 +67,7 @@ class Branch(eqx.Module, Tabular):
     footsteps: int = eqx.field(static=True)
     accuracy: str = eqx.field(static=True)
     engine: str = eqx.field(static=True)
+    section: AbstractSection | None = eqx.field(static=True, default=None)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -111,7 +115,7 @@ class Branch(eqx.Module, Tabular):
         found = found.point if isinstance(found, BifurcationPoint) else found
         return state_at(self.state_type, found.recurring)
 
-    def scene_at(self, point: int | BranchPoint | BifurcationPoint) -> Scene | RigidScene:
+    def scene_at(self, point: int | BranchPoint | BifurcationPoint) -> Any:
         """The scene of a gait: of the point with that number, or of a given point."""
         value = self.points[point].value if isinstance(point, int) else point.value
         return with_parameters(self.scene, {self.axis.name: value})
@@ -213,12 +217,18 @@ def _entries(
     return {before + name: entry for name, entry in entries.items()}
 
 
-def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
+def open_branch(
+    dataset: "xarray.Dataset",
+    scene: Scene | RigidScene | HybridSystem,
+    *,
+    section: AbstractSection | None = None,
+) -> Branch:
     """The branch that a dataset holds, to draw it or to continue it with `resume_branch`.
 
     Args:
         dataset: a dataset from `Branch.to_dataset`, also after it was stored and opened again.
         scene: the scene of the branch.
+        section: the section of its cycles, if it was given.
 
     Returns:
         The branch.
@@ -226,7 +236,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
     Raises:
         ArgumentError: the dataset is of another kind or another scene, or lacks a variable.
     """
-    scene = check_scene(scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene, HybridSystem)
     if "branch" not in dataset.attrs:
         raise ArgumentError("dataset is not allowed: it must be that of a branch.")
     settings = json.loads(dataset.attrs["branch"])
@@ -254,6 +264,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
         stops=(first, last),
         axis=Axis(**settings["axis"]),
         state_type=kind,
+        section=section_of(scene, section),
         **{name: settings[name] for name in _HOW},
     )
 

@@ -100,14 +100,15 @@ class CycleFootsteps(NamedTuple):
 
 
 class BranchPoint(NamedTuple):
-    """A gait on a branch. The state has m components besides hip_x.
+    """A gait on a branch. The state has m components besides those that are cyclic, as hip_x.
 
     Attributes:
         value: value of the parameter, SI units.
         recurring: the m components, shape (m,).
         period: duration of the cycle [s].
-        step_length: advance along the slope in the cycle [m].
-        peak_normal: largest normal force on a foot [N].
+        step_length: advance along the slope in the cycle [m], or of a hybrid system's first cyclic
+            coordinate; NaN if it has none.
+        peak_normal: largest normal force on a foot [N]; 0 for a hybrid system.
         multipliers: Floquet multipliers, largest first, without the trivial one, shape (m − 1,).
         multiplier_errors: estimated errors of the multipliers, shape (m − 1,); infinite if the gait
             grazes a switch.

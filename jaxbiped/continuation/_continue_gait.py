@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -40,11 +41,14 @@ from jaxbiped.gait._pseudo_arclength import Attempt, Change, Curve, CurvePoint, 
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
 from jaxbiped.gait._search_provenance import BranchEnd, explain_search
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
+from jaxbiped.hybrid._hybrid_system import HybridSystem, any_state
+from jaxbiped.hybrid._scales import recurring_sizes
+from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import with_parameters
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene, is_walker
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
-from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of, recurring_sizes
+from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
 
 _TOLD_BY_CONTACT = (BranchEnd.BREAKS_OFF, BranchEnd.WALK_ENDS)
 _CONVERGED = 3.0
@@ -64,7 +68,7 @@ class ContinuationSetup(NamedTuple):
         problem: how cycles are followed.
     """
 
-    scene: Scene | RigidScene
+    scene: Scene | RigidScene | HybridSystem
     axis: Axis
     arrivals: int
     accuracy: str
@@ -106,7 +110,7 @@ class ContinuationSetup(NamedTuple):
 
     def with_footsteps(self, point: BranchPoint) -> BranchPoint:
         """The same point with its cycle's footsteps, if these are several."""
-        if self.arrivals == 1 or point.footsteps is not None:
+        if self.arrivals == 1 or point.footsteps is not None or not is_walker(self.scene):
             return point
         scene = with_parameters(self.scene, {self.axis.name: point.value})
         begins, rows = point.recurring, []
@@ -150,30 +154,40 @@ class ContinuationSetup(NamedTuple):
             footsteps=self.footsteps,
             accuracy=self.accuracy,
             engine=self.problem.spec.engine,
+            section=self.problem.spec.section,
         )
 
 
 def continuation_setup(
-    scene: Scene | RigidScene, axis: Axis, *, footsteps: int | None, accuracy: str, engine: str
+    scene: Scene | RigidScene | HybridSystem,
+    axis: Axis,
+    *,
+    footsteps: int | None,
+    accuracy: str,
+    engine: str,
+    section: AbstractSection | None = None,
 ) -> ContinuationSetup:
     """The setup for a scene.
 
     Raises:
         ArgumentError: an engine that cannot, or footsteps that are no whole cycles.
     """
-    scene = check_scene(scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene, HybridSystem)
     arrivals = arrivals_of(scene, footsteps)
-    like = default_guess(scene)
+    like = any_state(scene) if isinstance(scene, HybridSystem) else default_guess(scene)
     # A branch may come to gaits that are costlier than those of a search.
     most = max(each.max_solver_steps for each in ACCURACIES.values())
-    spec = return_map_spec(scene, like, solver=None, engine=engine, max_solver_steps=most)
+    spec = return_map_spec(
+        scene, like, section=section, solver=None, engine=engine, max_solver_steps=most
+    )
     problem = CycleProblem(spec, scene, like, precision_of(accuracy, scene))
     return ContinuationSetup(scene, axis, arrivals, accuracy, problem)
 
 
 def setup_of(branch: Branch, **others: Any) -> ContinuationSetup:
     """The setup by which a branch was followed, with other settings where these are given."""
-    own = {name: getattr(branch, name) for name in ("axis", "footsteps", "accuracy", "engine")}
+    names = ("axis", "footsteps", "accuracy", "engine", "section")
+    own = {name: getattr(branch, name) for name in names}
     return continuation_setup(branch.scene, **own | others)
 
 
@@ -184,17 +198,18 @@ def check_followed(scene: object) -> None:
             "scene is not allowed in redundant coordinates: its gaits are those of scene.minimal, "
             "which can be followed."
         )
-    check_scene(scene, Scene, RigidScene)
+    check_scene(scene, Scene, RigidScene, HybridSystem)
     check_unbatched("scene", scene)
 
 
 def continue_gait(
-    scene: Scene | RigidScene,
+    scene: Scene | RigidScene | HybridSystem,
     along: str = "slope",
     *,
     bounds: tuple[float, float],
-    guess: Gait | WalkerState | None = None,
+    guess: Gait | WalkerState | PyTree | None = None,
     footsteps: int | None = None,
+    section: AbstractSection | None = None,
     log: bool | None = None,
     largest_step: float = 0.02,
     max_points: int = 200,
@@ -209,12 +224,14 @@ def continue_gait(
     points, the bifurcation is located by root finding and becomes a point of the branch.
 
     Args:
-        scene: the walker, compliant (with bristles or without) or rigid.
+        scene: the walker, compliant (with bristles or without) or rigid, or a hybrid system.
         along: the parameter's name (see `parameter_names`).
         bounds: the range (from, to), SI units, at whose ends the branch stops.
-        guess: a gait or a start near the gait to follow. Default: the gait that `find_gait` finds.
-        footsteps: number of footsteps of a cycle. Default: one for a mirrored walker, those of a
-            stride for unequal legs.
+        guess: a gait or a start near the gait to follow. Default: the gait that `find_gait` finds;
+            a hybrid system needs one.
+        footsteps: number of footsteps of a cycle, or of a hybrid system's arrivals. Default: one
+            for a mirrored walker or a system, those of a stride for unequal legs.
+        section: section on which cycles begin. Default: as of `find_gait`.
         log: whether equal steps are equal factors (if omitted: on if a positive range spans two
             decades).
         largest_step: maximum arclength of a step. In the arclength, the parameter is scaled by the
@@ -248,8 +265,11 @@ def continue_gait(
     check_count("max_points", max_points)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     start = start_of(scene, axis)
+    section = section_of(scene, section)
     near = state_of_guess(scene, guess)
-    setup = continuation_setup(scene, axis, footsteps=footsteps, accuracy=accuracy, engine=engine)
+    setup = continuation_setup(
+        scene, axis, footsteps=footsteps, accuracy=accuracy, engine=engine, section=section
+    )
     with stage(f"following the gait along {along}", unit="gaits", show=progress) as now:
         begin = first_gait(setup, start, near, engine)
         if isinstance(begin, str):
@@ -307,6 +327,7 @@ def first_gait(
         jtu.tree_map(as_float, scene),
         guess,
         footsteps=setup.footsteps,
+        section=setup.problem.spec.section,
         parameters=(),
         accuracy=setup.accuracy,
         engine=engine,

@@ -7,7 +7,7 @@ Kuznetsov, Elements of Applied Bifurcation Theory (2004), sections 10.2.1 and 10
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -132,7 +132,7 @@ def nearest_bifurcation(
     own = float(parameter_values(scene)[along])
     if not factor > 1.0:
         raise ArgumentError(f"factor = {factor!r} is not allowed: it must be above 1.")
-    bounds, level = range_of(scene, along, factor), own == 0.0
+    bounds = range_of(scene, along, factor)
     axis, steps = axis_of(scene, along, bounds, None), gait.step_lengths.shape[0]
     setup = continuation_setup(scene, axis, footsteps=steps, accuracy="balanced", engine="auto")
     begin = first_gait(setup, own, state_of_guess(scene, gait), "auto")
@@ -140,6 +140,12 @@ def nearest_bifurcation(
     if not isinstance(begin, str):
         # What lies beyond a fold are other gaits.
         parts = traces_from(setup, begin, until=tuple(BranchEvent), **STEPS)
+    return nearest_of(along, own, parts)
+
+
+def nearest_of(along: str, own: float, parts: Sequence[Trace]) -> NearestBifurcation:
+    """The nearest of the first events on traces that begin at a parameter's own value."""
+    level = own == 0.0
     first_seen = [each for part in parts for each in part.bifurcations[:1]]
     seen = [each for each in first_seen if level or each.value / own > 0.0]
     if not seen:

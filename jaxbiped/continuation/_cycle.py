@@ -17,7 +17,7 @@ from jaxbiped.compiler import host_jit
 from jaxbiped.gait._fixed_point_search import is_sound, search_by_lanes, takes_steps, with_looser
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.scene._scene import AbstractWalkerScene
+from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 
 NO_WALK = -1
@@ -36,7 +36,7 @@ class Cycle(NamedTuple):
         monodromy: with respect to the components at a fixed time, shape (m, m).
         velocity: their rates where the cycle ends, shape (m,).
         period: duration [s].
-        advance: along the slope [m].
+        advance: along the slope [m], or of a system's first cyclic coordinate; NaN if it has none.
         peak: largest force on a foot [N].
         code: 0 or that of the `Ending` that came instead.
         grazes: how often a switch was touched or missed by less than the tolerance resolves.
@@ -66,13 +66,13 @@ class CycleProblem(NamedTuple):
 
     Attributes:
         spec: of a return to the next arrival.
-        scene: the walker.
+        scene: the walker or system.
         like: any state of it.
         precision: of the solves.
     """
 
     spec: ReturnMapSpec
-    scene: AbstractWalkerScene
+    scene: AbstractScene
     like: PyTree
     precision: Precision
 
@@ -116,6 +116,7 @@ def _chain(
         y = state_with(spec.system, like, jnp.asarray(before.recurring))
         once = linearised_return(spec, seeds, y, precision, before.code != 0)
         own = once.jacobian / units
+        advance = once.advance[0] if len(once.advance) else jnp.asarray(jnp.nan)
         by_parameters = jnp.concatenate([jnp.zeros((m, m)), own[:, m:]], axis=1)
         return Cycle(
             recurring=once.recurring,
@@ -123,11 +124,11 @@ def _chain(
             monodromy=once.monodromy[:, :m] @ before.monodromy,
             velocity=once.velocity,
             period=before.period + once.period,
-            advance=before.advance + once.advance[0],
+            advance=before.advance + advance,
             peak=jnp.maximum(before.peak, once.peak),
             code=jnp.where(before.code != 0, before.code, once.code),
             grazes=before.grazes + once.grazes,
-            sound=before.sound & is_sound(scene, y, once.advance[0], once.period, 0),
+            sound=before.sound & is_sound(scene, y, advance, once.period, 0),
         )
 
     zero = jnp.zeros(())
@@ -144,4 +145,6 @@ def _chain(
         sound=jnp.asarray(True),
     )
     end: Cycle = jax.lax.fori_loop(0, arrivals, add, begin)
+    if not isinstance(scene, AbstractWalkerScene):
+        return end
     return end._replace(sound=end.sound & takes_steps(scene, end.advance, arrivals))

@@ -4,7 +4,7 @@ At the multiplier −1 a cycle of k footsteps throws off one of 2 k, at first al
 Seydel, Practical Bifurcation and Stability Analysis (2010), section 7.4.
 """
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -113,12 +113,26 @@ def doubling_cascade(
     here = _first_doubling(branch) if doubling is None else doubling
     if here is None:
         raise ArgumentError("branch is not allowed: it has no period doubling.")
-    branches, found, step, near = [branch], [here], largest_step, _NEAR
-    while len(found) < doublings:
+
+    def doubled(branch: Branch, doubling: BifurcationPoint, step: float, near: float) -> Branch:
         until = (BranchEvent.PERIOD_DOUBLING,)
-        branches.append(
-            _doubled_branch(branches[-1], found[-1], step, max_points, until=until, near=near)
-        )
+        return _doubled_branch(branch, doubling, step, max_points, until=until, near=near)
+
+    return _cascade_from(branch, here, doublings, largest_step, _NEAR, doubled)
+
+
+def _cascade_from(
+    branch: Branch,
+    here: BifurcationPoint,
+    doublings: int,
+    step: float,
+    near: float,
+    doubled: Callable[[Branch, BifurcationPoint, float, float], Branch],
+) -> DoublingCascade:
+    """Goes from doubling to doubling; steps, and how near a doubled gait is, shrink on the way."""
+    branches, found = [branch], [here]
+    while len(found) < doublings:
+        branches.append(doubled(branches[-1], found[-1], step, near))
         after = _first_doubling(branches[-1])
         if after is None:
             break

@@ -66,9 +66,14 @@ def limit_cause(
     if _load(here, state) < _UNLOADED:
         return "no touch: the stance foot carries nothing on the section"
     known, found = (_slipping_load(scene, state, period) for scene in (before, beyond))
-    if found > max(_SLIDES * known, known + _LITTLE):
+    if slides(known, found):
         return "slip: beyond, a foot that lands slides on"
     return None
+
+
+def slides(known: float, found: float) -> bool:
+    """Whether feet slide under so much more of their load that they do beyond, not before."""
+    return found > max(_SLIDES * known, known + _LITTLE)
 
 
 def _load(scene: Scene, state: WalkerState) -> float:

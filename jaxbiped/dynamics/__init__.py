@@ -11,7 +11,6 @@ from jaxbiped.dynamics._constrained_motion import project as project
 from jaxbiped.dynamics._constrained_motion import violation as violation
 from jaxbiped.dynamics._contacts import FootForce as FootForce
 from jaxbiped.dynamics._contacts import feet as feet
-from jaxbiped.dynamics._contacts import foot_forces as foot_forces
 from jaxbiped.dynamics._energy import Energies as Energies
 from jaxbiped.dynamics._energy import Powers as Powers
 from jaxbiped.dynamics._energy import energies as energies
@@ -21,6 +20,7 @@ from jaxbiped.dynamics._equivalent_states import minimal_state as minimal_state
 from jaxbiped.dynamics._equivalent_states import redundant_state as redundant_state
 from jaxbiped.dynamics._equivalent_states import rigid_state as rigid_state
 from jaxbiped.dynamics._equivalent_states import whole_state as whole_state
+from jaxbiped.dynamics._foot_forces import foot_forces as foot_forces
 from jaxbiped.dynamics._footfalls import FootMotion as FootMotion
 from jaxbiped.dynamics._footfalls import touches as touches
 from jaxbiped.dynamics._impact import Impact as Impact
@@ -38,9 +38,6 @@ from jaxbiped.dynamics._redundant_motion import redundant_motion as redundant_mo
 from jaxbiped.dynamics._stance_motion import rolling as rolling
 from jaxbiped.dynamics._stance_motion import rolling_field as rolling_field
 from jaxbiped.dynamics._state import standing_height as standing_height
-from jaxbiped.dynamics._surfaces import AbstractSection as AbstractSection
-from jaxbiped.dynamics._surfaces import Switch as Switch
-from jaxbiped.dynamics._surfaces import switches as switches
 from jaxbiped.scene._linkages import LinkageScene as LinkageScene
 from jaxbiped.scene._linkages import walker_linkage as walker_linkage
 from jaxbiped.scene._state_types import Accelerations as Accelerations

@@ -157,23 +157,6 @@ def foot_force(scene: CompliantScene, foot: FootMotion) -> FootForce:
     return FootForce(normal, scene.friction.force(normal, foot.slip_speed))
 
 
-@kept_alone
-def foot_forces(scene: CompliantScene, state: CompliantState) -> tuple[FootForce, ...]:
-    """Forces on all feet at a state; leaves shaped as the state's.
-
-    Args:
-        scene: the walker, in minimal or redundant coordinates.
-        state: leaves of any common shape, SI units.
-
-    Returns:
-        Normal and tangential force on each foot [N], leaves shaped as the state's.
-
-    Raises:
-        ArgumentError: the state lacks the bristles that the scene's friction needs.
-    """
-    return tuple(foot_force(scene, foot) for foot in feet(scene, state))
-
-
 class Contacts(NamedTuple):
     """Feet, whether each touches, and the forces on them; leaves shaped as the state's."""
 
@@ -186,7 +169,7 @@ def contacts(scene: CompliantScene, state: CompliantState) -> Contacts:
     """All feet's contacts with the ground."""
     found = feet(scene, state)
     touching = tuple(jnp.broadcast_to(touches(foot), foot.x.shape) for foot in found)
-    return Contacts(found, touching, foot_forces(scene, state))
+    return Contacts(found, touching, tuple(foot_force(scene, foot) for foot in found))
 
 
 def normal_forces(
@@ -231,35 +214,12 @@ def hip_motion(
     )
 
 
-class Gap(NamedTuple):
-    """A gap between two parts that press on each other where it is closed.
-
-    Attributes:
-        penetration: positive where it is closed [m, at a stop rad].
-        penetration_rate: its rate [m/s, rad/s].
-        admitted: whether they may touch; None for "always", False for "never", as of a `Foot`.
-    """
-
-    penetration: Scalar
-    penetration_rate: Scalar
-    admitted: Scalar | bool | None
-
-
 def limits_of(
     scene: CompliantScene, state: CompliantState
 ) -> tuple[tuple[AbstractNormalLaw, Pressed], ...]:
     """Every limit of the stops of a scene with its law."""
     motion = motion_in(scene, state)
     return stop_limits(scene.mechanism, motion, scene.ground.slope)
-
-
-def gaps(scene: CompliantScene, state: CompliantState) -> tuple[Gap, ...]:
-    """All gaps of a scene: those of its feet, then those of its stops."""
-    under = [
-        Gap(foot.penetration, foot.penetration_rate, foot.admitted) for foot in feet(scene, state)
-    ]
-    at_stops = [Gap(limit.penetration, limit.rate, None) for _, limit in limits_of(scene, state)]
-    return (*under, *at_stops)
 
 
 def contact_places(scene: CompliantScene, state: CompliantState) -> tuple[Scalar, ...]:

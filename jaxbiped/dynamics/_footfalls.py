@@ -1,14 +1,13 @@
 """Feet, legs and footfalls: how they move, which legs touch, and which of them come down ahead."""
 
 import functools
-import operator
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
 
 from jaxbiped._trigonometry import angle_of_vector
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, any_of
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._tree import PointMotion, Pose
 from jaxbiped.scene._structure import Structure
@@ -52,11 +51,6 @@ def touches(foot: FootMotion) -> Scalar:
     """
     below = foot.penetration > 0.0
     return below if foot.admitted is None else below & foot.admitted
-
-
-def any_of(values: Sequence[Scalar]) -> Scalar:
-    """Whether any of some conditions holds (boolean); at least one is given."""
-    return functools.reduce(operator.or_, values)
 
 
 def touching_legs(structure: Structure, feet: Sequence[FootMotion]) -> tuple[Scalar, ...]:

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._implicit_field import fold
+from jaxbiped.dynamics._force_balance import fold
 from jaxbiped.dynamics._stance import Stance, angles_and_rates, stance_on
 from jaxbiped.linalg._small_matrices import symmetric_factors
 from jaxbiped.linalg._sparse_lu import SparseFactors

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from jaxbiped._types import Scalar, Time, VectorField
+from jaxbiped._types import Scalar, Time
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import Carriers, load_shares, with_driven_joints
 from jaxbiped.dynamics._contacts import (
@@ -17,14 +17,8 @@ from jaxbiped.dynamics._contacts import (
 )
 from jaxbiped.dynamics._equivalent_states import CompliantState, motion_in
 from jaxbiped.dynamics._footfalls import FootMotion
-from jaxbiped.dynamics._implicit_field import (
-    AbstractImplicitField,
-    Residual,
-    force_balance,
-    free_mass_entries,
-)
+from jaxbiped.dynamics._force_balance import force_balance, free_mass_entries
 from jaxbiped.dynamics._joint_loads import with_constraint_torques
-from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, Pose, point_motion, pose_of
 from jaxbiped.dynamics._tree_inertia import Composites, composites, eliminate, inertial_loads
 from jaxbiped.linalg._sparse_lu import SparseMatrix, times
@@ -147,36 +141,28 @@ def vector_field(t: Time, state: Any, scene: Scene) -> Any:
     return type(state)(**places, **second, **bristle_rates(scene, state))
 
 
-class WalkerField(AbstractImplicitField):
-    """`vector_field` with the tree's implicit form, in which bristles stand alone."""
+def mass_matrix(scene: Scene, state: CompliantState) -> SparseMatrix:
+    """The mass matrix, by the positions of the coordinates' rates in the state."""
+    at = _at(scene, state)
+    places = _places(at.mechanism.structure, state)
+    entries = free_mass_entries(at.mechanism.structure, at.known, at.pose)
+    return {(places[i], places[j]): entry for (i, j), entry in entries.items()}
 
-    def __call__(self, t: Time, y: CompliantState, args: Scene) -> CompliantState:
-        return vector_field(t, y, args)
 
-    def mass_matrix(self, y: CompliantState, args: Scene) -> SparseMatrix:
-        at = _at(args, y)
-        places = _places(at.mechanism.structure, y)
-        entries = free_mass_entries(at.mechanism.structure, at.known, at.pose)
-        return {(places[i], places[j]): entry for (i, j), entry in entries.items()}
-
-    def residual(self, y: CompliantState, rates: CompliantState, args: Scene) -> Residual:
-        at, (downhill, weight) = _at(args, y), gravity_on(args.ground)
-        structure = at.mechanism.structure
-        given = [getattr(rates, name) for name in structure.rates]
-        given[0], given[1] = given[0] - downhill, given[1] + weight
-        loads = _with_applied_loads(Loads.none(structure), args, at)
-        balance = force_balance(structure, at.known, at.pose, loads, given)
-        found = dict(zip(_places(structure, y), balance, strict=True))
-        for name, rate in bristle_rates(args, y).items():
-            found[y._fields.index(name)] = rate - getattr(rates, name)
-        return found
+def force_residual(scene: Scene, state: CompliantState, rates: CompliantState) -> dict[int, Scalar]:
+    """F − M ẏ at given rates, by the positions of the coordinates' rates and of the bristles."""
+    at, (downhill, weight) = _at(scene, state), gravity_on(scene.ground)
+    structure = at.mechanism.structure
+    given = [getattr(rates, name) for name in structure.rates]
+    given[0], given[1] = given[0] - downhill, given[1] + weight
+    loads = _with_applied_loads(Loads.none(structure), scene, at)
+    balance = force_balance(structure, at.known, at.pose, loads, given)
+    residual = dict(zip(_places(structure, state), balance, strict=True))
+    for name, rate in bristle_rates(scene, state).items():
+        residual[state._fields.index(name)] = rate - getattr(rates, name)
+    return residual
 
 
 def _places(structure: Structure, state: CompliantState) -> list[int]:
     """Where the rates of the coordinates are in a state."""
     return [state._fields.index(name) for name in structure.rates]
-
-
-@field_of.register
-def _(scene: Scene) -> VectorField:
-    return WalkerField()

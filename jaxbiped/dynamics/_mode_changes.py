@@ -21,7 +21,7 @@ from jaxbiped.dynamics._stance_motion import (
     plastic_impact,
     turning_of,
 )
-from jaxbiped.dynamics._surfaces import Switch, rate_unit
+from jaxbiped.dynamics._surfaces import rate_unit
 from jaxbiped.scene._modes import THROUGH_STRIKE, Mode, Modes, leg_after_strike, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 
@@ -32,45 +32,12 @@ _FLIES = 1e-6
 """Rate, in the unit of rates, above which what an impact throws off leaves though it is pressed."""
 
 
-def mode_switches(scene: RigidScene, state: Any) -> tuple[Switch, ...]:
-    """Where a scene's mode changes: gaps and reactions of limits, heights and loads of two feet.
-
-    Values are in rad, heights in units of the walker's, and loads in units of its weight too.
-    """
-    mechanism, modes = scene.mechanism, rigid_modes(scene.mechanism)
-    if not modes.any:
-        return ()
-    weight = mechanism.total_mass * scene.ground.g
-    mode = modes.decoded(jnp, state.mode)
-
-    def gaps_and_reactions(stance: Stance) -> list[Scalar]:
-        reactions = _reactions(stance, turning_of(scene, stance))
-        gaps = [gap_of(scene, limit, stance) for limit in modes.limits]
-        return [*gaps, *(each / (weight * mechanism.height) for each in reactions)]
-
-    pressed = [a & b for a, b in zip(mode.held, _loose(modes, mode), strict=True)]
-    live = [*(~held for held in mode.held), *pressed]
-    values = of_stance(scene, state, gaps_and_reactions) if modes.limits else []
-    found = [_falls(*each) for each in zip(values, live, strict=True)]
-    for leg, flat in modes.flat(mode).items():
-        stance, here = stance_on(scene, state, leg), modes.stands_on(mode, leg)
-        for k, stands in zip(stance.feet, stance.stands, strict=True):
-            found.append(_falls(stance.height(k) / mechanism.height, here & ~stands))
-        loads = foot_loads(scene, stance, turning_of(scene, stance))
-        found += [_falls(load / weight, flat) for load in loads]
-    return tuple(found)
-
-
-def _falls(value: Scalar, live: Scalar) -> Switch:
-    return Switch(value, live, resets=True, first_only=True)
-
-
-def _reactions(stance: Stance, turning: Turning) -> list[Scalar]:
+def held_reactions(stance: Stance, turning: Turning) -> list[Scalar]:
     """Of limits that are held."""
     return turning.reactions[1:] if len(stance.feet) > 1 else turning.reactions
 
 
-def _loose(modes: Modes, mode: Mode) -> list[Any]:
+def loose_limits(modes: Modes, mode: Mode) -> list[Any]:
     """Of each limit, whether it is held only while it is pressed on."""
     by_lock = dict(zip(modes.locks, mode.loose, strict=True))
     return [by_lock.get(i, True) for i in range(len(modes.limits))]
@@ -113,7 +80,7 @@ def grip_at_strike(scene: RigidScene, old: Stance) -> Grip:
     stood = old.leg
     loose = [
         each if limit.leg != stood or limit.holds == THROUGH_STRIKE else True
-        for limit, each in zip(modes.limits, _loose(modes, mode), strict=True)
+        for limit, each in zip(modes.limits, loose_limits(modes, mode), strict=True)
     ]
     hits = _hits(scene, old, modes, mode, SLACK)
     return Grip([held | hit for held, hit in zip(mode.held, hits, strict=True)], loose)
@@ -193,7 +160,7 @@ def _changed(
     ]
     held = [a | b for a, b in zip(mode.held, hits, strict=True)]
     stands = tuple(a | b for a, b in zip(old.stands, comes, strict=True))
-    grip = Grip(held, _loose(modes, mode))
+    grip = Grip(held, loose_limits(modes, mode))
     found = plastic_impact(old, old.feet, stands, None, modes, grip)
     # What rests at a limit has not hit it: it locks nothing.
     rests = [jnp.abs(rate) <= _still(scene) for rate in _gap_rates(old, modes)]
@@ -260,7 +227,7 @@ def _pressed(scene: RigidScene, state: Any, leg: int, least: Scalar | float) -> 
         return state
     count = len(held) - len(modes.limits)
     if modes.limits:
-        loose = [*[False] * count, *_loose(modes, mode)]
+        loose = [*[False] * count, *loose_limits(modes, mode)]
         pressed = least * (scene.ground.g / mechanism.height) - ROUNDING
         held = holds.pressed(turning.unheld, held, loose, pressed)
     tree, rates = stance.tree, stance.pose.motion.rates

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, Time, VectorField
+from jaxbiped._types import Scalar, Time
 from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._linkage import row_times, torque_on, turn_of
 from jaxbiped.dynamics._constrained_motion import (
@@ -17,10 +17,8 @@ from jaxbiped.dynamics._constrained_motion import (
 from jaxbiped.dynamics._contacts import bristles_of, feet, feet_at, foot_force
 from jaxbiped.dynamics._equivalent_states import BodiesState, poses_of
 from jaxbiped.dynamics._footfalls import mean
-from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
 from jaxbiped.dynamics._joint_loads import of_all_bodies
 from jaxbiped.dynamics._minimal_motion import accelerations, bristle_rates, with_torques
-from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import (
     Arm,
     Loads,
@@ -31,7 +29,7 @@ from jaxbiped.dynamics._tree import (
     point_acceleration,
     point_motion,
 )
-from jaxbiped.linalg._sparse_lu import SparseMatrix, times
+from jaxbiped.linalg._sparse_lu import times
 from jaxbiped.scene._bodies import Point
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._linkages import loaded_bodies
@@ -109,25 +107,6 @@ def redundant_field(t: Time, state: BodiesState, scene: RedundantScene) -> Bodie
     _, v = coordinates_of(scene, state)
     moved = with_coordinates(state, v, _linkage_motion(scene, state).accelerations)
     return moved._replace(**bristle_rates(scene, state))
-
-
-class BodiesField(AbstractImplicitField):
-    """`redundant_field`, whose implicit form is its own: forces of constraints reach every body."""
-
-    def __call__(self, t: Time, y: BodiesState, args: RedundantScene) -> BodiesState:
-        return redundant_field(t, y, args)
-
-    def mass_matrix(self, y: BodiesState, args: RedundantScene) -> SparseMatrix:
-        return {}
-
-    def residual(self, y: BodiesState, rates: BodiesState, args: RedundantScene) -> Residual:
-        found = redundant_field(jnp.zeros(()), y, args)
-        return {i: a - b for i, (a, b) in enumerate(zip(found, rates, strict=True))}
-
-
-@field_of.register
-def _(scene: RedundantScene) -> VectorField:
-    return BodiesField()
 
 
 def _linkage_motion(scene: RedundantScene, state: BodiesState) -> LinkageMotion:

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxbiped._parameter_declaration import with_fields
 from jaxbiped._types import Scalar, select
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.dynamics._implicit_field import Weights, free_weights
+from jaxbiped.dynamics._force_balance import Weights, free_weights
 from jaxbiped.dynamics._joint_loads import motion_of
 from jaxbiped.dynamics._tree import Motion, PointMotion, Pose, point_motion, pose_of, rehung
 from jaxbiped.dynamics._tree_inertia import Composites, composites, mass_entries

@@ -9,15 +9,14 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._types import Scalar, Time, VectorField, select
+from jaxbiped._types import Scalar, Time, select
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import Carriers, with_driven_joints
 from jaxbiped.dynamics._contacts import FootForce, legs_in
+from jaxbiped.dynamics._force_balance import fold, fold_matrix
 from jaxbiped.dynamics._holds import Holds, Row, holds_of
-from jaxbiped.dynamics._implicit_field import fold, fold_matrix
 from jaxbiped.dynamics._joint_loads import of_all_bodies
 from jaxbiped.dynamics._stance import Sole, Stance, angles_and_rates, either, of_stance, sole_of
-from jaxbiped.dynamics._state import field_of
 from jaxbiped.dynamics._tree import Loads, rehung
 from jaxbiped.dynamics._tree_inertia import inertial_loads
 from jaxbiped.linalg._sparse_lu import Entry, factorise, plus, product
@@ -156,11 +155,6 @@ def rolling_field(t: Time, state: Any, scene: RigidScene) -> Any:
 
     vx, turning = of_stance(scene, state, moves)
     return type(state)(vx, *rates, *turning, *modes)
-
-
-@field_of.register
-def _(scene: RigidScene) -> VectorField:
-    return rolling_field
 
 
 class Impulse(NamedTuple):

@@ -1,12 +1,12 @@
 """States of scenes: their types, their checks, the seed's start, and what each coordinate is.
 
-A formulation registers its kind of scene here, by `state_type` and `field_of`. A coordinate whose
+A formulation registers its kind of scene here, by `state_type`. A coordinate whose
 name is not known has no size, and is refused where errors are measured in sizes.
 """
 
 import functools
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -15,21 +15,18 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._quantity import Quantity
-from jaxbiped._types import Scalar, VectorField, as_float, by_numpy
+from jaxbiped._types import Scalar, as_float, by_numpy
 from jaxbiped.scene._placement import placement
 from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.scene._state_types import SomeState, State, is_redundant, state_type_of
+
+Periods: TypeAlias = tuple[float | None, ...]
+"""Period of each of some coordinates, None for one that has none; () if none of them has one."""
 
 
 @functools.singledispatch
 def state_type(scene: object) -> type[PyTree]:
     """The type of a scene's states, a NamedTuple of scalar leaves."""
-    raise ArgumentError(f"scene is a {type(scene).__name__}, which is not allowed: give a scene.")
-
-
-@functools.singledispatch
-def field_of(scene: object) -> VectorField:
-    """A scene's vector field f(t, state, scene), in the form that `diffrax.ODETerm` takes."""
     raise ArgumentError(f"scene is a {type(scene).__name__}, which is not allowed: give a scene.")
 
 
@@ -247,8 +244,12 @@ def unit_of(name: str) -> str:
 def cyclic_names(state: Any) -> tuple[str, ...]:
     """Names of the coordinates of a state, or of a kind of state, that no rate depends on.
 
-    They need not recur in a cycle, only advance: the root point's place along the slope.
+    They need not recur in a cycle, only advance: the root point's place along the slope. A
+    system's state tells them in `cyclic`.
     """
+    kind = state if isinstance(state, type) else type(state)
+    if (cyclic := getattr(kind, "cyclic", None)) is not None:
+        return tuple(cyclic)
     first, *rest = state._fields
     turns = any(name.startswith("omega_") for name in rest)
     return (first,) if turns and first.endswith("_x") and not is_redundant(state) else ()
@@ -263,6 +264,26 @@ def recurring_names(state: Any) -> tuple[str, ...]:
 def recurring_leaves(state: Any) -> list[Any]:
     """The coordinates of a state that recur in a cycle."""
     return [getattr(state, name) for name in recurring_names(state)]
+
+
+def periods_of(state: Any) -> Mapping[str, float]:
+    """Period of each coordinate of a state, or of a kind of state, that turns, by name."""
+    kind = state if isinstance(state, type) else type(state)
+    periods: Mapping[str, float] = getattr(kind, "periodic", {})
+    return periods
+
+
+def recurring_periods(state: Any) -> Periods:
+    """Periods of the recurring coordinates of a state or of a kind of state; () if none has one."""
+    periods = periods_of(state)
+    return tuple(periods.get(name) for name in recurring_names(state)) if periods else ()
+
+
+def turned_difference(difference: Any, period: float | None) -> Any:
+    """A difference of a coordinate, modulo its period if it has one: at most half of it."""
+    if period is None:
+        return difference
+    return by_numpy(lambda numpy, x: x - period * numpy.round(x / period), difference)
 
 
 def state_of_recurring(kind: Any, recurring: Iterable[Any], cyclic: Any = 0.0) -> Any:

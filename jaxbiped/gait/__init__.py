@@ -21,7 +21,3 @@ from jaxbiped.gait._search_starts import rolling_starts as rolling_starts
 from jaxbiped.gait._stability import Bifurcation as Bifurcation
 from jaxbiped.gait._stability import Stability as Stability
 from jaxbiped.gait._stability import stability_of as stability_of
-from jaxbiped.variational._hybrid_system import AbstractSystem as AbstractSystem
-from jaxbiped.variational._hybrid_system import RedundantWalking as RedundantWalking
-from jaxbiped.variational._hybrid_system import Rolling as Rolling
-from jaxbiped.variational._hybrid_system import Walking as Walking

@@ -13,12 +13,13 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Gait, Measures
+from jaxbiped.gait._gait import QUANTITIES, Gait, Measures
 from jaxbiped.gait._return_map_spec import orbit_solver
 from jaxbiped.gait._search_provenance import unknown_derivatives
+from jaxbiped.hybrid._scales import relative_to_scene
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import AbstractScene
-from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision, relative_to_scene
+from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
 from jaxbiped.solve._error_estimate import Judged, check_untraced, refine
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 
@@ -39,7 +40,6 @@ _SLOPES_SHARE = 0.5
 _MULTIPLIERS_SHARE = 0.8
 """Part of that sum that is a multiplier's bar: on the same scenes the sum was 28 times the error in
 the median, this part 23 times, and all multipliers lay within it in 99.0 % of them."""
-_NUMBERS = ("period", "step_length", "speed", "peak_normal")
 
 
 def accurate_gait(
@@ -111,7 +111,7 @@ def judge_gait(scene: AbstractScene, gait: Gait, other: Gait, radius: bool) -> J
     }
     of, found = bars["measures"], gait.measures
     shares = [relative_to_scene(scene, of.period, of.state)]
-    shares += [_ratio(getattr(of, name), getattr(found, name)) for name in _NUMBERS]
+    shares += [_ratio(getattr(of, name), getattr(found, name)) for name in _numbers_of(gait)]
     multipliers = np.abs(np.asarray(gait.multipliers))
     shares.append(_ratio(bars["multipliers"].max(), max(1.0, multipliers.max())))
     slopes, unknown = _elasticity_shares(scene, gait, bars["sensitivities"], radius)
@@ -129,7 +129,7 @@ def _elasticity_shares(
     values = parameter_values(scene)
     sizes = np.abs([float(values[name]) for name in gait.parameters])
     sizes = np.where(sizes > 0.0, sizes, 1.0)
-    names = [*_NUMBERS, "spectral_radius"] if radius else list(_NUMBERS)
+    names = [*_numbers_of(gait), "spectral_radius"] if radius else _numbers_of(gait)
     shares, lacking = [], []
     for name in names:
         slopes, errors = (
@@ -143,6 +143,11 @@ def _elasticity_shares(
     told = " and ".join(each.replace("_", " ") for each in lacking)
     why = "the law's force jumps or is infinitely steep there"
     return shares, f"derivatives of the {told} are unknown: {why}"
+
+
+def _numbers_of(gait: Gait) -> list[str]:
+    known = (name for name in QUANTITIES if getattr(gait.measures, name) is not None)
+    return [name for name in known if name != "spectral_radius"]
 
 
 def _bar(estimate: Any, told: Any, other: Any) -> np.ndarray:

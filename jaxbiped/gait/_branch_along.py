@@ -28,10 +28,11 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.gait._walk_waves import is_far_from_seed, walks_of
+from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.scene._walker import Walker
-from jaxbiped.solve._accuracy import Precision, recurring_sizes
+from jaxbiped.solve._accuracy import Precision
 
 _CONTROL = StepControl(first=0.08, largest=0.35, smallest=2e-4)
 _CONVERGED = 2e-5

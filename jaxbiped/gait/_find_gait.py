@@ -22,7 +22,6 @@ from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped.compiler import deferred_checks, host_jit
 from jaxbiped.dynamics._equivalent_states import BodiesState
 from jaxbiped.dynamics._state import recurring_leaves
-from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
@@ -40,13 +39,15 @@ from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes
 from jaxbiped.gait._search_provenance import FoundBy, single_stage_origin, warn_of_unknown
 from jaxbiped.gait._search_starts import start_of_search
+from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._scales import recurring_sizes
+from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import RigidState, State, WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
 from jaxbiped.solve._error_estimate import check_wanted
-from jaxbiped.variational._hybrid_system import section_of
 
 if TYPE_CHECKING:
     import optax
@@ -59,8 +60,8 @@ _SAME = 1e-4
 
 @without_switches
 def find_gait(
-    scene: Scene | RigidScene | RedundantScene,
-    guess: Gait | WalkerState | BodiesState | None = None,
+    scene: Scene | RigidScene | RedundantScene | HybridSystem,
+    guess: Gait | WalkerState | BodiesState | PyTree | None = None,
     *,
     footsteps: int | None = None,
     section: AbstractSection | None = None,
@@ -134,7 +135,7 @@ def find_gait(
         >>> str(gait.outcome), round(float(gait.measures.period), 4)
         ('found', 0.4438)
     """
-    scene = check_scene(scene, Scene, RigidScene, RedundantScene)
+    scene = check_scene(scene, Scene, RigidScene, RedundantScene, HybridSystem)
     if not isinstance(accuracy, str | Precision):
         check_wanted(accuracy, optimiser=optimiser)
         find = functools.partial(
@@ -191,6 +192,7 @@ def find_gait(
         max_evaluations=int(most),
         residual=_RESIDUAL_SHARE * precision.rtol,
         patience=np.asarray(int(most)),
+        sizes=recurring_sizes(scene, start) if isinstance(scene, HybridSystem) else None,
     )
     # One program of lanes serves every search, whatever it is asked for, and what follows it.
     every = active if parameters is None else select_parameters(modelled, None)[1]

@@ -15,10 +15,10 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._ending import NamedCode
-from jaxbiped._types import RealScalarLike, Scalar, by_numpy, is_traced
+from jaxbiped._types import RealScalarLike, Scalar, any_of, by_numpy, is_traced
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._equivalent_states import minimal_state
-from jaxbiped.dynamics._footfalls import FootMotion, any_of, touches
+from jaxbiped.dynamics._footfalls import FootMotion, touches
 from jaxbiped.gait._newton import Method, Progress, Stage, initial_progress, newton_iteration
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
@@ -75,7 +75,8 @@ class Found(NamedTuple):
         evaluations: how often the return map was evaluated.
         history: residual of each evaluation, shape (max_evaluations,), NaN beyond the last.
         sound: whether the orbit is a walk (see `is_sound`).
-        again: the return solved once more, by other steps; None where it was not.
+        columns: both returns solved once more, with derivatives with respect to parameters; None
+            where they were not (see `with_parameter_columns`).
     """
 
     ending: Scalar
@@ -86,24 +87,34 @@ class Found(NamedTuple):
     evaluations: Scalar
     history: Scalar
     sound: Scalar
-    again: LinearisedReturn | None = None
+    columns: LinearisedReturn | None = None
 
     @property
     def last(self) -> LinearisedReturn:
         """The return from the fixed point."""
-        return self._one_of_both(0)
+        return _row(self.both, 0)
 
     @property
     def coarse(self) -> LinearisedReturn:
         """The looser one."""
-        return self._one_of_both(1)
+        return _row(self.both, 1)
 
-    def _one_of_both(self, place: int) -> LinearisedReturn:
-        known: LinearisedReturn = self.both
-        if not is_traced(known):
-            # By NumPy: JAX would compile a program for every shape.
-            known = jax.tree.map(np.asarray, known)
-        return jax.tree.map(lambda leaf: leaf[place], known)
+    @property
+    def fine(self) -> LinearisedReturn:
+        """The return with derivatives with respect to parameters, if any."""
+        return _row(self.both if self.columns is None else self.columns, 0)
+
+    @property
+    def loose(self) -> LinearisedReturn:
+        """The looser one with these."""
+        return _row(self.both if self.columns is None else self.columns, 1)
+
+
+def _row(pair: LinearisedReturn, place: int) -> LinearisedReturn:
+    if not is_traced(pair):
+        # By NumPy: JAX would compile a program for every shape.
+        pair = jax.tree.map(np.asarray, pair)
+    return jax.tree.map(lambda leaf: leaf[place], pair)
 
 
 class FixedPointProblem(NamedTuple):
@@ -127,6 +138,11 @@ class FixedPointProblem(NamedTuple):
 
     def state(self, recurring: Scalar) -> PyTree:
         return state_with(self.spec.system, self.guess, recurring)
+
+    @property
+    def loaded(self) -> bool:
+        """Whether the system has a load, whose largest value is known."""
+        return self.spec.system.load_exists(self.args, self.guess)
 
     def directions(self, m: int) -> tuple[Seeded, Scalar]:
         """Seeds of the m components and the active parameters, and the sizes of these."""
@@ -261,13 +277,15 @@ def takes_steps(scene: AbstractWalkerScene, step_length: Any, arrivals: Any) -> 
     return step_length > shortest * arrivals * scene.arrival_footsteps
 
 
-def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: RealScalarLike) -> Scalar:
+def minimal_cycle(
+    last: LinearisedReturn, error: Scalar, rtol: RealScalarLike, cyclic: tuple[int, ...] = (0,)
+) -> Scalar:
     """The least divisor k of n such that the crossing after k footsteps is the first one.
 
     `last` are the n returns of the cycle, with their nodes; `error` are the estimated errors of the
     components that it begins at, shape (m,).
     """
-    crossings = crossings_of(last)
+    crossings = crossings_of(last, cyclic)
     n = crossings.shape[0]
     if n == 1:
         return jnp.asarray(1)
@@ -284,9 +302,13 @@ def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: RealScalarLike) -
     return by_numpy(least, crossings, error, rtol)
 
 
-def crossings_of(last: LinearisedReturn) -> Scalar:
-    """The m recurring components at the beginning of each of the n returns, shape (n, m)."""
+def crossings_of(last: LinearisedReturn, cyclic: tuple[int, ...] = (0,)) -> Scalar:
+    """The m recurring components at the beginning of each of the n returns, shape (n, m).
+
+    `cyclic` are the positions of the others among a state's leaves: a walker's is the first.
+    """
     assert last.nodes is not None
-    m = last.recurring.shape[0]
-    # A row is time, hip_x and then all that must return.
-    return last.nodes.start.reshape(-1, 2 + m)[:, 2:]
+    leaves = last.recurring.shape[0] + len(cyclic)
+    # A row is the time and then all leaves.
+    rows = last.nodes.start.reshape(-1, 1 + leaves)
+    return rows[:, [1 + k for k in range(leaves) if k not in cyclic]]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._checks import check_unbatched
-from jaxbiped._ending import Ending
+from jaxbiped._ending import NamedCode, endings_named
 from jaxbiped._quantity import Quantity
 from jaxbiped._summary import call_text, in_short, notebook_html, summary
 from jaxbiped._tables import Entry, Tabular, variables_of
@@ -43,8 +43,9 @@ class Measures(NamedTuple):
 
     Attributes:
         period: duration of the cycle [s].
-        step_length: advance along the slope in a cycle [m].
-        speed: mean speed along the slope [m/s].
+        step_length: advance along the slope in a cycle [m]; of a hybrid system, that of its first
+            cyclic coordinate, None if it has none.
+        speed: mean speed along the slope [m/s]; None likewise.
         peak_normal: largest normal force on a foot [N]; None if the gradient mode does not provide
             it.
         spectral_radius: largest absolute value of a Floquet multiplier, without the trivial one;
@@ -53,8 +54,8 @@ class Measures(NamedTuple):
     """
 
     period: Scalar
-    step_length: Scalar
-    speed: Scalar
+    step_length: PyTree
+    speed: PyTree
     peak_normal: PyTree
     spectral_radius: PyTree
     state: PyTree
@@ -111,8 +112,10 @@ class Gait(eqx.Module, Tabular):
             unless the accuracy was a number.
         parameters: names of the p parameters.
         engine: engine that computed it: "xla" or "lanes".
-        cycle: "step" for a mirrored walker, "stride" for any other.
+        cycle: "step" for a mirrored walker, "stride" for any other, "cycle" for a hybrid system.
         quantities: words, symbols and units of the parameters; () if they are not known.
+        endings: names of the endings of a hybrid system, which `walk_ending` may tell; None for a
+            walker.
     """
 
     ending: Scalar
@@ -143,6 +146,7 @@ class Gait(eqx.Module, Tabular):
     engine: str = eqx.field(static=True)
     cycle: str = eqx.field(static=True)
     quantities: tuple[Quantity, ...] = eqx.field(static=True, default=())
+    endings: tuple[str, ...] | None = eqx.field(static=True, default=None)
     error: ErrorEstimate | None = None
     _repr_html_ = notebook_html
 
@@ -152,9 +156,15 @@ class Gait(eqx.Module, Tabular):
             return summary(self, like=like, code=code, names=Search, engine=self.engine)
         numbers: dict[str, Any] = {"outcome": str(self.outcome), "residual": self.residual}
         if self.outcome is Search.FOUND:
-            numbers |= {name: getattr(self.measures, name) for name in QUANTITIES}
+            numbers |= {name: getattr(self.measures, name) for name in self.measured}
             numbers["stable"] = bool(self.stable)
         return call_text("Gait", numbers | {"cycle": self.cycle, "engine": self.engine})
+
+    @property
+    def measured(self) -> dict[str, Quantity]:
+        """What is measured of it: those of `QUANTITIES` that its system has."""
+        known = QUANTITIES.items()
+        return {name: q for name, q in known if getattr(self.measures, name) is not None}
 
     @property
     def state(self) -> PyTree:
@@ -167,9 +177,9 @@ class Gait(eqx.Module, Tabular):
         return Search.of(self.ending)
 
     @property
-    def walk_outcome(self) -> Ending:
-        """`Ending` of the last trial that did not return; for one gait, not a batch."""
-        return Ending.of(self.walk_ending)
+    def walk_outcome(self) -> NamedCode:
+        """Ending of the last trial that did not return; for one gait, not a batch."""
+        return endings_named(self.endings).of(self.walk_ending)
 
     @property
     def found_by(self) -> FoundBy:
@@ -244,7 +254,7 @@ def gait_entries(gait: Gait) -> dict[str, Entry]:
         flags = {int(each): str(each) for each in kind}
         words = Quantity(name.replace("_", " "))
         entries[name] = Entry((), np.asarray(code, dtype=np.int8), words, flags=flags)
-    for name, quantity in QUANTITIES.items():
+    for name, quantity in gait.measured.items():
         add(name, getattr(gait.measures, name), quantity, getattr(gait.measure_errors, name))
     for name in recurring_names(gait.measures.state):
         quantity = state_quantity(name) or Quantity(name)
@@ -258,7 +268,7 @@ def gait_entries(gait: Gait) -> dict[str, Entry]:
     add("unit_multiplier_error", gait.unit_multiplier_error, words)
     add("residual", gait.residual, Quantity("residual", "", "SI"))
     add("grazes", gait.grazes, Quantity("switches that are grazed"))
-    for name, quantity in QUANTITIES.items():
+    for name, quantity in gait.measured.items():
         slope, slope_error, elasticity = (
             np.asarray(getattr(each, name))
             for each in (gait.sensitivities, gait.sensitivity_errors, gait.elasticities)

@@ -1,5 +1,7 @@
 """Gait measures as a function of the scene that JAX can differentiate."""
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -9,11 +11,13 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import Scalar, as_float, is_traced
 from jaxbiped.dynamics._state import cyclic_names, recurring_names
-from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.gait._return_map_spec import AbstractGradient, Implicit
+from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._sections import AbstractSection
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.linalg._small_matrices import solution
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
@@ -22,8 +26,8 @@ from jaxbiped.simulate._derivatives import first_derivatives_only
 
 
 def gait_measures(
-    scene: Scene | RigidScene | RedundantScene,
-    guess: Gait | WalkerState | None = None,
+    scene: Scene | RigidScene | RedundantScene | HybridSystem,
+    guess: Gait | WalkerState | PyTree | None = None,
     *,
     gradient: AbstractGradient | None = None,
     footsteps: int | None = None,
@@ -58,7 +62,7 @@ def gait_measures(
         raise ArgumentError(
             f"gradient = {gradient!r} is not allowed: choose Implicit(), Forward() or Reverse()."
         )
-    check_type("scene", scene, Scene, RigidScene, RedundantScene)
+    check_type("scene", scene, Scene, RigidScene, RedundantScene, HybridSystem)
     scene = jtu.tree_map(as_float, scene)
     implicit = isinstance(gradient, Implicit)
     if implicit:
@@ -85,10 +89,10 @@ def gait_measures(
         accuracy=accuracy,
         engine=engine,
     )
-    return _by_correction(gait, once)
+    return _by_correction(scene, gait, once)
 
 
-def _by_theorem(scene: Scene | RigidScene | RedundantScene, gait: Gait) -> Measures:
+def _by_theorem(scene: Any, gait: Gait) -> Measures:
     modelled = scene.minimal
     _, active = select_parameters(modelled, gait.parameters)
     leaves = jtu.tree_leaves(modelled)
@@ -128,18 +132,21 @@ def _differentiated_once_jvp(
     return eqx.combine(once, still), tangents[0]
 
 
-def _by_correction(gait: Gait, once: Return) -> Measures:
+def _by_correction(scene: PyTree, gait: Gait, once: Return) -> Measures:
     """Newton's correction at the gait changes nothing but has the gait's derivatives."""
     state = gait.measures.state
     recurring = recurring_names(state)
-    change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in recurring])
+    after = system_of(scene.minimal).unwrapped(state, once.state)
+    change = jnp.stack([getattr(after, n) - getattr(state, n) for n in recurring])
     size = len(recurring)
     step = solution(jnp.eye(size) - gait.return_jacobian[:size], change)
     corrected = {n: getattr(state, n) + step[i] for i, n in enumerate(recurring)}
-    by_period, by_length = gait.return_jacobian[size:]
-    (along,) = cyclic_names(state)
-    time, length = once.time + by_period @ step, getattr(once.state, along) + by_length @ step
-    measures = Measures(time, length, length / time, None, None, state._replace(**corrected))
+    by_period, *by_advance = gait.return_jacobian[size:]
+    time, length = once.time + by_period @ step, None
+    for name, row in list(zip(cyclic_names(state), by_advance, strict=True))[:1]:
+        length = getattr(after, name) + row @ step
+    speed = None if length is None else length / time
+    measures = Measures(time, length, speed, None, None, state._replace(**corrected))
     return _nan_unless_found(gait, measures)
 
 

@@ -32,15 +32,13 @@ from jaxbiped.gait._search_provenance import Origin
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.scene._parameter_access import parameter_quantities
+from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.scene._structure import Structure
 
 _NOTHING = 1e-9
 """A measure (SI units) that is zero but for the solve's error has no elasticity."""
-_CHANGE_SHARE, _TERMS_SHARE = 1.0, 0.08
-"""What a measure's error has of its change by a looser solve, and of that change's terms at least.
-
-With both, on 60 rigid gaits of random scenes all of 240 measures lay within their bars, and the
-median bar was 8 times the error. So did all of 25 compliant gaits', at 24 times."""
+_TERMS_SHARE = 0.2
+"""What a measure's error has at least of the terms of its change by a looser solve."""
 _ROUNDING = 1e-15
 """Relative error that no tolerance takes away."""
 
@@ -56,29 +54,29 @@ def summarise_gait(
     """
     path = nodes_of(found.last, problem.guess)  # of the search, whose steps are counted
     found = with_parameter_columns(problem, found)
-    orbit = orbit_of(problem, found, radius=radius)
-    stability = orbit.stability
+    return summary_of(problem, orbit_of(problem, found, radius=radius), path, names, origin)
+
+
+def summary_of(
+    problem: FixedPointProblem, orbit: Orbit, path: PyTree, names: tuple[str, ...], origin: Origin
+) -> Gait:
+    """The gait of an orbit, whose nodes are given as `nodes_of` has them."""
+    found, stability = orbit.found, orbit.stability
     last, m = found.last, found.recurring.shape[0]
-    structure = problem.args.mechanism.structure
     lost = found.ending == int(Search.NO_RETURN)
 
     def known(tree: PyTree) -> PyTree:
         """NaN where no cycle was ever completed."""
         return jtu.tree_map(lambda leaf: jnp.where(lost, jnp.nan, leaf), tree)
 
-    measures = Measures(
-        period=last.period,
-        step_length=last.advance[0],
-        speed=last.advance[0] / last.period,
-        peak_normal=last.peak,
-        spectral_radius=stability.spectral_radius,
-        state=orbit.state,
+    measures = _measures(
+        problem, last.period, last.advance, last.peak, stability.spectral_radius, orbit.state
     )
     measures = known(measures)._replace(state=orbit.state)
     slopes = measure_slopes(orbit, measures, orbit.slopes, orbit.radius_slopes)
     backwards = speed_backwards(measures)
     slope_errors = measure_slopes(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
-    errors = measure_errors(measures, orbit)
+    errors = measure_errors(problem, measures, orbit)
     rows = jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])
     told = dict(
         measure_errors=errors,
@@ -107,59 +105,88 @@ def summarise_gait(
         solver_steps=last.attempted,
         grazes=last.grazes,
         cycle_footsteps=problem.args.arrival_footsteps
-        * minimal_cycle(last, off, problem.precision.rtol),
+        * minimal_cycle(last, off, problem.precision.rtol, problem.spec.system.cyclic_coordinates),
         sound=found.sound,
         origin=jtu.tree_map(jnp.asarray, origin),
         orbit=path,
         parameters=names,
         engine=problem.spec.engine,
-        cycle="stride" if len(structure.namings) == 1 else "step",
+        cycle=problem.args.cycle,
+        endings=problem.args.endings,
         quantities=tuple(map(parameter_quantities(problem.args).__getitem__, names)),
     )
 
 
-def measure_errors(measures: Measures, orbit: Orbit) -> Measures:
+def measure_errors(problem: FixedPointProblem, measures: Measures, orbit: Orbit) -> Measures:
     """What Newton's last correction and a looser solve change in the measures.
 
-    A looser solve may change a measure little by chance, but not the terms of that change, taken
-    without their signs.
+    A looser solve may change one measure little by chance, but not period, length, speed and peak
+    alike: relative to the terms of its change, taken without their signs, each error is at least
+    what it changes in these four (root mean square), and a fifth. On 430 rigid gaits of random
+    scenes at "draft", 1,707 of 1,720 measures lay within their bars (the worst 2.0 bars off), and
+    all of 240 of 60 compliant ones; the fifth alone held 1,701, in the median as wide.
     """
     last, coarse = orbit.found.last, orbit.found.coarse
-    fine, loose = (_at_fixed_point(each, orbit) for each in (last, coarse))
+    fine, loose = (_at_fixed_point(problem, each, orbit) for each in (last, coarse))
     radius, backwards = orbit.stability.errors[0], speed_backwards(measures)
-    terms = measure_slopes(orbit, backwards, change_terms(last, coarse), radius)
+    terms = measure_slopes(
+        orbit, backwards, change_terms(last, coarse, problem.spec.system.cyclic_coordinates), radius
+    )
 
-    def error(told: Scalar, fine: Scalar, loose: Scalar, terms: Scalar) -> Scalar:
-        change = _CHANGE_SHARE * (jnp.abs(told - fine) + jnp.abs(fine - loose))
-        return jnp.maximum(change, _TERMS_SHARE * terms) + _ROUNDING * jnp.abs(told)
+    changes = jtu.tree_map(lambda a, b: jnp.abs(a - b), fine, loose)
+    four = zip(*map(jtu.tree_leaves, (changes[:4], terms[:4])), strict=True)
+    shares = jnp.stack([each / jnp.where(size > 0.0, size, jnp.inf) for each, size in four])
+    pooled = jnp.maximum(jnp.sqrt(jnp.mean(shares * shares)), _TERMS_SHARE)
 
-    errors = jtu.tree_map(error, measures, fine, loose, terms)
+    def error(told: Scalar, fine: Scalar, change: Scalar, terms: Scalar) -> Scalar:
+        least = _ROUNDING * jnp.abs(told)
+        return jnp.maximum(jnp.abs(told - fine) + change, pooled * terms) + least
+
+    errors = jtu.tree_map(error, measures, fine, changes, terms)
     return errors._replace(spectral_radius=radius)
+
+
+def _measures(
+    problem: FixedPointProblem,
+    period: Scalar,
+    advance: Scalar,
+    peak: Scalar,
+    radius: Scalar,
+    state: PyTree,
+) -> Measures:
+    """Measures of a cycle; None for what its system has not."""
+    length = advance[0] if len(advance) else None
+    speed = None if length is None else length / period
+    return Measures(period, length, speed, peak if problem.loaded else None, radius, state)
 
 
 def speed_backwards(measures: Measures) -> Measures:
     """For errors: those of length and period add up in the speed's, whatever their signs."""
-    return measures._replace(speed=-jnp.abs(measures.speed))
+    return measures._replace(speed=jax.tree.map(lambda speed: -jnp.abs(speed), measures.speed))
 
 
-def _at_fixed_point(once: LinearisedReturn, orbit: Orbit) -> Measures:
+def _at_fixed_point(problem: FixedPointProblem, once: LinearisedReturn, orbit: Orbit) -> Measures:
     """Measures of a return, linearly extrapolated to its own fixed point."""
     m = orbit.found.recurring.shape[0]
-    begun = crossings_of(once)[0]
+    begun = crossings_of(once, problem.spec.system.cyclic_coordinates)[0]
     correction = solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - begun)
     period = once.period + once.period_row[:m] @ correction
-    length = once.advance[0] + once.advance_rows[0, :m] @ correction
+    advance = once.advance + once.advance_rows[:, :m] @ correction
     peak = once.peak + once.peak_row[:m] @ correction
     state = state_of_recurring(type(orbit.state), begun + correction, jnp.zeros_like(period))
-    return Measures(period, length, length / period, peak, orbit.stability.spectral_radius, state)
+    radius = orbit.stability.spectral_radius
+    return _measures(problem, period, advance, peak, radius, state)
 
 
 def measure_slopes(orbit: Orbit, measures: Measures, slopes: Slopes, radius: Scalar) -> Measures:
     """Derivatives of the measures with respect to parameters in their own sizes, shape (p,)."""
-    length, period = slopes.advance[0], slopes.period
-    speed = (length - measures.speed * period) / measures.period
+    period, peak = slopes.period, None if measures.peak_normal is None else slopes.peak
+    length = speed = None
+    if measures.speed is not None:
+        length = slopes.advance[0]
+        speed = (length - measures.speed * period) / measures.period
     state = state_of_recurring(type(measures.state), slopes.recurring, jnp.zeros_like(period))
-    return Measures(period, length, speed, slopes.peak, radius, state)
+    return Measures(period, length, speed, peak, radius, state)
 
 
 def elasticities_of(problem: FixedPointProblem, measures: Measures, slopes: Measures) -> Measures:
@@ -186,6 +213,8 @@ def step_lengths(problem: FixedPointProblem, last: LinearisedReturn, states: PyT
     The first one is from the last strike of the cycle before. Rigid feet: of the standing foot's
     places just after the strikes.
     """
+    if not isinstance(problem.args, AbstractWalkerScene):
+        return last.advance
     mechanism = problem.args.mechanism
     structure, steps = mechanism.structure, problem.spec.steps
     count = steps * problem.args.arrival_footsteps

@@ -31,9 +31,10 @@ from jaxbiped.gait._search_provenance import (
 )
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
 from jaxbiped.gait._walk_waves import Walks, is_far_from_seed, state_rows, walks_of
+from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Walker
-from jaxbiped.solve._accuracy import ACCURACIES, recurring_sizes
+from jaxbiped.solve._accuracy import ACCURACIES
 
 _PUSHES = (-0.05, -0.01, 0.01, 0.05)
 """Sizes (scaled) of the pushes off an unstable gait from which walks begin as well, and off a

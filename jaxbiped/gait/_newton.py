@@ -6,6 +6,7 @@ Problems (2004), algorithm NLEQ-ERR.
 """
 
 import enum
+import operator
 from typing import TYPE_CHECKING, NamedTuple
 
 import equinox as eqx
@@ -13,7 +14,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, choose
+from jaxbiped._types import Numbers, RealScalarLike, Scalar, choose
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.linalg._small_matrices import solution
 
@@ -25,6 +26,10 @@ _NEAR, _NEARER = 1e-3, 1e-4
 _FLOOR = 10.0
 """Newton's correction, in units of the residual that counts as none, from which one that no longer
 shrinks is the solve's own error: several footsteps of an unstable gait enlarge a residual's."""
+_SINGULAR = 1e-4
+"""Singular value of the slope, over its size, from which on a step along it counts for nothing."""
+_LEFT_OVER = 1e-2
+"""Share of a change that a step along all other directions may leave."""
 _SMALLEST_DAMPING = 1e-3
 """Share of Newton's step below which no step is a step forward."""
 
@@ -38,12 +43,18 @@ class Method(eqx.Module):
         max_evaluations: evaluations for whose history there is room.
         patience: evaluations allowed, at most as many; None for as many.
         residual: largest change of a recurring component over a cycle that counts as none.
+        sizes: what each component's change is measured in, shape (m,); None for SI units.
     """
 
     optimiser: "optax.GradientTransformation | None" = eqx.field(static=True)
     max_evaluations: int = eqx.field(static=True)
     residual: RealScalarLike
     patience: RealScalarLike | None = None
+    sizes: Numbers | None = None
+
+    def measured(self, change: Scalar) -> Scalar:
+        """A change of the components in what it is measured in."""
+        return change if self.sizes is None else change / self.sizes
 
     @property
     def evaluations_allowed(self) -> RealScalarLike:
@@ -53,7 +64,8 @@ class Method(eqx.Module):
 class Stage(enum.IntEnum):
     """Where a search is: on the way to the section, how exactly it solves, or how it ended.
 
-    As a witness of its error, what was found is solved once more, 10 times looser.
+    As a witness of its error, what was found is solved once more, 10 times looser, from Newton's
+    next correction: multipliers, too, are off by what they change from there.
     """
 
     APPROACH = 0
@@ -126,7 +138,7 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
     """One evaluation further: judge the trial, and propose the next."""
     returned = latest.code == 0
     change = latest.recurring - now.trial
-    residual = jnp.where(returned, jnp.max(jnp.abs(change)), jnp.inf)
+    residual = jnp.where(returned, jnp.max(jnp.abs(method.measured(change))), jnp.inf)
     approaching, witness = now.stage == Stage.APPROACH, now.stage == Stage.WITNESS
     place = jnp.where(witness, now.history.shape[0], now.evaluations)
     history = now.history.at[place].set(residual, mode="drop")
@@ -134,8 +146,9 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
         forward = jnp.asarray(True)
         simplified = jnp.zeros_like(change)
     else:
-        simplified = -solution(now.slope, change)
-        forward = jnp.isinf(now.base_residual) | (_size(simplified) < _size(now.step))
+        simplified = -_correction(now.slope, change)
+        sizes = (_size(method.measured(each)) for each in (simplified, now.step))
+        forward = jnp.isinf(now.base_residual) | operator.lt(*sizes)
     better = returned & ~approaching & ~witness & forward
 
     base = jnp.where(better, now.trial, now.base)
@@ -149,15 +162,17 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
     rough_done = (now.stage == Stage.ROUGH) & (base_residual <= _NEAR)
     coarse_done = (now.stage == Stage.COARSE) & (base_residual <= _NEARER)
     refined = rough_done | coarse_done
-    at_floor = returned & ~forward & (_size(now.step) <= _FLOOR * method.residual)
+    at_floor = returned & ~forward & (_size(method.measured(now.step)) <= _FLOOR * method.residual)
     fine_done = (now.stage == Stage.FINE) & ((base_residual <= method.residual) | at_floor)
     nowhere = ~returned & ~jnp.isfinite(base_residual) & (now.stage < Stage.COARSE)
     if method.optimiser is not None:
         step, optimiser = _descent_step(now, base, change, slope, better, method.optimiser)
         damping = jnp.asarray(1.0)
     else:
-        step = jnp.where(better, -solution(slope, change), now.step)
-        damping, optimiser = _damping_factor(now, step, simplified, returned, better), now.optimiser
+        step = jnp.where(better, -_correction(slope, change), now.step)
+        last, next_, plain = map(method.measured, (now.step, step, simplified))
+        damping = _damping_factor(now, last, next_, plain, returned, better)
+        optimiser = now.optimiser
     damping = jnp.where(refined | approaching, 1.0, damping)
     stuck = (damping < _SMALLEST_DAMPING) | (better & ~jnp.all(jnp.isfinite(step)))
     stage = jnp.where(approaching, int(Stage.ROUGH), now.stage)
@@ -167,9 +182,11 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
     stage = jnp.where(fine_done, int(Stage.WITNESS), stage)
     stage = jnp.where(nowhere, int(Stage.NO_RETURN), stage)
     stage = jnp.where(witness, int(Stage.FOUND), stage)
+    correction = step if method.optimiser is None else jnp.zeros_like(step)
+    ahead = jnp.where(fine_done, correction, damping * step)
     return Progress(
         stage=stage,
-        trial=jnp.where(approaching | fine_done, base, base + damping * step),
+        trial=jnp.where(approaching, base, base + ahead),
         base=base,
         # The finer solves begin afresh: their residuals are not the looser ones'.
         base_residual=jnp.where(refined, jnp.inf, base_residual),
@@ -186,22 +203,43 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
 
 
 def _damping_factor(
-    now: Progress, step: Scalar, simplified: Scalar, returned: Scalar, better: Scalar
+    now: Progress, last: Scalar, step: Scalar, simplified: Scalar, returned: Scalar, better: Scalar
 ) -> Scalar:
-    """Share of `step` to try next, from what the last trial told of the map's nonlinearity."""
+    """Share of `step` to try next, from what the trial along the `last` one told of the map."""
     tiny = jnp.finfo(step.dtype).tiny
     # After a step forward: how much Newton's new correction differs from the simplified one.
-    known = _size(now.step) * _size(simplified) * now.damping
+    known = _size(last) * _size(simplified) * now.damping
     ahead = known / (_size(simplified - step) * _size(step) + tiny)
     first = jnp.isinf(now.base_residual)
     ahead = jnp.where(first, 1.0, jnp.minimum(1.0, ahead))
     # After none: how far the simplified correction is from what a linear map would give.
-    expected = (1.0 - now.damping) * now.step
-    back = 0.5 * _size(now.step) * now.damping**2 / (_size(simplified - expected) + tiny)
+    expected = (1.0 - now.damping) * last
+    back = 0.5 * _size(last) * now.damping**2 / (_size(simplified - expected) + tiny)
     back = jnp.where(
         returned, jnp.clip(back, 0.1 * now.damping, 0.5 * now.damping), 0.5 * now.damping
     )
     return jnp.where(better, ahead, back)
+
+
+def _correction(slope: Scalar, change: Scalar) -> Scalar:
+    """What Newton's step is the negative of: the smallest, where the orbits are a family.
+
+    Those of a conservative system are, by their energy: their slope is singular, and the other
+    directions alone are corrected. Where that leaves a part of the change, as behind a fold, there
+    is no orbit to come to, and the plain step tells so.
+    """
+    step = solution(slope, change)
+    scale = jnp.max(jnp.abs(slope))
+    is_far = ~(_size(step) * scale * _SINGULAR <= _size(change))
+
+    def smallest() -> Scalar:
+        damped = slope @ slope.T + (_SINGULAR * scale) ** 2 * jnp.eye(len(change))
+        other = slope.T @ solution(damped, change)
+        solves = _size(slope @ other - change) <= _LEFT_OVER * _size(change)
+        return jnp.where(solves, other, step)
+
+    corrected: Scalar = jax.lax.cond(is_far, smallest, lambda: step)
+    return corrected
 
 
 def _size(step: Scalar) -> Scalar:

@@ -14,8 +14,14 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import RealScalarLike, Scalar
-from jaxbiped.compiler import LANES, XLA
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, with_looser
+from jaxbiped.compiler import XLA
+from jaxbiped.gait._fixed_point_search import (
+    FixedPointProblem,
+    Found,
+    Search,
+    crossings_of,
+    with_looser,
+)
 from jaxbiped.gait._poincare_map import (
     PARAMETER_FLOOR,
     LinearisedReturn,
@@ -25,8 +31,9 @@ from jaxbiped.gait._poincare_map import (
 )
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, has_switches
 from jaxbiped.gait._stability import Stability, stability_of
+from jaxbiped.hybrid._scales import recurring_inverse_units
 from jaxbiped.linalg._small_matrices import eigensystem, solve
-from jaxbiped.solve._accuracy import Precision, recurring_inverse_units
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._adjoint_solve import Adjoints, carry_tangents, pull_back
 from jaxbiped.variational._flow import Flow, tangent_on_section
 from jaxbiped.variational._tangents import Seeded, active_leaves
@@ -36,28 +43,24 @@ CLOSENESS = 1e-3
 _RADIUS_FLOOR = 2e-8
 """Error of the spectral radius's derivatives that no tolerance takes away, in units of the
 parameter's size: of the switches' crossings, which second derivatives magnify."""
-_ROWS = ("jacobian", "monodromy", "period_row", "advance_rows", "peak_row")
-"""Those of a return's leaves that are derivatives."""
 _VALUES = ("recurring", "period", "advance", "peak")
-"""Those that they are derivatives of."""
+_ROWS_OF_VALUES = ("jacobian", "period_row", "advance_rows", "peak_row")
+"""Of a return's leaves, values on the section, and their derivatives."""
+_ROWS = (*_ROWS_OF_VALUES, "monodromy")
+"""All those that are derivatives."""
 _NOTHING = 1e-300
 _POOLED = 0.7
-"""Of what a looser solve changes on the whole, that every derivative is wrong by at least.
-
-Chosen on 150 rigid gaits of random scenes at "draft". Of 7,345 derivatives of 129 others, 99.9 %
-lay within their bars, the worst 1.2 bars off; the median bar was 18 times a first one's error."""
+"""Of what a looser solve changes on the whole, that every derivative is wrong by at least: see the
+table in docs/gradients.md for how many then lie within their bars."""
 _FLOOR = 0.3
-"""Of the error up to which columns are solved however small they are, that derivatives have.
-
-At a pooled share of 0.2, all of 1,500 of 25 compliant gaits lay within, at 24 times the error."""
+"""Of the error up to which columns are solved however small they are, that derivatives have."""
 _LOOSER_SHARE, _TURNED, _TURNED_TERMS = 1.5, 3.0, 0.01
 """Of what a looser solve changes in derivatives of the spectral radius, that they are wrong by; and
 of a multiplier's error over its distance to the others, by which its eigenvectors are turned, that
 they and their terms are: the largest of the three counts.
 
-On 78 rigid and 26 compliant gaits of random scenes, 1,234 of 1,236 such derivatives lay within
-their bars, the worst 4.0 bars off, and the median bar was 28 times the error. On 70 of them, the
-sum of the three held as many, and the median was 34 instead of 25."""
+On 300 compliant gaits of random scenes at "draft", 4,484 of 4,485 such derivatives lay within their
+bars, the worst 1.1 bars off, and the median bar was 66 times the error."""
 _STEP = 0.2
 """Step of differences of Jacobians, in units of the fifth root of the tolerance."""
 
@@ -102,47 +105,47 @@ class Orbit(NamedTuple):
 
 
 def with_parameter_columns(problem: FixedPointProblem, found: Found) -> Found:
-    """What a search found, with derivatives with respect to parameters as well.
+    """What a search found, with derivatives with respect to parameters as well: its `columns`.
 
-    The gait's own values and derivatives stay those of the search. Those of the witness are taken
-    as far from it as its place is uncertain, by Newton's next correction and by the looser solve:
-    at few steps most of their error is that of the place. Of parameters nothing is claimed (NaN)
-    where the search did not converge, or where a solve with these columns does not come to the end.
+    The gait's own values and multipliers stay those of the search, whatever is asked for. At few
+    steps most of the derivatives' error is that of the gait's place. So they are taken at Newton's
+    next correction, and those of the witness as far from there as the looser solve's fixed point
+    is: some ten times the error of the place that is left, as its steps have ten times the error.
+    Of parameters nothing is claimed (NaN) where the search did not converge, or where a solve with
+    these columns does not come to the end.
     """
-    m, own = found.recurring.shape[0], found.both
-    alone = {name: getattr(own, name)[..., :m] for name in _ROWS}
+    m = found.recurring.shape[0]
+    own = found.both._replace(**{name: getattr(found.both, name)[..., :m] for name in _ROWS})
     if not problem.active:
-        return found._replace(both=own._replace(**alone))
+        return found._replace(both=own)
     seeds, _ = problem.directions(m)
     idle = found.ending == int(Search.NO_RETURN)
     lost = idle | (found.ending == int(Search.NOT_CONVERGED))
     spec = problem.spec.with_more_steps()
-    own_change = found.last.recurring - found.recurring
-    # Where a search ends at the looser map's fixed point, their sum would be none.
-    changes = own_change - (found.coarse.recurring - found.last.recurring)
-    off = solve(jnp.eye(m) - found.last.jacobian[:, :m], changes)
+    near = crossings_of(found.coarse, problem.spec.system.cyclic_coordinates)[0]
+    changes = jnp.stack([found.last.recurring - found.recurring, found.coarse.recurring - near])
+    correction, looser = solve(jnp.eye(m) - found.last.jacobian[:, :m], changes.T).T
+    looser = near - found.recurring + looser
+    # On the other side than the looser map's fixed point, where a search may have ended.
+    off = jnp.stack([correction, 2.0 * correction - looser])
     off = jnp.where(lost | ~jnp.isfinite(off), 0.0, off)
 
     def once(given: tuple[Precision, Scalar]) -> LinearisedReturn:
         precision, place = given
         return linearised_return(spec, seeds, problem.state(place), precision, idle)
 
-    places = jnp.stack([found.recurring, found.recurring + off])
-    new = _each_of(spec, once)((with_looser(problem.precision), places))
+    new = _each_of(spec, once)((with_looser(problem.precision), found.recurring + off))
 
-    def joined(name: str) -> Scalar:
+    def known(name: str) -> Scalar:
         every = getattr(new, name)
         unknown = jnp.reshape(lost | (new.code != 0), (-1, *[1] * (every.ndim - 1)))
-        parameters = jnp.where(unknown, jnp.nan, every[..., m:])
-        kept = (name == "monodromy") | unknown.at[0].set(True)
-        return jnp.concatenate([jnp.where(kept, alone[name], every[..., :m]), parameters], axis=-1)
+        return jnp.where(unknown, jnp.nan, every)
 
-    changed = {name: joined(name) for name in _ROWS}
-    for name in ("jumps", "grazes"):
-        changed[name] = jnp.maximum(getattr(own, name), getattr(new, name))
-    again = jax.tree.map(lambda leaf: leaf[0], new._replace(nodes=None))
-    # The search's own steps are half as many: second derivatives had 5 to 184 times the error.
-    return found._replace(both=own._replace(nodes=new.nodes, **changed), again=again)
+    seen: dict[str, Any] = {
+        name: jnp.maximum(getattr(own, name), getattr(new, name)) for name in ("jumps", "grazes")
+    }
+    columns = new._replace(**{name: known(name) for name in _ROWS}, **seen)
+    return found._replace(both=own._replace(**seen), columns=columns)
 
 
 def orbit_of(problem: FixedPointProblem, found: Found, *, radius: bool) -> Orbit:
@@ -157,15 +160,15 @@ def orbit_of(problem: FixedPointProblem, found: Found, *, radius: bool) -> Orbit
     stability = stability_of(monodromy, witness, last.velocity, CLOSENESS)
     unknown = jnp.where(last.grazes > 0, jnp.inf, stability.errors)
     stability = stability._replace(errors=unknown)
-    slopes = slopes_of(last)
+    slopes = slopes_of(found.fine)
     _, sizes = problem.directions(m)
     units = 1.0 / recurring_inverse_units(problem.args, m)
     least = jnp.asarray(problem.precision.tangent_rtol) * PARAMETER_FLOOR * units
     errors = _slope_errors(found, slopes, least)
     radius_slopes = radius_errors = jnp.full(len(problem.active), jnp.nan)
     if radius and problem.active:
-        slopes_of_radius = functools.partial(_radius_slopes, problem)
-        rows = found.both, with_looser(problem.precision)
+        slopes_of_radius = functools.partial(_radius_slopes, problem, least)
+        rows = found.columns, with_looser(problem.precision)
         both, terms, own = _each_of(problem.spec, slopes_of_radius)(rows)
         radius_slopes, radius_errors = both[0], own[0] + _radius_errors(both, terms[0], stability)
         if has_switches(problem.spec.system, problem.args, problem.guess):
@@ -205,36 +208,70 @@ def _slope_errors(found: Found, slopes: Slopes, least: Scalar) -> Slopes:
     """What a looser solve changes and what one by other steps does, and no less than a floor.
 
     Where a single derivative is hardly changed that is chance: terms that make it up are as
-    uncertain as others'. So the changes of a measure are pooled, each relative to the sum of its
-    terms without their signs. The floor is what errors of the components, `least`, shape (m,), make
-    of all else: the solve holds columns to no less.
+    uncertain as others'. So the changes are pooled, each relative to the sum of its terms without
+    their signs. The floor is what errors of the components, `least`, shape (m,), make of all else:
+    the solve holds columns to no less. By other steps, and where the search ended, are the
+    search's own derivatives with respect to the components.
     """
-    last = found.last
-    again = found.last if found.again is None else found.again
-    sizes = _chain_rule(last, _term_sizes(last), jnp.abs)
-    floors = jax.tree.map(lambda leaf: leaf[..., None], _spread(last, least))
+    fine, m = found.fine, found.recurring.shape[0]
+    pairs = {name: (getattr(found.last, name), getattr(fine, name)) for name in _ROWS}
+    searched: dict[str, Any] = {
+        name: jnp.concatenate([own[..., :m], by_all[..., m:]], axis=-1)
+        for name, (own, by_all) in pairs.items()
+    }
 
-    def error(slope: Scalar, looser: Scalar, other: Scalar, size: Scalar, floor: Scalar) -> Scalar:
-        changes = _pooled(jnp.abs(slope - looser), size)
-        return changes + jnp.abs(slope - other) + _FLOOR * floor
+    def change(other: LinearisedReturn) -> Slopes:
+        return jax.tree.map(lambda a, b: jnp.abs(a - b), slopes, slopes_of(other))
 
-    return jax.tree.map(error, slopes, slopes_of(found.coarse), slopes_of(again), sizes, floors)
-
-
-def _pooled(changes: Scalar, sizes: Scalar) -> Scalar:
-    """Changes by p parameters, and no less than a share of what they are on the whole."""
-    shares = changes / jnp.where(sizes == 0.0, 1.0, sizes)
-    whole = jnp.sqrt(jnp.mean(shares * shares, axis=-1, keepdims=True))
-    return jnp.maximum(changes, _POOLED * whole * sizes)
+    sizes = _chain_rule(fine, _term_sizes(fine), jnp.abs)
+    floors = jax.tree.map(lambda leaf: leaf[..., None], _spread(fine, least))
+    parts = _pooled(change(found.loose), sizes, floors), change(fine._replace(**searched)), floors
+    return jax.tree.map(lambda a, b, floor: a + b + _FLOOR * floor, *parts)
 
 
-def change_terms(last: LinearisedReturn, looser: LinearisedReturn) -> Slopes:
-    """What a looser solve from the same point changes in an orbit: its terms without their signs.
+def _pooled(changes: PyTree, sizes: PyTree, floors: PyTree) -> PyTree:
+    """Changes of quantities by p parameters, leaves (…, p), and no less than by chance.
 
-    Leaves are those of `Slopes` without its last axis.
+    That is a share of what those of the same quantity are on the whole, and as much more as those
+    by the same parameter are than all: relative to `sizes`, and to `floors` where these are
+    larger, as of what the section holds.
     """
-    changes = (jnp.abs(getattr(last, name) - getattr(looser, name)) for name in _VALUES)
-    recurring, period, advance, peak = changes
+
+    def share(change: Scalar, size: Scalar, floor: Scalar) -> Scalar:
+        return change / jnp.where(size + floor == 0.0, 1.0, size + floor)
+
+    shares = jax.tree.map(share, changes, sizes, floors)
+    every = jnp.concatenate([jnp.atleast_2d(leaf) for leaf in jax.tree.leaves(shares)])
+    # A quantity without derivatives, as a peak beside a jump may be, tells nothing of the others.
+    by_parameter = _root_mean_square(jnp.where(jnp.isfinite(every), every, 0.0), axis=0)
+    more = by_parameter / (_root_mean_square(by_parameter) + _NOTHING)
+
+    def pooled(change: Scalar, share: Scalar, size: Scalar) -> Scalar:
+        expected = _root_mean_square(share)[..., None] * jnp.maximum(_POOLED, more)
+        return jnp.maximum(change, expected * size)
+
+    return jax.tree.map(pooled, changes, shares, sizes)
+
+
+def _root_mean_square(values: Scalar, axis: int = -1) -> Scalar:
+    return jnp.sqrt(jnp.mean(values * values, axis=axis))
+
+
+def change_terms(
+    last: LinearisedReturn, looser: LinearisedReturn, cyclic: tuple[int, ...] = (0,)
+) -> Slopes:
+    """What a looser solve changes in an orbit: its terms without signs, `Slopes` of one axis less.
+
+    It need not begin where the other does: what that changes is taken off to first order.
+    """
+    m = last.recurring.shape[0]
+    apart = crossings_of(looser, cyclic)[0] - crossings_of(last, cyclic)[0]
+
+    def change(value: str, row: str) -> Scalar:
+        moved = getattr(last, value) + getattr(last, row)[..., :m] @ apart
+        return jnp.abs(moved - getattr(looser, value))
+
+    recurring, period, advance, peak = map(change, _VALUES, _ROWS_OF_VALUES)
     own = Slopes(jnp.zeros_like(recurring), period, advance, peak)
     return jax.tree.map(jnp.add, own, _spread(last, recurring))
 
@@ -254,16 +291,16 @@ def _radius_errors(both: Scalar, terms: Scalar, stability: Stability) -> Scalar:
     apart = jnp.min(jnp.abs(multipliers[1:] - multipliers[0]), initial=jnp.inf)
     turned = stability.errors[0] / jnp.maximum(apart, _NOTHING)
     slopes, looser = both
-    changes = _LOOSER_SHARE * _pooled(jnp.abs(slopes - looser), terms)
+    changes = _LOOSER_SHARE * _pooled(jnp.abs(slopes - looser), terms, 0.0)
     sizes = jnp.maximum(_TURNED * jnp.abs(slopes), _TURNED_TERMS * terms)
     return jnp.maximum(changes, turned * sizes)
 
 
 def _radius_slopes(
-    problem: FixedPointProblem, solved: tuple[LinearisedReturn, Precision]
+    problem: FixedPointProblem, least: Scalar, solved: tuple[LinearisedReturn, Precision]
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """Derivatives of the leading multiplier's absolute value, their terms without signs, and the
-    errors of their differences, (p,).
+    """Derivatives of the leading multiplier's absolute value, their terms without signs, and errors
+    of differences and of the orbit's derivatives, which are solved to no less than `least`, (p,).
 
     dλ = wᵀ (dP_x) v with left and right eigenvectors, dP_x along the orbits' family.
     """
@@ -281,8 +318,10 @@ def _radius_slopes(
     found = second_variation(
         problem.spec, seeds, problem.guess, last, leading, weights, family, sizes, precision
     )
-    terms = jnp.abs(found.by_point) @ _term_sizes(last) + jnp.abs(found.by_parameter)
-    return found.slopes, terms, jnp.broadcast_to(found.errors, found.slopes.shape)
+    by_point = jnp.abs(found.by_point)
+    terms = by_point @ _term_sizes(last) + jnp.abs(found.by_parameter)
+    floor = _FLOOR * by_point @ _inverse_size(last) @ least
+    return found.slopes, terms, jnp.broadcast_to(found.errors + floor, found.slopes.shape)
 
 
 def _term_sizes(last: LinearisedReturn) -> Scalar:
@@ -352,8 +391,7 @@ def second_variation(
         last: the return, with its nodes.
         leading: v directions of the m recurring components, those of the leading eigenpair, which
             move no parameter; (v, m).
-        weights: of the recurring components of each one's second derivatives, (v, m), or of all
-            components, (v, c).
+        weights: of each one's second derivatives, of the recurring components or all, (v, m or c).
         tangents: p other directions, each of which moves one active parameter, shape (m, p).
         sizes: by how much, shape (p,).
         precision: of the return.
@@ -361,7 +399,7 @@ def second_variation(
     Returns:
         For each of the p the sum over components and the v.
     """
-    engine = LANES if spec.engine == "lanes" else XLA
+    engine = XLA if spec.programs is None else spec.programs
     watch = spec.watch(args.args, like)
     assert watch.section is not None
     if has_switches(spec.system, args.args, like, "first_only"):

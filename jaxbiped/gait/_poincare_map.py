@@ -17,17 +17,12 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import Recorded
 from jaxbiped.dynamics._equivalent_states import minimal_state, redundant_state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.solve._accuracy import Precision, recurring_inverse_units
-from jaxbiped.variational._hybrid_system import AbstractSystem
+from jaxbiped.hybrid._scales import recurring_inverse_units
+from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve._watch import Watch
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival, solve_to_section
-from jaxbiped.variational._tangents import (
-    SectionSolve,
-    Seeded,
-    Tangents,
-    Watch,
-    along_columns,
-    as_columns,
-)
+from jaxbiped.variational._tangents import SectionSolve, Seeded, Tangents, along_columns, as_columns
 from jaxbiped.variational._variational_solve import solve_to_section_by_lanes
 
 STATE_FLOOR = 0.1
@@ -176,13 +171,23 @@ def _entry_coordinates(spec: ReturnMapSpec, y: Tangents, args: Seeded) -> Tangen
     return Tangents(state, as_columns(columns))
 
 
+class _Exit(eqx.Module):
+    """The state behind the reset, in the cycle's own coordinates."""
+
+    system: AbstractSystem
+
+    def __call__(self, args: PyTree, y: PyTree) -> PyTree:
+        return self.system.reset_map(args, minimal_state(args, y))
+
+
 def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) -> SectionArrival:
     """A solve's arrival in the cycle's own coordinates, behind the reset."""
     reset = spec.system.reset_map
     if spec.within is None:
         state, moved = along_columns(lambda s, a: reset(a, s), found.y, args)
         return found._replace(y=Tangents(state, as_columns(moved)))
-    state, columns = along_columns(lambda s, a: reset(a, minimal_state(a, s)), found.y, args)
+    leave = _Exit(spec.system)
+    state, columns = along_columns(lambda s, a: leave(a, s), found.y, args)
     nodes = found.nodes
     if nodes is not None:
         assert isinstance(nodes.ends, Recorded)
@@ -210,15 +215,18 @@ def _next_arrival(
     """The next arrival, by the engine that is asked for, and there the state behind the reset."""
     how = SectionSolve(watch, spec.solver, precision, limit, spec.max_solver_steps)
     m = args.seeds.shape[1] - len(args.active)
-    if spec.engine == "xla":
+    if spec.programs is None:
         deaf = (jnp.arange(len(args.floors)) >= m) & ~jnp.asarray(carries_parameters)
         floors = jnp.where(deaf, jnp.inf, args.floors)
         args = Seeded(args.args, args.seeds, floors, args.active)
         found = solve_to_section(how, y0, args, save_nodes=True)
         return _exit_coordinates(spec, found, args)
     sizes = jnp.diagonal(args.seeds[:, m:])
-    how = how._replace(watch=dataclasses.replace(watch, arrival=spec.system.reset_map))
-    return solve_to_section_by_lanes(how, y0, args, sizes, carries_parameters)
+    arrival, told = spec.system.reset_map, None
+    if spec.within is not None:
+        arrival, told = _Exit(spec.system), minimal_state
+    how = how._replace(watch=dataclasses.replace(watch, arrival=arrival, told=told))
+    return solve_to_section_by_lanes(how, y0, args, sizes, carries_parameters, spec.programs)
 
 
 def _chain_arrivals(
@@ -232,7 +240,8 @@ def _chain_arrivals(
 ) -> LinearisedReturn:
     places = jnp.asarray(recurring_indices(spec.system, y))
     cyclic_coordinates = jnp.asarray(spec.system.cyclic_coordinates, dtype=int)
-    before, after = jnp.stack(jtu.tree_leaves(y)), jnp.stack(jtu.tree_leaves(end.state))
+    last = spec.system.unwrapped(y, end.state)
+    before, after = jnp.stack(jtu.tree_leaves(y)), jnp.stack(jtu.tree_leaves(last))
     highest = jnp.argmax(arrivals.peak)
     return LinearisedReturn(
         recurring=after[places],

@@ -22,7 +22,6 @@ from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Scalar, Time, as_float, in_64_bits, select
 from jaxbiped.dynamics._equivalent_states import minimal_state, redundant_state
 from jaxbiped.dynamics._state import check_leaves, without_whole_turns
-from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._poincare_map import (
     PARAMETER_FLOOR,
     STATE_FLOOR,
@@ -41,13 +40,16 @@ from jaxbiped.gait._return_map_spec import (
     has_switches,
     return_map_spec,
 )
+from jaxbiped.hybrid._hybrid_system import HybridSystem, start_of_system
+from jaxbiped.hybrid._scales import units_of
+from jaxbiped.hybrid._sections import AbstractSection, section_of, with_leg_names_of
+from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.simulate._derivatives import first_derivatives_only
-from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, Precision, precision_of, units_of
-from jaxbiped.variational._hybrid_system import AbstractSystem, section_of, with_leg_names_of
+from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, Precision, precision_of
 from jaxbiped.variational._solve_to_section import SectionArrival, solve_to_section
 from jaxbiped.variational._tangents import SectionSolve, Seeded, Tangents, VariationalSolution
 from jaxbiped.variational._variational_solve import solve_variational
@@ -63,7 +65,7 @@ _Arrived: TypeAlias = tuple[PyTree, Scalar, Scalar]
 @eqx.filter_custom_jvp
 def forward(spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree) -> _Arrived:
     """The next arrival, its derivatives those of tangents that are carried along the motion."""
-    if spec.engine == "lanes":
+    if spec.programs is not None:
         solved = _solve(spec, precision, args, state, (), ())
         return _reset_on_arrival(spec, args, solved.state, solved.t, solved.code)
     found = _arrival(spec, precision, args, state)
@@ -81,7 +83,7 @@ def _forward_jvp(
             f"{type(spec.system).__name__} or {type(spec.section).__name__} holds what is "
             "differentiated: it must be among args, whose derivatives are carried."
         )
-    tangent = _tangent_by_lanes if spec.engine == "lanes" else _tangent_by_xla
+    tangent = _tangent_by_xla if spec.programs is None else _tangent_by_lanes
     moving, still = eqx.partition((args, state), eqx.is_array)
     moving = first_derivatives_only(moving, "a return map with gradient = Forward()")
     once = eqx.combine(moving, still)
@@ -140,7 +142,7 @@ def _tangent_by_lanes(
 
 def reverse(spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree) -> _Arrived:
     """The next arrival, differentiable in reverse mode."""
-    if spec.engine == "lanes":
+    if spec.programs is not None:
         return _reverse_by_lanes((args, state), spec, precision)
     return _reverse_by_xla(spec, precision, args, state)
 
@@ -301,6 +303,7 @@ def _solve(
         Tangents(state, jnp.asarray(columns)),
         Seeded(args, jnp.zeros((p, m + p)), floors, active),
         jnp.stack(_sizes(args, active)) if active else jnp.zeros(0),
+        engine=spec.programs,
     )
     nan = jnp.where(found.undetermined, jnp.nan, 0.0)
     return found._replace(columns=found.columns + nan, time_columns=found.time_columns + nan)
@@ -347,7 +350,7 @@ def return_map(
     accuracy: str = "balanced",
     system: AbstractSystem | None = None,
     solver: str | diffrax.AbstractSolver[PyTree] | None = None,
-    max_time: Time = 10.0,
+    max_time: Time | None = None,
     engine: str = "auto",
 ) -> Return:
     """Follows a motion to its next arrival at a section, differentiably.
@@ -365,8 +368,9 @@ def return_map(
         system: another system, an `AbstractSystem`. Default: the walker.
         solver: a name (see `SOLVERS`) or any diffrax solver that estimates its errors. Default:
             "rodas4"; for a rigid walker "rodas5p".
-        max_time: maximum time to an arrival [s].
-        engine: "xla", "lanes" or "auto" (see `ENGINES`); for a system of your own, "auto" is "xla".
+        max_time: maximum time to an arrival [s]. Default: 10 s, or 10 units of a hybrid system's
+            time.
+        engine: "xla", "lanes" or "auto" (see `ENGINES`); with `system`, "auto" is "xla".
             With the lanes engine, all directions of a derivative share one solve.
 
     Returns:
@@ -381,12 +385,11 @@ def return_map(
     gradient = Forward() if gradient is None else gradient
     check_gradient(gradient)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
+    max_time = 10.0 * getattr(args, "time_unit", 1.0) if max_time is None else max_time
     check_positive("max_time", max_time, "s", one=True)
     if system is None:
-        args = check_scene(args, Scene, RigidScene, RedundantScene)
-        if not hasattr(state, "_fields"):
-            raise ArgumentError(f"state = {state!r} is not allowed: give a State.")
-        state = without_whole_turns(args, in_64_bits(check_leaves(state, "state")))
+        args = check_scene(args, Scene, RigidScene, RedundantScene, HybridSystem)
+        state = _checked_start(args, state)
     arrivals = arrivals_of(args, footsteps)
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
     enters = system is None and isinstance(args, RedundantScene) and not is_redundant(state)
@@ -415,6 +418,14 @@ def return_map(
         time = time + jnp.where(code == 0, lasted, 0.0)
         code = jnp.where(code == 0, came, code)
     return Return(minimal_state(args, state) if enters else state, time, code)
+
+
+def _checked_start(scene: Any, state: PyTree) -> PyTree:
+    if isinstance(scene, HybridSystem):
+        return start_of_system(scene, state)
+    if not hasattr(state, "_fields"):
+        raise ArgumentError(f"state = {state!r} is not allowed: give a State.")
+    return without_whole_turns(scene, in_64_bits(check_leaves(state, "state")))
 
 
 def linearise_return_map(
@@ -464,7 +475,7 @@ def linearise_return_map(
         ArgumentError: an argument is not allowed; raised before anything is compiled.
     """
     if system is None:
-        check_type("args", args, Scene, RigidScene)
+        check_type("args", args, Scene, RigidScene, HybridSystem)
     for name, tolerance in (("rtol", rtol), ("tangent_rtol", tangent_rtol)):
         check_positive(name, tolerance)
     check_positive("max_time", max_time, "s", one=True)

@@ -12,23 +12,29 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_count, check_type
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.caching._cached_jit import note_code
-from jaxbiped.dynamics._surfaces import AbstractSection
+from jaxbiped.compiler import LANES, XLA, AbstractEngine
+from jaxbiped.hybrid._sections import AbstractSection, section_of
+from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._clearance import check_legs_admitted_alike
 from jaxbiped.scene._ground import check_pulls
-from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, Scene, is_rigid
+from jaxbiped.scene._scene import (
+    AbstractScene,
+    AbstractWalkerScene,
+    RedundantScene,
+    Scene,
+    is_rigid,
+)
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
 from jaxbiped.solve._solvers import solver_named, with_projection
-from jaxbiped.variational._hybrid_system import (
-    AbstractSystem,
-    RedundantWalking,
-    section_of,
-    system_of,
-)
-from jaxbiped.variational._tangents import Watch
+from jaxbiped.solve._watch import Watch
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""
+_PATIENCE_OF_SYSTEMS = 1e6
+"""The same of a hybrid system's, in its unit of time."""
 _MORE_STEPS = 4
 """Factor of the steps that a return may take where it carries columns of parameters: small
 sensitivities are solved as exactly as large ones."""
@@ -75,6 +81,7 @@ class ReturnMapSpec(eqx.Module):
         engine: "xla" or "lanes".
         within: the system that is solved, where its coordinates are redundant: every solve
             enters them and leaves them again, so that a cycle knows nothing of constraints.
+        resets: whether switches reset the state.
     """
 
     system: AbstractSystem
@@ -85,6 +92,14 @@ class ReturnMapSpec(eqx.Module):
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)
     within: AbstractSystem | None = None
+    resets: bool = eqx.field(static=True, default=False)
+
+    @property
+    def programs(self) -> AbstractEngine | None:
+        """The engine whose programs solve it; None where diffrax does, which resets no state."""
+        if self.engine == "lanes":
+            return LANES
+        return XLA if self.resets else None
 
     def with_more_steps(self) -> "ReturnMapSpec":
         """The same with the steps that a return with columns of parameters may take."""
@@ -100,14 +115,18 @@ class ReturnMapSpec(eqx.Module):
     ) -> Watch:
         """What the solves end on: a section is looked at after the arrival's reset."""
         system = self.system if of is None else of
-        loaded = eqx.filter_eval_shape(system.load, args, y) is not None
+        loaded = system.load_exists(args, y)
         return Watch(
             field=system.vector_field,
             switches=system.switches,
             section=_Arrival(system, self.section),
+            asked_before=self.section.behind_reset,
             ending=system.ending,
             peak=system.load if peak and loaded else None,
             reset=system.reset_at_switch if has_switches(system, args, y, "resets") else None,
+            repeats=system.repeats if system.resets else None,
+            time_unit=system.time_unit,
+            project=system.project if system.projects(args) else None,
         )
 
 
@@ -167,21 +186,29 @@ def return_map_spec(
         check_legs_admitted_alike(args.clearance, structure.legs, images)
     section = section_of(args, section)
     method = orbit_solver(solver, rigid=is_rigid(args))
-    obstacle = lane_obstacle(method, section, (args, state))
-    own, within = system_of(args) if system is None else system, None
+    obstacle = lane_obstacle(method, section, (args, state), columns=True)
+    own, within = system_of(args.minimal) if system is None else system, None
+    own = own.observed_at(section)
     if system is None and isinstance(args, RedundantScene):
-        obstacle = "redundant coordinates are diffrax's"
-        method, within = with_projection(args, method), RedundantWalking()
+        within = system_of(args)
         if is_redundant(state):
             own, within = within, None
     elif holds_arrays(system):
         obstacle = f"the system {type(system).__name__} holds arrays, which belong in args"
     by = engine_for(engine, obstacle=obstacle, prefers_xla=system is not None)
-    if by == "xla" and has_switches(own, args, state, "resets"):
+    resets = has_switches(own, args, state, "resets")
+    if by == "xla" and resets and not own.lands:  # which would compile for minutes
         raise ArgumentError(
             f"engine = {engine!r} is not allowed for a walker whose modes change: its gaits are "
             'found by lanes; give engine="lanes" and one of its solvers (rodas3p to rodas5p).'
         )
+    if resets and not isinstance(method, AbstractRosenbrock):
+        raise ArgumentError(
+            f"solver = {type(method).__name__} is not allowed where the state is reset within a "
+            "cycle: give one of rodas3p to rodas5p."
+        )
+    if by == "xla":
+        method = with_projection(own if within is None else within, args, method)
     return ReturnMapSpec(
         system=own,
         section=section,
@@ -191,6 +218,7 @@ def return_map_spec(
         max_solver_steps=max_solver_steps,
         engine=by,
         within=within,
+        resets=resets,
     )
 
 
@@ -202,7 +230,7 @@ def arrivals_of(args: PyTree, footsteps: int | None) -> int:
     """
     own = each = 1
     if isinstance(args, AbstractWalkerScene):
-        own, each = args.mechanism.structure.cycle_footsteps, args.arrival_footsteps
+        own, each = args.cycle_footsteps, args.arrival_footsteps
     if footsteps is None:
         return own // each
     check_count("footsteps", footsteps)
@@ -214,8 +242,10 @@ def arrivals_of(args: PyTree, footsteps: int | None) -> int:
     return int(footsteps) // each
 
 
-def patience_of(scene: AbstractWalkerScene) -> Scalar:
-    """Time that a walker's next arrival may take [s]."""
+def patience_of(scene: AbstractScene) -> Scalar | float:
+    """Time that the next arrival may take [s]."""
+    if not isinstance(scene, AbstractWalkerScene):
+        return _PATIENCE_OF_SYSTEMS * scene.time_unit
     check_pulls(scene.ground)
     found: Scalar = by_numpy(
         lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.mechanism.height, scene.ground.g

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._checks import check_positive
+from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped._types import Scalar, as_float, in_64_bits
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import bounded_cache
@@ -17,9 +17,11 @@ from jaxbiped.dynamics._contacts import legs_in
 from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._joint_loads import motion_of
 from jaxbiped.dynamics._state import seed_state, state_for, state_type
-from jaxbiped.dynamics._surfaces import AbstractSection, rate_unit
+from jaxbiped.dynamics._surfaces import rate_unit
 from jaxbiped.dynamics._tree import pose_of
 from jaxbiped.gait._gait import Gait
+from jaxbiped.hybrid._hybrid_system import HybridSystem, start_of_system
+from jaxbiped.hybrid._sections import AbstractSection, with_leg_names_of
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode, rigid_modes
@@ -29,13 +31,12 @@ from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, RigidScen
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import State, WalkerState
 from jaxbiped.scene._structure import Angle
-from jaxbiped.variational._hybrid_system import with_leg_names_of
 
 _BEND = 1.5
 """Largest bend of a joint with a stop in a scattered swing leg, in units of the spread [rad]."""
 
 
-def default_guess(scene: AbstractWalkerScene) -> WalkerState:
+def default_guess(scene: Any) -> WalkerState:
     """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight.
 
     The stance leg's line from the root point to its feet has the angle and the rate of the seed's,
@@ -48,21 +49,27 @@ def default_guess(scene: AbstractWalkerScene) -> WalkerState:
 
 
 def state_of_guess(
-    scene: AbstractWalkerScene, guess: Gait | WalkerState | None
-) -> WalkerState | None:
+    scene: AbstractWalkerScene | HybridSystem, guess: Gait | WalkerState | PyTree | None
+) -> Any:
     """The checked state from which a search begins: a gait's, or the one given; None for None.
 
     Raises:
         ArgumentError: no state of this scene.
     """
     near = guess.measures.state if isinstance(guess, Gait) else guess
+    if isinstance(scene, HybridSystem):
+        if near is None:
+            raise ArgumentError(
+                f"guess = None is not allowed for a {type(scene).__name__}: give a state."
+            )
+        return start_of_system(scene, near, "guess")
     return None if near is None else state_for(scene, near, "guess")
 
 
-def start_of_search(
-    scene: AbstractWalkerScene, section: AbstractSection, guess: PyTree
-) -> WalkerState:
+def start_of_search(scene: Any, section: AbstractSection, guess: PyTree) -> Any:
     """The checked state from which a walker is searched, the default where there is no guess."""
+    if isinstance(scene, HybridSystem):
+        return state_of_guess(scene, guess)
     start = default_guess(scene) if guess is None else guess
     if scene.redundant and not isinstance(guess, Gait):  # whose state is minimal
         start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)

@@ -18,18 +18,18 @@ from jaxbiped._progress import stage
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
-from jaxbiped.dynamics._surfaces import in_nearest_names
 from jaxbiped.gait._search_starts import (
     rolling_starts,
     scattered_start_count,
     starts_scattered_by,
 )
+from jaxbiped.hybrid._scales import recurring_sizes
+from jaxbiped.hybrid._sections import section_of
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.scene._walker import Walker
 from jaxbiped.simulate._simulate import simulate
-from jaxbiped.solve._accuracy import recurring_sizes
-from jaxbiped.variational._hybrid_system import section_of
 
 _DIGITS = 9
 """Decimals of scattered starts, in SI units."""
@@ -119,7 +119,13 @@ def walks_from(scene: Scene | RigidScene, starts: WalkerState) -> Walks:
     """Walks from starts, leaves of shape (n,), for 40 cycles at most."""
     # Without last digits, in which versions of JAX differ: all come to the same gait, to the bit.
     rounded = jtu.tree_map(lambda leaf: np.round(np.asarray(leaf), _DIGITS), starts)
-    counts, arrivals, attempted = _arrivals(scene, rounded)
+    return _walks_at(scene, *_arrivals(scene, rounded))
+
+
+def _walks_at(
+    scene: Scene | RigidScene, counts: Scalar, arrivals: WalkerState, attempted: Scalar
+) -> Walks:
+    """Walks that arrived at these states, leaves of shape (n, 40), and how often."""
     sizes = recurring_sizes(scene, arrivals)
     points = np.stack(recurring_leaves(arrivals), axis=-1) / sizes
     places = np.where(np.isfinite(arrivals[0]), arrivals[0], np.nan) / float(scene.mechanism.height)
@@ -145,7 +151,9 @@ def _arrivals(scene: Scene | RigidScene, starts: WalkerState) -> tuple[Scalar, W
         )
         assert walk.arrivals is not None
         at = jtu.tree_map(lambda leaf: leaf[each - 1 :: each], walk.arrivals.state)
-        named = in_nearest_names(section, scene, at, at) if scene.compliant else at
+        named = at
+        if scene.compliant:
+            named = system_of(scene).in_nearest_names(section, scene, at, at)
         return walk.arrivals.total // each, named, walk.attempted
 
     return jax.vmap(one)(starts)
@@ -159,7 +167,13 @@ def is_far_from_seed(scene: Scene | RigidScene) -> bool:
 def walks_of(scene: Scene | RigidScene, pushed: Pushed, *, most: int = _MOST) -> Iterator[Walks]:
     """Walks from more and more starts, for as long as they are asked for; of waves `most`."""
     if is_far_from_seed(scene):
-        yield from islice(_waves(scene, pushed), most)
+
+        def walk(begun: np.ndarray, others: list[np.ndarray]) -> Walks:
+            starts = starts_scattered_by(scene, jnp.asarray(begun.T))
+            with stage(f"walking {_COUNT} starts, about those that walked farthest"):
+                return _walks_from_rows(scene, type(starts), state_rows(starts), others)
+
+        yield from islice(_waves(scattered_start_count(scene), walk, pushed), most)
         return
     for count in _FEW if isinstance(scene, Scene) else _MANY:
         halves = [
@@ -188,16 +202,18 @@ def _walks_from_rows(
     return walks_from(scene, states)
 
 
-def _waves(scene: Scene | RigidScene, pushed: Pushed) -> Iterator[Walks]:
-    """Walks in waves, until some settle, or none gets much farther than those before."""
+def _waves(
+    size: int, walk: Callable[[np.ndarray, list[np.ndarray]], Walks], pushed: Pushed
+) -> Iterator[Walks]:
+    """Walks in waves, until some settle, or none gets much farther than those before.
+
+    `walk` takes the scatter of starts, shape (n, size), and states that replace some of them.
+    """
     numbers = np.random.default_rng(0)
-    size = scattered_start_count(scene)
     best, farthest, without, attempted = np.zeros((0, size)), np.zeros(0), 0, 0
     for _ in range(_MOST):
         begun, others = _draw(numbers, best, size), pushed()[: _COUNT // 2]
-        starts = starts_scattered_by(scene, jnp.asarray(begun.T))
-        with stage(f"walking {_COUNT} starts, about those that walked farthest"):
-            walks = _walks_from_rows(scene, type(starts), state_rows(starts), others)
+        walks = walk(begun, others)
         yield walks
         before, progress = farthest[:_KEPT].sum(), walks.progress()
         progress[1 : 1 + len(others)] = -np.inf  # they began elsewhere

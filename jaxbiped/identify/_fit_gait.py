@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from jaxtyping import PyTree
@@ -17,13 +17,15 @@ from jaxbiped._checks import (
     warn,
 )
 from jaxbiped._progress import Stage, stage
-from jaxbiped.dynamics._state import state_type
+from jaxbiped.dynamics._state import cyclic_names, recurring_names, state_type
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
 from jaxbiped.gait._search_starts import state_of_guess
+from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit, information
 from jaxbiped.identify._interval_end import AT_LIMIT, interval_end, linear_step
-from jaxbiped.identify._measured_gait import MeasuredGait
+from jaxbiped.identify._measured_gait import OF_STATE, MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
 from jaxbiped.scene._parameter_access import (
     parameter_names,
@@ -31,7 +33,7 @@ from jaxbiped.scene._parameter_access import (
     parameter_values,
     with_parameters,
 )
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import RigidScene, Scene, is_walker
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
@@ -58,7 +60,8 @@ def fit_gait(
     vary: Sequence[str] | Mapping[str, tuple[float, float]],
     measured: MeasuredGait | Sequence[MeasuredGait],
     *,
-    guess: Gait | WalkerState | None = None,
+    guess: Gait | WalkerState | PyTree | None = None,
+    section: AbstractSection | None = None,
     accuracy: str = "balanced",
     engine: str = "auto",
     max_evaluations: int = 50,
@@ -74,10 +77,12 @@ def fit_gait(
     standard error exceeds 2 % of its parameter, the ends are found with further scenes.
 
     Args:
-        scene: the walker, with the parameters at which the fit begins.
+        scene: the walker or hybrid system, with the parameters at which the fit begins.
         vary: names of the parameters to fit (see `parameter_names`), or their bounds by name (SI).
         measured: one measured gait or several, under known conditions.
-        guess: a gait, or a state near the gait at which the fit begins; None to search for it.
+        guess: a gait, or a state near the gait at which the fit begins; None to search for it (a
+            hybrid system needs one).
+        section: section on which cycles begin. Default: as of `find_gait`.
         accuracy, engine: as for `find_gait`.
         max_evaluations: maximum number of scenes that a descent tries.
         progress: whether to show on stderr what is being done, how far it is and what was found; by
@@ -101,7 +106,8 @@ def fit_gait(
         >>> str(fit.ending), round(fit.estimates["J"], 4)
         ('converged', 0.0096)
     """
-    scene = check_scene(scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene, HybridSystem)
+    section = section_of(scene, section)
     bounds = _check_bounds(scene, vary)
     gaits = list(measured) if isinstance(measured, Sequence) else [measured]
     if not gaits:
@@ -112,7 +118,7 @@ def fit_gait(
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_count("max_evaluations", max_evaluations)
     with stage("fitting", unit="scenes", show=progress) as now:
-        descent = Descent(scene, bounds, gaits, accuracy, engine, now, near)
+        descent = Descent(scene, bounds, gaits, accuracy, engine, now, near, section)
         fit = descent.run(int(max_evaluations))
     if fit.ending is FitEnding.CONVERGED and fit.p_value < UNLIKELY:
         warn(
@@ -165,6 +171,16 @@ def _check_measured(scene: AnyScene, measured: MeasuredGait, bounds: Mapping[str
             raise ArgumentError(f"{name} is both known (conditions) and to be fitted (vary).")
     with_parameters(scene, measured.conditions)
     arrivals_of(scene, measured.footsteps)
+    kind = state_type(scene)
+    lacks = () if is_walker(scene) else ("peak_normal", "angles")
+    if not is_walker(scene) and not cyclic_names(kind):
+        lacks = ("step_length", "speed", *lacks)
+    given = [*measured.measures, *(["angles"] if measured.angles is not None else [])]
+    for name in given:
+        if name in lacks:
+            raise ArgumentError(f"{name} is not allowed: a {type(scene).__name__} has none.")
+        if name.startswith(OF_STATE):
+            check_choice("measures", name, [OF_STATE + each for each in recurring_names(kind)])
     for name in () if measured.angles is None else measured.angles.known:
         angles = [each for each in state_type(scene)._fields if each.startswith("theta_")]
         check_choice("an angle", name, angles)
@@ -182,6 +198,7 @@ class Descent:
         engine: str,
         now: Stage,
         guess: PyTree | None = None,
+        section: AbstractSection | None = None,
     ) -> None:
         """`guess` is a state near the gait of the scene's own parameters; None to search it."""
         own = parameter_values(scene)
@@ -192,7 +209,7 @@ class Descent:
         self.linear = np.isfinite(limits).all(axis=0) & (limits[0] <= 0.0) & (limits[1] >= 0.0)
         self.widths = np.where(self.linear, limits[1] - limits[0], 1.0)
         self.limits = np.sort([self.variables(ends) for ends in limits], axis=0)
-        self.how = dict(accuracy=accuracy, engine=engine)
+        self.how: dict[str, Any] = dict(accuracy=accuracy, engine=engine, section=section)
         self.values = np.concatenate([gait.values for gait in measured])
         self.deviations = np.concatenate([gait.deviations for gait in measured])
         self.tried: list[Tried] = []
@@ -317,7 +334,8 @@ class Descent:
         except ArgumentError:
             return None  # such as static friction below kinetic
         one = predict(self.scene, each, values, sizes, guess, **self.how)
-        if not one.found and guess is not None and self.searching:
+        guessed = isinstance(self.scene, HybridSystem) or guess is None
+        if not one.found and self.searching and not guessed:
             one = predict(self.scene, each, values, sizes, None, **self.how)
         return one
 

@@ -27,6 +27,8 @@ from jaxbiped.scene._scene import AbstractScene
 
 MEASURES = ("period", "step_length", "speed", "peak_normal")
 """Measures of a gait that may be given, as in `Measures`."""
+OF_STATE = "state_"
+"""What the name of a coordinate of the state on the section begins with, as a measure."""
 CLOCKS = ("mid-stance", None)
 _LONGEST = 20.0
 """Time beyond which milliseconds are suspected [s]."""
@@ -157,7 +159,8 @@ class MeasuredGait:
 
     Attributes:
         measures: value and standard deviation of each measure by name (period [s], step_length [m],
-            speed [m/s], peak_normal [N]); masked values count as missing.
+            speed [m/s], peak_normal [N], or state_NAME for a coordinate of the state on the
+            section); masked values count as missing.
         conditions: known parameters whose values differ from the scene's, by name, such as the
             slope.
         angles: angles of bodies over time, if any.
@@ -186,7 +189,8 @@ class MeasuredGait:
         known = {name: pair for name, pair in self.measures.items() if not _is_masked(pair)}
         object.__setattr__(self, "measures", known)
         for name, pair in self.measures.items():
-            check_choice("measures", name, MEASURES)
+            if not name.startswith(OF_STATE):
+                check_choice("measures", name, (*MEASURES, f"{OF_STATE}COORDINATE"))
             if np.shape(pair) != (2,):
                 raise ArgumentError(
                     f"measures[{name!r}] = {pair!r} is not allowed: give the value and its "

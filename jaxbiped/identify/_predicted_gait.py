@@ -6,7 +6,7 @@ residual, and is not refused.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.tree_util as jtu
@@ -17,16 +17,17 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, as_float, rows_of
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._equivalent_states import exchange_legs
-from jaxbiped.dynamics._state import field_of
-from jaxbiped.dynamics._surfaces import MidStance
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Gait
-from jaxbiped.identify._measured_gait import MeasuredAngles, MeasuredGait
+from jaxbiped.gait._gait import Gait, Measures
+from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._sections import AbstractSection, MidStance
+from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.identify._measured_gait import OF_STATE, MeasuredAngles, MeasuredGait
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 
-AnyScene: TypeAlias = Scene | RigidScene
+AnyScene: TypeAlias = Scene | RigidScene | HybridSystem
 Curve = Callable[[np.ndarray], np.ndarray]
 Curves: TypeAlias = dict[str, tuple[Curve, Curve]]
 """Angles over time by their names in states, each with its rate."""
@@ -62,7 +63,8 @@ class AnglesInTime(NamedTuple):
             if gait.outcome is not Search.FOUND or known.sum() < 2:
                 return cls([], np.full(len(times), np.nan), np.nan)
             part = jtu.tree_map(lambda leaf, j=j, known=known: np.asarray(leaf)[j][known], states)
-            exchanged = jtu.tree_map(np.asarray, exchange_legs(scene, part))
+            walker: Any = scene
+            exchanged = jtu.tree_map(np.asarray, exchange_legs(walker, part))
             splines.append((_curves(clock[known], part), _curves(clock[known], exchanged)))
             lasts.append(clock[known][-1])
         return cls(splines, np.cumsum(lasts), _mid_stance(scene, gait))
@@ -125,7 +127,7 @@ def _mid_stance(scene: AnyScene, gait: Gait) -> float:
 @cached_jit
 def _past_mid_stance(scene: AnyScene, states: PyTree) -> tuple[Scalar, Scalar]:
     """A function of states that rises through zero at mid-stance, and its rate."""
-    rates = field_of(scene)(0.0, states, scene)
+    rates = system_of(scene).vector_field(0.0, states, scene)
     found: tuple[Scalar, Scalar] = jax.jvp(
         lambda y: MidStance().value(scene, y), (states,), (rates,)
     )
@@ -152,6 +154,13 @@ def clock_zero(angles: AnglesInTime, seen: MeasuredAngles) -> float:
 
 _DIFFERENCE = 3e-3
 """Relative change of a parameter for the derivatives of angles over time."""
+
+
+def _measure(measures: Measures, name: str) -> PyTree:
+    """A measure by name, or a coordinate of the state on the section."""
+    if name.startswith(OF_STATE):
+        return getattr(measures.state, name.removeprefix(OF_STATE))
+    return getattr(measures, name)
 
 
 class Prediction(NamedTuple):
@@ -190,6 +199,7 @@ def predict(
     *,
     accuracy: str,
     engine: str,
+    section: AbstractSection | None = None,
 ) -> Prediction:
     """The gait of a scene under these parameters, as far as it was measured.
 
@@ -206,6 +216,7 @@ def predict(
             scene_at(values),
             guess,
             footsteps=measured.footsteps,
+            section=section,
             parameters=wanted,
             accuracy=accuracy,
             radius_sensitivities=False,
@@ -215,7 +226,7 @@ def predict(
     gait = gait_at(parameters, guess, names)
     found = gait.outcome is Search.FOUND and bool(gait.sound)
     values, slopes, errors = (
-        np.array([np.asarray(getattr(part, name)) for name in measured.measures])
+        np.array([np.asarray(_measure(part, name)) for name in measured.measures])
         for part in (gait.measures, gait.sensitivities, gait.sensitivity_errors)
     )
     slopes, errors = (part.reshape(-1, len(names)) * sizes for part in (slopes, errors))

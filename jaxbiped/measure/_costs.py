@@ -6,7 +6,8 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_increasing, check_type
 from jaxbiped.compiler import count_operations
-from jaxbiped.dynamics._state import field_of, state_type
+from jaxbiped.dynamics._state import state_type
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.measure._energy_ledger import ledger_and_motors, rigid_ledger
 from jaxbiped.measure._footsteps import heel_strikes, root_place
 from jaxbiped.measure._samples import evaluate_at, kept_strikes, places_of_standing
@@ -108,6 +109,6 @@ def operation_counts(scene: Scene | RigidScene) -> dict[str, int]:
     Returns:
         The number of times that each operation occurs, by name.
     """
-    kind, field = state_type(scene), field_of(scene)
+    kind, field = state_type(scene), system_of(scene).vector_field
     state = kind(*[0.0] * len(kind._fields))
     return count_operations(lambda y, args: field(0.0, y, args), state, scene)

@@ -2,32 +2,36 @@
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from jaxbiped._checks import check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, variables_of
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._constrained_motion import violation
-from jaxbiped.dynamics._contacts import feet, foot_forces
+from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._energy import energies, powers
 from jaxbiped.dynamics._equivalent_states import BodiesState, minimal_state
+from jaxbiped.dynamics._foot_forces import foot_forces
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._state import state_quantity
 from jaxbiped.scene._parameter_access import parameter_quantities, parameter_values
-from jaxbiped.scene._scene import RedundantScene, Scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory, check_scene_of
 
 if TYPE_CHECKING:
     import xarray
 
 
-def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) -> "xarray.Dataset":
+def trajectory_dataset(
+    scene: Scene | RedundantScene | RigidScene, trajectory: Trajectory[Any]
+) -> "xarray.Dataset":
     """States, foot forces, penetrations and energies along a trajectory, labelled, in SI units.
 
-    Of a driven walker there is the power of its motors and actuators, too.
+    On rigid feet there are no penetrations and no slip, and bodies and feet have the names that the
+    states have: legs exchange them at every heel strike. Of a driven walker there is the power of
+    its motors and actuators, too.
 
     Variables have the dimension `time` [s]. Forces and penetrations also have `foot`, with the
     names of the feet; the coordinate `leg` names the leg of each. Attributes hold the outcome and
@@ -42,22 +46,22 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
         The dataset, with one entry along `time` for each saved time.
 
     Raises:
-        ArgumentError: the scene is that of a rigid walker.
+        ArgumentError: the scene is another one.
         ValueError: the trajectory is a batch.
     """
     import xarray
 
-    check_type("scene", scene, Scene, RedundantScene)
     check_scene_of(trajectory, scene)
     if np.ndim(trajectory.t) != 1:
         raise ValueError("This is a batch of trajectories: take one of them at a time.")
     state = trajectory.state
-    found, forces = feet(scene, state), foot_forces(scene, state)
+    forces = foot_forces(scene, state)
     held, driving = energies(scene, state), powers(scene, state).actuation
+    coordinates: Any = state if isinstance(scene, RigidScene) else minimal_state(scene, state)
     along, per_foot = ("time",), ("foot", "time")
     entries = {
         name: Entry(along, value, state_quantity(name) or Quantity(name))
-        for name, value in minimal_state(scene, state)._asdict().items()
+        for name, value in coordinates._asdict().items()
     }
     if isinstance(scene, RedundantScene):
         off = np.asarray(violation(scene, cast("BodiesState", state)).position)
@@ -73,11 +77,15 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
         return np.stack([np.asarray(value) for value in values])
 
     told: dict[str, tuple[Sequence[Scalar | None], str]] = {
-        "normal_force": ([force.normal for force in forces], "N"),
-        "penetration": ([foot.penetration for foot in found], "m"),
-        "slip_speed": ([foot.slip_speed for foot in found], "m/s"),
-        "touches": ([touches(foot) for foot in found], "1"),
+        "normal_force": ([force.normal for force in forces], "N")
     }
+    if not isinstance(scene, RigidScene):
+        found = feet(scene, state)
+        told |= {
+            "penetration": ([foot.penetration for foot in found], "m"),
+            "slip_speed": ([foot.slip_speed for foot in found], "m/s"),
+            "touches": ([touches(foot) for foot in found], "1"),
+        }
     if forces[0].tangential is not None:
         told["tangential_force"] = ([force.tangential for force in forces], "N")
     for name, (values, unit) in told.items():
@@ -94,7 +102,7 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
     return dataset.assign_attrs(ending=str(trajectory.outcome), **_parameters(scene))
 
 
-def _parameters(scene: Scene | RedundantScene) -> dict[str, float | str]:
+def _parameters(scene: Scene | RedundantScene | RigidScene) -> dict[str, float | str]:
     """Every parameter of a scene, and the names of its laws, by dotted path."""
     found: dict[str, float | str] = {}
     units: dict[str, str] = {}

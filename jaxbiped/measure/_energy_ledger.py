@@ -1,6 +1,8 @@
 """Energy ledgers: where the work of gravity and actuators went, on compliant and on rigid feet."""
 
-from typing import Any, NamedTuple
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
 
 import jax.tree_util as jtu
 import numpy as np
@@ -183,34 +185,42 @@ def rigid_ledger(scene: RigidScene, walk: Trajectory[Any]) -> RigidLedger:
     )
     push = np.asarray(push_off_work(scene, last))
     changes = mode_changes(scene, starts, (1.0 - _BEFORE) * periods)
-    driving, motors, joints = _works(scene, starts, periods, changes)
+
+    def energy(number: np.ndarray, since: np.ndarray) -> np.ndarray:
+        there = states_after(scene, rows_of(starts, number), since)
+        return np.sum(evaluate_along(scene, there, energies), axis=0)
+
+    driving = motors = joints = np.zeros(len(periods))
+    if is_driven(scene) or scene.mechanism.joints:
+        sampled = functools.partial(_sampled_powers, scene, starts)
+        driving, motors, joints = _works(sampled, periods, changes)
     gravity = held_first.gravitational - held_last.gravitational
     loss = held_last.kinetic + push - after.kinetic
     stored = after.kinetic - held_first.kinetic + held_last.elastic - held_first.elastic
     work = driving + push
-    stops = _stop_losses(scene, starts, periods, changes)
+    stops = _stop_losses(energy, periods, changes)
     residual = gravity + work - loss - stops - joints - stored
     motors = motors + np.maximum(push, 0.0)
     return RigidLedger(gravity, work, loss, stored, residual, motors, joints, stops)
 
 
-def _stop_losses(
-    scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeChanges
-) -> np.ndarray:
+_InFootsteps: TypeAlias = Callable[..., np.ndarray]
+"""A function of numbers of footsteps and of times in them [s]."""
+
+
+def _stop_losses(energy: _InFootsteps, periods: np.ndarray, changes: ModeChanges) -> np.ndarray:
     """What changes of mode take in each footstep [J], shape (n,): energy at once before and behind.
 
     NaN where there was no room for all of them.
     """
     number, lost = changes.number, np.zeros(len(periods))
-
-    def energy(shift: np.ndarray) -> np.ndarray:
-        states = states_after(scene, rows_of(starts, number), changes.since + shift)
-        return np.sum(evaluate_along(scene, states, energies), axis=0)
-
     if len(number):
         rest = _BEFORE * periods[number]
         # Joints lose in between as well, so that energies are continued up to the change.
-        before, behind = (2.0 * energy(r) - energy(2.0 * r) for r in (-rest, rest))
+        before, behind = (
+            2.0 * energy(number, changes.since + r) - energy(number, changes.since + 2.0 * r)
+            for r in (-rest, rest)
+        )
         np.add.at(lost, number, before - behind)
     return np.where(changes.known, lost, np.nan)
 
@@ -229,15 +239,13 @@ def _before_impact(scene: RigidScene, starts: Any, periods: np.ndarray) -> Any:
     return moved._replace(**angles)
 
 
-def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeChanges) -> np.ndarray:
-    """Computes works in each footstep [J], shape (3, n).
+def _works(powers: _InFootsteps, periods: np.ndarray, changes: ModeChanges) -> np.ndarray:
+    """Computes works in each footstep [J], shape (3, n), from powers as `_sampled_powers` has them.
 
     They are the work of all that drives, that of motors where they drive, and what joints lose.
     """
     count = len(periods)
     works, sizes = np.zeros((3, count)), np.zeros(count)
-    if not is_driven(scene) and not scene.mechanism.joints:
-        return works
     # Powers jump where the mode changes, so that no panel straddles a change. Panels are split
     # where a motor's law jumps or bends, and where a damper settles.
     even = np.linspace(0.0, 1.0, _PANELS + 1)
@@ -249,7 +257,7 @@ def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeCha
     begins = np.concatenate([ends[:-1] for ends in edges])
     widths = np.concatenate([np.diff(ends) for ends in edges])
     for splits in range(_SPLITS + 1):
-        sampled = _sampled_powers(scene, rows_of(starts, number), begins, widths)
+        sampled = powers(number, begins, widths)
         samples = Samples(np.append(0.0, np.cumsum(widths)), None)
         np.maximum.at(sizes, number, np.abs(sampled).max(axis=(0, 2)) * periods[number])
         rough = np.max([samples.roughness(power) for power in sampled], axis=0)
@@ -268,14 +276,14 @@ def _works(scene: RigidScene, starts: Any, periods: np.ndarray, changes: ModeCha
 
 
 def _sampled_powers(
-    scene: RigidScene, starts: Any, begins: np.ndarray, widths: np.ndarray
+    scene: RigidScene, starts: Any, number: np.ndarray, begins: np.ndarray, widths: np.ndarray
 ) -> np.ndarray:
-    """Computes powers at the Gauss points of n panels [W], shape (k, n, 5).
+    """Computes powers at the Gauss points of n panels of footsteps [W], shape (k, n, 5).
 
     They are the power of all that drives, what joints lose, and the power of each motor.
     """
     times = begins[:, None] + widths[:, None] * 0.5 * (1.0 + NODES)
-    many = rows_of(starts, np.repeat(np.arange(len(begins)), len(NODES)))
+    many = rows_of(starts, np.repeat(number, len(NODES)))
     flows = evaluate_along(scene, states_after(scene, many, times.ravel()), powers)
     driven = np.zeros(times.size) if flows.actuation is None else flows.actuation
     return np.reshape([driven, flows.damper, *(flows.motors or ())], (-1, *times.shape))

@@ -25,17 +25,14 @@ from jaxbiped.dynamics._energy import is_driven, kinetic_energy, powers
 from jaxbiped.dynamics._equivalent_states import exchange_legs
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._impact import impact, push_off_work
-from jaxbiped.dynamics._surfaces import (
-    AbstractSection,
-    Switch,
-    clearance,
-    clearance_rate,
-    distance_ahead,
-)
+from jaxbiped.dynamics._surfaces import clearance, clearance_rate, distance_ahead
+from jaxbiped.hybrid._guards import Switch
+from jaxbiped.hybrid._sections import AbstractSection
+from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.hybrid._walker_systems import Rolling, Walking
 from jaxbiped.scene._ground import Ground, SteppedGround
 from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene, is_rigid
 from jaxbiped.scene._state_types import WalkerState
-from jaxbiped.variational._hybrid_system import AbstractSystem, Rolling, Walking
 
 _KINDS: dict[tuple[type, tuple[str, ...]], Any] = {}
 """Of each walker's state the augmented ones: always the same types, or all would compile again."""
@@ -123,8 +120,8 @@ class AbstractAugmentedSystem(AbstractSystem):
     def switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
         return self.walker.switches(self.scene_of(args, y), motion_of(y))
 
-    def reset_at_switch(self, args: PyTree, y: PyTree) -> PyTree:
-        after = self.walker.reset_at_switch(self.scene_of(args, y), motion_of(y))
+    def reset_at_switch(self, args: PyTree, y: PyTree, which: Scalar) -> PyTree:
+        after = self.walker.reset_at_switch(self.scene_of(args, y), motion_of(y), which)
         return self.with_motion(y, after)
 
     def on_held(self, args: PyTree, y: PyTree) -> PyTree:
@@ -251,9 +248,9 @@ class RollingIntegrals(AbstractAugmentedSystem):
         motors = powers(args, state).motors or ()
         return self.walker.switches(args, state) + tuple(Switch(power, True) for power in motors)
 
-    def reset_at_switch(self, args: RigidScene, y: PyTree) -> PyTree:
+    def reset_at_switch(self, args: RigidScene, y: PyTree, which: Scalar) -> PyTree:
         state = motion_of(y)
-        after = self.walker.reset_at_switch(args, state)
+        after = self.walker.reset_at_switch(args, state, which)
         lost = kinetic_energy(args, state) - kinetic_energy(args, after)
         return self.with_motion(y._replace(impact_loss=y.impact_loss + lost), after)
 

@@ -5,6 +5,8 @@ them; at a doubling the modulus that is 1 is held, whichever it is among the lea
 """
 
 import enum
+import functools
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax.tree_util as jtu
@@ -13,7 +15,7 @@ import numpy as np
 from jaxbiped._checks import check_choice, check_type
 from jaxbiped._types import as_float
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent, advance, locate_near
-from jaxbiped.continuation._branch_point import axis_of, start_of
+from jaxbiped.continuation._branch_point import Axis, axis_of, start_of
 from jaxbiped.continuation._continue_gait import ContinuationSetup, continuation_setup, traces_from
 from jaxbiped.continuation._critical_values import STEPS, fold_forcing, range_of
 from jaxbiped.continuation._trace import LIMITS, Trace
@@ -107,20 +109,31 @@ def bifurcation_distance(
     check_choice("kind", kind, KINDS)
     check_choice("along", along, parameter_names(scene))
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
-    kind, names = BranchEvent(kind), parameter_names(scene)
-    own, bounds = float(parameter_values(scene)[along]), range_of(scene, along)
-    axis = axis_of(scene, along, bounds, None)
+    kind, axis = BranchEvent(kind), axis_of(scene, along, range_of(scene, along), None)
     steps = int(gait.step_lengths.shape[0])
     setup = continuation_setup(scene, axis, footsteps=steps, accuracy=accuracy, engine=gait.engine)
+    located = _located_fold if kind is BranchEvent.FOLD else _located_doubling
     parts = _both_ways(setup, gait, kind)
+    return _distance_along(axis, scene, kind, parts, functools.partial(located, setup))
+
+
+def _distance_along(
+    axis: Axis,
+    scene: Scene | RigidScene,
+    kind: BranchEvent,
+    parts: Sequence[Trace],
+    locate: Callable[[BifurcationPoint], Functional | None],
+) -> BifurcationDistance:
+    """The distance to the nearest event of a kind on traces that begin at the scene."""
+    along, names, bounds = axis.name, parameter_names(scene), (axis.first, axis.last)
+    own = float(parameter_values(scene)[along])
     seen = [each for part in parts for each in part.bifurcations]
     event = min(
         (each for each in seen if each.kind is kind),
         key=lambda each: abs(each.value - own),
         default=None,
     )
-    locate = _located_fold if kind is BranchEvent.FOLD else _located_doubling
-    located = None if event is None else locate(setup, event)
+    located = None if event is None else locate(event)
     if located is None:
         none, nowhere = np.nan, np.full(len(names), np.nan)
         outcome, distance = Sought.UNKNOWN, none
@@ -194,13 +207,21 @@ def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> Func
         accuracy=setup.accuracy,
         engine=setup.problem.spec.engine,
     )
-    values, errors, slopes, slope_errors = (np.asarray(each) for each in told[:4])
+    rows = [np.asarray(each) for each in told[:4]]
+    return _moved_to_one(rows, event.value, parameter_names(scene).index(along))
+
+
+def _moved_to_one(moduli: Sequence[np.ndarray], value: float, place: int) -> Functional:
+    """Where the modulus nearest to 1 is 1, in the parameter at a place that has a value.
+
+    `moduli` are values, errors, slopes and their errors.
+    """
+    values, errors, slopes, slope_errors = moduli
     which = int(np.nanargmin(np.abs(values - 1.0)))
-    place = parameter_names(scene).index(along)
     rate, rate_error = slopes[which][place], slope_errors[which][place]
     by_all = -slopes[which] / rate
     off = (slope_errors[which] + np.abs(by_all) * rate_error) / abs(rate)
     by_all[place] = off[place] = 0.0
     move = -(values[which] - 1.0) / rate
     error = (errors[which] + abs(move) * rate_error) / abs(rate)
-    return Functional(float(event.value + move), float(error), by_all, off)
+    return Functional(float(value + move), float(error), by_all, off)

@@ -19,10 +19,12 @@ from jaxbiped.continuation._critical_values import (
     range_of,
 )
 from jaxbiped.dynamics._state import recurring_leaves, unit_of
-from jaxbiped.dynamics._surfaces import HeelStrike, rate_unit
+from jaxbiped.dynamics._surfaces import rate_unit
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.hybrid._admissible_directions import independent_names
+from jaxbiped.hybrid._sections import HeelStrike
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._optimality import Optimality
 from jaxbiped.optimise._optimum import Optimum
@@ -36,7 +38,6 @@ from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure
 from jaxbiped.sweep.starts._starts import sample
-from jaxbiped.variational._hybrid_system import independent_names
 
 _SETTLED = 1e-4
 """Relative difference between a walk's last footstep and the gait's that counts as none."""
@@ -242,7 +243,8 @@ def _labelling(scene: Scene | RigidScene, gait: Gait) -> Labelling | None:
 
 def _basin(knows: Labelling, gait: Gait, count: int, scatter: float, seed: int) -> Fraction:
     """The fraction that comes back of starts about the gait: on the ground, and beyond no stop."""
-    scene, free = knows.scene, independent_names(knows.scene, gait.measures.state)
+    scene: Any = knows.scene
+    free = independent_names(scene, gait.measures.state)
     halves = {"rad": scatter, "rad/s": scatter * float(rate_unit(scene))}
     bounds = {
         name: (float(centre) - halves[unit], float(centre) + halves[unit])
@@ -257,32 +259,50 @@ def _basin(knows: Labelling, gait: Gait, count: int, scatter: float, seed: int) 
 
 
 def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> PushedWalk:
-    state: WalkerState = gait.measures.state
-    fast = [name for name in state._fields if unit_of(name) in ("m/s", "rad/s")]
-    faster = {name: as_float(float(getattr(state, name)) * (1.0 + push)) for name in fast}
-    pushed = state._replace(**faster)
     walk: Trajectory[Any] = simulate(
         scene,
-        pushed,
+        _pushed(gait.measures.state, push),
         footsteps=count,
         save=HeelStrike(),
         max_arrivals=count,
         max_solver_steps=max(65536, 1024 * count),
     )
     assert walk.arrivals is not None
-    times = np.asarray(walk.arrivals.t)
-    times = times[np.isfinite(times)]
-    own, each = scene.mechanism.structure.cycle_footsteps, scene.arrival_footsteps
-    cycle = own // each
+    footsteps = scene.mechanism.structure.cycle_footsteps, scene.arrival_footsteps
+    period = float(gait.measures.period)
+    return _judged(np.asarray(walk.arrivals.t), period, count, push, *footsteps)
+
+
+def _pushed(state: WalkerState, push: float) -> WalkerState:
+    """The state with all its speeds so much larger, relative to themselves."""
+    fast = [name for name in state._fields if unit_of(name) in ("m/s", "rad/s")]
+    faster = {name: as_float(float(getattr(state, name)) * (1.0 + push)) for name in fast}
+    found: WalkerState = state._replace(**faster)
+    return found
+
+
+def _judged(
+    times: np.ndarray, period: float, count: int, push: float, own: int, each: int
+) -> PushedWalk:
+    """By the times of arrivals, `each` of so many footsteps, of which a cycle has `own`."""
+    times, cycle = times[np.isfinite(times)], own // each
     last = float(times[-1] - times[-1 - cycle]) if len(times) > cycle else np.nan
-    difference = abs(last / float(gait.measures.period) - 1.0)
+    difference = abs(last / period - 1.0)
     done = each * len(times)
     return PushedWalk(push, done, count, difference, done >= count - own and difference < _SETTLED)
 
 
+def _other_than(engine: str) -> str:
+    return next(name for name in ENGINES if name not in ("auto", engine))
+
+
 def _by_other(scene: Scene | RigidScene, gait: Gait) -> OtherEngine:
-    other = next(name for name in ENGINES if name not in ("auto", gait.engine))
+    other = _other_than(gait.engine)
     again = find_gait(scene, gait.measures.state, parameters=(), engine=other)
+    return _compared(again, gait, other)
+
+
+def _compared(again: Gait, gait: Gait, other: str) -> OtherEngine:
     pairs = zip(again.measures[:2], gait.measures[:2], strict=True)
     period, length = (abs(float(a) / float(b) - 1.0) for a, b in pairs)
     radii = (float(each.measures.spectral_radius) for each in (again, gait))

@@ -12,7 +12,6 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._energy import is_driven
-from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._fixed_point_search import looser
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import (
@@ -28,13 +27,14 @@ from jaxbiped.gait._return_map_spec import (
     patience_of,
     runs_by_lanes,
 )
+from jaxbiped.hybrid._sections import AbstractSection, section_of
+from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.optimise._augmented_system import MotionSection, integrals_of
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, precision_of
-from jaxbiped.variational._hybrid_system import AbstractSystem, section_of
 from jaxbiped.variational._tangents import Seeded
 
 _COMPLIANT = {"balanced": Precision(2e-8, 2e-7)}

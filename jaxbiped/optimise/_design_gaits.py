@@ -1,7 +1,7 @@
 """Gaits of designs: of one, of many as one batch of lanes, of an ensemble under scatter."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -16,6 +16,7 @@ from jaxbiped.dynamics._state import state_of_recurring, state_type
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.optimise._jacobian_functionals import CLUSTER
 from jaxbiped.optimise._objective_values import (
     BothFunctionals,
@@ -42,10 +43,12 @@ class GaitSettings(NamedTuple):
     footsteps: int | None = None
     accuracy: str = "balanced"
     engine: str = "auto"
+    section: AbstractSection | None = None
+    radius_sensitivities: bool = False
 
     def find(self, scene: Scene | RigidScene, start: PyTree | None) -> Gait:
         """The gait of a scene near a state; from nothing for None."""
-        return find_gait(scene, start, radius_sensitivities=False, **self._asdict())
+        return find_gait(scene, start, **self._asdict())
 
     def find_near(self, scene: Scene | RigidScene, point: np.ndarray) -> Gait:
         return self.find(scene, self.state_of(scene, point))
@@ -122,7 +125,7 @@ class Ensemble(NamedTuple):
 
 
 def ensemble_of(
-    scene: Scene | RigidScene,
+    scene: Any,
     scatter: Mapping[str, float],
     members: int,
     criterion: str,
@@ -156,10 +159,8 @@ def ensemble_of(
 
 def with_worse_members(
     ensemble: Ensemble,
-    scene: Scene | RigidScene,
-    nominal: Evaluation,
+    evaluate: Callable[[Ensemble], Sequence[Evaluation | None]],
     wanted: tuple[str, ...],
-    settings: GaitSettings,
     seed: int,
 ) -> Ensemble | None:
     """The ensemble with worse members than it has, which a search in its box comes upon.
@@ -172,8 +173,7 @@ def with_worse_members(
         sign = 1.0 if ensemble.larger_is_worse.get(name, True) else -1.0
         factors, worst, centre = ensemble.factors, [-np.inf], ensemble.factors[0]
         for width in (*_WIDTHS, 0.0):
-            tried = ensemble._replace(factors=factors)
-            each = evaluate_members(tried, scene, nominal, wanted, settings)
+            each = evaluate(ensemble._replace(factors=factors))
             # A member without a gait is worse than any that has one.
             told = [np.inf if known is None else sign * known.values[name] for known in each]
             values = np.nan_to_num(told, nan=np.inf, posinf=np.inf, neginf=-np.inf)

@@ -8,7 +8,7 @@ branch, it is followed there in smaller steps. Every design is evaluated once an
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,13 +23,14 @@ from jaxbiped.optimise._design_gaits import (
     GaitSettings,
     are_walks,
     evaluate_ensemble,
+    evaluate_members,
     with_worse_members,
 )
 from jaxbiped.optimise._jacobian_functionals import CLUSTER
 from jaxbiped.optimise._objective_values import Evaluation, Evaluations, evaluate
 from jaxbiped.optimise._objectives import OBJECTIVES, check_objective
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import RigidScene, Scene, is_walker
 from jaxbiped.scene._state_types import WalkerState
 
 _WORDS = re.compile(r"^\s*(\w+)\s*(<=|>=|==|<|>|=)\s*([^<>=]+?)\s*$")
@@ -87,7 +88,7 @@ class Variables(NamedTuple):
         return dict(zip(self.names, self.values(u).tolist(), strict=True))
 
 
-def variables_of(scene: Scene | RigidScene, vary: Mapping[str, tuple[float, float]]) -> Variables:
+def variables_of(scene: Any, vary: Mapping[str, tuple[float, float]]) -> Variables:
     """The variables that a mapping from names to bounds describes.
 
     Raises:
@@ -121,7 +122,7 @@ def variables_of(scene: Scene | RigidScene, vary: Mapping[str, tuple[float, floa
     )
 
 
-def start_of(scene: Scene | RigidScene, variables: Variables) -> np.ndarray:
+def start_of(scene: Any, variables: Variables) -> np.ndarray:
     """The scene's own design in u, moved into the bounds, shape (k,)."""
     own = parameter_values(scene)
     return variables.positions(np.asarray([float(own[name]) for name in variables.names]))
@@ -135,7 +136,7 @@ class Requirement(NamedTuple):
     high: float | None
 
 
-def requirements_of(scene: Scene | RigidScene, subject_to: SubjectTo) -> tuple[Requirement, ...]:
+def requirements_of(scene: Any, subject_to: SubjectTo) -> tuple[Requirement, ...]:
     """What must hold, the bounds of each measure gathered.
 
     Raises:
@@ -245,7 +246,7 @@ class DesignProblem:
 
     def __init__(
         self,
-        scene: Scene | RigidScene,
+        scene: Any,
         variables: Variables,
         told: Mapping[str, float],
         sense: float,
@@ -265,7 +266,9 @@ class DesignProblem:
 
     @property
     def has_cluster(self) -> bool:
-        """Whether multipliers are those of one gait, and not means over an ensemble."""
+        """Whether multipliers are a walker's, and those of one gait, not means over an ensemble."""
+        if not is_walker(self.scene):
+            return False
         return self.ensemble is None or self.ensemble.criterion != "mean"
 
     def begin(self, u: np.ndarray, guess: WalkerState | None = None) -> Design:
@@ -300,10 +303,12 @@ class DesignProblem:
         """The ensemble with members that are worse at a design; None where none are found."""
         if self.ensemble is None or self.ensemble.criterion == "mean":
             return None
-        known = design.known
-        return with_worse_members(
-            self.ensemble, self.scene_at(design.u), known, self.wanted, self.settings, seed
-        )
+        scene, wanted = self.scene_at(design.u), self.wanted
+
+        def evaluate(tried: Ensemble) -> list[Evaluation | None]:
+            return evaluate_members(tried, scene, design.known, wanted, self.settings)
+
+        return with_worse_members(self.ensemble, evaluate, wanted, seed)
 
     def begin_again(self, design: Design, ensemble: Ensemble) -> Design:
         """That design with another ensemble, and no other.
@@ -404,7 +409,8 @@ class DesignProblem:
             if members is None:
                 return None
             known = members
-        if not all(np.isfinite(known.values[name]) for name in self.wanted):
+        known_slopes = np.all(np.isfinite(known.state_slopes[:, self.variables.places]))
+        if not known_slopes or not all(np.isfinite(known.values[name]) for name in self.wanted):
             self.unmeasured += 1
             return None
         self.evaluations.add(u, known)

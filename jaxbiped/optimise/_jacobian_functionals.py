@@ -15,11 +15,12 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state import dimensions_of
-from jaxbiped.dynamics._surfaces import AbstractSection
 from jaxbiped.gait._fixed_point_search import with_looser
 from jaxbiped.gait._orbit_derivatives import second_variation, slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
+from jaxbiped.hybrid._sections import AbstractSection, section_of
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.linalg._small_matrices import Eigensystem, eigenpairs, eigensystem, singular_pairs
 from jaxbiped.optimise._augmented_system import (
     DROP,
@@ -42,7 +43,6 @@ from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._adjoint_solve import COUNT
-from jaxbiped.variational._hybrid_system import section_of, system_of
 
 MODULI = ("spectral_radius", "modulus_2", "modulus_3")
 """Moduli that are told apart: of a pair of conjugate multipliers once."""
@@ -303,7 +303,7 @@ def jacobian_functionals(
     told = []
     for (by_step, has_clearance), group in groups.items():
         on, count = section_of(scene, None), arrivals
-        disturbed = disturbed_cycle(system_of(scene), DROP if by_step else PUSH)
+        disturbed = disturbed_cycle(system_of(scene.minimal), DROP if by_step else PUSH)
         system: AbstractAugmentedSystem = disturbed
         section: AbstractSection = SteppedSection(on) if by_step else MotionSection(on)
         if has_clearance:

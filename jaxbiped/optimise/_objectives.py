@@ -9,9 +9,10 @@ import jax.numpy as jnp
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._energy import is_driven
+from jaxbiped.dynamics._state import cyclic_names, state_type
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._modes import rigid_modes
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene, is_walker
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
 _SEARCHED = {
@@ -132,11 +133,19 @@ OBJECTIVES = {
 """
 
 
-def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective") -> None:
+def _of_walkers(name: str, scene: AbstractScene) -> str | None:
+    if is_walker(scene) or OBJECTIVES[name].measured is not None:
+        return None
+    advances = bool(cyclic_names(state_type(scene)))
+    own = ("period", "spectral_radius", *(("speed", "step_length") if advances else ()))
+    return None if name in own else f"a {type(scene).__name__} has {', '.join(own)}"
+
+
+def check_objective(name: str, scene: Any, what: str = "objective") -> None:
     """Raises `ArgumentError` for an unknown objective, or one that the scene lacks."""
     if name in _SEARCHED:
         raise ArgumentError(f"{what} = {name!r} is not allowed: {_SEARCHED[name]}.")
     check_choice(what, name, OBJECTIVES)
-    lacks = OBJECTIVES[name].lacks(scene)
+    lacks = _of_walkers(name, scene) or OBJECTIVES[name].lacks(scene)
     if lacks is not None:
         raise ArgumentError(f"{what} = {name!r} is not allowed for this scene: {lacks}.")

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -20,6 +21,8 @@ from jaxbiped._types import JsonObject
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
 from jaxbiped.gait._search_starts import state_of_guess
+from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.optimise._design_gaits import CRITERIA, Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._design_problem import (
     DesignProblem,
@@ -35,7 +38,7 @@ from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.optimise._runs import Runs, optimum_of, scattered_designs
 from jaxbiped.scene._parameter_access import scene_identity
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import RigidScene, Scene, is_walker
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
@@ -50,13 +53,14 @@ Goal: TypeAlias = str | Mapping[str, float] | None
 
 
 def optimise_gait(
-    scene: Scene | RigidScene,
+    scene: Scene | RigidScene | HybridSystem,
     *,
     vary: Mapping[str, tuple[float, float]],
     maximise: Goal = None,
     minimise: Goal = None,
     subject_to: SubjectTo = None,
-    guess: Gait | WalkerState | None = None,
+    guess: Gait | WalkerState | PyTree | None = None,
+    section: AbstractSection | None = None,
     optimiser: "str | optax.GradientTransformation" = "trust-region",
     iterations: int = 200,
     restarts: int = 0,
@@ -77,7 +81,8 @@ def optimise_gait(
     or its gait is not a walk, the step is shortened.
 
     Args:
-        scene: the walker to begin from; a parameter outside its bounds is moved onto them.
+        scene: the walker or hybrid system to begin from; a parameter outside its bounds is moved
+            onto them.
         vary: bounds (low, high) by the name of each parameter (see `parameter_names`), SI units.
             Positive parameters are varied through their logarithm.
         maximise, minimise: give one of the two: the name of a measure of the gait (see
@@ -85,7 +90,8 @@ def optimise_gait(
         subject_to: bounds (low, high) by measure, with None for no bound and equal bounds for an
             equality; or requirements as text, such as "spectral_radius<0.4", one or several.
         guess: a gait or a start near the gait of the first design. Default: the gait that
-            `find_gait` finds.
+            `find_gait` finds; a hybrid system needs one.
+        section: section on which the cycles of a hybrid system begin. Default: as of `find_gait`.
         optimiser: "trust-region", "slsqp" or "trust-constr"; without requirements, also "optax"
             (Adam in the logits of the bounds) or any optax transformation.
         iterations: maximum number of iterations of each run.
@@ -122,7 +128,10 @@ def optimise_gait(
         >>> str(best.outcome), round(best.variables["d"], 4)
         ('converged', 0.0873)
     """
-    scene = check_scene(scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene, HybridSystem)
+    if section is not None and is_walker(scene):
+        raise ArgumentError(f"section = {section!r} is not allowed for a walker: leave it out.")
+    section = None if is_walker(scene) else section_of(scene, section)
     variables = variables_of(scene, vary)
     told, sense = _goal(scene, maximise, minimise)
     requirements = requirements_of(scene, subject_to)
@@ -150,8 +159,9 @@ def optimise_gait(
     if scatter:
         worse = larger_is_worse(told, sense, requirements) if criterion == "worst" else {}
         ensemble = ensemble_of(scene, scatter, members, criterion, worse, seed)
-    settings = GaitSettings(footsteps, accuracy, engine)
     measures = {*told, *(each.name for each in requirements)}
+    radius = not is_walker(scene) and "spectral_radius" in measures
+    settings = GaitSettings(footsteps, accuracy, engine, section, radius)
     evaluations = Evaluations()
     if store is not None:
         path = user_path(store, "store")
@@ -186,9 +196,7 @@ def optimise_gait(
     return optimum_of(problem, runs)
 
 
-def _goal(
-    scene: Scene | RigidScene, maximise: Goal, minimise: Goal
-) -> tuple[dict[str, float], float]:
+def _goal(scene: Any, maximise: Goal, minimise: Goal) -> tuple[dict[str, float], float]:
     if (maximise is None) == (minimise is None):
         raise ArgumentError(
             'give either maximise or minimise: a measure of the gait, such as "speed".'
@@ -204,7 +212,7 @@ def _goal(
 
 
 def _problem_settings(
-    scene: Scene | RigidScene,
+    scene: Any,
     vary: Mapping[str, tuple[float, float]],
     measures: set[str],
     settings: GaitSettings,
@@ -242,7 +250,7 @@ class ParetoFront(NamedTuple):
 
 
 def pareto_front(
-    scene: Scene | RigidScene,
+    scene: Scene | RigidScene | HybridSystem,
     *,
     vary: Mapping[str, tuple[float, float]],
     against: str,

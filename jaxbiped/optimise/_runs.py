@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.optimise._design_functions import Functions
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
-from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
+from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem, Variables
 from jaxbiped.optimise._optimality import OPTIMAL, doubt_of, is_flat, is_near, optimality_of
 from jaxbiped.optimise._optimisers import BY_NAME, RunEnding, run_optax, run_trust_region
 from jaxbiped.optimise._optimum import Iteration, Optimum, Outcome
@@ -82,15 +83,9 @@ class Runs:
         """How it ended: converged only where the design is certified as an optimum, too."""
         if self.interrupted:
             return Outcome.INTERRUPTED
-        if self.problem.excess(self.best.known) > self.problem.allowance(self.best.known):
-            return Outcome.INFEASIBLE
-        if any(self.problem.weights.get(name) for name in self.best.known.beyond_range):
-            return Outcome.BEYOND_RANGE
-        if not self.ended.converged:
-            return Outcome.UNFINISHED
-        if doubt_of(self.problem, self.best):
-            return Outcome.CORNER
-        return Outcome.FLAT if is_flat(self.problem) else Outcome.CONVERGED
+        doubt = functools.partial(doubt_of, self.problem, self.best)
+        flat = functools.partial(is_flat, self.problem)
+        return outcome_of(self.problem, self.best, self.ended.converged, doubt, flat)
 
     def note(self, u: np.ndarray) -> None:
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
@@ -107,6 +102,25 @@ class Runs:
         self.now.update(found=f"objective {value:.6g}{missed}")
 
 
+def outcome_of(
+    problem: DesignProblem,
+    best: Design,
+    converged: bool,
+    doubt: Callable[[], str],
+    flat: Callable[[], bool],
+) -> Outcome:
+    """How runs that were not interrupted ended; what is asked last is asked only then."""
+    if problem.excess(best.known) > problem.allowance(best.known):
+        return Outcome.INFEASIBLE
+    if any(problem.weights.get(name) for name in best.known.beyond_range):
+        return Outcome.BEYOND_RANGE
+    if not converged:
+        return Outcome.UNFINISHED
+    if doubt():
+        return Outcome.CORNER
+    return Outcome.FLAT if flat() else Outcome.CONVERGED
+
+
 def rank_of(problem: DesignProblem, design: Design) -> tuple[float, float]:
     """Designs nearer to the requirements come first, and of those that keep them the better."""
     excess = problem.excess(design.known)
@@ -115,10 +129,11 @@ def rank_of(problem: DesignProblem, design: Design) -> tuple[float, float]:
 
 def _message(problem: DesignProblem, best: Design, ended: RunEnding, doubt: str) -> str:
     """The optimiser's own words, a doubt, and which bifurcations the best design does not meet."""
-    low, high = range_of(problem.scene_at(best.u), "slope")
-    ensemble = problem.ensemble
+    ensemble, none = problem.ensemble, list[str]()
+    if beyond := best.known.beyond_range:
+        low, high = range_of(problem.scene_at(best.u), "slope")
+        none = [f"{name}: none from {low:.6g} to {high:.6g} rad." for name in beyond]
     worst = [ensemble.words] if ensemble and ensemble.criterion == "worst" else []
-    none = [f"{name}: none from {low:.6g} to {high:.6g} rad." for name in best.known.beyond_range]
     return " ".join(filter(None, [ended.message, doubt, *worst, *none]))
 
 
@@ -164,7 +179,17 @@ def scattered_designs(problem: DesignProblem, begin: Design, count: int, seed: i
 
 def follow_designs(problem: DesignProblem, begin: Design, u: np.ndarray) -> np.ndarray:
     """States of the gaits of designs (n, k) on the section, shape (n, m); NaN where lost."""
-    variables, known = problem.variables, begin.known
+    return _followed(problem.variables, begin, u, functools.partial(_gaits_of_designs, problem))
+
+
+def _followed(
+    variables: Variables,
+    begin: Design,
+    u: np.ndarray,
+    gaits: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+) -> np.ndarray:
+    """By the derivatives of gaits that are found in some stages on the way."""
+    known = begin.known
     points, slopes = (
         np.broadcast_to(each, (len(u), *each.shape)) for each in (known.state, known.state_slopes)
     )
@@ -173,7 +198,7 @@ def follow_designs(problem: DesignProblem, begin: Design, u: np.ndarray) -> np.n
         here = begin.u + share * (u - begin.u)
         moves = variables.values(here) - variables.values(before)
         points = points + np.einsum("nmk,nk->nm", slopes[:, :, variables.places], moves)
-        points, slopes = _gaits_of_designs(problem, here, points)
+        points, slopes = gaits(here, points)
         before = here
     return points
 

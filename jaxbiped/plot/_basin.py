@@ -1,5 +1,6 @@
 """Basin pictures in two coordinates of the start: on a grid, and refined; with marks of gaits."""
 
+import functools
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,7 +17,7 @@ from matplotlib.patches import Patch
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.basins._label_statistics import fractions as fractions_of
-from jaxbiped.basins._labels import Label, check_known, label_names
+from jaxbiped.basins._labels import Label, check_known, endings_of, label_names, word_of_code
 from jaxbiped.basins._refined_boundary import RefinedBoundary
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import axis_label
@@ -216,11 +217,14 @@ def _names_of(
         )
     if grid.dtype.kind not in "iu":
         return grid.astype(str).astype(object)
-    check_known(grid)
+    endings = endings_of(labels)
+    check_known(grid, endings)
     if cycle_footsteps is None:
-        words = np.vectorize(lambda code: str(Label(code)), otypes=[object])(grid)
+        word = functools.partial(word_of_code, endings=endings)
+        words = np.vectorize(word, otypes=[object])(grid)
     else:
-        words = label_names(grid, _fitting_names("cycle_footsteps", cycle_footsteps, grid.shape))
+        cycles = _fitting_names("cycle_footsteps", cycle_footsteps, grid.shape)
+        words = label_names(grid, cycles, endings=endings)
     if gait is not None:
         which = _fitting_names("gait", gait, grid.shape)
         walks = grid == Label.WALKING

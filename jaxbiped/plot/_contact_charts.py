@@ -165,7 +165,7 @@ def _draw_strike(
     for ax, kind in zip(axes, _KINDS, strict=False):
         _mark_peak(ax, milliseconds, forces[f"{kind}_{loaded + 1}"])
     if both.size:
-        axes[0].legend(handles=[axes[0].patches[-1]], loc="best", fontsize="small")
+        style.legend(axes[0], handles=[axes[0].patches[-1]], loc="best")
 
 
 def _mark_peak(ax: Axes, t: np.ndarray, force: np.ndarray) -> None:

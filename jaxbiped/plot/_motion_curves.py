@@ -38,7 +38,7 @@ def leg_angles(scene: AnyScene, trajectory: Trajectory[Any], *, ax: Axes | None 
 
     Args:
         scene: the scene that was simulated.
-        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        trajectory: the motion, with every step saved; of a rigid walk, the steps or heel strikes.
         ax: axes to draw into. Default: a new figure.
 
     Returns:
@@ -69,7 +69,7 @@ def time_series(
 
     Args:
         scene: the scene that was simulated.
-        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        trajectory: the motion, with every step saved; of a rigid walk, the steps or heel strikes.
         names: names of scalars of the state, or of angles and rates of bodies that couplings fix,
             all with one unit, such as `theta_torso`, `omega_shank_1` or `hip_vx`.
         ax: axes to draw into. Default: a new figure.
@@ -160,7 +160,7 @@ def phase_portrait(
 
     Args:
         scene: the scene that was simulated.
-        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        trajectory: the motion, with every step saved; of a rigid walk, the steps or heel strikes.
         ax: axes to draw into. Default: a new figure.
         legs: numbers of the legs to draw, counted from 1: (1,), (2,) or (1, 2).
         bodies: names of the bodies to draw instead, such as ("torso",).

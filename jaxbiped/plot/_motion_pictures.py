@@ -57,7 +57,7 @@ def gait_strobe(
 
     Args:
         scene: the scene that was simulated.
-        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        trajectory: the motion, with every step saved; of a rigid walk, the steps or heel strikes.
         ax: axes to draw into. Default: a new figure.
         start, stop: first and last time drawn [s]. Default of `stop`: 1.8 s after the start, about
             four footsteps of the paper's walk, but at most the end of the motion.
@@ -160,7 +160,7 @@ def animate(
 
     Args:
         scene: the scene that was simulated.
-        trajectory: the motion, with every step saved; for a rigid walker, its heel strikes.
+        trajectory: the motion, with every step saved; of a rigid walk, the steps or heel strikes.
         frames_per_second: frames per second of the picture; a GIF rounds the time of a frame to 10
             ms.
         slow_down: seconds of the animation per second of the motion.

@@ -16,7 +16,13 @@ from jaxbiped.dynamics._equivalent_states import whole_state
 from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.measure._footsteps import HeelStrikes, heel_strikes
-from jaxbiped.measure._samples import NODES, Samples, evaluate_along, states_after
+from jaxbiped.measure._samples import (
+    NODES,
+    Samples,
+    evaluate_along,
+    from_start,
+    states_after,
+)
 from jaxbiped.plot._skeleton import body_motion
 from jaxbiped.scene._modes import rigid_modes, standing_legs
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
@@ -203,12 +209,14 @@ class RigidMotion:
 
 
 def rigid_motion(scene: RigidScene, walk: Trajectory[Any]) -> RigidMotion:
-    """The motion of a rigid walk from the first heel strike on that it kept.
+    """The motion of a rigid walk from the first heel strike on that it kept, or from its start.
 
     What comes after the last heel strike that the walk kept (`max_arrivals`) is left out where
     there were more. Raises `ArgumentError` for a walk without heel strikes.
     """
     check_type("trajectory.state", walk.state, state_type(scene))
+    if walk.dense is not None:
+        walk = from_start(scene, walk, rows_of(walk.state, 0))
     times, states, end = np.zeros(0), walk.state, float(np.asarray(walk.t)[-1])
     if walk.arrivals is not None:
         kept = np.isfinite(np.asarray(walk.arrivals.t))

@@ -70,7 +70,7 @@ def work_precision(
     concerned = (row for row in rows if axis in row["errors"] or not row["errors"])
     if failed := [row for row in concerned if row["outcome"] != "ok"]:
         _draw_failures(ax, failed, cost, ways)
-    style.dress(ax, "", f"error of {axis.replace('_', ' ')}, relative", COSTS[cost])
+    style.dress(ax, "", f"error of {axis.replace('_', ' ')} (relative)", COSTS[cost])
     if new:
         style.legend_right(ax)
     return style.figure_of(ax)

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
-from jaxbiped.basins._labels import Label
+from jaxbiped.basins._labels import PERIODIC, Label
 from jaxbiped.plot._figure_style import has_titles as has_titles
 from jaxbiped.plot._figure_style import is_narrow as is_narrow
 from jaxbiped.plot._figure_style import letter_size as letter_size
@@ -261,6 +261,7 @@ _LABEL_COLOURS = {
     str(Label.SOLVER_FAILED): "#000000",
     str(Label.UNRESOLVED): "#2A2A2A",
     str(Label.TIMED_OUT): "#9A9A9A",
+    str(Label.CHATTERS): "#6E4A20",
     str(Label.PENDING): "#F2F2F2",
 }
 """Okabe and Ito's colours, greys where nothing is known, all of different lightness: they can be
@@ -305,7 +306,7 @@ def label_marker(name: str) -> str:
 
 def _kind(name: str) -> tuple[bool, int]:
     """Whether it is an ending, and its place among these; or that of its gait or cycle's length."""
-    if not name.startswith(str(Label.WALKING)):
+    if not name.startswith((str(Label.WALKING), PERIODIC)):
         return True, _ORDER.index(name) if name in _ORDER else len(_ORDER)
     numbers = re.findall(r"\d+", name) or [1]
     return False, int(numbers[-1]) - (len(numbers) == 1)

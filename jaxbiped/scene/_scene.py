@@ -4,7 +4,7 @@ import abc
 import dataclasses
 from collections.abc import Sequence
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias, TypeGuard
 
 import equinox as eqx
 from equinox import AbstractVar
@@ -51,6 +51,9 @@ class AbstractScene(eqx.Module):
     """What is modelled, and how it is written down; a frozen pytree of its parameters.
 
     Attributes:
+        time_unit: size of the times in which its motion changes [s]. A property of the class.
+        endings: names of the endings of a hybrid system; None for a walker. A property of the
+            class.
         compliant: whether feet sink into the ground and slip on it by laws of contact; else they
             roll and strike. A property of the class.
         redundant: whether constraints hold more coordinates together than there are degrees of
@@ -59,6 +62,11 @@ class AbstractScene(eqx.Module):
 
     compliant: AbstractClassVar[bool]
     redundant: AbstractClassVar[bool]
+    time_unit: ClassVar[float] = 1.0
+    endings: ClassVar[tuple[str, ...] | None] = None
+    arrival_footsteps: ClassVar[int] = 1
+    cycle_footsteps: ClassVar[int] = 1
+    cycle: ClassVar[str] = "cycle"
 
     __repr__ = in_short
     _repr_html_ = notebook_html
@@ -97,12 +105,22 @@ class AbstractWalkerScene(AbstractScene):
         return mechanism_of(self.walker)
 
     @property
-    def arrival_footsteps(self) -> int:
+    def cycle(self) -> str:  # type: ignore[override]
+        """What a cycle of it is: a "step" where a mirror exchanges its sides, else a "stride"."""
+        return "stride" if len(self.mechanism.structure.namings) == 1 else "step"
+
+    @property
+    def cycle_footsteps(self) -> int:  # type: ignore[override]
+        """Footsteps after which a cycle may close, at least."""
+        return self.mechanism.structure.cycle_footsteps
+
+    @property
+    def arrival_footsteps(self) -> int:  # type: ignore[override]
         """Footsteps from one arrival at the section of a cycle to the next.
 
         Compliant feet strike by name: those of unlike legs arrive once a stride.
         """
-        return self.mechanism.structure.cycle_footsteps if self.compliant else 1
+        return self.cycle_footsteps if self.compliant else 1
 
     @property
     def has_bristles(self) -> bool:
@@ -367,6 +385,11 @@ class RedundantScene(AbstractWalkerScene):
 
 CompliantScene: TypeAlias = Scene | RedundantScene
 """A walker with laws of contact, in minimal or redundant coordinates."""
+
+
+def is_walker(args: object) -> TypeGuard[AbstractWalkerScene]:
+    """Whether the parameters of a system are a scene of a walker."""
+    return isinstance(args, AbstractWalkerScene)
 
 
 def is_compliant(args: object) -> bool:

@@ -4,7 +4,7 @@ Values that `equinox.tree_at` or `vmap` put in have passed no constructor.
 """
 
 from collections.abc import Iterator
-from typing import Any, TypeVar
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -18,10 +18,8 @@ from jaxbiped._types import SomeTree, as_float, is_real, is_traced
 from jaxbiped.caching._cached_jit import cached_jit, note_code
 from jaxbiped.caching._caches import OfObjects, OncePerVersion
 
-SomeModule = TypeVar("SomeModule", bound=eqx.Module)
 
-
-def check_scene(scene: Any, *kinds: type[SomeModule]) -> Any:
+def check_scene(scene: Any, *kinds: type[Any]) -> Any:
     """A scene of one of these kinds with all its numbers in 64 bits, each as its part allows.
 
     Raises:

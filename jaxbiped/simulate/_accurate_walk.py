@@ -18,9 +18,10 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, warn
 from jaxbiped._ending import Ending
 from jaxbiped._types import is_traced
+from jaxbiped.hybrid._scales import relative_to_scene, sizes_of
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._simulation import Simulation
-from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, relative_to_scene, sizes_of
+from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name
 from jaxbiped.solve._error_estimate import LOOSER, Judged, check_untraced, check_wanted, refine
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -127,17 +128,23 @@ def _outputs(walk: Trajectory[Any]) -> dict[str, Any]:
 
 
 def _on_times_of(walk: Trajectory[Any], other: Trajectory[Any]) -> dict[str, Any]:
-    """What another solve tells at a walk's own times; at the end, its own end."""
+    """What another solve tells at a walk's own times; at resets and at the end, at its own.
+
+    Empty where its resets are not as many.
+    """
     found = _outputs(other)
     if walk.dense is None:
         return found
     times = np.array(walk.t)
     inside = np.clip(times, None, found["t"][-1])
     between = jtu.tree_map(lambda leaf: np.array(leaf), other.at(inside))
-    last = other.final
-    for leaf, end in zip(jtu.tree_leaves(between), jtu.tree_leaves(last), strict=True):
-        leaf[-1] = end
-    times[-1] = found["t"][-1]
+    # A reset is at two of the times, at which there are the states on its two sides.
+    resets, others = (np.flatnonzero(np.diff(t) == 0.0) for t in (times, found["t"]))
+    if len(resets) != len(others):
+        return {}
+    here, there = (np.array([*before, *(before + 1), -1]) for before in (resets, others))
+    jtu.tree_map(lambda leaf, told: leaf.__setitem__(here, told[there]), between, found["state"])
+    times[here] = found["t"][there]
     return found | {"t": times, "state": between}
 
 
@@ -170,7 +177,7 @@ def warn_of_missed_contacts(run: Simulation, walk: Trajectory) -> None:
     )
 
 
-def warn_of_long_steps(run: Simulation, walk: Trajectory) -> None:
+def warn_of_long_steps(run: AnySimulation, walk: Trajectory[Any]) -> None:
     """Warns where other steps of one size lead elsewhere; nothing is known while tracing.
 
     Compiles nothing: steps are an input of the program.
@@ -179,11 +186,11 @@ def warn_of_long_steps(run: Simulation, walk: Trajectory) -> None:
         return
     if walk.outcome in (Ending.SOLVER_FAILED, Ending.OUT_OF_STEPS):
         return
-    many = float(run.duration) >= _MANY * float(run.dt) or run.max_solver_steps < 2 * _MANY
+    many = float(run.duration) >= _MANY * float(run.dt) or run.max_solver_steps < 3 * _MANY
     base = run.dt if many else jnp.minimum(run.dt, run.duration)
     for factor in _LONGER if many else _SHORTER:
         dt = factor * base
-        other = dataclasses.replace(run, dt=dt)()
+        other = run.with_steps(dt)()
         found = _change(run, walk, other)
         if found:
             break
@@ -195,7 +202,7 @@ def warn_of_long_steps(run: Simulation, walk: Trajectory) -> None:
     )
 
 
-def _change(run: Simulation, walk: Trajectory, other: Trajectory) -> str:
+def _change(run: AnySimulation, walk: Trajectory[Any], other: Trajectory[Any]) -> str:
     """How far another solve leads elsewhere; "" for not far."""
     if int(other.ending) != int(walk.ending):
         return f"it ends as {other.outcome} instead of {walk.outcome}"

@@ -11,19 +11,26 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array, PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._types import as_float, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import BY_NAME, LaneEngine, Request
-from jaxbiped.dynamics._state import field_of
-from jaxbiped.scene._scene import RedundantScene
+from jaxbiped.hybrid._endings import ending_code
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.simulate._start import Options
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adaptive_program
-from jaxbiped.solve._engine_names import ENGINES, engine_for, lane_obstacle
-from jaxbiped.solve._failure_events import ending_code, ending_events
-from jaxbiped.solve._saved_outputs import Saved, recorded_steps
+from jaxbiped.solve._engine_names import engine_for, lane_obstacle
+from jaxbiped.solve._recorders import (
+    AbstractRecorder,
+    ArrivalRecorder,
+    StepRecorder,
+    TimeRecorder,
+    recorded_steps,
+)
+from jaxbiped.solve._runge_kutta import stepper_of
 from jaxbiped.solve._solvers import with_projection, with_root_tolerances
+from jaxbiped.solve._stepper import Stepper
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 from jaxbiped.solve.controllers._event_steps import (
     PATIENCE,
@@ -35,10 +42,10 @@ from jaxbiped.solve.controllers._step_size import walk_control
 from jaxbiped.solve.controllers._wrapped_control import (
     Extremes,
     GivenFirstStep,
+    StepsOfOneSize,
     first_step,
     just_before_end,
 )
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulation import Simulation
@@ -49,36 +56,26 @@ _ROOM = 1 << 18
 """Steps that there is room for at first; who takes more runs again, with room for as many."""
 
 
-def choose_engine(
-    asked: Options, solver: diffrax.AbstractSolver[PyTree], leaves: PyTree, *, redundant: bool
-) -> str:
+def choose_engine(asked: Options, solver: diffrax.AbstractSolver[PyTree], leaves: PyTree) -> str:
     """The engine that "auto" stands for, or the one that is asked for.
 
     Raises:
         ArgumentError: an unknown name, or lanes or CUDA for what they cannot do.
     """
-    obstacle = _hindrance(asked, solver, leaves, redundant=redundant)
-    engine, section = asked.engine, asked.section
+    obstacle = _hindrance(asked, solver, leaves)
+    section = asked.section
     if section is None:
-        return engine_for(engine, obstacle=obstacle, prefers_xla=redundant, by_device=True)
-    check_choice("engine", engine, ENGINES)
-    if engine == "xla" or obstacle is not None:
-        chosen = 'engine = "xla" was chosen; choose "lanes" or "auto"'
-        why = f"here {obstacle}" if obstacle is not None else chosen
-        raise ArgumentError(
-            f"save = {type(section).__name__}() is not allowed here: only lanes do that, and {why}."
-        )
-    return engine_for("cuda", obstacle=None, by_device=True) if engine == "cuda" else "lanes"
+        return engine_for(asked.engine, obstacle=obstacle, by_device=True)
+    # The programs of lanes alone record arrivals; XLA runs these, too.
+    if obstacle is not None:
+        raise ArgumentError(f"save = {type(section).__name__}() is not allowed here: {obstacle}.")
+    return engine_for(asked.engine, obstacle=None, by_device=True)
 
 
 def _hindrance(
-    asked: Options, solver: diffrax.AbstractSolver[PyTree], leaves: PyTree, *, redundant: bool
+    asked: Options, solver: diffrax.AbstractSolver[PyTree], leaves: PyTree
 ) -> str | None:
     """Why lanes cannot do what is asked."""
-    if asked.dt is not None:
-        return "steps of one size (dt) are diffrax's"
-    if redundant and not (isinstance(asked.save, str) and asked.save == "end"):
-        return 'redundant coordinates are diffrax\'s, but for save="end"'
     if asked.save_steps and is_traced(jtu.tree_leaves(leaves)):
         return (
             'under jit, vmap or derivatives it does not save every step (save="steps"); ask for '
@@ -95,25 +92,25 @@ def _hindrance(
 def by_xla(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
     solver: diffrax.AbstractSolver[PyTree] = run.solver
+    system = system_of(run.scene)
     adjoint = diffrax.RecursiveCheckpointAdjoint() if run.adjoint is None else run.adjoint
     weight: float = getattr(solver, "switch_weight", 1.0)
-    controller: PyTree = walk_control(run.rtol, run.atol, run.units, switch_weight=weight)
+    controller: PyTree = walk_control(run.rtol, run.atol, run.units, system, switch_weight=weight)
     if run.dt is not None:
         constant: PyTree = diffrax.ConstantStepSize()
-        controller = MissedContacts(constant)
+        controller = MissedContacts(constant, system)
         solver = with_root_tolerances(solver, run.rtol, run.atol)
     if run.footsteps is not None:
-        controller = FootstepLimit(controller, run.footsteps)
+        controller = FootstepLimit(controller, run.footsteps, system)
     if run.dt is None:
-        controller = LocatedEnding(controller, run.watch)
+        controller = LocatedEnding(controller, system, run.watch)
     if run.extremes is not None:
         controller = Extremes(controller, run.extremes)
     size = first_step(run.duration, run.units.time) if run.dt is None else run.dt
-    events = ending_events(run.watch)
-    if isinstance(run.scene, RedundantScene):
-        solver = with_projection(run.scene, solver, adjoint)
+    events = system.failures(run.watch)
+    solver = with_projection(system, run.scene, solver, adjoint)
     solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(field_of(run.scene)),
+        diffrax.ODETerm(system.vector_field),
         solver,
         t0=jnp.zeros_like(run.duration),
         t1=run.duration,
@@ -188,7 +185,8 @@ def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
     dense, arrivals = None, None
     if run.save_steps:
         ended, rows = _step_by_step(run, request)
-        t, state, dense = recorded_steps(run.state, rows, run.solver)
+        resets = system_of(run.scene).resets
+        t, state, dense = recorded_steps(run.state, rows, _stepper(run), resets=resets)
     else:
         times = None if run.times is None else np.asarray(run.times)
         room = 0 if run.section is None else run.max_arrivals
@@ -213,7 +211,9 @@ def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
         lowest=ended.lowest,
         highest=ended.highest,
         correction=run.correction,
+        missed_contacts=ended.missed,
         engine=run.engine,
+        endings=run.scene.endings,
     )
 
 
@@ -231,11 +231,34 @@ def lane_request(run: "Simulation") -> Request:
         footsteps=as_float(footsteps),
         patience=as_float(PATIENCE * footsteps),
         max_attempts=as_float(run.max_solver_steps),
+        steps=None if run.dt is None else StepsOfOneSize.of(run.dt, run.duration),
     )
-    saved = Saved(run.save_steps, run.times is not None, run.section, run.extremes)
-    assert isinstance(run.solver, AbstractRosenbrock)
-    steps = AdaptiveSolve(run.solver, run.watch, run.footsteps is not None, saved, located=True)
+    steps = AdaptiveSolve(
+        system_of(run.scene),
+        _stepper(run),
+        run.watch,
+        run.footsteps is not None,
+        _recorder(run),
+        run.extremes,
+        located=run.dt is None,
+        fenced=run.engine == "xla",
+    )
     return Request(adaptive_program(steps), solve, quick=run.max_solver_steps <= _QUICK)
+
+
+def _stepper(run: "Simulation") -> Stepper:
+    """That of its solver, which lanes were asked about before."""
+    stepper = stepper_of(run.solver)
+    assert stepper is not None
+    return stepper
+
+
+def _recorder(run: "Simulation") -> AbstractRecorder | None:
+    if run.section is not None:
+        return ArrivalRecorder(run.section)
+    if run.save_steps:
+        return StepRecorder()
+    return None if run.times is None else TimeRecorder()
 
 
 def prepare_lanes(run: "Simulation", request: Request) -> Callable[["Simulation"], Trajectory]:
@@ -244,8 +267,8 @@ def prepare_lanes(run: "Simulation", request: Request) -> Callable[["Simulation"
     Where only the end is asked for, what JAX does around it is compiled as well.
     """
     engine = BY_NAME[run.engine]
-    assert isinstance(engine, LaneEngine)
-    engine.compile(request).prepare(1)
+    if isinstance(engine, LaneEngine):
+        engine.compile(request).prepare(1)
     within = run.save_steps or run.times is not None or run.section is not None
     return by_lanes if within else _compiled
 

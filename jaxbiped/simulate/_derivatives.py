@@ -24,24 +24,20 @@ from jaxbiped._types import Scalar, in_64_bits, is_real, is_traced, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import CUDA, host_jit
 from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._mode_changes import change_mode_on_surface, mode_switches
 from jaxbiped.dynamics._stance_motion import rolling_field
-from jaxbiped.dynamics._surfaces import (
-    AbstractSection,
-    in_nearest_names,
-    opening,
-    switches,
-    uprightness,
-)
+from jaxbiped.dynamics._surfaces import opening, uprightness
+from jaxbiped.hybrid._rigid_guards import mode_switches
+from jaxbiped.hybrid._scales import units_of
+from jaxbiped.hybrid._sections import AbstractSection
+from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.hybrid._walker_systems import Rolling, system_of
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.solve._accuracy import units_of
-from jaxbiped.solve._failure_events import ending_surface
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
+from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
 from jaxbiped.variational._variational_solve import (
     EventMotion,
     TangentsAtTimes,
@@ -55,10 +51,8 @@ from jaxbiped.variational._variational_solve import (
 _EARLY, _LEFT = 3.0, 1e-2
 """How long before an event the motion is first followed, in tolerances times the unit of time, and
 the share of that which is left in the end: behind a touchdown derivatives change in nanoseconds."""
-_WATCH = Watch(field=vector_field, switches=switches)
-"""Derivatives are taken up to the times at which the plain solve saved."""
 _ROLLING = Watch(field=rolling_field, switches=mode_switches)
-_IN_MODES = Watch(field=rolling_field, switches=mode_switches, reset=change_mode_on_surface)
+_IN_MODES = Watch(field=rolling_field, switches=mode_switches, reset=Rolling().reset_at_switch)
 _Run = TypeVar("_Run")
 _STILL = object()
 """Tangent of what is known."""
@@ -107,6 +101,7 @@ def slopes_of(
         device: whether CUDA devices carry the columns; else it is lanes where they can, else XLA.
     """
     scene, state, saved, t = in_64_bits((scene, state, found.state, found.t))
+    system = system_of(scene)
     if found.arrivals is not None:
         t = jnp.concatenate([in_64_bits(found.arrivals.t), t])
     by_clock = jnp.isfinite(t)
@@ -118,7 +113,7 @@ def slopes_of(
     at = TangentsAtTimes(there, jnp.zeros((len(t), 0, len(there))))
     time = jnp.zeros((len(t), 0))
     if places or active:
-        how, engine = motion_solve(_WATCH, solver, rtol), CUDA if device else None
+        how, engine = motion_solve(_watch_of(system), solver, rtol), CUDA if device else None
         start, seeded = seeded_directions(scene, state, places, active)
         early = _EARLY * rtol * units_of(scene, state).time
         at = tangents_at_times(how, start, seeded, jnp.where(by_clock, t, t - early), engine)
@@ -131,10 +126,11 @@ def slopes_of(
             lasts = jnp.where(delay <= 2.0 * early, (1.0 - _LEFT) * jnp.maximum(delay, 0.0), 0.0)
             return tangents_after(how, here, seeded, lasts, engine)
 
-        moves = _at_events(scene, at, end, found.ending, section, rtol, seeded, nearer)
+        moves = _at_events(system, scene, at, end, found.ending, section, rtol, seeded, nearer)
         time = jnp.where(by_clock[:, None], 0.0, moves.time)
         columns = jnp.where(by_clock[:, None, None], columns, moves.state)
-    rates = jnp.stack(jtu.tree_leaves(jax.vmap(lambda y: vector_field(0.0, y, scene))(at.state)), 1)
+    fields = jax.vmap(lambda y: system.vector_field(0.0, y, scene))(at.state)
+    rates = jnp.stack(jtu.tree_leaves(fields), 1)
     reached = jnp.isfinite(t)[:, None]
     return Slopes(
         time=jnp.where(reached, time, 0.0),
@@ -144,7 +140,21 @@ def slopes_of(
     )
 
 
+def _watch_of(system: AbstractSystem) -> Watch:
+    """What derivatives are followed with, up to the times at which the plain solve saved."""
+    if not system.resets:
+        return Watch(system.vector_field, system.switches, time_unit=system.time_unit)
+    return Watch(
+        system.vector_field,
+        system.switches,
+        reset=system.reset_at_switch,
+        repeats=system.repeats,
+        time_unit=system.time_unit,
+    )
+
+
 def _at_events(
+    system: AbstractSystem,
     scene: Scene,
     at: TangentsAtTimes,
     end: PyTree,
@@ -164,7 +174,7 @@ def _at_events(
         def event(at: Tangents) -> EventMotion:
             return follow_event(
                 surface,
-                lambda a, y: vector_field(0.0, y, a),
+                lambda a, y: system.vector_field(0.0, y, a),
                 at,
                 seeded,
                 rtol=rtol,
@@ -178,15 +188,21 @@ def _at_events(
         assert section is not None
 
         def surface(a: PyTree, y: PyTree) -> Scalar:
-            return section.value(a, in_nearest_names(section, a, here.state, y))
+            return section.value(a, system.in_nearest_names(section, a, here.state, y))
 
-        return follow(surface, here)
+        moves = follow(surface, here)
+        if not section.behind_reset:
+            return moves
+        reset = system.observed_at(section).reset_map
+        at_event = Tangents(moves.reached, moves.state.T)
+        _, behind = along_columns(lambda y, a: reset(a, y), at_event, seeded)
+        return moves._replace(state=as_columns(behind).T)
 
     last = jtu.tree_map(lambda leaf: leaf[-1], at)
     moments = [
         jtu.tree_map(
             lambda leaf: leaf[None],
-            follow(lambda a, y: ending_surface(ending, a, end, y), last),
+            follow(lambda a, y: system.ending_surface(ending, a, end, y), last),
         )
     ]
     if section is not None:
@@ -210,11 +226,16 @@ def rigid_slopes_of(
     count: Scalar,
     end: Scalar,
     ending: Scalar,
+    moments: Scalar | None = None,
     *,
+    section: AbstractSection | None = None,
     places: tuple[int, ...],
     active: tuple[int, ...],
 ) -> Slopes:
     """Derivatives with respect to some leaves of the state and of the scene.
+
+    They are those behind all heel strikes and at the end; at `moments`, those of times where there
+    is no section, else of arrivals there and at the end.
 
     Args:
         walk: what walked, from where, for how long and how exactly.
@@ -222,6 +243,8 @@ def rigid_slopes_of(
             there were more.
         count: how many there were.
         end, ending: when and how the walk ended.
+        moments: times [s] at which was saved, infinite where that did not come; None: strikes were.
+        section: at which these are arrivals.
         places, active: of the leaves that are differentiated.
     """
     scene, state = in_64_bits((walk.scene, walk.state))
@@ -259,6 +282,31 @@ def rigid_slopes_of(
     first = _Strike(jnp.zeros_like(end), jnp.zeros(n), start)
     reached = jnp.arange(len(strikes)) < count
     last, each = jax.lax.scan(strike, first, (strikes, reached))
+
+    def at_moment(t: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+        before = jnp.sum(reached & (strikes <= t))
+        since = jtu.tree_map(lambda a, rest: jnp.append(a[None], rest, 0)[before], first, each)
+        here = follow(since, jnp.where(jnp.isfinite(t), t, since.t))
+        rates = as_columns(rolling_field(0.0, here.state, scene))
+        if section is None:
+            return jnp.zeros(n), here.columns.T, rates
+        moves = event(section.value, here)
+        return moves.time, moves.state, rates
+
+    saved = None
+    if moments is not None:
+        known, k, c = jnp.isfinite(moments), len(moments), len(state)
+        time, columns, rates = jnp.zeros((k, n)), jnp.zeros((k, n, c)), jnp.zeros((k, c))
+        if n:
+            time, columns, rates = jax.lax.map(at_moment, moments)
+        saved = Slopes(
+            jnp.where(known[:, None], time, 0.0),
+            jnp.where(known[:, None, None], columns, 0.0),
+            jnp.zeros_like(moments),  # times to save at are known: they do not move
+            rates,
+        )
+        if section is None:
+            return saved
     at = follow(last, end)
 
     def fallen(a: RigidScene, y: Any) -> Scalar:
@@ -273,16 +321,17 @@ def rigid_slopes_of(
     columns = jnp.where(by_clock, at.columns.T, moves.state)
     columns = jnp.where(struck, last.after.columns.T, columns) + lost
     rates = as_columns(rolling_field(0.0, at.state, scene))
-    return Slopes(
-        time=jnp.append(jnp.where(reached[:, None], each.time, 0.0), time[None], 0),
-        state=jnp.append(
-            jnp.where(reached[:, None, None], jnp.swapaxes(each.after.columns, 1, 2), 0.0),
-            columns[None],
-            0,
-        ),
-        clock=jnp.append(jnp.zeros(len(strikes)), jnp.where(by_clock, 1.0, 0.0)),
-        rates=jnp.broadcast_to(rates, (len(strikes) + 1, len(rates))),
-    )
+    if saved is None:
+        behind = jnp.swapaxes(each.after.columns, 1, 2)
+        saved = Slopes(
+            jnp.where(reached[:, None], each.time, 0.0),
+            jnp.where(reached[:, None, None], behind, 0.0),
+            jnp.zeros(len(strikes)),
+            jnp.broadcast_to(rates, (len(strikes), len(rates))),
+        )
+    last_one = Slopes(time, columns, jnp.where(by_clock, 1.0, 0.0), rates)
+    found: Slopes = jtu.tree_map(lambda rows, row: jnp.append(rows, row[None], 0), saved, last_one)
+    return found
 
 
 def with_derivatives(

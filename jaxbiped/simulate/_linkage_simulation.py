@@ -19,27 +19,34 @@ from jaxbiped._checks import (
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, as_float, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.constraints._constraint_methods import (
-    AbstractProjectingMethod,
-    check_independent,
-    correct_step,
-    nearest_consistent,
-)
+from jaxbiped.compiler import LANES, Request
+from jaxbiped.constraints._constraint_methods import check_independent, nearest_consistent
 from jaxbiped.constraints._linkage import Constraints, constraints_of
-from jaxbiped.dynamics._constrained_motion import LinkageState, linkage_field
+from jaxbiped.dynamics._constrained_motion import LinkageState
+from jaxbiped.hybrid._linkage_system import Swinging
+from jaxbiped.hybrid._scales import Units
 from jaxbiped.scene._linkages import LinkageScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.simulate._start import Options, check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
+from jaxbiped.solve._engine_names import engine_for, lane_obstacle
+from jaxbiped.solve._recorders import TimeRecorder
+from jaxbiped.solve._runge_kutta import stepper_of
 from jaxbiped.solve._solvers import (
     check_adjoint,
     solver_named,
+    with_projection,
     with_root_tolerances,
-    wrap_projected,
 )
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, arrivals_among
 from jaxbiped.solve.controllers._step_size import step_control
-from jaxbiped.solve.controllers._wrapped_control import StepControl, first_step
+from jaxbiped.solve.controllers._wrapped_control import (
+    StepControl,
+    StepsOfOneSize,
+    first_step,
+    just_before_end,
+)
 
 _FAR = 0.5
 """Distance of a start from its joints, in units of the longest arm, beyond which it is refused."""
@@ -82,15 +89,24 @@ def simulate_linkage(
     check_independent(scene.linkage, scene.method, state.q)
     _check_joints(scene, state)
     check_adjoint(scene.method, adjoint)
-    relative, absolute = tolerances(asked.accuracy, asked.rtol, asked.atol)
+    relative, absolute = map(as_float, tolerances(asked.accuracy, asked.rtol, asked.atol))
+    step = None if dt is None else as_float(dt)
+    problem = scene, state, times
+    if adjoint is None and not is_traced((*problem, step, relative, absolute)):
+        request = _lane_request(problem, method, (relative, absolute), step, asked)
+        if request is not None:
+            swung = _by_lanes(problem, request)
+            if step is not None:
+                request = _with_steps(request, _LONGER * step)
+                _warn_of_long_steps(swung, float(step), _by_lanes(problem, request))
+            return swung
     control = step_control(relative, absolute, rms_norm) if dt is None else None
     chosen = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
     if dt is not None:
-        method = with_root_tolerances(method, as_float(relative), as_float(absolute))
-    problem = scene, state, times, method, control
-    step = None if dt is None else as_float(dt)
+        method = with_root_tolerances(method, relative, absolute)
+    how = method, control
     try:
-        swung = _solve(*problem, step, asked.max_solver_steps, chosen)
+        swung = _solve(*problem, *how, step, asked.max_solver_steps, chosen)
     except TypeError as error:
         if adjoint is not None or "forward-mode" not in str(error):
             raise
@@ -98,7 +114,7 @@ def simulate_linkage(
             "adjoint = None is not allowed in forward mode: choose diffrax.ForwardMode()."
         ) from error
     if step is not None and not is_traced((scene, state, times, step)):
-        longer = _solve(*problem, _LONGER * step, asked.max_solver_steps, chosen)
+        longer = _solve(*problem, *how, _LONGER * step, asked.max_solver_steps, chosen)
         _warn_of_long_steps(swung, float(step), longer)
     return swung
 
@@ -149,12 +165,10 @@ def _solve(
     most: int,
     adjoint: diffrax.AbstractAdjoint,
 ) -> Trajectory[LinkageState]:
-    if scene.method.projects:
-        solver = wrap_projected(solver, _correct_step, adjoint)
-    off = _distance(constraints_of(scene.linkage, *state))
-    start = LinkageState(*map(tuple, nearest_consistent(scene.linkage, *state)))
+    solver = with_projection(Swinging(), scene, solver, adjoint)
+    off, start = _begin(scene, state)
     solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(linkage_field),
+        diffrax.ODETerm(Swinging.vector_field),
         solver,
         t0=jnp.zeros_like(times[0]),
         t1=times[-1],
@@ -179,13 +193,84 @@ def _solve(
         accepted=solution.stats["num_accepted_steps"],
         rejected=solution.stats["num_rejected_steps"],
         correction=off,
-        violation=_distance(constraints_of(scene.linkage, *found)),
+        violation=_violation(scene, found),
     )
 
 
-def _correct_step(scene: LinkageScene, state: LinkageState) -> LinkageState:
-    assert isinstance(scene.method, AbstractProjectingMethod)
-    return LinkageState(*map(tuple, correct_step(scene.linkage, scene.method, *state)))
+def _lane_request(
+    problem: tuple[LinkageScene, LinkageState, Scalar],
+    solver: diffrax.AbstractSolver[PyTree],
+    tolerance: tuple[Scalar, Scalar],
+    dt: Scalar | None,
+    asked: Options,
+) -> Request | None:
+    """What a solve asks of lanes; None where they cannot do it."""
+    scene, state, times = problem
+    stepper = stepper_of(solver)
+    if (
+        stepper is None
+        or engine_for("auto", obstacle=lane_obstacle(solver, None, problem)) != "lanes"
+    ):
+        return None
+    zero, until = as_float(0.0), times[-1]
+    solve = Solve(
+        scene=scene,
+        state=state,
+        duration=until,
+        almost=just_before_end(until),
+        rtol=tolerance[0],
+        atol=tolerance[1],
+        units=Units(jtu.tree_map(jnp.ones_like, state), np.ones(())),
+        footsteps=zero,
+        patience=zero,
+        max_attempts=as_float(asked.max_solver_steps),
+        steps=None if dt is None else StepsOfOneSize.of(dt, until),
+    )
+    steps = AdaptiveSolve(Swinging(), stepper, (), counting=False, recorder=TimeRecorder())
+    request = Request(adaptive_program(steps), solve, times=np.asarray(times))
+    return None if LANES.can(request) else request
+
+
+def _with_steps(request: Request, dt: Scalar) -> Request:
+    """The same with steps of another size [s]."""
+    solve = request.inputs
+    steps = StepsOfOneSize.of(dt, solve.duration)
+    return request._replace(inputs=solve._replace(steps=steps))
+
+
+def _by_lanes(
+    problem: tuple[LinkageScene, LinkageState, Scalar], request: Request
+) -> Trajectory[LinkageState]:
+    scene, state, _ = problem
+    off, start = _begin(scene, state)
+    request = request._replace(inputs=request.inputs._replace(state=start))
+    solved, recorded, _ = LANES.run(request)
+    assert recorded is not None
+    saved = arrivals_among(recorded.values, jnp.asarray(recorded.counts), state)
+    code = jnp.where(solved.ending == int(Ending.WALKING), int(Ending.FINISHED), solved.ending)
+    return Trajectory(
+        t=saved.t,
+        state=saved.state,
+        ending=code,
+        accepted=solved.accepted,
+        rejected=solved.rejected,
+        correction=off,
+        violation=_violation(scene, saved.state),
+        engine="lanes",
+    )
+
+
+@cached_jit
+def _begin(scene: LinkageScene, state: LinkageState) -> tuple[Scalar, LinkageState]:
+    """How far a start is from its constraints [m], and the nearest one on them."""
+    off = _distance(constraints_of(scene.linkage, *state))
+    return off, LinkageState(*map(tuple, nearest_consistent(scene.linkage, *state)))
+
+
+@cached_jit
+def _violation(scene: LinkageScene, state: LinkageState) -> Scalar:
+    """Distances of states from the constraints [m], shaped as their leaves."""
+    return _distance(constraints_of(scene.linkage, *state))
 
 
 def _distance(at: Constraints) -> Scalar:

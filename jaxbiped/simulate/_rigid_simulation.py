@@ -2,7 +2,8 @@
 
 import dataclasses
 import functools
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -13,16 +14,17 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import (
     ArgumentError,
+    check_choice,
     check_positive,
     check_room,
     check_unbatched,
     traced_rules,
 )
-from jaxbiped._types import Scalar, as_float, by_numpy
-from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import BY_NAME, Program, Request
+from jaxbiped._types import Scalar, as_float, by_numpy, is_traced
+from jaxbiped.compiler import BY_NAME, Request
 from jaxbiped.dynamics._state import check_state, state_type, without_whole_turns
-from jaxbiped.dynamics._surfaces import HeelStrike
+from jaxbiped.hybrid._mode_history import history_of
+from jaxbiped.hybrid._sections import AbstractSection, HeelStrike, check_section_body
 from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._modes import check_mode, rigid_modes
 from jaxbiped.scene._scene import RigidScene
@@ -32,27 +34,33 @@ from jaxbiped.simulate._start import (
     Options,
     check_limits,
     check_single_scene,
+    check_steps,
+    check_times,
     in_one_precision,
     in_own_precision,
+    watched_by,
 )
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._engine_names import engine_for
-from jaxbiped.solve._mode_history import history_of
-from jaxbiped.solve._rigid_steps import (
-    RigidProgress,
-    RigidWalk,
-    attempt_step,
-    ending_of,
-    initial_progress,
-    is_pulled,
-    state_with_hip,
+from jaxbiped.solve._explicit_methods import EXPLICIT_METHODS, ExplicitMethod
+from jaxbiped.solve._recorders import (
+    AbstractRecorder,
+    ArrivalRecorder,
+    StepRecorder,
+    StrikeRecorder,
+    TimeRecorder,
 )
+from jaxbiped.solve._rigid_program import RigidSolve, RigidSolved, rigid_program
+from jaxbiped.solve._rigid_record import rigid_record
+from jaxbiped.solve._rigid_steps import FallWatch, RigidWalk
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, scene_key, single_time
 
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""
 _ROWS = 64
 """Changes of mode that there is room for beside heel strikes."""
+_STEPS = 1 << 14
+"""Steps that there is room for at first; a walk of more runs again, with room for as many."""
 _FIRST = 1e-1
 """First tolerance as a share of the relative error wanted."""
 _EMBEDDED = 0.3
@@ -70,8 +78,13 @@ class RigidSimulation(eqx.Module):
     Attributes:
         walk: the program's inputs.
         waits: whether the duration only bounds the wait for footsteps.
-        embedded: whether steps go on with the embedded solution, one order lower.
-        max_arrivals: how many heel strikes to keep.
+        method: its steps.
+        watch: as in `simulate`.
+        times: times at which to save [s], shape (n,), or None.
+        save_steps: whether every step is saved.
+        section: where arrivals are saved, or None.
+        room: how many of these, or of the steps, to keep.
+        extremes: as in `simulate`.
         engine: "lanes", "cuda" or "xla".
         finest_tolerance: finest relative tolerance to which its error is refined: rolling is smooth
             and never stiff.
@@ -80,50 +93,55 @@ class RigidSimulation(eqx.Module):
     finest_tolerance: ClassVar[float] = 1e-13
     walk: RigidWalk
     waits: bool = eqx.field(static=True)
-    embedded: bool = eqx.field(static=True)
-    max_arrivals: int = eqx.field(static=True)
+    method: ExplicitMethod = eqx.field(static=True)
+    watch: tuple[str, ...] = eqx.field(static=True)
+    times: np.ndarray | None
+    save_steps: bool = eqx.field(static=True)
+    section: AbstractSection | None = eqx.field(static=True)
+    extremes: Callable[..., PyTree] | None = eqx.field(static=True)
+    room: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)
 
     @staticmethod
     def of(scene: RigidScene, state: Any, asked: Options) -> "RigidSimulation":
         """Checks what is asked, and forms it."""
-        asked.refuse(scene, "solver", "atol", "dt", "extremes", "watch", "adjoint")
+        asked.refuse(scene, "atol", "adjoint")
+        method = _method_of(asked)
         section, duration, footsteps = asked.section, asked.duration, asked.footsteps
-        ends_alone = isinstance(asked.save, str) and asked.save == "end"
-        if not ends_alone and not isinstance(section, HeelStrike):
-            raise ArgumentError(
-                f"save = {asked.save!r} is not allowed for a RigidScene: "
-                'give "end" or HeelStrike().'
-            )
+        if isinstance(asked.save, str):
+            check_choice("save", asked.save, ("steps", "end"))
         check_limits(duration, footsteps, asked.max_solver_steps)
         with traced_rules() as rules:
             scene = check_scene(scene, RigidScene)
             state = check_state(in_own_precision(state), state_type(scene))
             state = in_one_precision(without_whole_turns(scene, state))
             check_single_scene(scene)
+            check_section_body(scene, section)
             check_unbatched("state", state, "one start")
             if (modes := rigid_modes(scene.mechanism)).any:
                 check_mode(scene.mechanism, modes, scene.ground.slope, state)
+            longest: Any = duration
             if duration is None:
                 check_pulls(scene.ground)
+                longest = by_numpy(
+                    lambda numpy, l, g: footsteps * (_PATIENCE * numpy.sqrt(l / g)),
+                    scene.mechanism.height,
+                    scene.ground.g,
+                )
             else:
                 check_positive("duration", duration, "s")
             usual = ACCURACIES[asked.accuracy].rigid_walk
             tolerance = usual if asked.rtol is None else asked.rtol
             check_positive("rtol", tolerance)
+            check_steps(None, asked.dt, most_steps=asked.max_solver_steps, duration=longest)
         # Of a lane that is not allowed nothing is known from the start.
-        state, duration = where_allowed(rules, state), where_allowed(rules, duration, 1.0)
+        state, longest = where_allowed(rules, state), where_allowed(rules, longest, 1.0)
+        watched_by(scene, asked.watch)
         check_room("max_arrivals", asked.max_arrivals)
         dtype = state[0].dtype
         narrow = "it computes in 64 bits" if dtype != jnp.float64 else None
-        count, longest = 1 if footsteps is None else footsteps, duration
-        if duration is None:
-            longest = by_numpy(
-                lambda numpy, l, g: count * (_PATIENCE * numpy.sqrt(l / g)),
-                scene.mechanism.height,
-                scene.ground.g,
-            )
-        others = footsteps or 0, tolerance, asked.max_solver_steps
+        if asked.times is not None:
+            check_times(asked.times, longest)
 
         def cast(leaf: Any) -> Scalar:
             return as_float(leaf).astype(dtype)
@@ -131,12 +149,26 @@ class RigidSimulation(eqx.Module):
         # In the precision of the start, as a compliant walk has it. A scene that is formed anew
         # makes its mechanism anew.
         scene = scene if narrow is None else jtu.tree_map(cast, scene)
+        engine = _engine_for(asked, narrow)
         return RigidSimulation(
-            RigidWalk(scene, state, cast(longest), *map(cast, others)),
+            RigidWalk(
+                scene=scene,
+                state=state,
+                duration=cast(longest),
+                footsteps=cast(footsteps or 0),
+                rtol=cast(tolerance),
+                max_attempts=cast(asked.max_solver_steps),
+                dt=None if asked.dt is None else cast(asked.dt),
+            ),
             waits=duration is None,
-            embedded=False,
-            max_arrivals=0 if section is None else int(asked.max_arrivals),
-            engine=engine_for(asked.engine, obstacle=narrow, by_device=True, by_any=True),
+            method=method,
+            watch=tuple(asked.watch),
+            times=None if asked.times is None else np.asarray(asked.times, dtype=float),
+            save_steps=asked.save_steps,
+            section=section,
+            extremes=asked.extremes,
+            room=asked.room,
+            engine=engine,
         )
 
     @property
@@ -149,14 +181,47 @@ class RigidSimulation(eqx.Module):
         """Relative tolerance."""
         return self.walk.rtol
 
+    @property
+    def duration(self) -> Scalar:
+        """Longest simulated time [s]."""
+        return self.walk.duration
+
+    @property
+    def dt(self) -> Scalar | None:
+        """Size of all steps [s], or None."""
+        return self.walk.dt
+
+    @property
+    def max_solver_steps(self) -> int:
+        """As in `simulate`, where it is known."""
+        return int(self.walk.max_attempts)
+
+    def with_steps(self, dt: Scalar) -> "RigidSimulation":
+        """The same with steps of another fixed size [s]."""
+        return dataclasses.replace(self, walk=self.walk._replace(dt=dt))
+
     def at_tolerance(self, rtol: float) -> "RigidSimulation":
         """The same at another relative tolerance."""
         changed = as_float(rtol).astype(self.rtol.dtype)
         return dataclasses.replace(self, walk=self.walk._replace(rtol=changed))
 
+    def saving_strikes(self, room: int) -> "RigidSimulation":
+        """The same, of which so many heel strikes are saved and nothing else."""
+        section = HeelStrike() if room else None
+        return dataclasses.replace(
+            self,
+            times=None,
+            save_steps=False,
+            section=section,
+            extremes=None,
+            room=room,
+        )
+
     def by_other_method(self) -> tuple["RigidSimulation", float, float]:
-        """The same by the embedded method; its tolerance in units of the walk's, and its weight."""
-        return dataclasses.replace(self, embedded=True), _EMBEDDED, 1.0
+        """The same by another method; its tolerance in units of the walk's, and its weight."""
+        if self.method == ExplicitMethod():
+            return dataclasses.replace(self, method=ExplicitMethod(embedded=True)), _EMBEDDED, 1.0
+        return dataclasses.replace(self, method=ExplicitMethod()), 1.0, 1.0
 
     def first_tolerance(self, wanted: float) -> float:
         """The relative tolerance to begin with where this relative error is wanted."""
@@ -164,90 +229,142 @@ class RigidSimulation(eqx.Module):
 
     def __call__(self) -> Trajectory[Any]:
         """Solves it, differentiably."""
-        walk = with_derivatives(self, RigidSimulation.solved, moving=_moving, slopes=_slopes)
+        walk = with_derivatives(
+            self, RigidSimulation.solved, moving=_moving, slopes=_slopes, check=_check_derivatives
+        )
         return dataclasses.replace(walk, scene_key=scene_key(self.walk.scene))
 
     def solved(self) -> Trajectory[Any]:
         """Solves it."""
-        state = self.walk.state
-        moded = rigid_modes(self.scene.mechanism).any
-        program = rigid_program(self.max_arrivals > 0, moded, self.waits, self.embedded)
-        room = _ROWS + 8 * self.max_arrivals if moded else self.max_arrivals
-        request = Request(program, self.walk, room=room, quick=True)
-        found, recorded, _ = BY_NAME[self.engine].run(request)
-        no_rows = np.zeros((0, 1 + len(state)), state[0].dtype)
-        rows: Any = no_rows if recorded is None else recorded.values
+        scene, state = self.scene, self.walk.state
+        moded = rigid_modes(scene.mechanism).any
+        recorder = self._recorder(moded)
+        strikes = isinstance(recorder, StrikeRecorder)
+        solved, rows, total = self._run(
+            recorder, _ROWS + 8 * self.room if moded and strikes else self.room
+        )
+        (t, told), dense = single_time(solved.t, solved.state), None
+        arrivals, changes = arrivals_among(self._no_rows, solved.footsteps, state), (rows, total)
+        if self.save_steps:
+            record = rigid_record(scene, state, rows, total)
+            t, told, dense, changes = record.t, record.state, record.dense, record.resets
+            arrivals = arrivals_among(record.strikes, solved.footsteps, state)
+        elif self.times is not None:
+            _, t, told = arrivals_among(rows, total, state)
+        elif isinstance(recorder, ArrivalRecorder):
+            arrivals = arrivals_among(rows, total, state)
+        elif self.room:
+            if moded:
+                rows = by_numpy(functools.partial(_first_strikes, count=self.room), rows)
+            arrivals = arrivals_among(rows, solved.footsteps, state)
         history = None
-        if moded and recorded is not None:
-            history = history_of(self.scene, found.begin, rows, recorded.counts)
-            kept = functools.partial(_first_strikes, count=self.max_arrivals)
-            rows = by_numpy(kept, rows) if self.max_arrivals else no_rows
-        t, end = single_time(found.t, found.state)
+        if moded:
+            if not strikes and not self.save_steps:  # such rows tell no modes
+                changes = self._run(StrikeRecorder(strikes=False), _ROWS)[1:]
+            assert solved.begin is not None
+            history = history_of(scene, solved.begin, *changes)
         return Trajectory(
             t=t,
-            state=end,
-            ending=found.ending,
-            accepted=found.accepted,
-            rejected=found.rejected,
-            arrivals=arrivals_among(rows, found.footsteps, state),
-            grazes=found.grazes,
-            pulls=found.pulls,
+            state=told,
+            ending=solved.ending,
+            accepted=solved.accepted,
+            rejected=solved.rejected,
+            dense=dense,
+            arrivals=arrivals,
+            lowest=solved.lowest,
+            highest=solved.highest,
+            grazes=solved.grazes,
+            pulls=solved.pulls,
             mode_history=history,
             engine=self.engine,
         )
+
+    @property
+    def _no_rows(self) -> np.ndarray:
+        return np.zeros((0, 1 + len(self.walk.state)), self.rtol.dtype)
+
+    def _recorder(self, moded: bool) -> AbstractRecorder | None:
+        if self.times is not None:
+            return TimeRecorder()
+        if self.save_steps:
+            return StepRecorder()
+        if self.section is not None and not isinstance(self.section, HeelStrike):
+            return ArrivalRecorder(self.section)
+        return StrikeRecorder(strikes=self.room > 0) if moded or self.section else None
+
+    def _run(self, recorder: AbstractRecorder | None, room: int) -> tuple[RigidSolved, Any, Any]:
+        """What is solved, the rows that are recorded, and how many there were."""
+        falls = FallWatch.LOCATED if "fall" in self.watch else FallWatch.IGNORED
+        steps = RigidSolve(recorder, self.extremes, self.waits, self.method, falls)
+        scheduled = recorder is not None and recorder.scheduled
+        request = Request(
+            rigid_program(steps),
+            self.walk,
+            room=0 if scheduled else room,
+            times=self.times if scheduled else None,
+            quick=True,
+        )
+        if self.save_steps and not is_traced(self.walk):
+            request = request._replace(room=min(room, _STEPS))
+        solved, recorded, _ = BY_NAME[self.engine].run(request)
+        if recorded is None:
+            return solved, self._no_rows, 0
+        total = recorded.counts
+        if self.save_steps and not is_traced(total):
+            if int(total) > request.room:
+                # Memory is asked for by what a solve takes, not by what it might.
+                _, recorded, _ = BY_NAME[self.engine].run(request._replace(room=int(total)))
+                assert recorded is not None
+            return solved, recorded.values[: int(total)], total
+        return solved, recorded.values, total
+
+
+def _method_of(asked: Options) -> ExplicitMethod:
+    """The explicit method that is asked for; by default the one of order eight.
+
+    Raises:
+        ArgumentError: another solver, or steps under error control by a method without an estimate.
+    """
+    solver = asked.solver
+    if isinstance(solver, str) and solver == Options._field_defaults["solver"]:
+        return ExplicitMethod()
+    names = {kind: name for name, kind in EXPLICIT_METHODS.items()}
+    name = solver if isinstance(solver, str) else names.get(type(solver))
+    if name not in EXPLICIT_METHODS:
+        raise ArgumentError(
+            f"solver = {solver!r} is not allowed for a RigidScene, whose motion between impacts is "
+            f"smooth and never stiff: choose one of {', '.join(EXPLICIT_METHODS)}."
+        )
+    method = ExplicitMethod(name)
+    if asked.dt is None and not method.estimates:
+        raise ArgumentError(
+            f"dt = None is not allowed for solver = {name}, whose steps have a fixed size: "
+            "give it in seconds."
+        )
+    return method
+
+
+def _engine_for(asked: Options, narrow: str | None) -> str:
+    """The engine, which must be able to save what is asked.
+
+    Raises:
+        ArgumentError: times that are not known beforehand, or a section that holds numbers.
+    """
+    engine = engine_for(asked.engine, obstacle=narrow, by_device=True, by_any=True)
+    obstacle = None
+    if asked.section is not None and jtu.tree_leaves(asked.section):
+        obstacle = f"the section {type(asked.section).__name__} holds numbers of its own"
+    if asked.times is not None and is_traced(asked.times):
+        obstacle = "the times to save at must be known beforehand"
+    if obstacle is not None:
+        raise ArgumentError(f"save = {asked.save!r} is not allowed here: {obstacle}.")
+    return engine
 
 
 def _first_strikes(numpy: Any, rows: Any, count: int) -> Any:
     """So many rows, those of heel strikes first, in their order and without the flag."""
     order = numpy.argsort(rows[:, 1] == 0.0, stable=True)[:count]
     return numpy.concatenate([rows[:, :1], rows[:, 2:]], axis=1)[order]
-
-
-class RigidSolved(NamedTuple):
-    """One walk's outputs: see `RigidProgress`."""
-
-    t: Scalar
-    state: Any
-    ending: Scalar
-    footsteps: Scalar
-    accepted: Scalar
-    rejected: Scalar
-    grazes: Scalar
-    pulls: Scalar
-    begin: Scalar | None
-
-
-@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def rigid_program(strikes: bool, modes: bool, waits: bool, embedded: bool = False) -> Program:
-    """The program of a `RigidWalk`.
-
-    Args:
-        strikes: whether time and state after each strike are recorded.
-        modes: whether every change of mode is recorded, with its state where strikes are.
-        waits: whether the duration only bounds the wait for footsteps.
-        embedded: whether steps go on with the embedded solution; see `rolling_step`.
-    """
-
-    def finish(walk: RigidWalk, now: RigidProgress) -> RigidSolved:
-        code = ending_of(walk, now, jnp.asarray(waits))
-        counts = (now.footsteps, now.accepted, now.rejected, now.grazes, now.pulls)
-        begin = getattr(walk.state, "mode", None)
-        begin = begin if now.modes is None else now.modes.begin
-        return RigidSolved(now.t, state_with_hip(walk, now), code, *counts, begin)
-
-    def attempt(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Scalar]:
-        after, over = attempt_step(walk, now, embedded=embedded)
-        pulled = (after.accepted > now.accepted) & is_pulled(walk, after)
-        return after._replace(pulls=now.pulls + jnp.where(pulled, 1, 0)), over
-
-    def record(walk: RigidWalk, now: RigidProgress, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-        happens = now.struck if now.modes is None else now.struck | now.modes.changed
-        if not strikes:
-            return happens, [now.t, now.state.mode]
-        flag = [jnp.where(now.struck, 1.0, 0.0)] if modes else []
-        return happens, [now.t, *flag, *state_with_hip(walk, now)]
-
-    return Program(initial_progress, attempt, finish, record if strikes or modes else None)
 
 
 def _moving(run: RigidSimulation) -> tuple[PyTree, PyTree, PyTree]:
@@ -261,20 +378,48 @@ def _slopes(
     active: tuple[int, ...],
 ) -> Slopes:
     assert found.arrivals is not None
-    count, kept, grazes = found.arrivals.total, run.max_arrivals, jnp.asarray(found.grazes)
-    strikes = found.arrivals.t
+    strikes_saved = run.times is None and (
+        run.section is None or isinstance(run.section, HeelStrike)
+    )
+    count, kept, strikes = found.arrivals.total, run.room, found.arrivals.t
+    if not strikes_saved:
+        plain: RigidSimulation = jax.lax.stop_gradient(run.saving_strikes(0))
+        again = plain.solved().arrivals
+        assert again is not None
+        count, kept, strikes = again.total, 0, again.t
     known = [each for each in (count, run.walk.footsteps) if not isinstance(each, jax.core.Tracer)]
     room = int(known[0]) if known and int(known[0]) else _ROOM
     if room > kept:
-        walk: RigidSimulation = jax.lax.stop_gradient(dataclasses.replace(run, max_arrivals=room))
+        walk: RigidSimulation = jax.lax.stop_gradient(run.saving_strikes(room))
         again = walk.solved().arrivals
         assert again is not None
         strikes = again.t
+    moments = None
+    if not strikes_saved:
+        moments = found.t if run.section is None else found.arrivals.t
     end = found.t[-1], found.ending
-    slopes = rigid_slopes_of(run.walk, strikes, count, *end, places=places, active=active)
+    section = None if strikes_saved else run.section
+    if run.times is not None:
+        end = run.walk.duration, found.ending
+    slopes = rigid_slopes_of(
+        run.walk, strikes, count, *end, moments, section=section, places=places, active=active
+    )
     # Another solve may tell what this one cannot: it then differentiates another walk.
+    grazes = jnp.asarray(found.grazes)
     slopes = jtu.tree_map(lambda leaf: jnp.where(grazes > 0, jnp.nan, leaf), slopes)
-    if len(strikes) == kept:
+    if not strikes_saved or len(strikes) == kept:
         return slopes
     # Of the strikes only those that are kept, then the end.
     return Slopes(*(jnp.concatenate([leaf[:kept], leaf[-1:]]) for leaf in slopes))
+
+
+def _check_derivatives(run: RigidSimulation) -> None:
+    if run.save_steps:
+        raise ArgumentError(
+            'save = "steps" is not allowed under derivatives: ask for save="end", an array of '
+            "times or a section."
+        )
+    if run.extremes is not None:
+        raise ArgumentError(
+            "extremes is not allowed under derivatives: only times and states have derivatives."
+        )

@@ -10,7 +10,9 @@ from jaxbiped._checks import check_function, check_type, warn
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Parameter
 from jaxbiped.dynamics._constrained_motion import LinkageState
-from jaxbiped.dynamics._surfaces import AbstractSection, HeelStrike
+from jaxbiped.hybrid._endings import WATCHES
+from jaxbiped.hybrid._scales import unresolved_slip
+from jaxbiped.hybrid._sections import AbstractSection, HeelStrike
 from jaxbiped.scene._linkages import LinkageScene
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState
@@ -24,8 +26,6 @@ from jaxbiped.simulate._linkage_simulation import simulate_linkage
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.simulate._start import Options
-from jaxbiped.solve._accuracy import unresolved_slip
-from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._trajectory import Trajectory
 
 
@@ -62,9 +62,9 @@ def simulate(
     available with `save="steps"`.
 
     Args:
-        scene: the scene; a `RedundantScene` for coordinates of each body. For a `RigidScene` and a
-            `LinkageScene`, only the options of `rigid_walk` and `swing` apply; the first saves
-            "end" or `HeelStrike()`, the second an array of times.
+        scene: the scene; a `RedundantScene` for coordinates of each body. For a `RigidScene`,
+            `atol` and `adjoint` do not apply. For a `LinkageScene`, only the options of `swing`
+            apply.
         state: start, a `State`; if friction has bristles, also a `BristleState` (in a `State`, they
             are zero). The precision of the solve is that of the most precise leaf, by default 64
             bits. A redundant scene also accepts a redundant state, which is first moved onto its
@@ -72,7 +72,8 @@ def simulate(
         duration: simulated time [s].
         footsteps: number of footsteps (heel strikes) to simulate. If `duration` is also given, the
             first limit that is reached ends the walk; its outcome is "walking" in both cases.
-        solver: a name (see `SOLVERS`) or any diffrax solver.
+        solver: a name (see `SOLVERS`) or any diffrax solver. On rigid feet, where motion is smooth
+            between impacts, an explicit one of these; by default that of order 8, "dopri8".
         accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`); the tolerance is finer if
             necessary to resolve the slip speed over which friction builds up. Or a number: the
             relative error requested of every state and time that is returned, in units of the legs'
@@ -92,13 +93,14 @@ def simulate(
             a third as long). A `RuntimeWarning` is issued if one of these solves disagrees, or if
             the walk's own steps missed contacts.
         save: "steps" for every step and the continuous solution; "end" for the final state; an
-            array of increasing times [s], shape (n,); or a section (lanes engine only), whose
-            `arrivals` are saved beside the final state: `HeelStrike()` saves the footsteps. At a
-            section, the legs take turns as in `return_map`, but the saved states keep the names of
-            their legs. None: "steps", or "end" for a `RigidScene`.
+            array of increasing times [s], shape (n,); or a section, whose `arrivals` are saved
+            beside the final state: `HeelStrike()` saves the footsteps. At a section, the legs take
+            turns as in `return_map`, but the saved states keep the names of their legs. None:
+            "steps", or "end" for a `RigidScene`, whose legs exchange their names at every heel
+            strike; a state saved at that time is the one before the impact.
         max_arrivals: maximum number of arrivals at a section to save.
         extremes: a function of (scene, state); the result has the smallest and largest value of
-            each number that it returns, over the ends of all steps.
+            each number that it returns, over the ends of all steps, and on both sides of an impact.
         watch: failures that end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: maximum number of attempted solver steps.
         adjoint: an adjoint of diffrax, to differentiate the steps that were taken instead of the
@@ -151,7 +153,11 @@ def simulate(
         asked = asked._replace(accuracy="balanced")
     if isinstance(scene, RigidScene):
         rolls = RigidSimulation.of(scene, state, asked)
-        return rolls() if wanted is None else accurate_walk(rolls, wanted)
+        if wanted is not None:
+            return accurate_walk(rolls, wanted)
+        rolled = rolls()
+        warn_of_long_steps(rolls, rolled)
+        return rolled
     run = Simulation.of(scene, state, asked)
     if wanted is not None:
         return accurate_walk(run, wanted)

@@ -17,7 +17,6 @@ from jaxbiped._checks import (
     check_choice,
     check_positive,
     check_room,
-    check_type,
     check_unbatched,
     traced_rules,
     warn,
@@ -25,8 +24,11 @@ from jaxbiped._checks import (
 from jaxbiped._types import Numbers, Scalar, as_array, as_float, is_traced
 from jaxbiped.compiler import BY_NAME, Request
 from jaxbiped.dynamics._constrained_motion import Consistent
-from jaxbiped.dynamics._surfaces import AbstractSection
-from jaxbiped.scene._scene import RedundantScene, Scene
+from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._scales import Units, check_precision, resolve_slip_speed, si_units, units_of
+from jaxbiped.hybrid._sections import AbstractSection
+from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.scene._scene import RedundantScene, Scene, is_walker
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._backends import (
     by_lanes,
@@ -43,18 +45,12 @@ from jaxbiped.simulate._start import (
     check_start_height,
     check_steps,
     check_times,
+    saved_section,
     start_for,
+    watched_by,
 )
-from jaxbiped.solve._accuracy import (
-    Units,
-    check_precision,
-    resolve_slip_speed,
-    si_units,
-    tolerances,
-    units_of,
-)
+from jaxbiped.solve._accuracy import tolerances
 from jaxbiped.solve._error_estimate import LOOSER
-from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._solvers import check_adjoint, solver_named
 from jaxbiped.solve._trajectory import Trajectory, scene_key
 from jaxbiped.solve.controllers._event_steps import PATIENCE
@@ -129,7 +125,8 @@ class Simulation(eqx.Module):
         for name, value in (("rtol", asked.rtol), ("atol", asked.atol)):
             check_unbatched(name, value)
         with traced_rules() as rules:
-            scene = check_scene(scene, Scene, RedundantScene)
+            scene = check_scene(scene, Scene, RedundantScene, HybridSystem)
+            section = saved_section(scene, asked)
             if not scene.redundant:
                 state, correction = start_for(scene, state)
             check_positive("duration", time, "s")
@@ -140,17 +137,16 @@ class Simulation(eqx.Module):
             state, correction = start_for(scene, state)
         # Of a lane that is not allowed nothing is known from the start.
         state, time = where_allowed(rules, state), where_allowed(rules, time, 1.0)
-        check_type("watch", asked.watch, tuple, list)
-        for name in asked.watch:
-            check_choice("watch", name, WATCHES)
+        watch = watched_by(scene, asked.watch)
         if asked.save is None or isinstance(asked.save, str):
             check_choice("save", asked.save, ("steps", "end"))
         check_room("max_arrivals", asked.max_arrivals)
         if times is not None:
             check_times(times, time)
         dtype = jnp.result_type(jtu.tree_leaves(state)[0])
-        check_precision(scene, dtype)
-        check_start_height(scene, jtu.tree_map(as_float, given))
+        if is_walker(scene):
+            check_precision(scene, dtype)
+            check_start_height(scene, jtu.tree_map(as_float, given))
         if isinstance(scene, RedundantScene):
             check_adjoint(scene.method, asked.adjoint)
 
@@ -168,7 +164,7 @@ class Simulation(eqx.Module):
         units = units if asked.atol is None else si_units(units)
         scene = scene if dtype == jnp.float64 else jtu.tree_map(cast, scene)
         longest = cast(time)
-        chosen = choose_engine(asked, method, (scene, state, longest), redundant=scene.redundant)
+        chosen = choose_engine(asked, method, (scene, state, longest))
         return Simulation(
             scene=scene,
             state=state,
@@ -183,11 +179,11 @@ class Simulation(eqx.Module):
             adjoint=asked.adjoint,
             footsteps=None if footsteps is None else int(footsteps),
             save_steps=asked.save_steps,
-            watch=tuple(asked.watch),
+            watch=watch,
             max_solver_steps=int(asked.max_solver_steps),
             engine=chosen,
-            replaceable=asked.engine == "auto" and asked.section is None,
-            section=asked.section,
+            replaceable=asked.engine == "auto" and section is None,
+            section=section,
             max_arrivals=int(asked.max_arrivals),
             extremes=asked.extremes,
         )
@@ -210,6 +206,10 @@ class Simulation(eqx.Module):
         both = (jnp.asarray(np.asarray(x, self.rtol.dtype)) for x in (rtol, share * rtol))
         return eqx.tree_at(lambda run: (run.rtol, run.atol), self, tuple(both))
 
+    def with_steps(self, dt: Scalar) -> "Simulation":
+        """The same with steps of another fixed size [s]."""
+        return dataclasses.replace(self, dt=dt)
+
     def by_other_method(self) -> tuple["Simulation", float, float]:
         """The same by another method; its tolerance in units of the walk's, and its weight."""
         if isinstance(self.solver, Rodas5P):
@@ -225,8 +225,8 @@ class Simulation(eqx.Module):
         return min(max(_FIRST * wanted, _FINEST_FIRST), float(self.rtol) * 10.0, resolved)
 
     def lane_request(self) -> Request | None:
-        """What it asks of lanes or devices; None where XLA runs it, also for what they lack."""
-        if self.engine == "xla":
+        """The program that runs it; None where diffrax does, also for what lanes lack."""
+        if self.engine == "xla" and self.section is None and not system_of(self.scene).lands:
             return None
         request = lane_request(self)
         hindered = self.replaceable and BY_NAME[self.engine].can(request) is not None
@@ -267,7 +267,7 @@ def _slopes(
 ) -> Slopes:
     # The columns take the walk's own method of steps, where that is one for them.
     solver = run.solver if isinstance(run.solver, AbstractRosenbrock) else Rodas4P()
-    assert isinstance(run.scene, Scene)
+    assert isinstance(run.scene, Scene | HybridSystem)
     return slopes_of(
         run.scene,
         run.state,

@@ -12,8 +12,10 @@ from jaxtyping import ArrayLike, PyTree
 
 from jaxbiped._checks import (
     ArgumentError,
+    check_choice,
     check_count,
     check_positive,
+    check_type,
     check_unbatched,
     holds_somewhere,
     warn,
@@ -26,9 +28,10 @@ from jaxbiped.dynamics._constrained_motion import Consistent, consistent_state, 
 from jaxbiped.dynamics._contacts import feet, limits_of
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._state import state_for
-from jaxbiped.dynamics._surfaces import AbstractSection
+from jaxbiped.hybrid._endings import WATCHES
+from jaxbiped.hybrid._hybrid_system import HybridSystem, section_of_system, start_of_system
+from jaxbiped.hybrid._sections import AbstractSection, check_section_body
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
-from jaxbiped.solve._failure_events import WATCHES
 
 _PRECISIONS = (np.float16, np.float32, np.float64)
 """Of NumPy's, those that JAX has."""
@@ -71,6 +74,13 @@ class Options(NamedTuple):
         return self.save if isinstance(self.save, AbstractSection) else None
 
     @property
+    def room(self) -> int:
+        """How many steps or arrivals to keep."""
+        if self.save_steps:
+            return int(self.max_solver_steps)
+        return 0 if self.section is None else int(self.max_arrivals)
+
+    @property
     def times(self) -> Any:
         """The times to save at, as they are given."""
         return None if isinstance(self.save, str | AbstractSection) else self.save
@@ -86,12 +96,19 @@ class Options(NamedTuple):
                 )
 
 
-def start_for(scene: Scene | RedundantScene, state: PyTree) -> tuple[PyTree, Consistent | None]:
+def start_for(
+    scene: Scene | RedundantScene | HybridSystem, state: PyTree
+) -> tuple[PyTree, Consistent | None]:
     """A checked start of the kind that a scene needs, and how it was put on its constraints.
 
     Raises:
         ArgumentError: a start that is not allowed, or constraints that the method cannot hold.
     """
+    if isinstance(scene, HybridSystem):
+        check_unbatched("scene", scene, "one system")
+        start = start_of_system(scene, state)
+        check_unbatched("state", start, "one start")
+        return start, None
     check_single_scene(scene)
     if not isinstance(scene, RedundantScene):
         start = state_for(scene, in_own_precision(state))
@@ -135,6 +152,19 @@ def check_single_scene(scene: Scene | RigidScene | RedundantScene) -> None:
             check_unbatched(f"scene.{name}", part, "one scene")
 
 
+def saved_section(scene: Any, asked: Options) -> AbstractSection | None:
+    """The section at which to save, checked with all that a hybrid system has not.
+
+    Raises:
+        ArgumentError: a section that is none of the scene's, or an option that it has not.
+    """
+    if not isinstance(scene, HybridSystem):
+        check_section_body(scene.minimal, asked.section)
+        return asked.section
+    asked.refuse(scene, "footsteps", "dt", "adjoint")
+    return None if asked.section is None else section_of_system(scene, asked.section)
+
+
 def check_limits(
     duration: Scalar | float | None, footsteps: int | None, max_solver_steps: int
 ) -> None:
@@ -147,8 +177,24 @@ def check_limits(
     check_count("max_solver_steps", max_solver_steps)
 
 
+def watched_by(scene: Any, watch: Any) -> tuple[str, ...]:
+    """The failures to watch for: those named; of a hybrid system, by default all of its endings.
+
+    Raises:
+        ArgumentError: a name that is none of a failure.
+    """
+    check_type("watch", watch, tuple, list)
+    allowed = WATCHES
+    if isinstance(scene, HybridSystem):
+        allowed = tuple(guard.name for guard in scene.guards() if guard.ends)
+        watch = allowed if tuple(watch) == WATCHES else watch
+    for name in watch:
+        check_choice("watch", name, allowed)
+    return tuple(watch)
+
+
 def check_steps(
-    solver: diffrax.AbstractSolver[PyTree],
+    solver: diffrax.AbstractSolver[PyTree] | None,
     dt: float | None,
     *,
     most_steps: int,

@@ -8,7 +8,9 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.compiler import BY_NAME, CUDA
-from jaxbiped.dynamics._surfaces import AbstractSection
+from jaxbiped.hybrid._sections import AbstractSection
+from jaxbiped.solve._runge_kutta import stepper_of
+from jaxbiped.solve._solvers import SOLVERS
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 ENGINES = ("auto", "xla", "lanes", "cuda")
@@ -63,11 +65,20 @@ def engine_for(
 
 
 def lane_obstacle(
-    solver: diffrax.AbstractSolver[PyTree], section: AbstractSection | None, leaves: PyTree
+    solver: diffrax.AbstractSolver[PyTree],
+    section: AbstractSection | None,
+    leaves: PyTree,
+    *,
+    columns: bool = False,
 ) -> str | None:
-    """Why lanes cannot solve by a solver, to a section, from these numbers; None where they can."""
-    if not isinstance(solver, AbstractRosenbrock):
+    """Why lanes cannot solve by a solver, to a section, from these numbers; None where they can.
+
+    `columns`: whether the steps carry derivatives, as those of Rosenbrock methods alone do.
+    """
+    if columns and not isinstance(solver, AbstractRosenbrock):
         return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
+    if stepper_of(solver) is None:
+        return f"{type(solver).__name__} is not one of its solvers ({', '.join(SOLVERS)})"
     if section is not None and jtu.tree_leaves(section):
         return f"the section {type(section).__name__} holds numbers of its own"
     if any(jnp.result_type(leaf) != jnp.float64 for leaf in jtu.tree_leaves(leaves)):

@@ -1,5 +1,8 @@
 """Steps of the rigid walker: explicit Runge–Kutta in single support, ended by impacts."""
 
+import enum
+import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -12,10 +15,12 @@ from jaxbiped.dynamics._mode_changes import SLACK, change_mode
 from jaxbiped.dynamics._stance import Stance, angles_and_rates, of_stance
 from jaxbiped.dynamics._stance_motion import ground_force, rolling_rates
 from jaxbiped.dynamics._surfaces import lean
+from jaxbiped.hybrid._endings import rigid_ending
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene
-from jaxbiped.solve._failure_events import rigid_ending
+from jaxbiped.solve._explicit_methods import ExplicitMethod
 from jaxbiped.solve._rolling_step import (
+    DOPRI8,
     EULER_DISTANCE,
     ModeEvents,
     Rates,
@@ -28,6 +33,8 @@ from jaxbiped.solve._rolling_step import (
     mode_events,
     onto_surface,
     rolling_step,
+    root_place,
+    shifted,
     with_changes,
 )
 
@@ -46,6 +53,8 @@ class RigidWalk(NamedTuple):
         footsteps: heel strikes after which to end, 0 for no limit.
         rtol: relative tolerance; the absolute one (SI) is a hundredth of it.
         max_attempts: cap on the attempted steps.
+        recording: inputs of who looks at the steps, if it has any.
+        dt: length of all steps [s]; None: each is as long as its error allows.
     """
 
     scene: RigidScene
@@ -54,6 +63,8 @@ class RigidWalk(NamedTuple):
     footsteps: Scalar
     rtol: Scalar
     max_attempts: Scalar
+    recording: Any = None
+    dt: Scalar | None = None
 
 
 class RigidProgress(NamedTuple):
@@ -125,7 +136,9 @@ def initial_progress(walk: RigidWalk) -> RigidProgress:
     """Before the first step."""
     zero = jnp.zeros_like(walk.duration)
     none = jnp.zeros((), dtype=jnp.int64)
-    step = _FIRST_STEP * jnp.sqrt(walk.scene.mechanism.height / walk.scene.ground.g)
+    step = walk.dt
+    if step is None:
+        step = _FIRST_STEP * jnp.sqrt(walk.scene.mechanism.height / walk.scene.ground.g)
     step = jnp.minimum(step, walk.duration)
     no = jnp.asarray(False)
     state, modes = walk.state, None
@@ -139,7 +152,7 @@ def initial_progress(walk: RigidWalk) -> RigidProgress:
     never = jnp.full_like(zero, jnp.inf)
     return RigidProgress(
         t=zero,
-        state=shifted(state, -root_place(walk, state)),
+        state=shifted(state, -root_place(walk.scene, state)),
         rates=rates,
         step=step,
         pace=step,
@@ -181,16 +194,6 @@ def with_next_step(walk: RigidWalk, after: RigidProgress) -> RigidProgress:
     return after._replace(step=jnp.where(lands, after.step, step), modes=modes)
 
 
-def state_with_hip(walk: RigidWalk, now: RigidProgress) -> Any:
-    """The state with the root point where it is."""
-    return shifted(now.state, root_place(walk, now.state))
-
-
-def root_place(walk: RigidWalk, state: Any) -> Scalar:
-    """Where the root point is from the place of the standing foot at its body's angle 0 [m]."""
-    return of_stance(walk.scene, state, lambda stance: stance.root.x)
-
-
 def is_pulled(walk: RigidWalk, now: RigidProgress) -> Scalar:
     """Whether the ground has to pull on the leg that stands, where a real foot would fly."""
 
@@ -198,11 +201,6 @@ def is_pulled(walk: RigidWalk, now: RigidProgress) -> Scalar:
         return ground_force(walk.scene, stance, now.rates).normal
 
     return (now.landing == 0) & (of_stance(walk.scene, now.state, load) < 0.0)
-
-
-def shifted(state: Any, distance: Scalar) -> Any:
-    """A state farther down the slope [m]."""
-    return type(state)(state[0] + distance, *state[1:])
 
 
 _SAFETY, _MOST_SHRINK, _MOST_GROWTH = 0.8, 0.2, 5.0
@@ -214,36 +212,76 @@ _MOST_LANDINGS = 12
 """Newton steps onto a heel strike or a fall, after which it counts as missed."""
 
 
-def attempt_step(
-    walk: RigidWalk, now: RigidProgress, *, embedded: bool = False, lands_on_falls: bool = True
-) -> tuple[RigidProgress, Scalar]:
-    """One attempted step further, and whether the walk is over (boolean).
+class Attempted(NamedTuple):
+    """An attempted step.
 
-    `embedded`: whether it goes on with the embedded solution; see `rolling_step`. A fall that is
-    not landed on, which saves a step, has its time by interpolation, and no accurate state.
+    Attributes:
+        after: what is then carried.
+        over: whether the walk is over (boolean).
+        accepted: whether the step was accepted.
+        end: gives the state at its end, before what an impact or a change of mode makes of it.
+        stages: rates of its stages.
+        trial: where these lead.
     """
-    trial, error, roughly = rolling_step(
-        walk.scene, now.state, now.rates, now.step, walk.rtol, embedded=embedded
+
+    after: RigidProgress
+    over: Scalar
+    accepted: Scalar
+    end: Callable[[], Any]
+    stages: list[Rates]
+    trial: Any
+
+
+class FallWatch(enum.Enum):
+    """What becomes of falls."""
+
+    LOCATED = enum.auto()
+    """They are landed on, and end the walk."""
+    TOLD = enum.auto()
+    """They end the walk, at a time by interpolation, with no accurate state: it saves a step."""
+    IGNORED = enum.auto()
+    """The walk goes on."""
+
+
+def attempt_step(
+    walk: RigidWalk,
+    now: RigidProgress,
+    *,
+    method: ExplicitMethod = DOPRI8,
+    falls: FallWatch = FallWatch.LOCATED,
+) -> Attempted:
+    """One attempted step further."""
+    trial, error, stages = rolling_step(
+        walk.scene, now.state, now.rates, now.step, walk.rtol, method=method
     )
+    roughly = stages[-1]
     onto = euler_step_onto(walk.scene, now.falling, trial, roughly, walk.rtol)
+    length = method.length(error)
     course = changes = None
     if now.modes is not None:
         course = course_of(walk.scene, trial)
-        length = _length(error)
-        changes = mode_events(now.step, now.modes.course, course, walk.rtol, length)
+        changes = mode_events(now.step, now.modes.course, course, walk.rtol, length, method)
         surface = onto_surface(course, now.modes.changing - 1, walk.rtol, now.pace)
         there = _along_course(walk, trial, course, surface.rest)
         own = onto._replace(near=surface.near, rest=surface.rest, state=there)
         onto = select(now.modes.changing > 0, own, onto)
-    free, kept = _after_free_step(walk, now, trial, error, roughly, onto, lands_on_falls, changes)
+    free, kept = _after_free_step(
+        walk, now, trial, error, length, method, roughly, onto, falls, changes
+    )
     landing = now.landing > 0
     after = select(landing, _landing(walk, now, trial, onto), free)
     if now.modes is None:
         strike = _strike(walk, onto)
     else:  # with stops an impact is much work
         strike = jax.lax.cond(after.struck, lambda: _strike(walk, onto), lambda: onto.state)
-    after = select(after.struck, _after_strike(walk, after, onto, strike), after)
+    tried = after
+
+    def end() -> Any:
+        state = select(tried.struck, onto.state, tried.state)
+        return state if tried.modes is None else select(tried.modes.changed, onto.state, state)
+
     accepted = landing | kept
+    after = select(after.struck, _after_strike(walk, after, onto, strike), after)
     # The last stage is the first one of the next step, after an impact from the new state.
     if now.modes is None:
         rates = rolling_rates(walk.scene, select(after.struck, strike, trial))
@@ -262,7 +300,7 @@ def attempt_step(
     attempts = (after.accepted + after.rejected).astype(after.t.dtype)
     tired = attempts >= walk.max_attempts
     code = jnp.where((after.code == 0) & tired & ~done, int(Ending.OUT_OF_STEPS), after.code)
-    return after._replace(code=code), done | (code != 0)
+    return Attempted(after._replace(code=code), done | (code != 0), accepted, end, stages, trial)
 
 
 def ending_of(walk: RigidWalk, now: RigidProgress, waits: Scalar) -> Scalar:
@@ -276,7 +314,7 @@ def _strike(walk: RigidWalk, onto: StepOnto) -> Any:
     """The state after a heel strike: the root point stays where it is, over another leg."""
     at = onto.state
     after = impact(walk.scene, at).state
-    return shifted(after, root_place(walk, at) - root_place(walk, after))
+    return shifted(after, root_place(walk.scene, at) - root_place(walk.scene, after))
 
 
 def _after_change(
@@ -292,7 +330,7 @@ def _after_change(
         lambda: trial.state,
     )
     # Where another foot of its leg stands the place is told from that one.
-    moved = root_place(walk, onto.state) - root_place(walk, state)
+    moved = root_place(walk.scene, onto.state) - root_place(walk.scene, state)
     state = shifted(state, jnp.where(changed, moved, 0.0))
     t = jnp.where(changed, trial.t + onto.rest, trial.t)
     event = jnp.where(trial.struck, 1, jnp.where(changed, 1 + trial.modes.changing, 0))
@@ -309,7 +347,7 @@ def _after_change(
     return trial._replace(
         t=t,
         state=state,
-        pace=jnp.where(known > 0.0, known, trial.pace),
+        pace=jnp.where(known > 0.0, known, trial.pace) if walk.dt is None else trial.pace,
         landing=jnp.where(changed, 0, trial.landing),
         modes=modes,
     )
@@ -323,7 +361,7 @@ def _after_strike(
     period = t - trial.strike
     change_of_rest = jnp.abs(period - trial.period) * jnp.abs(onto.closing)
     steady = change_of_rest <= 2.0 * EULER_DISTANCE * jnp.sqrt(walk.rtol)
-    due = jnp.where(steady, t + period, jnp.inf)
+    due = jnp.where(steady, t + period, jnp.inf) if walk.dt is None else trial.due
     return trial._replace(
         t=t,
         state=state,
@@ -343,19 +381,16 @@ def _along_course(walk: RigidWalk, state: Any, course: SurfaceCourse, time: Scal
     return advance(state, time, [1.0], [(*middle, *course.turning)])
 
 
-def _length(error: Scalar) -> Scalar:
-    """Of a step in units of the one whose error is the tolerance: the eighth root of the error."""
-    return jnp.sqrt(jnp.sqrt(jnp.sqrt(jnp.maximum(error, 1e-10))))
-
-
 def _after_free_step(
     walk: RigidWalk,
     now: RigidProgress,
     trial: Any,
     error: Scalar,
+    length: Scalar,
+    method: ExplicitMethod,
     rates: Rates,
     onto: StepOnto,
-    lands_on_falls: bool,
+    falls: FallWatch,
     changes: ModeEvents | None,
 ) -> tuple[RigidProgress, Scalar]:
     """After a step in single support: whether a heel strike or a fall lies in it or beside it.
@@ -363,7 +398,6 @@ def _after_free_step(
     Or a change of mode; what comes first is landed on. Also whether the step is kept. `rates` are
     those of the trial, roughly.
     """
-    length = _length(error)
     happens = events_within(
         walk.scene,
         now.step,
@@ -372,18 +406,25 @@ def _after_free_step(
         rtol=walk.rtol,
         length=length,
         begins_on_section=(now.footsteps > 0) & (now.t <= now.strike),
+        falls=falls is not FallWatch.IGNORED,
+        method=method,
     )
     grazes = happens.grazes
     if changes is not None:
         happens = with_changes(happens, changes)
         grazes = happens.grazes | changes.grazes
-    fallen = rigid_ending(walk.scene, now.state)
-    keep = (error <= 1.0) & ~happens.unclear & (fallen == 0)
+    ending = functools.partial(rigid_ending, walk.scene, falls=falls is not FallWatch.IGNORED)
+    fallen = ending(now.state)
+    fits = error <= 1.0 if walk.dt is None else jnp.isfinite(error)
+    keep = fits & ~happens.unclear & (fallen == 0)
     t = jnp.where(keep, now.t + now.step, now.t)
     beside = onto.near & onto.ahead & (t + onto.rest <= walk.duration)
     struck = keep & beside & happens.above & ~happens.grazes & ~happens.falls
-    lands = happens.strikes | (happens.falls & lands_on_falls)
-    pace = now.step * jnp.clip(_SAFETY / length, _MOST_SHRINK, _MOST_GROWTH)
+    lands = happens.strikes | (happens.falls & (falls is FallWatch.LOCATED))
+    if walk.dt is None:
+        pace = now.step * jnp.clip(_SAFETY / length, _MOST_SHRINK, _MOST_GROWTH)
+    else:
+        pace = jnp.where(fits, walk.dt, jnp.nan)
     modes, changed = now.modes, jnp.zeros_like(struck)
     if changes is not None and modes is not None:
         due, which = modes.changing, jnp.where(happens.changes, 1 + changes.which, 0)
@@ -401,12 +442,12 @@ def _after_free_step(
         )
     lands = keep & lands & ~struck & ~changed
     # A step that is too long to tell what happens within it is tried again at half the length.
-    pace = jnp.where(happens.unclear & (error <= 1.0), 0.5 * now.step, pace)
+    pace = jnp.where(happens.unclear & fits, 0.5 * now.step, pace)
     back = now.step * (happens.place - 1.0)
     lost = ~jnp.isfinite(pace) | (pace <= _ROUNDING * t)
-    if not lands_on_falls:
+    if falls is not FallWatch.LOCATED:
         ends = keep if changes is None else keep & ~happens.changes
-        fallen = jnp.where(ends, rigid_ending(walk.scene, trial), fallen)
+        fallen = jnp.where(ends, ending(trial), fallen)
         t = jnp.where(keep & happens.falls, t + back, t)
     after = now._replace(
         t=t,

@@ -1,4 +1,4 @@
-"""Rolling step: single support of the rigid walker by Dormand and Prince's method of order 8.
+"""Rolling step: single support of the rigid walker by an explicit method, usually of order 8.
 
 Heel strikes and falls within it are located on its interpolant. A heel strike is where the opening
 falls through zero while the swing foot is ahead. Both are asked at the root: a leg that swings back
@@ -11,30 +11,24 @@ import operator
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._joint_loads import of_all_bodies
-from jaxbiped.dynamics._mode_changes import mode_switches
-from jaxbiped.dynamics._stance import angles_and_rates
+from jaxbiped.dynamics._stance import angles_and_rates, of_stance
 from jaxbiped.dynamics._stance_motion import rolling_field, rolling_rates
 from jaxbiped.dynamics._surfaces import Surface, lead, lean, opening, surface_along, uprightness
+from jaxbiped.hybrid._rigid_guards import mode_switches
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene
+from jaxbiped.solve._explicit_methods import ExplicitMethod
 from jaxbiped.solve._step_polynomials import Quintic, StepCubic
 
-_TABLEAU = diffrax.Dopri8.tableau
-_STAGES = np.zeros((len(_TABLEAU.a_lower) - 1, len(_TABLEAU.a_lower)))
-for _row, _weights in zip(_STAGES, _TABLEAU.a_lower[:-1], strict=True):
-    _row[: len(_weights)] = _weights
+DOPRI8 = ExplicitMethod()
 Rates = tuple[Scalar, ...]
 """Rates of the angles and of their rates."""
-_INTERPOLATED = 2.0
-"""Largest error of an interpolated opening or gap [rad], as measured, over a step whose own error
-is the tolerance, in units of rtol^¾."""
 _RESOLVED = 1.0
 """Error that an opening or another surface may have [rad], in units of rtol."""
 EULER_DISTANCE = 0.1
@@ -102,7 +96,12 @@ class ModeEvents(NamedTuple):
 
 
 def mode_events(
-    step: Scalar, before: SurfaceCourse, after: SurfaceCourse, rtol: Scalar, length: Scalar
+    step: Scalar,
+    before: SurfaceCourse,
+    after: SurfaceCourse,
+    rtol: Scalar,
+    length: Scalar,
+    method: ExplicitMethod = DOPRI8,
 ) -> ModeEvents:
     """What happens within a step of one mode, from the surfaces at its ends.
 
@@ -121,8 +120,7 @@ def mode_events(
     gaps = len(before.bends)
     if gaps:
         # Gaps are sums of angles, whose quintic bounds them.
-        root = jnp.sqrt(rtol)
-        off = _INTERPOLATED * root * jnp.sqrt(root) * length**6
+        off = method.interpolation_error(rtol, length)
         ends = ((each.values[:gaps], each.rates[:gaps], each.bends) for each in (before, after))
         width = jnp.maximum(off, known)
         first, second, third, *others = Quintic.of(step, *ends).control
@@ -206,19 +204,19 @@ def rolling_step(
     step: Scalar,
     rtol: Scalar,
     *,
-    embedded: bool = False,
-) -> tuple[Any, Scalar, Rates]:
-    """The state a step further, its error in units of the tolerance, and its rates, roughly.
+    method: ExplicitMethod = DOPRI8,
+) -> tuple[Any, Scalar, list[Rates]]:
+    """The state a step further, its error in units of the tolerance, and the rates of its stages.
+
+    Those of the last stage are the state's, roughly.
 
     `at_start` are the angular accelerations at the start. The place along the slope stays. Of the
-    error, the root mean square over the components; infinite where it is no number. `embedded`:
-    whether to go on with the embedded solution of order 7, by which the error is estimated: another
-    method of steps, which a witness of errors takes.
+    error, the root mean square over the components; infinite where it is no number.
     """
-    count = len(at_start)
+    count, tableau = len(at_start), method.tableau
     turning = slice(1 + count, 1 + 2 * count)
     found = jnp.stack([*state[turning], *at_start])
-    found = jnp.pad(found[None], ((0, len(_STAGES)), (0, 0)))
+    found = jnp.pad(found[None], ((0, len(tableau.stages)), (0, 0)))
 
     def stage(found: Scalar, each: Any) -> tuple[Scalar, None]:
         row, here = each
@@ -227,19 +225,37 @@ def rolling_step(
         return jnp.where(here[:, None], rates, found), None
 
     # A loop, which XLA compiles once; lanes write it out, without what is multiplied by zero.
-    here = np.eye(len(_STAGES) + 1, dtype=bool)[1:]
-    found, _ = jax.lax.scan(stage, found, (_STAGES.astype(found.dtype), here))
+    here = np.eye(len(tableau.stages) + 1, dtype=bool)[1:]
+    found, _ = jax.lax.scan(stage, found, (tableau.stages.astype(found.dtype), here))
     stages: list[Rates] = [tuple(row) for row in found]
-    weights = _TABLEAU.b_sol - _TABLEAU.b_error if embedded else _TABLEAU.b_sol
-    end = advance(state, step, weights[:-1], stages)
+    end = advance(state, step, tableau.end, stages)
     share = jnp.zeros_like(step)
     ends = list(zip(state[1 : 1 + 2 * count], end[1 : 1 + 2 * count], strict=True))
-    for i, (a, b) in enumerate(ends):
-        error = step * _weighted(_TABLEAU.b_error[:-1], stages, i)
+    for i, (a, b) in enumerate(ends if method.estimates else []):
+        error = step * _weighted(tableau.error, stages, i)
         size = rtol * (0.01 + jnp.maximum(jnp.abs(a), jnp.abs(b)))
         share = share + (error / size) ** 2
-    error = jnp.sqrt(share / len(ends))
-    return end, jnp.where(jnp.isnan(error), jnp.inf, error), stages[-1]
+    # A method without an estimate errs by one tolerance, as far as is known.
+    error = jnp.sqrt(share / len(ends)) if method.estimates else 1.0 + 0.0 * sum(end)
+    return end, jnp.where(jnp.isnan(error), jnp.inf, error), stages
+
+
+def within_step(
+    step: Scalar, place: Scalar, before: tuple[Any, Rates], after: tuple[Any, Rates]
+) -> Any:
+    """The state at a share of a step, from states and accelerations at both ends: of order five."""
+    start, end, bends = before[0], after[0], (before[1], after[1])
+    count = len(bends[0])
+    angles, rates = [], []
+    for i in range(count):
+        ends = [
+            (state[1 + i], state[1 + count + i], bend[i])
+            for state, bend in zip((start, end), bends, strict=True)
+        ]
+        angle, slope, _ = Quintic.of(step, *ends).derivatives(place)
+        angles.append(angle)
+        rates.append(slope / jnp.where(step == 0.0, 1.0, step))
+    return type(start)(start[0], *angles, *rates, *start[1 + 2 * count :])
 
 
 def advance(
@@ -259,6 +275,34 @@ def _weighted(weights: Sequence[Any] | np.ndarray, stages: list[Rates], i: int) 
         if isinstance(weight, jax.Array) or weight != 0.0
     ]
     return functools.reduce(operator.add, terms)
+
+
+def told_state(scene: RigidScene, state: Any) -> Any:
+    """A state with the root point's place instead of the standing foot's."""
+    return shifted(state, root_place(scene, state))
+
+
+def root_place(scene: RigidScene, state: Any) -> Scalar:
+    """Where the root point is from the place of the standing foot at its body's angle 0 [m]."""
+    return of_stance(scene, state, lambda stance: stance.root.x)
+
+
+def state_after(
+    scene: RigidScene,
+    state: Any,
+    accelerations: Rates,
+    time: Scalar,
+    method: ExplicitMethod = DOPRI8,
+) -> Any:
+    """The told state so much later [s], by one step from a state and its accelerations."""
+    # The tolerance scales the step's error, which is not asked.
+    end, *_ = rolling_step(scene, state, accelerations, time, jnp.ones_like(time), method=method)
+    return told_state(scene, end)
+
+
+def shifted(state: Any, distance: Scalar) -> Any:
+    """A state farther down the slope [m]."""
+    return type(state)(state[0] + distance, *state[1:])
 
 
 class StepEvents(NamedTuple):
@@ -306,10 +350,13 @@ def events_within(
     rtol: Scalar,
     length: Scalar,
     begins_on_section: Scalar,
+    falls: bool = True,
+    method: ExplicitMethod = DOPRI8,
 ) -> StepEvents:
     """What happens within a step, from states at both ends and rates that end with accelerations.
 
-    `step` is its length [s]; `length` counts it in units of the one whose error is the tolerance.
+    `step` is its length [s]; `length` counts it in units of the one whose error is the tolerance;
+    `falls` tells whether falls are watched for.
     """
 
     def course(function: Callable[[RigidScene, Any], Scalar]) -> Quintic:
@@ -318,13 +365,14 @@ def events_within(
     foot, front = course(opening), course(lead)
     side = jnp.sign(lean(scene, after[0]))
     upright = course(functools.partial(uprightness, side=side))
-    outside = upright.control[-1] <= 0.0
+    outside = upright.control[-1] <= 0.0 if falls else jnp.zeros_like(begins_on_section)
     begins_on_section = begins_on_section | (jnp.abs(foot.control[0]) <= _ON_SECTION)
-    root = jnp.sqrt(rtol)
-    off, known = _INTERPOLATED * root * jnp.sqrt(root) * length**6, _RESOLVED * rtol
+    off, known = method.interpolation_error(rtol, length), _RESOLVED * rtol
     width = jnp.maximum(off, known)
     several, perhaps = _turns(foot, width, begins_on_section)
-    falls_and_rises, tilts = _turns(upright, width, jnp.zeros_like(outside))
+    falls_and_rises, tilts = (
+        _turns(upright, width, jnp.zeros_like(outside)) if falls else (outside, outside)
+    )
     above = jnp.where(begins_on_section, foot.control[1], foot.control[0]) > 0.0
     comes_down = above & (foot.control[-1] <= 0.0)
     place = select(outside, upright, foot).root()

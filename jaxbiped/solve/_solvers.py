@@ -16,8 +16,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import BoolScalarLike, Numbers, RealScalarLike, Time
 from jaxbiped.constraints._constraint_methods import AbstractConstraintMethod
-from jaxbiped.dynamics._constrained_motion import project
-from jaxbiped.scene._scene import RedundantScene
+from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas3P, Rodas4, Rodas4P, Rodas5P
 
@@ -179,7 +178,10 @@ def wrap_projected(
 
 
 def with_projection(
-    scene: RedundantScene, solver: _Solver, adjoint: diffrax.AbstractAdjoint | None = None
+    system: AbstractSystem,
+    args: PyTree,
+    solver: _Solver,
+    adjoint: diffrax.AbstractAdjoint | None = None,
 ) -> _Solver:
-    """The solver, wrapped where the scene's method projects after each step."""
-    return wrap_projected(solver, project, adjoint) if scene.method.projects else solver
+    """The solver, wrapped where the system projects what a step arrives at."""
+    return wrap_projected(solver, system.project, adjoint) if system.projects(args) else solver

@@ -21,16 +21,16 @@ import numpy.typing as npt
 from jaxtyping import Array, Float, Int, PyTree, PyTreeDef
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._ending import Ending
+from jaxbiped._ending import NamedCode, endings_named
 from jaxbiped._identity import identity
 from jaxbiped._summary import summary
 from jaxbiped._types import Numbers, Scalar, as_array, by_numpy, in_parts, is_traced
-from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import PROGRAMS, OfObjects, bounded_cache
+from jaxbiped.compiler import host_jit
+from jaxbiped.hybrid._mode_history import ModeHistory
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.solve._error_estimate import ErrorEstimate
-from jaxbiped.solve._mode_history import ModeHistory
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -90,6 +90,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
         scene_key: a number that identifies the scene; measures and figures use it to refuse another
             scene.
         engine: engine that computed it: "xla", "lanes" or "cuda".
+        endings: names of the endings of a hybrid system, which `ending` may tell; None for others.
     """
 
     t: Float[Array, "..."]
@@ -110,9 +111,11 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     mode_history: ModeHistory | None = None
     scene_key: Float[Array, "..."] | None = None
     engine: str = eqx.field(static=True, default="xla")
+    endings: tuple[str, ...] | None = eqx.field(static=True, default=None)
 
     def __repr__(self) -> str:
-        return summary(self, like=self.t, code=self.ending, names=Ending, engine=self.engine)
+        names = endings_named(self.endings)
+        return summary(self, like=self.t, code=self.ending, names=names, engine=self.engine)
 
     @property
     def attempted(self) -> Int[Array, "..."]:
@@ -126,9 +129,9 @@ class Trajectory(eqx.Module, Generic[SomeState]):
         return jtu.tree_map(lambda leaf: by_numpy(lambda _, x: x[..., -1], leaf), self.state)
 
     @property
-    def outcome(self) -> Ending:
-        """The outcome as an `Ending`; for one simulation, not a batch."""
-        return Ending.of(self.ending)
+    def outcome(self) -> NamedCode:
+        """The outcome, for one simulation, not a batch: an `Ending`, or one of a hybrid system."""
+        return endings_named(self.endings).of(self.ending)
 
     @property
     def modes(self) -> tuple[tuple[str, ...], ...]:
@@ -233,7 +236,7 @@ def evaluate_dense(dense: diffrax.DenseInterpolation, times: np.ndarray) -> PyTr
     return in_parts(states, inside)
 
 
-@cached_jit
+@host_jit(within=True)
 def _evaluate(
     kind: Callable[..., diffrax.AbstractLocalInterpolation],
     start: np.ndarray,

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.basins._labels import Label
+from jaxbiped.dynamics._state import Periods, turned_difference
 
 NO_GAIT = -math.inf
 """Radius of a place for a gait that holds none."""
@@ -98,8 +99,14 @@ def after_arrival(
     cycles: tuple[int, ...],
     gap: Scalar,
     rtol: Scalar,
+    periods: Periods = (),
+    lasting: tuple[Scalar, ...] | None = None,
 ) -> ArrivalHistory:
     """After an arrival in this state; `rtol` is the solver's tolerance.
+
+    Differences of components with a period are those modulo it; () if no component has one.
+    `lasting` tells for cycles of 1, 2, … arrivals whether the last one took as long as the one
+    before, without which none is taken for repeated; None: durations are not asked.
 
     It converges to a known gait where it lies within that gait's radius, and nearer than a cycle
     before, or within `gap` of the state then: at the gait itself rounding decides which is nearer.
@@ -110,22 +117,23 @@ def after_arrival(
     than `gap` (in units of the scales, root mean square), and no known gait comes nearer, it
     converges to some other one: the verdict is then "unresolved", with the cycle's footsteps.
     """
-    repeats = _repeats(trace, state, goals, gap)
+    repeats = _repeats(trace, state, goals, gap, periods, lasting)
     distances, slows, steadies, certain, rates = [], [], [], [], []
     nearing = jnp.asarray(False)
     for g, length in enumerate(cycles):
-        distance = _distance(goals, g, state)
+        off = _off(goals, g, state, periods)
+        distance = _distance(goals, g, off)
         before = trace.distances[g][-1]
         nearer = distance < before
         nearing |= jnp.isfinite(before) & (distance < _NEARING * before)
         # Of a longer cycle only the arrivals tell that are near the point itself.
         for other in trace.distances[g][:-1]:
             nearing |= other < _NEARING * distance
-        slow = _size(_times(goals.slowest[g], _off(goals, g, state)))
+        slow = _size(_times(goals.slowest[g], off))
         steady = jnp.zeros_like(trace.goal)
         if length <= DEPTH:
             nearer |= repeats[length - 1] > 0
-            does = _does_as_predicted(trace, state, goals, g, slow, length, rtol)
+            does = _does_as_predicted(trace, off, goals, g, slow, length, rtol, periods)
             steady = jnp.where(does & jnp.isfinite(distance), trace.steady[g][-1] + 1, 0)
         nearing |= steady > 0
         inside = (distance <= goals.radii[g]) & jnp.isfinite(before) & nearer
@@ -167,20 +175,21 @@ def after_arrival(
     )
 
 
-def _distance(goals: Goals, g: int, state: tuple[Scalar, ...]) -> Scalar:
+def _distance(goals: Goals, g: int, off: list[Scalar]) -> Scalar:
     """From a gait's point, in its metric; infinite where there is no such gait."""
-    distance = _size(_times(goals.metrics[g], _off(goals, g, state)))
+    distance = _size(_times(goals.metrics[g], off))
     return jnp.where(goals.radii[g] == NO_GAIT, jnp.inf, distance)
 
 
 def _does_as_predicted(
     trace: ArrivalHistory,
-    state: tuple[Scalar, ...],
+    here: list[Scalar],
     goals: Goals,
     g: int,
     slow: Scalar,
     length: int,
     rtol: Scalar,
+    periods: Periods,
 ) -> Scalar:
     """Whether the last cycles were those of the gait's linear model.
 
@@ -191,11 +200,11 @@ def _does_as_predicted(
     drawn in.
     Where the tolerance hides how much that is, it must be as near as before and the model hold.
     """
-    now, holds = _times(goals.metrics[g], _off(goals, g, state)), []
+    now, holds = _times(goals.metrics[g], here), []
     noise = _NOISE * rtol
     for cycles in range(1, DEPTH // length + 1)[:2]:
         before = trace.recent[cycles * length - 1]
-        then = predicted = _times(goals.metrics[g], _off(goals, g, before))
+        then = predicted = _times(goals.metrics[g], _off(goals, g, before, periods))
         for _ in range(cycles):
             predicted = _times(goals.models[g], predicted)
         off = _size([a - b for a, b in zip(now, predicted, strict=True)])
@@ -207,8 +216,13 @@ def _does_as_predicted(
     return jnp.isfinite(earlier) & ((either & drawn) | hidden)
 
 
-def _off(goals: Goals, g: int, state: tuple[Scalar, ...]) -> list[Scalar]:
-    return [x - goals.points[g, i] for i, x in enumerate(state)]
+def _off(goals: Goals, g: int, state: tuple[Scalar, ...], periods: Periods) -> list[Scalar]:
+    return [_change(x, goals.points[g, i], periods, i) for i, x in enumerate(state)]
+
+
+def _change(x: Scalar, y: Scalar, periods: Periods, i: int) -> Scalar:
+    change: Scalar = x - y
+    return turned_difference(change, periods[i]) if periods else change
 
 
 def _times(matrix: Scalar, vector: list[Scalar]) -> list[Scalar]:
@@ -221,15 +235,25 @@ def _size(parts: list[Scalar]) -> Scalar:
 
 
 def _repeats(
-    trace: ArrivalHistory, state: tuple[Scalar, ...], goals: Goals, gap: Scalar
+    trace: ArrivalHistory,
+    state: tuple[Scalar, ...],
+    goals: Goals,
+    gap: Scalar,
+    periods: Periods,
+    lasting: tuple[Scalar, ...] | None,
 ) -> tuple[Scalar, ...]:
     offs: list[Scalar] = []
     for old in trace.recent:
-        parts = [(x - y) / goals.scales[i] for i, (x, y) in enumerate(zip(state, old, strict=True))]
+        parts = [
+            _change(x, y, periods, i) / goals.scales[i]
+            for i, (x, y) in enumerate(zip(state, old, strict=True))
+        ]
         offs.append(_size(parts) / math.sqrt(len(parts)))
     counts = []
     for length, (off, count) in enumerate(zip(offs, trace.repeats, strict=True), 1):
         again = off < gap
+        if lasting is not None:
+            again &= lasting[length - 1]
         for shorter in (k for k in range(1, length) if length % k == 0):
             # A slow transient about a shorter cycle comes back as well, but less far each time.
             again &= off < jnp.maximum(_CYCLE * offs[shorter - 1], _CYCLE * gap)

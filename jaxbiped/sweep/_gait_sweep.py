@@ -24,11 +24,13 @@ from jaxbiped._identity import provenance
 from jaxbiped._progress import Stage, stage
 from jaxbiped._types import as_float, rows_of
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._state import recurring_leaves
+from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.gait._search_starts import default_guess, state_of_guess
+from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import (
     parameter_quantities,
     parameter_values,
@@ -54,7 +56,7 @@ from jaxbiped.sweep.starts._coordinates import parameter_axes
 if TYPE_CHECKING:
     import xarray
 
-AnyScene: TypeAlias = Scene | RigidScene | RedundantScene
+AnyScene: TypeAlias = Scene | RigidScene | RedundantScene | HybridSystem
 
 _FEW, _MANY = 16, 256
 """Searches in a batch: every size is a program that XLA compiles."""
@@ -76,6 +78,8 @@ def gait_sweep(
     over: Mapping[str, Sequence[float] | np.ndarray],
     *,
     parameters: tuple[str, ...] | None = None,
+    guess: Gait | PyTree | None = None,
+    section: AbstractSection | None = None,
     footsteps: int | None = None,
     accuracy: str = "balanced",
     radius_sensitivities: bool = True,
@@ -99,9 +103,12 @@ def gait_sweep(
     on the coarse lattice, those next to one.
 
     Args:
-        scene: the walker; parameters that are not swept keep their values.
+        scene: the walker or hybrid system; parameters that are not swept keep their values.
         over: values of each swept parameter by name (see `parameter_names`), arrays of shape (k,).
         parameters, footsteps, accuracy, radius_sensitivities, engine: as for `find_gait`.
+        guess: a gait or a state near one, from which the first search begins, and every search that
+            has no neighbours to begin from; a hybrid system needs one.
+        section: section on which cycles begin. Default: as of `find_gait`.
         store: directory or address of a Zarr store (see `sweep`), from which an interrupted run
             continues. Default: in memory.
         progress: whether to show on stderr what is being done, how far it is and what was found; by
@@ -120,7 +127,8 @@ def gait_sweep(
             has other settings or cannot be written.
         ResourceError: the disk is full. The contents of the store are kept.
     """
-    scene = check_scene(scene, Scene, RigidScene, RedundantScene)
+    scene = check_scene(scene, Scene, RigidScene, RedundantScene, HybridSystem)
+    section, near = section_of(scene, section), state_of_guess(scene.minimal, guess)
     if not isinstance(over, Mapping) or not over:
         raise ArgumentError(
             f"over = {over!r} is not allowed: map one parameter's name or more to its values, "
@@ -152,27 +160,28 @@ def gait_sweep(
     with stage(
         "finding gaits", total=size, unit="gaits", show=progress, kept=what_is_kept(path)
     ) as now:
-        first = find_gait(scene_at(centre), engine=engine, **options)
+        first = find_gait(scene_at(centre), near, section=section, engine=engine, **options)
         kind = type(first.measures.state)
         at_once = size >= LARGE and first.engine == "lanes"
 
         def search_alone(place: Place) -> Gait:
-            return (
-                first if place == centre else find_gait(scene_at(place), engine=engine, **options)
-            )
+            if place == centre:
+                return first
+            return find_gait(scene_at(place), near, section=section, engine=engine, **options)
 
         def start_at(place: Place) -> np.ndarray:
-            return np.array(recurring_leaves(default_guess(scene_at(place))), float)
+            start = default_guess(scene_at(place)) if near is None else near
+            return np.array(recurring_leaves(start), float)
 
         def find(places: Sequence[Place], guesses: np.ndarray) -> Iterator[tuple[slice, Gait]]:
             if at_once:
                 columns = zip(values, np.transpose(places), strict=True)
                 chosen = {name: values[name][rows] for name, rows in columns}
-                yield from find_each(scene, chosen, guesses, kind, options)
+                yield from find_each(scene, chosen, guesses, kind, options | {"section": section})
                 return
             for k, (place, guess) in enumerate(zip(places, guesses, strict=True)):
-                start = jtu.tree_map(as_float, kind(0.0, *guess))
-                gait = find_gait(scene_at(place), start, engine=engine, **options)
+                start = jtu.tree_map(as_float, state_of_recurring(kind, guess))
+                gait = find_gait(scene_at(place), start, section=section, engine=engine, **options)
                 yield slice(k, k + 1), rows_of(gait, None)
 
         quantities = parameter_quantities(scene)
@@ -213,7 +222,7 @@ def find_each(
         # A search from nowhere ends at once: it fills the batch.
         rows = np.pad(starts[part], ((0, missing), (0, 0)), constant_values=np.nan)
         columns = {k: np.pad(v[part], (0, missing), mode="edge") for k, v in values.items()}
-        begin = state(np.zeros(size), *np.ascontiguousarray(rows.T))
+        begin = state_of_recurring(state, np.ascontiguousarray(rows.T), np.zeros(size))
         gaits = _find_each(scene, columns, begin, dict(options))
         yield part, rows_of(gaits, slice(kept))
         first = part.stop

@@ -19,20 +19,22 @@ from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.dynamics._state import state_type, without_whole_turns
+from jaxbiped.hybrid._hybrid_system import HybridSystem, within_periods
+from jaxbiped.hybrid._scales import resolve_slip_speed
 from jaxbiped.scene._parameter_access import scene_identity, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import RigidScene, Scene, is_rigid, is_walker
 from jaxbiped.scene._scene_checks import check_scene
-from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
-from jaxbiped.sweep._follow_starts import Effort, Labelled, broadcast_leaves, follow_starts
+from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
 from jaxbiped.sweep._gait_family import Family
+from jaxbiped.sweep._label_recorders import Labelled
 
 _FINER = 10.0
 """From one tolerance to the next."""
-_FINEST = {True: 1e-10, False: 1e-13}
-"""Finest tolerance that is tried, compliant or not."""
+_FINEST = {False: 1e-10, True: 1e-13}
+"""Finest tolerance that is tried, on rigid feet or not."""
 _LEAST = 2.0
 """How many times looser the looser tolerance is at least."""
 _STEPS = 2
@@ -43,7 +45,7 @@ Follow = Callable[[np.ndarray, Effort], Labelled]
 
 
 def relabel_doubtful(
-    follow: Follow, count: int, effort: Effort, scene: Scene | RigidScene
+    follow: Follow, count: int, effort: Effort, scene: Scene | RigidScene | HybridSystem
 ) -> Labelled:
     """Labels of n starts, solved again where they are in doubt; no start's depends on another's.
 
@@ -66,7 +68,7 @@ def relabel_doubtful(
     doubtful = disagreed > 0 if first.grazes is None else (disagreed > 0) | (first.grazes > 0)
     doubt = np.where(doubtful, int(Doubt.REMAINS), int(Doubt.NONE))
     open_ = np.flatnonzero(doubtful)
-    agree, finer, finest = agree[open_], effort, _FINEST[scene.compliant]
+    agree, finer, finest = agree[open_], effort, _FINEST[is_rigid(scene)]
     while len(open_) and finer.rtol > 1.001 * finest:
         finer = finer._replace(rtol=max(finer.rtol / _FINER, finest))
         finer = finer._replace(max_attempts=_STEPS * finer.max_attempts)
@@ -103,12 +105,12 @@ class Labelling(eqx.Module):
     """A function from starts to labels, made by `labelling`. Call it with many starts at once.
 
     Attributes:
-        scene: the walker.
+        scene: the walker, or a hybrid system.
         family: the gaits, for every value of the scene parameters in which the starts differ.
         effort: how far and how accurately starts are followed.
     """
 
-    scene: Scene | RigidScene
+    scene: Scene | RigidScene | HybridSystem
     family: Family
     effort: Effort = eqx.field(static=True)
 
@@ -123,8 +125,10 @@ class Labelling(eqx.Module):
 
         Each is followed until its label is certain: until it comes within a known gait's radius,
         and nearer than a cycle before; until it falls, stops, stumbles or slides; or until all the
-        footsteps are walked. No start's result depends on another's; one that is no number is
-        labelled "solver failed". To an accuracy that is a number, see `relabel_doubtful`.
+        footsteps are walked. A hybrid system is followed until one of its endings, and its arrivals
+        at the section count as footsteps. No start's result depends on another's; one that is not
+        a number is labelled "solver failed". To an accuracy that is a number, see
+        `relabel_doubtful`.
 
         Args:
             states: leaves of shape (n,).
@@ -146,8 +150,10 @@ class Labelling(eqx.Module):
             return self._label_once(some, own, effort)
 
         if self.effort.wanted is None:
-            return follow(np.arange(count), self.effort)
-        return relabel_doubtful(follow, count, self.effort, self.scene)
+            found = follow(np.arange(count), self.effort)
+        else:
+            found = relabel_doubtful(follow, count, self.effort, self.scene)
+        return found._replace(endings=self.scene.endings)
 
     def _label_once(
         self, states: PyTree, given: Mapping[str, np.ndarray], effort: Effort
@@ -155,7 +161,7 @@ class Labelling(eqx.Module):
         """Labels of starts that are checked, by one solve of each."""
         count = len(states[0])
         scene = with_parameters(self.scene, {k: jnp.asarray(v) for k, v in given.items()})
-        scene = check_scene(scene, Scene, RigidScene)
+        scene = check_scene(scene, Scene, RigidScene, HybridSystem)
         goals, cycles = self.family.goals(given, count)
         found = follow_starts(scene, states, goals, cycles, effort)
         if not given or self.family.names:
@@ -184,26 +190,38 @@ class Labelling(eqx.Module):
         effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
         # All engines give the same labels.
         del effort["engine"], effort["may_move"], effort["embedded"]
+        section = effort.pop("section")
         if effort["wanted"] is None:
             del effort["wanted"]
+        models = {"scene": own["model"], "solver": identity(self.effort.solver)}
+        if section is not None:
+            models["section"] = identity(section)
         return {
-            "model": "compliant" if self.scene.compliant else "rigid",
+            "model": _kind_of(self.scene),
             "scene": own["scene"],
             "effort": effort,
-            "models": {"scene": own["model"], "solver": identity(self.effort.solver)},
+            "models": models,
             "gaits": self.family.described(),
         }
 
 
-def _check_states(scene: Scene | RigidScene, states: PyTree) -> PyTree:
-    kind, structure = state_type(scene), scene.mechanism.structure
-    if (*getattr(states, "_fields", ()), *structure.bristles) == kind._fields:
+def _kind_of(scene: Scene | RigidScene | HybridSystem) -> str:
+    if not is_walker(scene):
+        return "hybrid system"
+    return "rigid" if is_rigid(scene) else "compliant"
+
+
+def _check_states(scene: Scene | RigidScene | HybridSystem, states: PyTree) -> PyTree:
+    kind = state_type(scene)
+    bristles = scene.mechanism.structure.bristles if is_walker(scene) else ()
+    if (*getattr(states, "_fields", ()), *bristles) == kind._fields:
         straight = np.zeros_like(np.asarray(states[0]))
-        states = kind(*states, *[straight] * len(structure.bristles))
+        states = kind(*states, *[straight] * len(bristles))
     check_type("states", states, kind)
     whole: PyTree = kind(*[np.asarray(leaf, dtype=np.float64) for leaf in states])
     check_leaves_of_starts(whole)
-    return jtu.tree_map(np.asarray, without_whole_turns(scene, whole))
+    within = without_whole_turns(scene, whole) if is_walker(scene) else within_periods(whole)
+    return jtu.tree_map(np.asarray, within)
 
 
 def check_leaves_of_starts(states: PyTree) -> None:

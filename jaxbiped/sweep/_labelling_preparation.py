@@ -14,14 +14,18 @@ from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.basins._labels import Doubt, Label
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._scales import resolve_slip_speed
+from jaxbiped.hybrid._sections import AbstractSection, section_of
+from jaxbiped.scene._scene import RigidScene, Scene, is_rigid, is_walker
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
-from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
+from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._error_estimate import check_wanted
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.sweep._attractor import turned_offsets
 from jaxbiped.sweep._follow_starts import Effort
 from jaxbiped.sweep._gait_family import Guesses, find_family, with_gaits
 from jaxbiped.sweep._labelling import Labelling
@@ -32,21 +36,22 @@ _ALIKE = 0.05
 """Distance of two starts' last states, in the components' scales, that count as one guess."""
 _MOST_GUESSES = 8
 """Of one cycle length for one combination of parameters."""
-_GAP_SHARE = {True: 30.0, False: 3.0}
-"""Gap between states that repeat each other in units of the tolerance, compliant or not: rolling
-errs by less, and slow transients past an unstable gait move by as little as a wider gap."""
+_GAP_SHARE = {False: 30.0, True: 3.0}
+"""Gap between states that repeat each other in units of the tolerance, on rigid feet or not:
+rolling errs by less, and slow transients past an unstable gait move by as little as a wider gap."""
 _FIRST = 3e-3
 """First tolerance as a share of the accuracy wanted, at most that of "draft": of 100,000 labels of
 the seed's slice 37 were wrong and not in doubt at 1e-5 by Rodas4, and 11 at 1e-6."""
-FINEST_FIRST = {True: 1e-9, False: 1e-11}
-"""Finest tolerance at which every start is labelled, compliant or not."""
+FINEST_FIRST = {False: 1e-9, True: 1e-11}
+"""Finest tolerance at which every start is labelled, on rigid feet or not."""
 
 
 def labelling(
-    scene: Scene | RigidScene,
+    scene: Scene | RigidScene | HybridSystem,
     *,
     parameters: Mapping[str, Sequence[float] | np.ndarray] | None = None,
-    guess: Gait | WalkerState | None = None,
+    guess: Gait | WalkerState | PyTree | None = None,
+    section: AbstractSection | None = None,
     footsteps: int = 30,
     accuracy: str | float = "draft",
     rtol: float | None = None,
@@ -57,18 +62,21 @@ def labelling(
     """Finds the scene's gait and returns a labelling of starts.
 
     Args:
-        scene: the walker, compliant or rigid.
+        scene: the walker, compliant or rigid, or a hybrid system (`jb.hybrid.HybridSystem`).
         parameters: values of scene parameters by name; the gait is found for every combination.
-        guess: a gait, or a start near one. Default: the seed's start.
-        footsteps: maximum number of footsteps; a start that is still uncertain after them is
-            "unresolved".
+        guess: a gait, or a start near one. Default: the seed's start; a hybrid system has none.
+        section: section at which a hybrid system's arrivals are compared with its cycles. Default:
+            at its first guard that resets the state. A walker is compared at mid-stance, or with
+            rigid feet behind heel strike.
+        footsteps: maximum number of footsteps, or of a hybrid system's arrivals; a start that is
+            still uncertain after them is "unresolved".
         accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`). Or a number, the fraction of
             the labels that may be wrong: each start is then also solved at a looser tolerance and
             with a second method, and if the labels differ, at finer tolerances until they agree.
             Starts whose label remains in doubt are flagged (`Labelled.doubt`). `sweep` estimates
             how many of the others are wrong, and tightens the tolerance until the number is met.
         rtol: relative tolerance, instead of an accuracy; the absolute one is a hundredth of it.
-        solver: solver for a compliant walker, "rodas3p" to "rodas5p".
+        solver: solver for a compliant walker or a hybrid system, "rodas3p" to "rodas5p".
         max_solver_steps: maximum number of attempted steps for a start.
         engine: "lanes", "cuda", "xla" or "auto" (see `ENGINES`). All give the same labels, except
             for starts that are nearer to a boundary than the tolerance.
@@ -83,6 +91,7 @@ def labelling(
     """
     effort = effort_of(
         scene,
+        section=section,
         footsteps=footsteps,
         accuracy=accuracy,
         rtol=rtol,
@@ -91,7 +100,9 @@ def labelling(
         engine=engine,
     )
     values = parameter_axes(scene, parameters, "parameters") if parameters else {}
-    start = state_of_guess(scene, default_guess(scene) if guess is None else guess)
+    if guess is None and is_walker(scene):
+        guess = default_guess(scene)
+    start = state_of_guess(scene, guess)
     family = find_family(scene, effort, parameters=values, guess=start)
     missing = sum(not row for row in family.rows)
     if missing:
@@ -104,8 +115,9 @@ def labelling(
 
 
 def effort_of(
-    scene: Scene | RigidScene,
+    scene: Scene | RigidScene | HybridSystem,
     *,
+    section: AbstractSection | None = None,
     footsteps: int = 30,
     accuracy: str | float = "draft",
     rtol: float | None = None,
@@ -114,7 +126,7 @@ def effort_of(
     engine: str = "auto",
 ) -> Effort:
     """How to follow starts, from the arguments of `labelling`; raises `ArgumentError`."""
-    scene = check_scene(scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene, HybridSystem)
     check_count("footsteps", footsteps)
     check_count("max_solver_steps", max_solver_steps)
     if any(np.ndim(leaf) for leaf in jtu.tree_leaves(scene)):
@@ -124,9 +136,10 @@ def effort_of(
         )
     wanted = _share_wanted(accuracy, rtol)
     named = ACCURACIES["draft" if wanted is not None else str(accuracy)]
-    own = named.walk if scene.compliant else named.rigid_walk
+    rigid = is_rigid(scene)
+    own = named.rigid_walk if rigid else named.walk
     if wanted is not None:
-        own = min(own, max(_FIRST * wanted, FINEST_FIRST[scene.compliant]))
+        own = min(own, max(_FIRST * wanted, FINEST_FIRST[rigid]))
     tolerance = resolve_slip_speed(own, scene) if rtol is None else rtol
     check_positive("rtol", tolerance, one=True)
     method = solver_named(solver)
@@ -138,12 +151,27 @@ def effort_of(
         rtol=float(tolerance),
         footsteps=int(footsteps),
         max_attempts=int(max_solver_steps),
-        gap_share=_GAP_SHARE[scene.compliant],
+        gap_share=_GAP_SHARE[rigid],
         solver=method,
         engine=engine_for(engine, obstacle=None, by_device=True, by_any=True),
         may_move=engine == "auto",
         wanted=wanted,
+        section=_section_for(scene, section),
     )
+
+
+def _section_for(
+    scene: Scene | RigidScene | HybridSystem, section: AbstractSection | None
+) -> AbstractSection | None:
+    """The section of a hybrid system, checked; None for a walker, which has one alone."""
+    if not is_walker(scene):
+        return section_of(scene, section)
+    if section is not None:
+        raise ArgumentError(
+            f"section = {section!r} is not allowed for a {type(scene).__name__}: walkers are "
+            "compared at their own section; leave it out."
+        )
+    return None
 
 
 def _share_wanted(accuracy: str | float, rtol: float | None) -> float | None:
@@ -196,7 +224,8 @@ def guesses_among(labelling: Labelling, starts: AbstractStarts, numbers: np.ndar
     guesses: dict[int, list[tuple[int, list[float]]]] = {}
     for row, length in sorted({(int(rows[i]), int(found.cycle_footsteps[i])) for i in open_}):
         among = open_[(rows[open_] == row) & (found.cycle_footsteps[open_] == length)]
-        for i in among[_distinct_points(found.final[among] / family.scales[row])]:
+        distinct = _distinct_points(family.states[row], found.final[among], family.scales[row])
+        for i in among[distinct]:
             guesses.setdefault(row, []).append((length, found.final[i].tolist()))
     return guesses
 
@@ -208,11 +237,15 @@ def with_guesses(labelling: Labelling, guesses: Guesses) -> Labelling:
     return Labelling(labelling.scene, more, labelling.effort)
 
 
-def _distinct_points(points: np.ndarray) -> list[int]:
-    """Positions of the first few of these points that are not alike, shape (n, m)."""
+def _distinct_points(state: PyTree, points: np.ndarray, scales: np.ndarray) -> list[int]:
+    """Positions of the first few of these points that are not alike, shape (n, m).
+
+    They are recurring coordinates of states of the same kind as the given one.
+    """
     chosen: list[int] = []
     for i, point in enumerate(points):
-        far = all(np.linalg.norm(point - points[j]) > _ALIKE for j in chosen)
+        off = turned_offsets(state, point - points[chosen]) / scales
+        far = np.all(np.linalg.norm(off, axis=1) > _ALIKE)
         if far and len(chosen) < _MOST_GUESSES:
             chosen.append(i)
     return chosen
@@ -232,7 +265,7 @@ def label_at(
     Args:
         labelling: a `Labelling`.
         names: names of the d coordinates of points (see `coordinate_names`).
-        failing: whether to distinguish only walking (0) from everything else (1).
+        failing: whether to distinguish only convergence to a cycle (0) from everything else (1).
         place, follow, base: as in `grid`.
 
     Returns:

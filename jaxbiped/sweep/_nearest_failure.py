@@ -1,5 +1,6 @@
 """Nearest failure: the nearest start that does not return to the gait."""
 
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -15,11 +16,14 @@ from jaxbiped.basins._rays import Normal
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
 from jaxbiped.gait._return_map import return_map
+from jaxbiped.hybrid._admissible_directions import admissible_directions
+from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.sweep._attractor import Attractor
 from jaxbiped.sweep._follow_starts import passes_a_stop
-from jaxbiped.sweep._gait_family import Attractor, scene_with
+from jaxbiped.sweep._gait_family import scene_with
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.variational._hybrid_system import admissible_directions
 
 _MOST_FOOTSTEPS = 6
 """After which the distance from the gait is differentiated."""
@@ -37,12 +41,14 @@ def nearest_failure(
 ) -> FatalShock:
     """The smallest push away from the first gait, on its section, after which the walk fails.
 
-    On rigid feet, a push leaves held stops held, and moves no angle beyond a stop.
+    On rigid feet, a push leaves held stops held, and moves no angle beyond a stop. A push of a
+    hybrid system leaves its modes, and moves no state beyond a guard that resets it.
 
-    The coordinates are all m leaves of the state except `ROOT_x`, in their order. Distances are
-    measured in the scales `Family.scales`: 1 rad for angles, √(g l) for velocities, √(g/l) for
-    rates, and the stance foot's penetration for the height of the root point. Every label except
-    walking is a failure.
+    The coordinates are all m leaves of the state except cyclic ones (`ROOT_x`), in their order.
+    Distances are measured in the scales `Family.scales`: 1 rad for angles, √(g l) for velocities,
+    √(g/l) for rates, and the stance foot's penetration for the height of the root point; those of a
+    hybrid system are its state's `scales`. Every label except walking, or of a hybrid system
+    periodic, is a failure.
 
     Args:
         labelling: a labelling that has a gait.
@@ -73,7 +79,7 @@ def nearest_failure(
 
     def fails(pushes: np.ndarray) -> np.ndarray:
         count = len(pushes)
-        states = type(attractor.state)(np.zeros(count), *point_of(pushes).T)
+        states = state_of_recurring(type(attractor.state), point_of(pushes).T, np.zeros(count))
         parameters = {
             name: np.full(count, value)
             for name, value in zip(family.names, family.table[0], strict=True)
@@ -82,7 +88,8 @@ def nearest_failure(
         failed = found.label != int(Label.WALKING)
         return (failed & ~passes_a_stop(scene, states._asdict())).astype(int)
 
-    normal = boundary_normal(scene, attractor) if gradients else None
+    section = labelling.effort.section
+    normal = boundary_normal(scene, attractor, section) if gradients else None
     shock = minimal_fatal_shock(
         fails,
         np.zeros(ways.shape[1]),
@@ -99,7 +106,11 @@ def nearest_failure(
     )
 
 
-def boundary_normal(scene: Scene | RigidScene, attractor: Attractor) -> Normal:
+def boundary_normal(
+    scene: Scene | RigidScene | HybridSystem,
+    attractor: Attractor,
+    section: AbstractSection | None = None,
+) -> Normal:
     """Gradients of the distance from the gait after a few footsteps, at points (n, m).
 
     Starts on the boundary of the basin follow it towards an unstable gait, all to one place: so
@@ -107,6 +118,14 @@ def boundary_normal(scene: Scene | RigidScene, attractor: Attractor) -> Normal:
     footsteps are taken as the start has left before it fails, up to a few.
     """
     scene = jax.tree.map(as_float, scene)
+
+    def arrivals(points: np.ndarray) -> PyTree:
+        return _arrivals(scene, type(attractor.state), section, jnp.asarray(points))
+
+    return _normal_by(arrivals, attractor)
+
+
+def _normal_by(arrivals: Callable[[np.ndarray], PyTree], attractor: Attractor) -> Normal:
     squared = attractor.metric.T @ attractor.metric
 
     def some(points: np.ndarray) -> np.ndarray:
@@ -114,13 +133,12 @@ def boundary_normal(scene: Scene | RigidScene, attractor: Attractor) -> Normal:
         slopes = np.broadcast_to(np.eye(at.shape[1]), (*at.shape, at.shape[1])).copy()
         walked = np.zeros(len(points), dtype=int)
         for _ in range(_MOST_FOOTSTEPS):
-            found = _arrivals(scene, type(attractor.state), jnp.asarray(at))
-            change, (after, code) = jax.tree.map(np.asarray, found)
+            change, (after, code) = jax.tree.map(np.asarray, arrivals(at))
             on = on & (code == 0) & np.isfinite(change).all(axis=(1, 2))
             slopes[on] = change[on] @ slopes[on]
             at[on] = after[on]
             walked += on
-        gradients = np.einsum("ni,nij->nj", (at - attractor.point) @ squared, slopes)
+        gradients = np.einsum("ni,nij->nj", attractor.offsets_of(at) @ squared, slopes)
         return np.where(walked[:, None] > 0, gradients, np.nan)
 
     def normal(points: np.ndarray) -> np.ndarray:
@@ -131,11 +149,16 @@ def boundary_normal(scene: Scene | RigidScene, attractor: Attractor) -> Normal:
 
 
 @cached_jit
-def _arrivals(scene: Scene | RigidScene, kind: type, points: Array) -> PyTree:
+def _arrivals(
+    scene: Scene | RigidScene | HybridSystem,
+    kind: type,
+    section: AbstractSection | None,
+    points: Array,
+) -> PyTree:
     """Derivatives of the next arrivals from points (n, m), these arrivals and their codes."""
 
     def arrival(point: Array) -> tuple[Array, tuple[Array, Array]]:
-        came = return_map(scene, state_of_recurring(kind, point, jnp.zeros(())))
+        came = return_map(scene, state_of_recurring(kind, point, jnp.zeros(())), section=section)
         after = jnp.stack(recurring_leaves(came.state))
         return after, (after, came.code)
 

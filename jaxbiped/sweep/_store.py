@@ -6,6 +6,7 @@ One on a disk is continued where a killed run left off.
 import contextlib
 import enum
 import functools
+import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,11 +15,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from jaxbiped._checks import warn
+from jaxbiped._ending import endings_named
 from jaxbiped._files import strict_json
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import JsonObject
-from jaxbiped.basins._labels import Doubt, Label, Witness
-from jaxbiped.sweep._follow_starts import Labelled
+from jaxbiped.basins._labels import ENDINGS, PERIODIC, Doubt, Label, Witness
+from jaxbiped.sweep._label_recorders import Labelled
 from jaxbiped.sweep._store_files import SETTINGS, continue_store, note, open_store, writing
 from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
 
@@ -65,12 +67,14 @@ class Layout(NamedTuple):
             the axes before it, all of those after.
         quantities: what the starts' coordinates are, as far as it is known.
         doubts: whether `DOUBT_FIELDS` are kept.
+        endings: names of the endings of a hybrid system; None for a walker.
     """
 
     starts: AbstractStarts
     chunk_shape: tuple[int, ...]
     quantities: Mapping[str, Quantity]
     doubts: bool = False
+    endings: tuple[str, ...] | None = None
 
     @staticmethod
     def of(
@@ -79,13 +83,14 @@ class Layout(NamedTuple):
         quantities: Mapping[str, Quantity] | None = None,
         *,
         doubts: bool = False,
+        endings: tuple[str, ...] | None = None,
     ) -> "Layout":
         """With at most `chunk` starts in a chunk."""
         shape, left = [], chunk
         for size in reversed(starts.shape):
             shape.append(max(1, min(left, size)))
             left = left // size if left >= size else 1
-        return Layout(starts, tuple(reversed(shape)), quantities or {}, doubts)
+        return Layout(starts, tuple(reversed(shape)), quantities or {}, doubts, endings)
 
     @property
     def fields(self) -> dict[str, tuple[str, float, str, str]]:
@@ -151,9 +156,16 @@ def empty_dataset(layout: Layout) -> "xarray.Dataset":
         if unit:
             attributes["units"] = unit
         if name in _FLAGS:
-            kind, flags = _FLAGS[name]
-            attributes[kind] = [int(each) for each in flags]
-            attributes["flag_meanings"] = " ".join(str(each.name).lower() for each in flags)
+            kind, members = _FLAGS[name]
+            flags: list[Any] = list(members)
+            if name == "label" and layout.endings is not None:
+                flags += [each for each in endings_named(layout.endings) if each not in flags]
+                attributes[ENDINGS] = json.dumps(layout.endings)
+            attributes[kind] = [int(each.value) for each in flags]
+            words = [str(each.name).lower() for each in flags]
+            if ENDINGS in attributes:
+                words[flags.index(Label.WALKING)] = PERIODIC
+            attributes["flag_meanings"] = " ".join(words)
         values = np.broadcast_to(np.asarray(nothing, dtype=dtype), starts.shape)
         variables[name] = (dims, values, attributes)
     coordinates = {

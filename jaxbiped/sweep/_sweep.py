@@ -22,6 +22,7 @@ from jaxbiped.basins._labels import (
     Witness,
     estimate_label_errors,
 )
+from jaxbiped.scene._scene import is_rigid
 from jaxbiped.sweep._gait_family import Guesses
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import (
@@ -116,7 +117,8 @@ def sweep(
     began = time.perf_counter()
     quantities = coordinate_quantities(labelling.scene)
     doubts = labelling.effort.wanted is not None
-    layout = Layout.of(starts, int(chunk), quantities, doubts=doubts)
+    endings = labelling.scene.endings
+    layout = Layout.of(starts, int(chunk), quantities, doubts=doubts, endings=endings)
     own = {
         "fields": list(layout.fields),
         "starts": starts.described(),
@@ -241,7 +243,7 @@ def tightened(
     starts, so that no label depends on the chunks.
     """
     layout, wanted = results.layout, labelling.effort.wanted
-    least = FINEST_FIRST[labelling.scene.compliant]
+    least = FINEST_FIRST[is_rigid(labelling.scene)]
     assert wanted is not None
     tolerances = json.loads(results.noted(_TOLERANCES) or json.dumps([labelling.effort.rtol]))
     while True:

@@ -16,13 +16,14 @@ from jaxbiped._types import JsonObject
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.hybrid._scales import sizes_of
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.scene._parameter_access import parameter_names
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import MinimalState, WalkerState
 from jaxbiped.simulate._simulation import CompiledSimulation, Simulation
-from jaxbiped.solve._accuracy import Precision, sizes_of
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._trajectory import Trajectory
 
 Values = Mapping[str, np.ndarray]

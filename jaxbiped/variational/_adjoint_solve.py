@@ -25,6 +25,7 @@ from jaxtyping import PyTree, PyTreeDef
 from jaxbiped._types import Scalar, select
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import AbstractEngine, Program, Recorded, Recording, Request, jacobian
+from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.variational._collocated_step import (
     KnownStep,
     Linear,
@@ -44,7 +45,6 @@ from jaxbiped.variational._flow import (
     on_section,
     sides_of,
 )
-from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._solve_to_section import Nodes
 from jaxbiped.variational._tangents import Seeded, active_leaves
 
@@ -195,7 +195,7 @@ class FirstVariationSolve:
             fresh=now.fresh,
             crossed=crossing.crossed,
         )
-        rows = Rows(flow.rates, order, list(parameters))
+        rows = Rows(flow.rates, order, list(parameters), flow.margin)
         points, share, velocity = collocate_step(rows, known)
         stages = Stages.of(order, share, jax.lax.map(rows.by_state, points))
         begun, _ = without_flow(now.leading, order.sorted(velocity), now.fresh)
@@ -450,7 +450,7 @@ class _AdjointSolve:
     def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
         flow, step = self.flow(given), self.read(row)
         order, parameters = field_order(flow)
-        rows = Rows(flow.rates, order, list(parameters))
+        rows = Rows(flow.rates, order, list(parameters), flow.margin)
         crossed, ends = step.which > 0.0, (step.before, now.state)
         sides = sides_of(flow, now.state, step.which, parameters)
         linear = linearise_about(rows, *ends, step.points, step.share, crossed, sides)

@@ -17,9 +17,9 @@ import numpy as np
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import jacobian
 from jaxbiped.linalg._small_matrices import BlockFactors, factorise
+from jaxbiped.solve.controllers._switch_locator import MARGIN
 from jaxbiped.solve.rosenbrock._linearisation import linearise
 from jaxbiped.variational._flow import jump_of
-from jaxbiped.variational._switch_locator import MARGIN
 
 _ROOT = 6.0**0.5
 _NODES = np.array([(4 - _ROOT) / 10, (4 + _ROOT) / 10, 1.0])
@@ -177,10 +177,16 @@ class Stages(NamedTuple):
 
 
 class Rows:
-    """Rates and their derivatives at one point, of `field` for components in this `order`."""
+    """Rates and their derivatives at one point, of `field` for components in this `order`.
 
-    def __init__(self, field: Field, order: Order, parameters: Sequence[Scalar]) -> None:
+    A step that ends on a switch belongs to the side that lies a `margin` [s] before.
+    """
+
+    def __init__(
+        self, field: Field, order: Order, parameters: Sequence[Scalar], margin: float = MARGIN
+    ) -> None:
         self.field, self.order, self.parameters = field, order, list(parameters)
+        self.margin = margin
         # Compiled by themselves, these are traced once, not at each use.
         self.by_state, self.curved = jax.jit(self._by_state), jax.jit(self._curved)
 
@@ -247,7 +253,7 @@ def collocate_step(rows: Rows, step: KnownStep) -> tuple[Scalar, Scalar, Scalar]
     begins, ends = rows.velocity(step.before), rows.velocity(step.after)
     points = _correct(rows, step, part, share, begins, ends)
     # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
-    short = jnp.where(step.crossed, step.after - MARGIN * ends, points[2])
+    short = jnp.where(step.crossed, step.after - rows.margin * ends, points[2])
     return jnp.concatenate([points[:2], short[None]]), share, begins
 
 

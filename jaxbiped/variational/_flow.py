@@ -13,9 +13,9 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree, PyTreeDef
 
 from jaxbiped._types import Scalar, VectorField
-from jaxbiped.dynamics._surfaces import Switch
-from jaxbiped.variational._hybrid_system import AbstractSystem
-from jaxbiped.variational._switch_locator import MARGIN
+from jaxbiped.hybrid._guards import Switch
+from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.solve.controllers._switch_locator import MARGIN
 from jaxbiped.variational._tangents import Seeded, with_active
 
 Arrival = Callable[[PyTree, PyTree], tuple[Scalar, Scalar]]
@@ -76,10 +76,15 @@ class Flow(eqx.Module):
         state, scene = self._parts(z)
         return self.arrival(scene, state)[0]
 
+    @property
+    def margin(self) -> float:
+        """Time by which a step that ends on a switch belongs to the side before it."""
+        return MARGIN * self.system.time_unit
+
     def earlier(self, row: Scalar, parameters: Scalar) -> Scalar:
         """Time and components, (1 + c,), as little earlier as tells a switch's sides apart."""
         rates = self.velocity(jnp.concatenate([row[1:], parameters]))
-        return row - MARGIN * jnp.concatenate([jnp.ones(1), rates])
+        return row - self.margin * jnp.concatenate([jnp.ones(1), rates])
 
     def _parts(self, z: Sequence[Scalar] | Scalar) -> tuple[PyTree, PyTree]:
         c = self.structure.num_leaves

@@ -13,8 +13,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, VectorField
-from jaxbiped.compiler import jacobian
-from jaxbiped.solve._fusion_barrier import fusion_barrier, without_barriers
+from jaxbiped.compiler import fusion_barrier, jacobian, without_barriers
 from jaxbiped.solve.rosenbrock._linearisation import Components, ImplicitForm, split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import Stages, stages_of
 from jaxbiped.solve.rosenbrock._tableau_form import RosenbrockTableau, end_weights, error_weights

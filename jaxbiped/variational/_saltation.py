@@ -9,11 +9,11 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.compiler import fusion_barrier
+from jaxbiped.solve._watch import Watch
 from jaxbiped.variational._tangents import (
     Seeded,
     Tangents,
-    Watch,
     active_leaves,
     along_columns_in_turn,
     as_columns,
@@ -165,6 +165,7 @@ def saltation_at(watch: Watch, state: PyTree, args: Seeded, happens: Scalar) -> 
 def behind_reset(
     watch: Watch,
     met: Scalar,
+    which: Scalar,
     past: Scalar,
     state: PyTree,
     columns: list[Scalar],
@@ -177,8 +178,9 @@ def behind_reset(
     motions meet the switch, so that the reset's own derivative is all that changes them.
 
     Args:
-        watch: the field, and the reset of (args, state).
+        watch: the field, and its reset.
         met: whether the switch was met (boolean); else nothing changes.
+        which: the switch's number, from 1 on.
         past: how long before [s]; so short that the state moves along its rates.
         state: just past the switch.
         columns: of the directions of the state, then of those of parameters, shapes (n, c).
@@ -189,7 +191,8 @@ def behind_reset(
     assert reset is not None
 
     def behind(leaves: list[Scalar], q: list[Scalar]) -> list[Scalar]:
-        return jtu.tree_leaves(reset(with_active(args, q), jtu.tree_unflatten(structure, leaves)))
+        before = jtu.tree_unflatten(structure, leaves)
+        return jtu.tree_leaves(reset(with_active(args, q), before, which))
 
     def after() -> tuple[PyTree, list[Scalar]]:
         rates = watch.field(jnp.zeros_like(past), state, args.args)

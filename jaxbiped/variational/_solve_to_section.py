@@ -19,9 +19,16 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar, Time, VectorField
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import Recorded, Recording
-from jaxbiped.solve._accuracy import rms_norm, units_of
+from jaxbiped.hybrid._scales import units_of
+from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._solvers import Projected
+from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._step_size import step_control
+from jaxbiped.solve.controllers._switch_locator import (
+    SwitchLocator,
+    SwitchLocatorState,
+    nearest,
+)
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractMemorylessControl,
     Adapted,
@@ -34,12 +41,10 @@ from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
 )
 from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
 from jaxbiped.variational._saltation import field_switch_values, saltation_at
-from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
 from jaxbiped.variational._tangents import (
     SectionSolve,
     Seeded,
     Tangents,
-    Watch,
     along_columns,
     as_columns,
     is_cut_short,
@@ -110,12 +115,14 @@ class TangentSolver(AbstractMemorylessSolver):
             new, error = Tangents(y1, choosing.columns), Tangents(error, errors.columns)
         else:
             new, error = _tangent_step(self, t0, t1, y0, args)
-        crosses = _crosses(self.watch, t1 - t0, y0.state, new.state, args.args)
+        crosses = _crosses(self.watch, t0, t1, y0.state, new.state, args.args)
         new, error = _columns_held(crosses, y0, new, error)
         return new, error, dict(y0=y0, y1=new), None, diffrax.RESULTS.successful
 
 
-def _crosses(watch: Watch, span: Time, before: PyTree, after: PyTree, args: PyTree) -> Scalar:
+def _crosses(
+    watch: Watch, t0: Time, t1: Time, before: PyTree, after: PyTree, args: PyTree
+) -> Scalar:
     """Whether a step is the short one that crosses a switch where the field is not smooth.
 
     Its last stage lies behind, where the Jacobian may be any size: saltation is all that its
@@ -125,7 +132,7 @@ def _crosses(watch: Watch, span: Time, before: PyTree, after: PyTree, args: PyTr
     old, new = (field_switch_values(watch, state, ends[2]) for state in ends[:2])
     changed = [(a > 0.0) != (b > 0.0) for a, b in zip(old, new, strict=True)]
     crossed = functools.reduce(jnp.logical_or, changed, jnp.asarray(False))
-    return crossed & jax.lax.stop_gradient(jnp.asarray(span) <= 2.0 * NEAR)
+    return crossed & jax.lax.stop_gradient(t1 - t0 <= 2.0 * nearest(watch, t1))
 
 
 def _columns_held(
@@ -322,7 +329,9 @@ def solve_to_section(
         y0=y0,
         args=args,
         saveat=diffrax.SaveAt(subs=subs, controller_state=True),
-        stepsize_controller=SwitchLocator(controller, watch),
+        stepsize_controller=SwitchLocator(
+            controller, watch, state_of=plain_state, args_of=plain_args
+        ),
         max_steps=how.max_solver_steps,
         throw=False,
     )

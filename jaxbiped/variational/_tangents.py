@@ -1,6 +1,5 @@
 """Tangents: a state with its derivatives, and what a solve of them watches, takes and gives."""
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -13,12 +12,11 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, VectorField
-from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
-from jaxbiped.dynamics._surfaces import Switch
+from jaxbiped.hybrid._implicit_field import AbstractImplicitField, Residual
+from jaxbiped.hybrid._scales import Units
 from jaxbiped.linalg._sparse_lu import SparseMatrix
-from jaxbiped.solve._accuracy import Precision, Units
-
-_ROUNDING = 1e-12
+from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve._watch import Watch
 
 
 class Tangents(NamedTuple):
@@ -121,31 +119,6 @@ def plain_args(args: PyTree) -> PyTree:
     return args.args if isinstance(args, Seeded) else args
 
 
-class Watch(eqx.Module):
-    """What a solve ends steps on, and what ends it. All functions take (args, state).
-
-    Attributes:
-        field: vector field (t, state, args).
-        switches: the surfaces that no step may straddle.
-        section: value and whether a crossing counts; the solve ends where the value rises through
-            zero and it does. None: nothing to arrive at.
-        ending: code of the failure that ends the solve, 0 for none.
-        peak: a quantity whose largest value is to be known.
-        reset: what becomes of the state at a switch that `resets`.
-        arrival: what becomes of it on the section, for a program to carry its columns through.
-    """
-
-    field: VectorField = eqx.field(static=True)
-    switches: Callable[[PyTree, PyTree], tuple[Switch, ...]] = eqx.field(static=True)
-    section: Callable[[PyTree, PyTree], tuple[Scalar, Scalar]] | None = eqx.field(
-        static=True, default=None
-    )
-    ending: Callable[[PyTree, PyTree], Scalar] | None = eqx.field(static=True, default=None)
-    peak: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
-    reset: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
-    arrival: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
-
-
 class _TracedOnce(AbstractImplicitField):
     rates: Callable[..., PyTree] = eqx.field(static=True)
     masses: Callable[..., SparseMatrix] = eqx.field(static=True)
@@ -184,20 +157,6 @@ class SectionSolve(NamedTuple):
     precision: Precision
     max_time: Time
     max_solver_steps: int
-
-
-def surfaces_of(watch: Watch, peak: PyTree, scene: PyTree, state: PyTree) -> list[Switch]:
-    """Every surface to end steps on: switches, the peak quantity's maxima, and last the section."""
-    found = list(watch.switches(scene, state))
-    if watch.peak is not None:
-        rate = watch.field(jnp.zeros_like(peak), state, scene)
-        quantity = functools.partial(watch.peak, scene)
-        value, slope = jax.jvp(quantity, (state,), (rate,))
-        # The same value computed twice may differ by its rounding.
-        found.append(Switch(slope, value >= peak - _ROUNDING * jnp.abs(peak)))
-    if watch.section is not None:
-        found.append(Switch(*watch.section(scene, state)))
-    return found
 
 
 class VariationalProblem(NamedTuple):

@@ -1,7 +1,7 @@
 """Variational solve for lanes: the twin of what `_solve_to_section` does through diffrax."""
 
 import dataclasses
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import diffrax
 import jax
@@ -13,7 +13,14 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._gathering import Gathering
+from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._step_size import step_control
+from jaxbiped.solve.controllers._switch_locator import (
+    SwitchLocator,
+    SwitchLocatorState,
+    nearest,
+)
 from jaxbiped.solve.controllers._wrapped_control import clip_step, first_step
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._rosenbrock_tangents import (
@@ -30,14 +37,13 @@ from jaxbiped.variational._saltation import (
     meeting_at,
 )
 from jaxbiped.variational._solve_to_section import SHARE, onto_section, peak_of
-from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
 from jaxbiped.variational._tangents import (
     Seeded,
     Tangents,
     VariationalProblem,
     VariationalSolution,
-    Watch,
     along_columns_in_turn,
+    as_columns,
     traced_once,
 )
 
@@ -65,6 +71,7 @@ class _Now(NamedTuple):
     attempted: Scalar
     kept: Scalar
     lost: Scalar
+    resets: Gathering | None = None
 
 
 class AdaptiveColumns:
@@ -88,7 +95,9 @@ class AdaptiveColumns:
         self.solver, self.active = solver, active
         # Compiled by themselves, these are traced once, not at each of their many uses.
         whole = ((name, getattr(watch, name)) for name in ("section", "ending", "peak", "reset"))
-        once = {name: jax.jit(function) for name, function in whole if function is not None}
+        once: dict[str, Any] = {
+            name: jax.jit(function) for name, function in whole if function is not None
+        }
         self.watch = dataclasses.replace(watch, field=traced_once(watch.field), **once)
         self.save_nodes = save_nodes
         self.term: diffrax.ODETerm[PyTree] = diffrax.ODETerm(watch.field)
@@ -113,8 +122,10 @@ class AdaptiveColumns:
         count = jnp.zeros((), dtype=jnp.int64)
         landed = jtu.tree_map(jnp.asarray, landed)
         shifts = tuple(jnp.zeros(part.shape[0]) for part in columns)
+        resets = None if self.watch.repeats is None else Gathering.none(zero)
+        peaks = columns, shifts
         return _Now(
-            zero, next_t, given.state, columns, shifts, landed, columns, shifts, count, none, none
+            zero, next_t, given.state, columns, shifts, landed, *peaks, count, none, none, resets
         )
 
     def attempt(self, given: VariationalProblem, now: _Now) -> tuple[_Now, Scalar]:
@@ -128,6 +139,8 @@ class AdaptiveColumns:
             carries_parameters=given.carries_parameters > 0.0,
         )
         new_columns, worst = self._columns(given, now, step)
+        if self.watch.project is not None:
+            step, new_columns = self._projected(given, step, new_columns)
         error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), step.error)
         keep, t, next_t, _, landed, result = self._controller(given, worst).adapt_step_size(
             now.t,
@@ -143,12 +156,18 @@ class AdaptiveColumns:
         t, next_t = clip_step(keep, t, next_t, limit, given.almost)
         state = select(keep, step.end, now.state)
         columns, peaks, peak_shifts = now.columns, now.peak_columns, now.peak_shifts
+        resets = now.resets
         new_columns, shifts = self._met(given, now, landed, new_columns, step)
         if self.watch.reset is not None:
             seeded, past = self._seeded(given), landed.past
             met = keep & (landed.crossed_field > 0)
-            behind = behind_reset(self.watch, met, past, state, new_columns, seeded, given.sizes)
+            behind = behind_reset(
+                self.watch, met, landed.crossed_field, past, state, new_columns, seeded, given.sizes
+            )
             (state, new_columns), t = behind, jnp.where(met, t - past, t)
+            if resets is not None and self.watch.repeats is not None:
+                repeats = self.watch.repeats(given.args, state)
+                resets = resets.after(met, t, repeats, self.watch.time_unit)
         if self.watch.peak is None:
             pairs = zip(new_columns, columns, strict=True)
             columns = tuple(jax.lax.map(lambda each: jnp.where(keep, *each), p) for p in pairs)
@@ -165,14 +184,15 @@ class AdaptiveColumns:
         lost = jnp.asarray(result == diffrax.RESULTS.dt_min_reached)
         over = (t >= limit) | jnp.asarray(result != diffrax.RESULTS.successful)
         over = over | (attempted.astype(limit.dtype) >= given.max_attempts)
-        after = _Now(
-            t, next_t, state, columns, shifts, landed, peaks, peak_shifts, attempted, keep, lost
-        )
-        return after, over
+        steps = (attempted, keep, lost)
+        after = _Now(t, next_t, state, columns, shifts, landed, peaks, peak_shifts, *steps, resets)
+        return after, over if resets is None else over | resets.chatters
 
     def finish(self, given: VariationalProblem, now: _Now) -> VariationalSolution:
         ended = jnp.where(now.t >= given.max_time, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
+        if now.resets is not None:
+            ended = jnp.where(now.resets.chatters, int(Ending.CHATTERS), ended)
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
         zero, field, carries = jnp.zeros(()), self.watch.field, given.carries_parameters > 0.0
         rates, unknown = field(zero, now.state, given.args), jnp.where(carries, 0.0, jnp.nan)
@@ -183,7 +203,8 @@ class AdaptiveColumns:
         time_columns = peak_columns = jnp.zeros(columns.shape[1])
         if self.watch.section is not None:
             y, t, time_columns = onto_section(self.watch, y, t, seeded, along_columns_in_turn)
-        reached, y = y.state, behind_arrival(self.watch, y, seeded)
+        reached = self.watch.node(given.args, y.state)
+        y = behind_arrival(self.watch, y, seeded)
         if self.watch.peak is not None:
             at_peak = now.landed.at_peak
             rates = field(zero, at_peak, given.args)
@@ -205,6 +226,32 @@ class AdaptiveColumns:
             peak=peak,
             peak_columns=peak_columns,
         )
+
+    def _projected(
+        self, given: VariationalProblem, step: Differentiated, columns: list[Scalar]
+    ) -> tuple[Differentiated, list[Scalar]]:
+        """A step and its columns on the constraints."""
+        project, seeds = self.watch.project, jnp.eye(len(given.sizes)) * given.sizes
+        assert project is not None
+
+        def moved(rows: Scalar, seeds: Scalar) -> tuple[PyTree, Scalar]:
+            seeded = Seeded(given.args, seeds, jnp.zeros(len(rows)), self.active)
+            end, found = along_columns_in_turn(
+                lambda s, a: project(a, s), Tangents(step.end, rows.T), seeded
+            )
+            return end, as_columns(found).T
+
+        by_state, by_parameter = columns
+        end = project(given.args, step.end)
+        if by_state.shape[0]:
+            _, by_state = moved(by_state, jnp.zeros((len(seeds), len(by_state))))
+        if by_parameter.shape[0]:
+            by_parameter = jax.lax.cond(
+                given.carries_parameters > 0.0,
+                lambda: moved(columns[1], seeds)[1],
+                lambda: columns[1],
+            )
+        return step._replace(end=end), [by_state, by_parameter]
 
     def _met(
         self,
@@ -239,7 +286,7 @@ class AdaptiveColumns:
         self, given: VariationalProblem, now: _Now, time: Scalar
     ) -> tuple[Scalar, list[Scalar]]:
         """The time and the state at the end of an accepted step."""
-        return now.kept, [now.t, *jtu.tree_leaves(now.state)]
+        return now.kept, [now.t, *jtu.tree_leaves(self.watch.node(given.args, now.state))]
 
     def _columns(
         self, given: VariationalProblem, now: _Now, step: Differentiated
@@ -281,7 +328,7 @@ class AdaptiveColumns:
             worst = jnp.maximum(worst, square)
         # The step that crosses a switch is too short for them to change.
         return [by_state, by_parameter], jnp.where(
-            now.next_t - now.t > 2.0 * NEAR, jnp.sqrt(worst), 0.0
+            now.next_t - now.t > 2.0 * nearest(self.watch, now.next_t), jnp.sqrt(worst), 0.0
         )
 
     def _controller(self, given: VariationalProblem, columns_norm: Scalar) -> SwitchLocator:

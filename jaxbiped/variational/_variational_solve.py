@@ -15,7 +15,9 @@ from jaxtyping import PyTree
 from jaxbiped._types import RealScalarLike, Scalar, select
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import LANES, XLA, AbstractEngine, Program, Recorded, Recording, Request
-from jaxbiped.solve._accuracy import Precision, units_of
+from jaxbiped.hybrid._scales import units_of
+from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._wrapped_control import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival
@@ -25,7 +27,6 @@ from jaxbiped.variational._tangents import (
     Tangents,
     VariationalProblem,
     VariationalSolution,
-    Watch,
     along_columns,
     as_columns,
 )
@@ -101,15 +102,27 @@ def _number(value: RealScalarLike) -> Scalar:
 
 
 def solve_to_section_by_lanes(
-    how: SectionSolve, y0: Tangents, args: Seeded, sizes: Scalar, carries_parameters: Scalar | bool
+    how: SectionSolve,
+    y0: Tangents,
+    args: Seeded,
+    sizes: Scalar,
+    carries_parameters: Scalar | bool,
+    engine: AbstractEngine,
 ) -> SectionArrival:
     """`solve_to_section` for columns as `solve_variational` takes them; nodes are a `Recording`.
 
     State and columns are those behind the watch's `arrival`.
     """
     found, recording = solve_variational(
-        how, y0, args, sizes, carries_parameters=carries_parameters, save_nodes=True
+        how,
+        y0,
+        args,
+        sizes,
+        carries_parameters=carries_parameters,
+        save_nodes=True,
+        engine=engine,
     )
+    start = how.watch.node(args.args, y0.state)
     return SectionArrival(
         y=Tangents(found.state, found.columns.T),
         time=found.t,
@@ -120,7 +133,7 @@ def solve_to_section_by_lanes(
         jumps=found.jumps,
         grazes=found.grazes,
         attempted=found.attempted,
-        nodes=None if recording is None else _nodes(y0.state, found, recording),
+        nodes=None if recording is None else _nodes(start, found, recording),
     )
 
 
@@ -214,11 +227,13 @@ class EventMotion(NamedTuple):
     Attributes:
         delay: from the state to the event [s].
         time, state: derivatives of its time, shape (n,), and of the state at it, (n, c).
+        reached: the state at it.
     """
 
     delay: Scalar
     time: Scalar
     state: Scalar
+    reached: PyTree
 
 
 def follow_event(
@@ -261,4 +276,6 @@ def follow_event(
     is_near = jnp.abs(here) <= _NEAR * unit * jnp.abs(speed)
     time = jnp.where(grazes | ~is_near, jnp.nan, -along / speed)
     state = at.columns.T + time[:, None] * as_columns(velocity)[None]
-    return EventMotion(-here / speed, time, state)
+    delay = -here / speed
+    reached = jtu.tree_map(lambda leaf, rate: leaf + rate * delay, at.state, velocity)
+    return EventMotion(delay, time, state, reached)

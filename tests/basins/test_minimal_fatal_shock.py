@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.basins._label_oracle import LabelOracle
+from jaxbiped.basins._rays import Brackets, GivenNormals, Surroundings, descend_rays
 from tests.basins.known_basins import Recorded, ball, half_space
 
 TOLERANCE = 1e-4
@@ -86,6 +88,21 @@ def test_nearest_point_of_a_ball_that_bulges_inward(d, with_normal):
     assert 0.8 <= found.distance <= 0.8 + 1.5 * TOLERANCE
     if d == 6:
         assert found.bisected_distance > 0.81
+
+
+def test_where_half_a_turn_passes_a_narrow_ball_by_a_quarter_meets_it_at_once():
+    """Met near its edge, 0.24 rad from its centre: there the normal lies 72 degrees away."""
+    centre, radius, angle = np.array([1.0, 0.0]), 0.25, -0.24
+    distance = np.cos(angle) - np.sqrt(radius**2 - np.sin(angle) ** 2)
+    asked = Recorded(ball(centre, radius))
+    around = Surroundings(LabelOracle(asked, 100), np.zeros(2), np.ones(2), 0)
+    direction = np.array([[np.cos(angle), np.sin(angle)]])
+    near = np.array([distance - 0.5 * TOLERANCE]), np.array([distance + 0.5 * TOLERANCE])
+    begin = Brackets(direction, *near, around.labels(direction, near[1]))
+    found, _ = descend_rays(around, begin, GivenNormals(around, lambda x: x - centre), TOLERANCE)
+    at_first = asked.calls[1]
+    assert (asked(at_first) != 0).sum() == 1
+    assert float(found.outside[0]) == pytest.approx(0.75, abs=2.0 * TOLERANCE)
 
 
 @pytest.mark.parametrize("seed", range(6))

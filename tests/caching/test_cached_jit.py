@@ -4,6 +4,7 @@ import os
 import pickle
 import subprocess
 import sys
+import types
 
 import jax
 import jax.numpy as jnp
@@ -12,14 +13,14 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.caching._cached_jit import Skeleton, _without_noise, cached_jit
-from jaxbiped.caching._disk_cache import CACHE_VARIABLE, disk_use
+from jaxbiped.caching._disk_cache import disk_use
 from jaxbiped.simulate._backends import by_xla
 from jaxbiped.solve.controllers._wrapped_control import just_before_end
 
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path / "cache"))
     just_before_end.clear()
     yield tmp_path / "cache" / "xla"
     just_before_end.clear()
@@ -29,17 +30,17 @@ def _refuse(*_):
     raise AssertionError("compiled again")
 
 
-def test_what_was_compiled_is_loaded(cache, monkeypatch):
+def test_what_was_compiled_is_loaded(cache, xla_refuses):
     first = just_before_end(np.float64(2.0))
     (kept,) = cache.iterdir()
     just_before_end.clear()
-    monkeypatch.setattr("jaxbiped.caching._cached_jit.trace_call", _refuse)
+    xla_refuses()
     assert just_before_end(np.float64(2.0)) == first < 2.0
     assert just_before_end(np.float64(-3.0)) < -3.0
     assert list(cache.iterdir()) == [kept]
 
 
-def test_a_walk_by_xla_is_loaded(cache, monkeypatch):
+def test_a_walk_by_xla_is_loaded(cache, xla_refuses):
     """diffrax's checks are calls back to Python, with which a program could not be kept."""
 
     def walk():
@@ -50,7 +51,7 @@ def test_a_walk_by_xla_is_loaded(cache, monkeypatch):
     by_xla.clear()
     first = walk()
     by_xla.clear()
-    monkeypatch.setattr("jaxbiped.caching._cached_jit.trace_call", _refuse)
+    xla_refuses()
     assert walk() == first
     by_xla.clear()
 
@@ -129,7 +130,7 @@ def test_functions_of_a_notebook_are_compiled_as_ever(cache):
 
 
 def test_without_a_cache_it_is_compiled_as_ever(cache, monkeypatch):
-    monkeypatch.setenv(CACHE_VARIABLE, "")
+    monkeypatch.setenv("JAXBIPED_CACHE", "")
     assert just_before_end(np.float64(2.0)) < 2.0
     assert not cache.exists()
 
@@ -155,6 +156,17 @@ def test_its_shape_is_known_before_and_after(cache):
     assert (before.shape, before.dtype) == (after.shape, after.dtype) == ((3,), np.float64)
 
 
+def test_what_was_called_or_begun_is_not_lowered_again(cache, monkeypatch):
+    just_before_end.begin(np.ones(3)).finish()
+    just_before_end(np.ones(4))
+    with monkeypatch.context() as patch:
+        patch.setattr(just_before_end, "_jitted", types.SimpleNamespace(lower=_refuse))
+        for n in (3, 4):
+            begun = just_before_end.begin(np.ones(n))
+            begun.finish()
+            assert begun.result.shape == (n,)
+
+
 WALK = """
 import jaxbiped as jb
 from jaxbiped.caching import _cached_jit
@@ -173,7 +185,7 @@ print(walk.engine, walk.outcome, float(walk.t[-1]).hex(), float(gait.measures.pe
 
 @pytest.mark.nightly
 def test_another_process_runs_what_one_compiled(tmp_path, monkeypatch):
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path))
 
     def run(how, slope):
         command = [sys.executable, "-c", WALK, how, slope]

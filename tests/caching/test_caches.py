@@ -14,15 +14,16 @@ import jaxbiped as jb
 from jaxbiped.caching import _caches
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import Once, bounded_cache
-from jaxbiped.compiler.runtime import _compiled_program, _lane_call
-from jaxbiped.compiler.runtime._engines import LaneEngine, Request
+from jaxbiped.compiler import LaneEngine, Request
+from jaxbiped.compiler.runtime import _lane_call
 from jaxbiped.compiler.runtime._machine_code import _LOADED
 from jaxbiped.compiler.runtime._primitive import call
 from jaxbiped.gait._search_starts import default_guess
-from jaxbiped.simulate._rigid_simulation import rigid_program
-from jaxbiped.solve._failure_events import WATCHES, ending_events
+from jaxbiped.hybrid._endings import WATCHES, ending_events
+from jaxbiped.solve._recorders import StrikeRecorder
+from jaxbiped.solve._rigid_program import RigidSolve, rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk
-from tests.compiler.one_shot import compiled, stepped
+from tests.compiler.one_shot import compiled, let_threads_run, stepped
 from tests.sweep.walkers import same
 
 POINTS = np.linspace(-1.0, 1.0, 5)
@@ -35,14 +36,6 @@ def _what_others_left_is_not_searched():
     gc.freeze()
     yield
     gc.unfreeze()
-
-
-@pytest.fixture
-def registry(monkeypatch):
-    """A registry for one test's own caches."""
-    caches = {}
-    monkeypatch.setattr(_caches, "_CACHES", caches)
-    return caches
 
 
 def test_calls_at_once_make_one_result(registry):
@@ -157,11 +150,11 @@ def test_machine_code_goes_with_its_program(registry):
 def test_code_lives_as_long_as_a_thread_that_runs_it(monkeypatch):
     left = []
 
-    def interrupted(work, workers, stop, *, quick):
+    def interrupted(run, work, *given, **how):
         left.append(work)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(_compiled_program, "run_in_threads", interrupted)
+    let_threads_run(monkeypatch, interrupted)
     program = compiled(lambda x: jnp.cos(x) - 0.123, ())
     code = weakref.ref(program.kernel.code(1))
     with contextlib.suppress(KeyboardInterrupt):
@@ -224,7 +217,7 @@ def test_a_compiled_program_that_somebody_has_is_found_again():
     walk = RigidWalk(rigid, default_guess(rigid), *[jnp.ones(())] * 4)
 
     def program():
-        return LaneEngine().compile(Request(rigid_program(True, False, False), walk))
+        return LaneEngine().compile(Request(rigid_program(RigidSolve(StrikeRecorder())), walk))
 
     held = program()
     jb.clear_caches()

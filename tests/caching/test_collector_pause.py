@@ -7,13 +7,15 @@ from collections.abc import Iterator
 
 import pytest
 
+from jaxbiped.caching import _cached_jit
 from jaxbiped.caching._cached_jit import long_trace
 
 SHORT, LONG = 0.005, 0.5
 
 
 @pytest.fixture(autouse=True)
-def _settings_of_the_interpreter() -> Iterator[None]:
+def _settings_of_the_interpreter(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(_cached_jit, "_FROZEN", threading.Event())
     spell = sys.getswitchinterval()
     gc.enable()
     sys.setswitchinterval(SHORT)
@@ -83,3 +85,13 @@ def test_what_the_user_froze_stays_frozen() -> None:
         assert gc.get_freeze_count()
     finally:
         gc.unfreeze()
+
+
+def test_what_is_frozen_is_counted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python walks through all of it: for milliseconds after each of thousands of short traces."""
+    counts = []
+    monkeypatch.setattr(gc, "get_freeze_count", lambda: counts.append(1) or 1)
+    for _ in range(3):
+        with long_trace():
+            pass
+    assert len(counts) == 1

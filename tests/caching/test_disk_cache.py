@@ -12,22 +12,21 @@ from pathlib import Path
 import pytest
 
 from jaxbiped.caching import _disk_cache
-from jaxbiped.caching._disk_cache import (
-    CACHE_VARIABLE,
-    cache_folder,
-    clear_disk,
-    disk_use,
-    read_entry,
-    write_entry,
-)
+from jaxbiped.caching._disk_cache import cache_folder, clear_disk, disk_use, read_entry, write_entry
 
 CONTENT = bytes(range(256)) * 40
 
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path / "cache"))
     return tmp_path / "cache"
+
+
+@pytest.fixture
+def holds(monkeypatch):
+    """Lets the folder hold so many bytes."""
+    return lambda size: monkeypatch.setattr(_disk_cache, "BYTES", size)
 
 
 def test_what_is_written_is_read(cache):
@@ -85,18 +84,18 @@ def test_on_a_system_without_owners_what_was_written_is_read(cache, monkeypatch)
 
 
 @pytest.mark.parametrize("spare", [0, -1])
-def test_the_folder_may_hold_so_many_bytes_and_not_one_more(cache, monkeypatch, spare):
+def test_the_folder_may_hold_so_many_bytes_and_not_one_more(cache, holds, spare):
     write_entry("xla", "a", CONTENT)
     size = (cache / "xla" / "a").stat().st_size
     os.utime(cache / "xla" / "a", (1, 1))
-    monkeypatch.setattr(_disk_cache, "BYTES", 2 * size + spare)
+    holds(2 * size + spare)
     write_entry("xla", "b", CONTENT)
     assert (read_entry("xla", "a") is None) == (spare < 0)
     assert read_entry("xla", "b") == CONTENT
 
 
 def test_nothing_is_kept_where_nothing_is_wanted(monkeypatch):
-    monkeypatch.setenv(CACHE_VARIABLE, "")
+    monkeypatch.setenv("JAXBIPED_CACHE", "")
     assert cache_folder() is None
     write_entry("xla", "a", CONTENT)
     assert read_entry("xla", "a") is None
@@ -109,25 +108,25 @@ def test_a_folder_that_cannot_be_written_does_no_harm(cache):
     assert read_entry("xla", "a") is None
 
 
-def test_what_was_used_longest_ago_makes_room(cache, monkeypatch):
+def test_what_was_used_longest_ago_makes_room(cache, holds):
     for k, name in enumerate("ab"):
         write_entry("xla", name, CONTENT)
         os.utime(cache / "xla" / name, (k, k))
     read_entry("xla", "a")  # now used later than the other one
-    monkeypatch.setattr(_disk_cache, "BYTES", 5 * len(CONTENT) // 2)
+    holds(5 * len(CONTENT) // 2)
     write_entry("lanes", "c", CONTENT)
     assert read_entry("xla", "a") == read_entry("lanes", "c") == CONTENT
     assert read_entry("xla", "b") is None
 
 
-def test_a_folder_among_the_entries_is_left_alone(cache, monkeypatch):
+def test_a_folder_among_the_entries_is_left_alone(cache, holds):
     """It cannot be unlinked, and what comes behind it makes room as ever."""
     write_entry("xla", "a", CONTENT)
     (cache / "xla" / "old").mkdir()
     for k, name in enumerate(("old", "a")):
         os.utime(cache / "xla" / name, (k, k))
     assert disk_use()["xla"].entries == 1
-    monkeypatch.setattr(_disk_cache, "BYTES", len(CONTENT) + 32)
+    holds(len(CONTENT) + 32)
     write_entry("xla", "b", CONTENT)
     assert read_entry("xla", "a") is None
     assert read_entry("xla", "b") == CONTENT

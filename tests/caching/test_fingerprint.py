@@ -14,8 +14,9 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.caching import _fingerprint
 from jaxbiped.caching._fingerprint import Leaf, as_leaves, fingerprint, settings
+from jaxbiped.hybrid._endings import WATCHES, ending_events
 from jaxbiped.optimise._augmented_system import augment
-from jaxbiped.solve._failure_events import WATCHES, ending_events
+from tests.mechanisms import scene_of
 
 SCENE = as_leaves(jb.seed_scene())
 
@@ -171,3 +172,8 @@ def test_a_setting_of_jax_that_changes_programs_changes_fingerprints(name, other
     finally:
         jax.config.update(name, before)
     assert fingerprint(1) == own
+
+
+def test_types_of_states_have_one_each():
+    kinds = [type(scene_of(name).state()) for name in ("kneed", "torso")]
+    assert len({*map(fingerprint, kinds), None}) == 3

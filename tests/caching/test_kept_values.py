@@ -7,16 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from jaxbiped.caching import _caches
-from jaxbiped.caching._caches import (
-    CacheInfo,
-    OfObjects,
-    Once,
-    bounded_cache,
-    cache_info,
-    clear_caches,
-    register_cache,
-)
+from jaxbiped import cache_info, clear_caches
+from jaxbiped.caching._caches import CacheInfo, OfObjects, Once, bounded_cache, register_cache
 from jaxbiped.caching._disk_cache import (
     ABANDONED,
     KINDS,
@@ -80,8 +72,7 @@ def test_the_value_of_an_object_goes_with_it():
     assert values(two, make) == 2
 
 
-def test_a_bounded_cache_keeps_the_last_results_and_finds_what_somebody_has(monkeypatch):
-    monkeypatch.setattr(_caches, "_CACHES", {})
+def test_a_bounded_cache_keeps_the_last_results_and_finds_what_somebody_has(registry):
     calls = []
 
     @bounded_cache(2)
@@ -106,8 +97,7 @@ def test_a_bounded_cache_keeps_the_last_results_and_finds_what_somebody_has(monk
     assert made(1) is kept
 
 
-def test_a_bounded_cache_keeps_plain_values_too(monkeypatch):
-    monkeypatch.setattr(_caches, "_CACHES", {})
+def test_a_bounded_cache_keeps_plain_values_too(registry):
     calls = []
 
     @bounded_cache(1)
@@ -119,8 +109,7 @@ def test_a_bounded_cache_keeps_plain_values_too(monkeypatch):
     assert calls == [1, 2, 1]
 
 
-def test_caches_are_listed_by_name_with_their_units(monkeypatch):
-    monkeypatch.setattr(_caches, "_CACHES", {})
+def test_caches_are_listed_by_name_with_their_units(registry):
     cleared = []
     register_cache("b", lambda: 3, lambda: 7, lambda: cleared.append("b"), "bytes")
     register_cache("a", lambda: 1, lambda: 5, lambda: cleared.append("a"))

@@ -12,7 +12,6 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.caching import _fingerprint
-from jaxbiped.caching._disk_cache import CACHE_VARIABLE
 from jaxbiped.caching._fingerprint import SourceDigests, as_leaves, fingerprint
 
 PACKAGE = Path(jb.__file__).parent
@@ -25,15 +24,15 @@ WORDS = {
     "docstring": ("dynamics/_stance_motion.py", "rolls without slip", "rolls and does not slip"),
     "new docstring": (COULOMB, "switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:",
                       "switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:\n        'None.'"),
-    "attribute's docstring": ("solve/_failure_events.py", "Rate of a leg at rest",
+    "attribute's docstring": ("hybrid/_endings.py", "Rate of a leg at rest",
                               "A resting leg's rate"),
-    "layout": ("solve/_failure_events.py", "_LOST_RATE = 0.1", "_LOST_RATE = (\n    0.10\n)"),
+    "layout": ("hybrid/_endings.py", "_LOST_RATE = 0.1", "_LOST_RATE = (\n    0.10\n)"),
 }  # fmt: skip
 CODE = {
     "sign of a law": (COULOMB, "return -self.mu", "return self.mu"),
-    "constant": ("solve/_failure_events.py", "_LOST_RATE = 0.1", "_LOST_RATE = 0.2"),
+    "constant": ("hybrid/_endings.py", "_LOST_RATE = 0.1", "_LOST_RATE = 0.2"),
     "string": ("gait/_find_gait.py", '"newton"', '"newtons"'),
-    "registered for a class": ("dynamics/_stance_motion.py", "return rolling_field", "return None"),
+    "registered for a class": ("dynamics/_equivalent_states.py", '"euler"', '"other"'),
     "compiler": ("compiler/ir/_liveness.py", "value.op in", "value.op not in"),
     "how programs are kept": ("caching/_cached_jit.py", '_KIND = "xla"', '_KIND = "lax"'),
     "what laws there are": ("scene/laws/__init__.py", "Tsuji as Tsuji", "Tsuji as Fuji"),
@@ -58,10 +57,16 @@ def copied(tmp_path_factory):
 
 
 @pytest.fixture
-def keys(copied, monkeypatch, tmp_path):
+def settles_after(monkeypatch):
+    """Lets the digest of a file be kept once it has not changed for so long [ns]."""
+    return lambda time: monkeypatch.setattr(_fingerprint, "_SETTLED", time)
+
+
+@pytest.fixture
+def keys(copied, monkeypatch, settles_after, tmp_path):
     """Fingerprints of the programs, were the package the copy; an edit of it may be given."""
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
-    monkeypatch.setattr(_fingerprint, "_SETTLED", 0)
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path / "cache"))
+    settles_after(0)
 
     def found(file=None, old="", new=""):
         whole = None
@@ -134,7 +139,7 @@ def test_who_reaches_a_table_of_functions_reaches_those_that_are_put_there():
                     module = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
                     registered.append(module)
                     assert module in digests.reached(homes.get(each.split(".")[0], module))
-    assert "jaxbiped.dynamics._stance_motion" in registered
+    assert "jaxbiped.dynamics._equivalent_states" in registered
 
 
 def _package(folder, **modules):
@@ -160,7 +165,7 @@ def _package(folder, **modules):
     ],
 )
 def test_imports_of_all_kinds_are_followed(tmp_path, imports, monkeypatch):
-    monkeypatch.setenv(CACHE_VARIABLE, "")
+    monkeypatch.setenv("JAXBIPED_CACHE", "")
     folder = _package(
         tmp_path / "walks", own=imports, far="near = 1", other="from walks import far"
     )
@@ -169,9 +174,29 @@ def test_imports_of_all_kinds_are_followed(tmp_path, imports, monkeypatch):
     assert ("walks.other" in reached) == (imports in ("import walks", "from walks import anything"))
 
 
-def test_the_next_process_reads_only_what_changed(tmp_path, monkeypatch):
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
-    monkeypatch.setattr(_fingerprint, "_SETTLED", 0)
+@pytest.mark.parametrize(
+    ("imports", "all_of_it"),
+    [
+        ("import walks.far", True),
+        ("from walks import far", True),
+        ("from walks.far import n", False),
+    ],
+)
+def test_an_attribute_of_an_imported_package_may_be_any_module_in_it(
+    tmp_path, imports, all_of_it, monkeypatch
+):
+    """A name taken from it is one of its names, which its statements lead to."""
+    monkeypatch.setenv("JAXBIPED_CACHE", "")
+    modules = {"far__in____init__": "n = 1", "far__in__deep": "", "other": ""}
+    folder = _package(tmp_path / "walks", own=imports, **modules)
+    reached = SourceDigests(folder, loaded=LATER).reached("walks.own")
+    deep = {"walks.far.deep"} if all_of_it else set()
+    assert reached == {"walks", "walks.own", "walks.far"} | deep
+
+
+def test_the_next_process_reads_only_what_changed(tmp_path, monkeypatch, settles_after):
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path / "cache"))
+    settles_after(0)
     folder = _package(tmp_path / "walks", own="from walks import far", far="near = 1")
     read, read_module = [], _fingerprint._read_module
 
@@ -196,10 +221,10 @@ def test_the_next_process_reads_only_what_changed(tmp_path, monkeypatch):
     assert read == ["walks.far"]
 
 
-def test_a_file_that_has_just_changed_is_read_again(tmp_path, monkeypatch):
+def test_a_file_that_has_just_changed_is_read_again(tmp_path, monkeypatch, settles_after):
     """Its next change may leave it the same stamp: clocks of file systems are coarse."""
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
-    monkeypatch.setattr(_fingerprint, "_SETTLED", 10**12)
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path / "cache"))
+    settles_after(10**12)
     folder = _package(tmp_path / "walks", own="")
     first = SourceDigests(folder, loaded=LATER)
     first.digest("walks.own")
@@ -208,7 +233,7 @@ def test_a_file_that_has_just_changed_is_read_again(tmp_path, monkeypatch):
 
 def test_what_changed_after_it_was_imported_has_none(tmp_path, monkeypatch):
     """The process may run the code that was there before."""
-    monkeypatch.setenv(CACHE_VARIABLE, "")
+    monkeypatch.setenv("JAXBIPED_CACHE", "")
     folder = _package(tmp_path / "walks", own="from walks import far", far="")
     loaded = (folder / "own.py").stat().st_ctime_ns
     while (folder / "far.py").stat().st_ctime_ns <= loaded:
@@ -224,7 +249,7 @@ def test_what_changed_after_it_was_imported_has_none(tmp_path, monkeypatch):
 
 
 def test_a_source_that_cannot_be_read_has_none(tmp_path, monkeypatch):
-    monkeypatch.setenv(CACHE_VARIABLE, "")
+    monkeypatch.setenv("JAXBIPED_CACHE", "")
     folder = _package(tmp_path / "walks", own="def :")
     for module in ("walks.own", "walks.nowhere"):
         with pytest.raises(LookupError):

@@ -1,5 +1,6 @@
 """Commands as a user gives them, run in this process."""
 
+import functools
 import json
 import shlex
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
+import jaxbiped as jb
 from jaxbiped._progress import Stage
 from jaxbiped.cli import main
 from tests.drawn import saved_figures
@@ -53,14 +55,50 @@ def refused(command, capsys):
     return line
 
 
-def interrupt_after(monkeypatch, count):
-    """Lets Ctrl-C come when stages have counted or told so often what was found."""
+class _Asked(Exception):  # noqa: N818
+    """A function of the package was called."""
+
+
+def asked(command, *doors, ends=_Asked):
+    """Arguments and keywords with which a command calls one of these first, which ends it.
+
+    By an interrupt if `ends` is one.
+    """
+    calls = []
+
+    def stop(*arguments, **keywords):
+        calls.append((arguments, keywords))
+        raise ends
+
+    with pytest.MonkeyPatch.context() as patch:
+        for door in doors:
+            *parts, name = door.split(".")
+            patch.setattr(functools.reduce(getattr, parts, jb), name, stop)
+        with pytest.raises(_Asked if ends is _Asked else SystemExit) as stopped:
+            main(shlex.split(command))
+    assert ends is _Asked or stopped.value.code == 130
+    return calls[0]
+
+
+def walked(options=""):
+    """Scene and start of `jaxbiped walk` with these options."""
+    (scene, start, *_), _ = asked(f"walk {options}", "Simulation.prepare", "rigid_walk")
+    return scene, start
+
+
+def starts_of(options):
+    """Starts that `jaxbiped basin` with these options reads from a file."""
+    return asked(f"basin {options}", "starts.GivenStarts")[0][0]
+
+
+def interrupt_after(monkeypatch, count, word=""):
+    """Lets Ctrl-C come when stages have counted or told so often what was found, with a word."""
     told = iter(range(count))
     update = Stage.update
 
     def interrupted(stage, *given, **found):
         update(stage, *given, **found)
-        if next(told, None) is None:
+        if word in str(found) and next(told, None) is None:
             monkeypatch.undo()
             raise KeyboardInterrupt
 

@@ -1,32 +1,11 @@
 """What commands ask of the package's functions, against what their options say."""
 
-import functools
 import json
-import shlex
 
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli import _parse, main
-
-
-class _Asked(Exception):  # noqa: N818
-    """The function was called."""
-
-
-def _asked(command, door, monkeypatch):
-    """Arguments and keywords that a command calls a function with, which ends it."""
-    calls = []
-
-    def stop(*arguments, **keywords):
-        calls.append((arguments, keywords))
-        raise _Asked
-
-    *parts, name = door.split(".")
-    monkeypatch.setattr(functools.reduce(getattr, parts, jb), name, stop)
-    with pytest.raises(_Asked):
-        main(shlex.split(command))
-    return calls[0]
+from tests.cli.commands import asked as asked_by
 
 
 @pytest.mark.parametrize(
@@ -106,41 +85,43 @@ def _asked(command, door, monkeypatch):
         ),
     ],
 )  # fmt: skip
-def test_options_are_handed_on_by_their_names(command, door, asked, monkeypatch):
-    assert _asked(command, door, monkeypatch)[1] == asked
+def test_options_are_handed_on_by_their_names(command, door, asked):
+    assert asked_by(command, door)[1] == asked
 
 
 @pytest.mark.parametrize("name", ["MidStance", "HeelStrike"])
-def test_a_section_is_asked_for(name, monkeypatch):
+def test_a_section_is_asked_for(name):
     words = {"MidStance": "mid-stance", "HeelStrike": "heel-strike"}
-    asked = _asked(f"gait --section {words[name]}", "find_gait", monkeypatch)[1]
+    asked = asked_by(f"gait --section {words[name]}", "find_gait")[1]
     assert type(asked["section"]) is getattr(jb, name)
 
 
-def test_a_basin_along_a_parameter_asks_for_its_gaits(monkeypatch):
+def test_a_basin_along_a_parameter_asks_for_its_gaits():
     command = "basin --x theta_swing=-0.1:0.2:3 --y slope=0.01:0.02:2"
-    asked = _asked(command, "labelling", monkeypatch)[1]
+    asked = asked_by(command, "labelling")[1]
     values = asked.pop("parameters")
     assert {name: list(each) for name, each in values.items()} == {"slope": [0.01, 0.02]}
     assert asked == dict(accuracy="draft", footsteps=30, engine="auto")
 
 
-def test_a_fit_is_asked_for_its_names_and_its_gaits(tmp_path, monkeypatch):
+def test_a_fit_is_asked_for_its_names_and_its_gaits(tmp_path):
     path = tmp_path / "measured.json"
     path.write_text(json.dumps({"gaits": [{"period_s": [0.44, 1e-3]}]}))
     command = f"fit {path} --vary ' K, c' --max-evaluations 7 --engine lanes"
-    (scene, names, measured), how = _asked(command, "fit_gait", monkeypatch)
+    (scene, names, measured), how = asked_by(command, "fit_gait")
     assert (type(scene), names) == (jb.Scene, ("K", "c"))
     assert [each.measures for each in measured] == [{"period": (0.44, 1e-3)}]
     assert how == dict(max_evaluations=7, engine="lanes", accuracy="balanced")
 
 
-def test_a_start_that_is_said_is_the_guess(monkeypatch):
-    (_, guess), _ = _asked("gait --theta-1 -0.3", "find_gait", monkeypatch)
+def test_a_start_that_is_said_is_the_guess():
+    (_, guess), _ = asked_by("gait --theta-1 -0.3", "find_gait")
     assert float(guess.theta_1) == -0.3
     assert float(guess.theta_2) == float(jb.seed_state().theta_2)
 
 
 def test_none_stands_for_what_is_not_said():
-    asked = _parse(["walk", "--rtol", "None", "--slope", "None", "--dt", "1ms"])
-    assert (asked.solve.rtol, asked.scene.slope, asked.solve.dt) == (None, None, 1e-3)
+    command = "walk --rtol None --slope None --dt 1ms"
+    (scene, _), how = asked_by(command, "Simulation.prepare")
+    assert (how["rtol"], how["dt"]) == (1e-6, 1e-3)
+    assert float(scene.ground.slope) == float(jb.seed_scene().ground.slope)

@@ -9,14 +9,12 @@ import xarray as xr
 import zarr
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 
 import jaxbiped as jb
-from jaxbiped import plot
-from jaxbiped.cli._start_options import StartsOptions
 from jaxbiped.plot.style import label_colour
-from tests.cli.commands import numbers_of, outputs_of, run
+from tests.cli.commands import asked, numbers_of, outputs_of, run
 from tests.drawn import assert_is_drawn
-from tests.mechanisms import scene_of
 
 pytestmark = pytest.mark.slow
 
@@ -143,14 +141,15 @@ def test_a_full_disk_is_no_argument_of_ours(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(zarr.Group, "create_array", full)
     assert run("basin", *AXES, "--store", tmp_path / "store") == 1
     assert capsys.readouterr().err.splitlines()[-1].startswith("jaxbiped: store = ")
-    monkeypatch.setattr(plot, "basin", full)
+    monkeypatch.setattr(Figure, "savefig", full)
     assert run("basin", *AXES, "--out", tmp_path / "out") == 1
     assert "No space left on device" in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_axes_that_nobody_chose():
+def test_axes_that_nobody_chose(tmp_path):
     """Of legs of any name: a body that swings and one that stands where a cycle begins."""
-    chosen = {"unequal": "leg", "kneed": "thigh"}
-    for name, body in chosen.items():
-        starts = StartsOptions(seed=0).chosen(scene_of(name))
-        assert list(starts.axes) == [f"omega_{body}_1", f"theta_{body}_1"]
+    file = tmp_path / "walkers.py"
+    for name, body in {"unequal": "leg", "kneed": "thigh"}.items():
+        file.write_text(f"from tests.mechanisms import WALKERS\nown = WALKERS[{name!r}]")
+        (_, axes), _ = asked(f"basin --walker {file}:own", "starts.grid")
+        assert list(axes) == [f"omega_{body}_1", f"theta_{body}_1"]

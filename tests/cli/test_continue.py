@@ -4,7 +4,6 @@ import pytest
 import xarray
 
 import jaxbiped as jb
-from jaxbiped import _progress
 from tests.cli.commands import interrupt_after, numbers_of, one_line, outputs_of, run
 from tests.drawn import assert_is_drawn
 
@@ -49,8 +48,7 @@ def test_figures_and_dataset(followed):
     assert len(branch.bifurcations) == 1
 
 
-def test_what_is_printed(capsys, monkeypatch):
-    monkeypatch.setattr(_progress, "_PATIENCE", 0.0)
+def test_what_is_printed(capsys, stages_at_once):
     assert run("continue", "--model", "rigid", "--from", "0.018", "--to", "0.022") == 0
     printed = capsys.readouterr()
     assert "following the gait along slope" in printed.err

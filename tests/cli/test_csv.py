@@ -55,10 +55,3 @@ def test_a_gait_a_branch_and_a_fit(capsys, tmp_path):
 def test_both_cannot_print(capsys):
     assert "give one of them a file" in refused("walk --csv - --json -", capsys)
     assert "/no/such/it.csv" in refused("walk --csv /no/such/it.csv", capsys)
-
-
-def test_rows_of_numbers_have_their_names_and_what_is_in_them():
-    from jaxbiped.cli._report import csv_of
-
-    rows = [{"way": "a", "errors": {"state": 1e-3}}, {"way": "b", "errors": {}, "steps": 2}]
-    assert csv_of(rows) == "way,errors.state,steps\na,0.001,\nb,,2\n"

@@ -5,43 +5,31 @@ import json
 import signal
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
+import tyro
 
-from jaxbiped import cli
-from jaxbiped._progress import stage
-from jaxbiped.cli import COMMANDS, _options, main
-from tests.cli.commands import run
-
-
-class Counting(_options.Command):
-    """Counts until it is interrupted."""
-
-    def run(self) -> int:
-        """Runs the command."""
-        with stage("counting", total=9, unit="sheep") as now:
-            now.update(3, found="one black")
-            raise KeyboardInterrupt
+from jaxbiped.cli import main
+from tests.cli.commands import asked, run
 
 
-def test_ctrl_c_says_what_was_done_in_a_line_and_exits_as_shells_expect(monkeypatch, capsys):
-    monkeypatch.setitem(COMMANDS, "counting", Counting)
-    with pytest.raises(SystemExit) as ended:
-        main(["counting"])
-    assert ended.value.code == 130
-    told = capsys.readouterr().err
-    assert told == "jaxbiped: Interrupted: counting: 3 of 9 sheep, one black.\n"
+def test_ctrl_c_says_what_was_done_in_a_line_and_exits_as_shells_expect(capsys):
+    asked("walk", "Simulation.prepare", ends=KeyboardInterrupt)
+    assert capsys.readouterr().err == "jaxbiped: Interrupted: preparing the start.\n"
 
 
 def test_ctrl_c_before_a_command_is_known_is_the_same(monkeypatch, capsys):
-    def interrupt(*_):
+    def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "_parse", interrupt)
+    monkeypatch.setattr(tyro, "cli", interrupt)
     with pytest.raises(SystemExit) as ended:
         main(["walk"])
     assert (ended.value.code, capsys.readouterr().err) == (130, "jaxbiped: Interrupted.\n")
-    monkeypatch.setattr(cli, "main", interrupt)  # as if it came during the import
+    monkeypatch.delitem(sys.modules, "jaxbiped.cli")
+    find = lambda name, *_: interrupt() if name == "jaxbiped.cli" else None
+    monkeypatch.setattr(sys, "meta_path", [SimpleNamespace(find_spec=find), *sys.meta_path])
     monkeypatch.setattr(signal, "signal", lambda *_: None)
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
     with pytest.raises(SystemExit) as ended:

@@ -14,7 +14,7 @@ from jaxbiped.cli._gait import _SECTIONS
 from jaxbiped.cli._options import Command, Options
 from jaxbiped.cli._scene_options import SEED
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
-from jaxbiped.solve._solvers import SOLVERS
+from jaxbiped.solve.solvers import SOLVERS
 from jaxbiped.sweep._sweep import CHUNK
 from tests.cli.test_refusal import EARLY
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from jaxbiped.caching._disk_cache import CACHE_VARIABLE, read_entry, write_entry
+from jaxbiped.caching._disk_cache import read_entry, write_entry
 from jaxbiped.cli import _doctor
 from jaxbiped.cli._doctor import Truth, complaints, self_test
 from tests.cli.commands import numbers_of, run
@@ -18,9 +18,15 @@ def test_a_sound_installation_passes(capsys):
     assert {abs(each.found - each.known) < each.allowed for each in self_test()} == {True}
 
 
-def test_what_is_wrong_is_said_and_costs_the_exit_code(capsys, monkeypatch):
+@pytest.fixture
+def tests_itself(monkeypatch):
+    """Lets the self-test be another one."""
+    return lambda by: monkeypatch.setattr(_doctor, "self_test", by)
+
+
+def test_what_is_wrong_is_said_and_costs_the_exit_code(capsys, tests_itself):
     off = Truth("height", 1.0, 1.5, 1e-9)
-    monkeypatch.setattr(_doctor, "self_test", lambda: (off, off._replace(found=1.0)))
+    tests_itself(lambda: (off, off._replace(found=1.0)))
     assert run("doctor") == 1
     printed = capsys.readouterr().out
     assert "height is off by 5e-01" in printed
@@ -29,7 +35,7 @@ def test_what_is_wrong_is_said_and_costs_the_exit_code(capsys, monkeypatch):
     def broken():
         raise RuntimeError("no code for this CPU")
 
-    monkeypatch.setattr(_doctor, "self_test", broken)
+    tests_itself(broken)
     assert run("doctor") == 1
     printed = capsys.readouterr().out
     assert "the self-test ended with RuntimeError: no code for this CPU" in printed
@@ -48,7 +54,7 @@ def _told(capsys, *arguments):
 
 
 def test_the_cache_is_counted_and_cleared(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path / "cache"))
     write_entry("lanes", "a", bytes(1000))
     write_entry("xla", "b", bytes(2000))
     told = numbers_of(capsys, "cache")
@@ -63,6 +69,6 @@ def test_the_cache_is_counted_and_cleared(tmp_path, monkeypatch, capsys):
 
 
 def test_a_cache_where_nothing_is_kept_says_so(monkeypatch, capsys):
-    monkeypatch.setenv(CACHE_VARIABLE, "")
+    monkeypatch.setenv("JAXBIPED_CACHE", "")
     assert "nothing is kept" in _told(capsys)
     assert numbers_of(capsys, "cache")["folder"] is None

@@ -7,13 +7,19 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._gait import _UNITS, gait_numbers
 from tests.cli.commands import outputs_of
 from tests.drawn import assert_is_drawn, points_of
 
 pytestmark = pytest.mark.slow
 
-MEASURES = {"period_s", "step_length_m", "speed_m_s", "peak_normal_N", "spectral_radius"}
+MEASURES = "period_s", "step_length_m", "speed_m_s", "peak_normal_N", "spectral_radius"
+
+
+def outputs_with(find, folder):
+    """What the command leaves whose search is this function."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jb, "find_gait", find)
+        return outputs_of(folder, "gait")
 
 
 @pytest.fixture(scope="module")
@@ -25,9 +31,7 @@ def gait(tmp_path_factory):
         found.append(find_gait(*arguments, **options))
         return found[-1]
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(jb, "find_gait", find)
-        outputs = outputs_of(tmp_path_factory.mktemp("gait"), "gait")
+    outputs = outputs_with(find, tmp_path_factory.mktemp("gait"))
     assert outputs.code == 0
     return outputs, found[0]
 
@@ -48,7 +52,7 @@ def test_json_keys(numbers):
     assert len(states) == 8
     for table in ("sensitivities", "sensitivity_errors", "elasticities"):
         assert {"K", "c", "xi", "slope", "hip_mass"} <= set(numbers[table])
-        assert set(numbers[table]["K"]) == MEASURES | states
+        assert set(numbers[table]["K"]) == {*MEASURES, *states}
     assert set(numbers["wall_s"]) == {"import", "total"}
 
 
@@ -69,16 +73,17 @@ def test_the_seed_walker_s_gait(numbers):
     assert sizes[0] == pytest.approx(numbers["spectral_radius"])
 
 
-def test_slopes_and_stability_stand_under_their_names(gait, numbers):
+def test_slopes_and_stability_stand_under_their_names(gait, numbers, tmp_path):
     found = gait[1]
     place, fields = found.parameters.index("slope"), jb.gait.Measures._fields[:5]
     for table in ("sensitivities", "sensitivity_errors", "elasticities"):
         told, ours = numbers[table]["slope"], getattr(found, table)
-        own = (told[name] for name in _UNITS.values())
+        own = (told[name] for name in MEASURES)
         assert list(own) == [float(getattr(ours, name)[place]) for name in fields]
         assert told["state.omega_2"] == float(ours.state.omega_2[place])
     unstable = found.measures._replace(spectral_radius=np.asarray(1.01))
-    assert gait_numbers(dataclasses.replace(found, measures=unstable))["stable"] is False
+    falls = dataclasses.replace(found, measures=unstable)
+    assert outputs_with(lambda *_, **__: falls, tmp_path).numbers["stable"] is False
 
 
 def test_writes_pictures(gait, numbers):
@@ -93,7 +98,7 @@ def test_writes_pictures(gait, numbers):
     assert points_of(figures["orbit.png"].axes[0])[0][0] == pytest.approx(start, abs=1e-6)
 
 
-def test_a_search_that_fails_says_so(gait, tmp_path, capsys, monkeypatch):
+def test_a_search_that_fails_says_so(gait, tmp_path, capsys):
     lost = dataclasses.replace(
         gait[1],
         ending=np.asarray(int(jb.gait.Search.NOT_CONVERGED)),
@@ -102,8 +107,7 @@ def test_a_search_that_fails_says_so(gait, tmp_path, capsys, monkeypatch):
         measures=gait[1].measures._replace(period=np.asarray(np.nan)),
         multipliers=np.full(6, np.nan + 0j),
     )
-    monkeypatch.setattr(jb, "find_gait", lambda *arguments, **options: lost)
-    code, folder, figures, numbers = outputs_of(tmp_path, "gait")
+    code, folder, figures, numbers = outputs_with(lambda *_, **__: lost, tmp_path)
     assert code == 1
     (printed,) = capsys.readouterr().out.strip().splitlines()
     for word in ("not converged", "1.23e-02", "fell forward", "hip_z = 0.399354"):

@@ -4,6 +4,7 @@ With so many processes that all begin at once: `python -m tests.cli.test_killed_
 take some 15 GB of memory and a quarter of an hour on two cores.
 """
 
+import hashlib
 import json
 import os
 import random
@@ -16,8 +17,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-
-from jaxbiped.caching._disk_cache import CACHE_VARIABLE, _digest
 
 COMMANDS = (
     ("walk", "--duration", "0.5", "--json", "-"),
@@ -41,7 +40,7 @@ class Survival(NamedTuple):
 
 
 def _begin(command, cache):
-    environment = os.environ | {CACHE_VARIABLE: str(cache)}
+    environment = os.environ | {"JAXBIPED_CACHE": str(cache)}
     arguments = [sys.executable, "-m", "jaxbiped", *command]
     return subprocess.Popen(
         arguments, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
@@ -81,7 +80,8 @@ def _spoil(cache, chance):
             content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
         else:
             garbage = chance.randbytes(5_000)
-            content = _digest(path.parent.name, path.name, garbage) + garbage
+            place = f"{path.parent.name}/{path.name}\0".encode()
+            content = hashlib.sha256(place + garbage).digest() + garbage
         path.write_bytes(content)
         path.chmod(0o666 if how == 3 else 0o600)
     return len(chosen)

@@ -5,8 +5,7 @@ import pytest
 from reference.rigid import rigid_walker
 
 import jaxbiped as jb
-from jaxbiped.cli._scene_options import SceneOptions
-from tests.cli.commands import numbers_of, outputs_of, run
+from tests.cli.commands import numbers_of, outputs_of, run, walked
 
 
 def test_lists_every_law_with_units_and_cost(capsys):
@@ -54,7 +53,7 @@ def test_rigid_walk_and_gait(tmp_path, capsys):
     assert set(numbers["state"]) == set(jb.dynamics.RigidState._fields)
     # By multipliers of Lagrange for the rolling foot, along an integration of their own.
     state = jb.dynamics.RigidState(**numbers["state"])
-    walker = rigid_walker(SceneOptions(model="rigid").scene())
+    walker = rigid_walker(walked("--model rigid")[0])
     needed = walker.needed_friction(state[1:])
     assert numbers["assumptions"]["needed_friction"] == pytest.approx(needed, rel=1e-9)
     solved = walker.until_strike(np.array(state[1:]))

@@ -5,8 +5,15 @@ import json
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._parameter_search import _bounds
-from tests.cli.commands import interrupt_after, numbers_of, one_line, outputs_of, run
+from tests.cli.commands import (
+    asked,
+    interrupt_after,
+    numbers_of,
+    one_line,
+    outputs_of,
+    refused,
+    run,
+)
 from tests.drawn import assert_is_drawn, points_of
 
 pytestmark = pytest.mark.slow
@@ -111,15 +118,16 @@ def test_bad_options_of_a_fit(file, capsys, words, said):
     assert said in capsys.readouterr().err
 
 
-def test_bounds_that_are_not_given_are_half_and_twice_the_value_as_far_as_it_may_be():
+def test_bounds_that_are_not_given_are_half_and_twice_the_value_as_far_as_it_may_be(capsys):
     """A leg is at least as long as its foot is high."""
-    scene = jb.with_parameters(jb.ladder()["rigid"], {"l": 0.4, "r": 0.3, "J": 0.01})
-    bounds = _bounds(scene, "J, d=0.05:0.2, l")
+    command = "optimise --model rigid --l 0.4 --r 0.3 --J 0.01 --minimise period --vary"
+    bounds = asked(f"{command} 'J, d=0.05:0.2, l'", "optimise_gait")[1]["vary"]
     assert bounds["J"] == pytest.approx((0.005, 0.02))
     assert bounds["d"] == (0.05, 0.2)
     assert bounds["l"] == pytest.approx((0.3, 0.8), rel=1e-3)
     assert list(bounds) == ["J", "d", "l"]
-    with pytest.raises(jb.ArgumentError, match="vary = 'q' is not known: choose one of m, J"):
-        _bounds(scene, "q")
-    with pytest.raises(jb.ArgumentError, match="vary = hip_mass needs bounds, as its value is 0"):
-        _bounds(scene, "hip_mass")
+    said = refused(f"{command} q", capsys)
+    assert "vary = 'q' is not known: choose one of m, J" in said
+    assert "vary = hip_mass needs bounds, as its value is 0" in refused(
+        f"{command} hip_mass", capsys
+    )

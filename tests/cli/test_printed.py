@@ -16,16 +16,16 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._files import strict_json
-from jaxbiped.basins._minimal_fatal_shock import FatalShock
+from jaxbiped.basins import FatalShock
 from jaxbiped.cli import COMMANDS, _basin, _constraints, _continue, _gait, _models, _trade, _walk
 from jaxbiped.cli import _parameter_search as _search
 from jaxbiped.cli._options import OutputOptions
 from jaxbiped.cli._report import Report, columns, table, words
 from jaxbiped.cli._scene_options import SceneOptions
 from jaxbiped.cli._start_options import StartOptions
-from jaxbiped.continuation import BifurcationPoint, BranchEvent
-from jaxbiped.continuation._critical_values import NearestBifurcation
-from jaxbiped.optimise._certificate import Certificate, OtherEngine, PushedWalk
+from jaxbiped.continuation import BifurcationPoint, BranchEvent, NearestBifurcation
+from jaxbiped.optimise import Certificate
+from jaxbiped.optimise._certificate import OtherEngine, PushedWalk
 from jaxbiped.trade import Row, Truth
 from tests.cli.commands import run
 from tests.plot.test_fit_charts import _fit as make_fit

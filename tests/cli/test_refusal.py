@@ -161,7 +161,6 @@ walk --hip-z -5 | hip_z = -5 | below the ground
 walk --model rigid --solver rodas5p | solver = rodas5p
 gait --friction coulomb --xi 9 | xi = 9 | friction = coulomb
 gait --model rigid --section mid-stance | HeelStrike
-gait --formulation redundant --engine lanes | redundant coordinates are
 gait --hip-torque torque=1,2 | torque
 gait --hip-torque torque=1 reaction=hand | reaction = 'hand'
 gait --hip-spline torque=1 | two or more

@@ -1,79 +1,77 @@
 """Options that describe a scene and a start, against the functions of the package."""
 
-import dataclasses
 import math
+import re
 
 import jax
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._scene_options import SEED, ActuationOptions, SceneOptions
-from jaxbiped.cli._start_options import StartOptions
-from tests.cli.commands import numbers_of
+from tests.cli.commands import numbers_of, run, walked
 
 
 def test_flags_build_the_scene():
-    scene = SceneOptions(
-        normal="hunt-crossley", friction="coulomb", set=("hysteresis=2.5",)
-    ).scene()
+    scene, _ = walked("--normal hunt-crossley --friction coulomb --set hysteresis=2.5")
     assert isinstance(scene.normal, jb.laws.HuntCrossley)
     assert isinstance(scene.friction, jb.laws.RegularisedCoulomb)
     assert float(scene.normal.hysteresis) == 2.5
-    rigid = SceneOptions(model="rigid", slope=0.03, hip_mass=1.0).scene()
+    rigid, _ = walked("--model rigid --slope 0.03 --hip-mass 1")
     assert isinstance(rigid, jb.RigidScene)
     assert float(rigid.ground.slope) == 0.03
     assert float(rigid.walker.hip_mass) == 1.0
-    held = SceneOptions(formulation="redundant", method="baumgarte", orientation="euler").scene()
+    held, _ = walked("--formulation redundant --method baumgarte --orientation euler")
     assert isinstance(held, jb.RedundantScene)
     assert isinstance(held.method, jb.constraints.Baumgarte)
     assert held.orientation == "euler"
-    assert isinstance(SceneOptions(formulation="redundant").scene().method, jb.constraints.Index1)
-    seed = SceneOptions().scene()
+    assert isinstance(walked("--formulation redundant")[0].method, jb.constraints.Index1)
+    seed, _ = walked()
     assert jax.tree.structure(seed) == jax.tree.structure(jb.seed_scene())
     assert jax.tree.leaves(seed) == jax.tree.leaves(jb.seed_scene())
 
 
-def test_help_tells_the_units_of_the_seeds_parameters():
+def _help(capsys):
+    """What the help of a walk says of its options, by their names."""
+    assert run("walk", "--help") == 0
+    plain = re.sub(r"\x1b\[[0-9;]*m|[│╭╮╰╯─]", " ", capsys.readouterr().out)
+    _, *options = re.split(r"\s--(?=[a-zA-Z])", " ".join(plain.split()))
+    return {text.partition(" ")[0]: text for text in options}
+
+
+def test_help_tells_the_units_of_the_seeds_parameters(capsys):
     """A unit stands at its end."""
+    said = _help(capsys)
     for name, quantity in jb.parameter_quantities(jb.seed_scene()).items():
-        said = SEED[name].help
-        assert said.endswith(f" [{quantity.unit}]." if quantity.unit else ".")
-        assert ("[" in said) == bool(quantity.unit)
+        text = re.split(r" \(| If omitted", said[name.replace("_", "-")])[0]
+        assert text.endswith(f" [{quantity.unit}]." if quantity.unit else ".")
+        assert ("[" in text) == bool(quantity.unit)
 
 
-def test_every_actuator_has_a_flag():
-    fields = [field.name.replace("_", "-") for field in dataclasses.fields(ActuationOptions)]
-    assert fields == list(jb.actuation.ACTUATORS)
+def test_every_actuator_has_a_flag(capsys):
+    actuators = list(jb.actuation.ACTUATORS)
+    assert [name for name in _help(capsys) if name in actuators] == actuators
 
 
 def test_flags_make_the_actuators():
-    asked = ActuationOptions(
-        hip_spring=("k=0.05", "theta_0=0.1"),
-        hip_torque=("torque=0.1", "reaction=trunk"),
-        hip_spline=("torque=0.1,0.2,0.3", "first=-0.1"),
-    )
-    found = SceneOptions(driven=asked, set=("torque_2=0.7", "b=0.001")).scene()
+    spline = "--hip-spline torque=0.1,0.2,0.3 first=-0.1"
+    driven = f"--hip-spring k=0.05 theta_0=0.1 --hip-torque torque=0.1 reaction=trunk {spline}"
+    found, _ = walked(f"{driven} --set torque_2=0.7 b=0.001")
     spring, torque, spline = found.actuation
     assert [float(x) for x in (spring.k, spring.b, spring.theta_0)] == [0.05, 0.001, 0.1]
     assert (float(torque.torque), torque.reaction) == (0.1, "trunk")
     assert [float(x) for x in spline.torque] == [0.1, 0.7, 0.3]
     assert float(spline.first) == -0.1
-    sprung = ActuationOptions(hip_spring=("k=1", "theta_0=0"))
-    turned = SceneOptions(driven=sprung, set=("theta_0=5deg",)).scene()
+    turned, _ = walked("--hip-spring k=1 theta_0=0 --set theta_0=5deg")
     assert float(turned.actuation[0].theta_0) == pytest.approx(math.radians(5.0))
-    rigid = SceneOptions(model="rigid", driven=ActuationOptions(push_off=("impulse=0.2",))).scene()
+    rigid, _ = walked("--model rigid --push-off impulse=0.2")
     assert float(rigid.actuation[0].impulse) == 0.2
-    redundant = SceneOptions(formulation="redundant", driven=asked).scene()
+    redundant, _ = walked(f"--formulation redundant {driven}")
     assert len(redundant.actuation) == 3
 
 
 def test_what_is_said_stays_as_it_was_said():
-    options = StartOptions(hip_z=0.4, omega_2=-1.0)
-    assert options.given == {"hip_z": 0.4, "omega_2": -1.0}
-    start = options.start(jb.seed_scene(K=1e8))
+    _, start = walked("--K 1e8 --hip-z 0.4 --omega-2 -1")
     assert (float(start.hip_z), float(start.omega_2)) == (0.4, -1.0)
     assert float(start.theta_2) == float(jb.seed_state().theta_2)
-    assert StartOptions().given == {}
 
 
 @pytest.mark.slow

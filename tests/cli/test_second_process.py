@@ -11,8 +11,6 @@ import sys
 
 import pytest
 
-from jaxbiped.caching._disk_cache import CACHE_VARIABLE
-
 pytestmark = pytest.mark.slow
 
 COUNTED = """
@@ -29,7 +27,7 @@ def compiled(*given):
     told.append("lanes")
     return module(*given)
 
-_machine_code._module = compiled
+_machine_code._module, _machine_code.EFFORT = compiled, 0
 jax.monitoring.register_event_duration_secs_listener(note)
 atexit.register(lambda: print("COMPILED", json.dumps(told), file=sys.stderr))
 from jaxbiped.cli import main
@@ -69,7 +67,7 @@ def test_the_second_process_compiles_nothing(name, tmp_path):
     measured.write_text(
         json.dumps({"gaits": [{"period_s": [0.44, 1e-3], "step_length_m": [0.19, 1e-3]}]})
     )
-    environment = os.environ | {CACHE_VARIABLE: str(tmp_path / "cache")}
+    environment = os.environ | {"JAXBIPED_CACHE": str(tmp_path / "cache")}
 
     def compiled(turn):
         places = {"OUT": str(tmp_path / turn), "MEASURED": str(measured)}

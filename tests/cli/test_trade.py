@@ -1,13 +1,13 @@
 """`jaxbiped trade`, against errors that fall with the tolerance."""
 
+import csv
 import json
 
 import pytest
 
 import jaxbiped as jb
 from jaxbiped import trade
-from jaxbiped.cli._trade import Trade
-from jaxbiped.trade import Row, Truth
+from jaxbiped.trade import Row, Truth, failed_row
 from tests.cli.commands import one_line, outputs_of, run
 from tests.drawn import assert_is_drawn
 
@@ -49,9 +49,23 @@ class _Walk:
         self.rows += 1
         if self.rows == 3:
             raise KeyboardInterrupt
-        return Row(
-            f"{way.solver} ({way.engine})", way.setting, "ok", {"state": 1e-6}, 1.0, 1.0, 1.0
-        )
+        errors = {"state": 1e-6} if self.rows == 1 else {}
+        return Row(f"{way.solver} ({way.engine})", way.setting, "ok", errors, 1.0, 1.0, 1.0)
+
+
+@pytest.fixture
+def measured_by(monkeypatch):
+    """Lets walks and gaits be measured by these."""
+
+    def by(walks, gaits=trade.GaitTrade):
+        monkeypatch.setattr(trade, "WalkTrade", walks)
+        monkeypatch.setattr(trade, "GaitTrade", gaits)
+
+    return by
+
+
+class _Gait(_Walk):
+    pass
 
 
 class _NoGait(_Walk):
@@ -59,10 +73,10 @@ class _NoGait(_Walk):
         return None
 
 
-def test_ctrl_c_keeps_the_rows_that_are_measured(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(trade, "WalkTrade", _Walk)
-    numbers = tmp_path / "trade.json"
-    assert run("trade", "--json", numbers) == 130
+def test_ctrl_c_keeps_the_rows_that_are_measured(tmp_path, measured_by, capsys):
+    measured_by(_Walk)
+    numbers, table = tmp_path / "trade.json", tmp_path / "trade.csv"
+    assert run("trade", "--json", numbers, "--csv", table) == 130
     printed, line = one_line(capsys)
     assert line == "jaxbiped: Interrupted: 2 settings are measured."
     assert [row["setting"] for row in json.loads(numbers.read_text())["rows"]] == [
@@ -70,23 +84,32 @@ def test_ctrl_c_keeps_the_rows_that_are_measured(tmp_path, monkeypatch, capsys):
         "balanced",
     ]
     assert "rodas4p (lanes)" in printed
+    first, second = csv.DictReader(table.read_text().splitlines())
+    assert first["of"] == "walk"
+    assert (first["errors.state"], second["errors.state"]) == ("1e-06", "")
 
 
-def test_a_scene_without_a_gait_is_told_by_the_code(monkeypatch, capsys):
-    monkeypatch.setattr(trade, "WalkTrade", _NoGait)
-    monkeypatch.setattr(trade, "GaitTrade", _NoGait)
+def test_a_scene_without_a_gait_is_told_by_the_code(measured_by, capsys):
+    measured_by(_NoGait, _NoGait)
     assert run("trade") == 1
     assert "gait: the references found none" in capsys.readouterr().out
 
 
-def test_the_settings_of_a_walk_are_the_tolerances_of_its_accuracies():
-    scene, state = jb.seed_scene(), jb.seed_state()
-    settings = dict(Trade()._settings("walk", scene))
+def test_the_settings_of_a_walk_are_the_tolerances_of_its_accuracies(measured_by):
+    ways = {_Walk: {}, _Gait: {}}
+
+    def noted(self, way, truth):
+        ways[type(self).__base__][way.setting] = way.rtol
+        return failed_row(way.solver, way.setting, "no gait")
+
+    measured_by(*(type(kind.__name__, (kind,), {"row": noted}) for kind in ways))
+    assert run("trade") == 0
+    settings = dict(ways[_Walk])
     for name in jb.ACCURACIES:
-        request = jb.Simulation.prepare(scene, state, duration=1.0, accuracy=name)
+        request = jb.Simulation.prepare(
+            jb.seed_scene(), jb.seed_state(), duration=1.0, accuracy=name
+        )
         assert settings.pop(name) == float(request.rtol)
     assert settings == {}
-    assert list(dict(Trade(full=True)._settings("gait", scene)))[3:5] == [
-        "rtol=0.001",
-        "rtol=0.0001",
-    ]
+    assert run("trade", "--full") == 0
+    assert list(ways[_Gait])[3:5] == ["rtol=0.001", "rtol=0.0001"]

@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._scene_options import ActuationOptions, SceneOptions
-from jaxbiped.cli._start_options import StartOptions, StartsOptions, read_starts
-from jaxbiped.cli._walkers import WALKERS
 from jaxbiped.models import MODELS
-from tests.cli.commands import numbers_of, outputs_of, refused
+from tests.cli.commands import numbers_of, outputs_of, refused, starts_of, walked
+
+WALKERS = "seed", "kneed", "with-torso", *MODELS
 
 OWN = """
 import jaxbiped as jb
@@ -42,16 +41,13 @@ def file(tmp_path):
 
 @pytest.mark.parametrize("name", ["walker", "make"])
 def test_a_file_s_walker_is_modelled(name, file):
-    options = SceneOptions(walker=f"{file}:{name}", clearance="stance-rotation", slope=0.03)
-    options.check()
-    scene = options.scene()
+    own = f"--walker {file}:{name}"
+    scene, start = walked(f"{own} --clearance stance-rotation --slope 0.03 --state theta_leg_1=0.2")
     assert scene.mechanism.structure.bodies == ("leg_1", "leg_2")
     assert float(scene.mechanism.total_mass) == 3.0
     assert isinstance(scene.clearance, jb.laws.StanceRotation)
     assert float(scene.ground.slope) == 0.03
-    assert isinstance(SceneOptions(walker=f"{file}:{name}").scene().clearance,
-                      jb.laws.AlwaysTouching)  # fmt: skip
-    start = StartOptions(state=("theta_leg_1=0.2",)).start(scene, f"{file}:{name}")
+    assert isinstance(walked(own)[0].clearance, jb.laws.AlwaysTouching)
     assert float(start.theta_leg_1) == 0.2
 
 
@@ -70,59 +66,50 @@ def test_what_is_no_walker_is_refused(name, words, file, capsys):
 
 @pytest.mark.parametrize("name", WALKERS)
 def test_named_walkers_walk_on_the_usual_slope(name):
-    scene = SceneOptions(walker=name).scene()
-    start = StartOptions().start(scene, name)
-    walk = jb.simulate(scene, start, duration=4.0, accuracy="draft", save="end")
+    walk = jb.simulate(*walked(f"--walker {name}"), duration=4.0, accuracy="draft", save="end")
     assert walk.outcome is jb.Ending.WALKING
 
 
-def test_published_walkers_have_scenes_of_their_own_that_flags_change():
+def test_published_walkers_have_scenes_of_their_own_that_flags_change(capsys):
     for name, model in MODELS.items():
-        scene, own = SceneOptions(walker=name).scene(), model.make()
+        (scene, start), own = walked(f"--walker {name}"), model.make()
         assert jax.tree.all(jax.tree.map(np.array_equal, scene, own)), name
-        start, (known, *_) = StartOptions().start(scene, name), model.starts.values()
+        known, *_ = model.starts.values()
         held = known.get("held")
         numbers = {key: x for key, x in known.items() if key not in ("held", "standing")}
         assert {key: float(getattr(start, key)) for key in numbers} == numbers
         assert held is None or float(start.mode) == float(scene.state(held=held).mode)
-    steeper = SceneOptions(walker="garcia", slope=0.02, g=9.8).scene()
+    steeper = walked("--walker garcia --slope 0.02 --g 9.8")[0]
     assert (float(steeper.ground.slope), float(steeper.ground.g)) == (0.02, 9.8)
-    soft = SceneOptions(walker="goswami", model="compliant", K=1e7).scene()
+    soft = walked("--walker goswami --model compliant --K 1e7")[0]
     assert (soft.compliant, float(soft.normal.K)) == (True, 1e7)
     assert float(soft.ground.slope) == float(MODELS["goswami"].make().ground.slope)
-    pushed = SceneOptions(walker="kuo", driven=ActuationOptions(push_off=("impulse=0.05",))).scene()
+    pushed = walked("--walker kuo --push-off impulse=0.05")[0]
     assert [float(each.impulse) for each in pushed.actuation] == [0.05]
-    with pytest.raises(jb.ArgumentError, match="no laws of contact"):
-        SceneOptions(walker="garcia", K=2e6).check()
-    with pytest.raises(jb.ArgumentError, match="parameters of its own"):
-        SceneOptions(walker="garcia", m=2.0).check()
+    assert "no laws of contact" in refused("walk --walker garcia --K 2e6", capsys)
+    assert "parameters of its own" in refused("walk --walker garcia --m 2", capsys)
 
 
 def test_a_start_is_said_by_the_names_of_the_state():
-    scene = SceneOptions(walker="kneed").scene()
-    said = StartOptions(state=("theta_thigh_1=0.2", "hip_x=1.5"), standing="shank_2")
-    start = said.start(scene, "kneed")
+    said = "--state theta_thigh_1=0.2 hip_x=1.5 --standing shank_2"
+    scene, start = walked(f"--walker kneed {said}")
     assert (float(start.theta_thigh_1), float(start.hip_x)) == (0.2, 1.5)
-    assert float(start.theta_shank_1) == WALKERS["kneed"].start["theta_shank_1"]
+    assert float(start.theta_shank_1) == float(walked("--walker kneed")[1].theta_shank_1)
     foot = jb.dynamics.feet(scene, start)[1]
     assert float(foot.penetration) == pytest.approx(0.0, abs=1e-12)
     assert float(foot.slip_speed) == pytest.approx(0.0, abs=1e-12)
-    seed = jb.seed_scene()
-    plain = StartOptions(state=("omega_1=0.3",)).start(seed)
-    assert plain == StartOptions(omega_1=0.3).start(seed)
+    assert walked("--state omega_1=0.3")[1] == walked("--omega-1 0.3")[1]
 
 
-def test_starts_of_a_file_have_the_names_of_the_state(tmp_path):
-    scene = SceneOptions(walker="kneed").scene()
+def test_starts_of_a_file_have_the_names_of_the_state(tmp_path, capsys):
+    scene, _ = walked("--walker kneed")
     names = scene.mechanism.structure.coordinates + scene.mechanism.structure.rates
     rows = [",".join(names), *(",".join(f"{k}.{n}" for n in range(len(names))) for k in (0, 1))]
     (tmp_path / "starts.csv").write_text("\n".join(rows))
-    starts = read_starts(tmp_path / "starts.csv", scene)
+    starts = starts_of(f"--walker kneed --starts {tmp_path / 'starts.csv'}")
     assert type(starts) is type(scene.state())
     np.testing.assert_array_equal(starts.hip_x, [0.0, 1.0])
-    with pytest.raises(jb.ArgumentError, match="header"):
-        read_starts(tmp_path / "starts.csv", jb.seed_scene())
-    assert StartsOptions().axes == ()
+    assert "header" in refused(f"basin --starts {tmp_path / 'starts.csv'}", capsys)
 
 
 def test_walkers_are_listed(capsys):

@@ -220,11 +220,21 @@ def _give(pointer, value):
     return 0
 
 
+def load(monkeypatch, driver):
+    """Makes it what is loaded as the machine's driver; None for no driver."""
+    monkeypatch.setattr(_cuda_device, "load_library", lambda: driver)
+
+
+def limit_room(monkeypatch, size):
+    """Lets devices take at most so many bytes at once."""
+    monkeypatch.setattr(_processors, "_MOST_BYTES", size)
+
+
 def install(monkeypatch, **options):
     """Makes it the machine's driver; nothing that it loads is kept on disk."""
     fake = FakeDriver(**options)
     monkeypatch.setenv("JAXBIPED_CACHE", "")
-    monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
+    load(monkeypatch, fake)
     monkeypatch.setattr(_kernel, "ptx_text", lambda text, architecture: text)
     monkeypatch.setattr(_processors, "devices", functools.cache(_cuda_device.devices.__wrapped__))
     return fake

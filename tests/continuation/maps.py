@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from jaxbiped.continuation._branch_point import Axis, change_of
+from jaxbiped.continuation import Axis
+from jaxbiped.continuation._branch_point import change_of
 from jaxbiped.continuation._cycle import Cycle
 from jaxbiped.gait._pseudo_arclength import Curve, correct
 

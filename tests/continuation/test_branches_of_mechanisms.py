@@ -7,23 +7,10 @@ from reference.mechanism_flow import checked_cycle
 
 import jaxbiped as jb
 from jaxbiped.continuation import BranchEvent
-from jaxbiped.continuation._branch_point import axis_of
-from jaxbiped.continuation._continue_gait import continuation_setup
 from tests.mechanism_numbers import tree_of
-from tests.mechanisms import SEED_WITH_TORSO, scene_of
+from tests.mechanisms import SEED_WITH_TORSO
 
 STIFFNESS = "torso.spring.stiffness"
-
-
-@pytest.mark.parametrize(("name", "footsteps"), [("torso", 3), ("unequal", 6)])
-def test_a_cycle_is_as_many_arrivals(name, footsteps):
-    scene = scene_of(name)
-    axis = axis_of(scene, "slope", (0.02, 0.04), None)
-    how = dict(accuracy="balanced", engine="auto")
-    setup = continuation_setup(scene, axis, footsteps=footsteps, **how)
-    assert (setup.arrivals, setup.footsteps) == (3, footsteps)
-    setup = continuation_setup(scene, axis, footsteps=None, **how)
-    assert (setup.arrivals, setup.footsteps) == (1, footsteps // 3)
 
 
 @pytest.mark.slow

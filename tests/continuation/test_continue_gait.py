@@ -19,6 +19,8 @@ from jaxbiped.continuation import (
     resume_branch,
     switch_branch,
 )
+from jaxbiped.gait import BranchEnd
+from tests.cli.commands import interrupt_after
 from tests.rigid_walkers import (
     FIRST_DOUBLING,
     MULTIPLIER,
@@ -227,6 +229,14 @@ def test_a_stored_branch_is_resumed(rigid, tmp_path):
     cut = resume_branch(whole, 5, max_points=3)
     assert len(cut) == 9
     assert cut.bifurcations == ()
+
+
+def test_ctrl_c_ends_a_branch_with_its_points_so_far(monkeypatch):
+    interrupt_after(monkeypatch, 1, "radius")
+    found = jb.continue_gait(rigid_seed(), "slope", bounds=(0.018, 0.022))
+    assert {stop.end for stop in found.stops} == {BranchEnd.INTERRUPTED}
+    assert len(found) >= 2
+    assert np.all(np.diff(found.values) > 0.0)
 
 
 def test_a_dataset_says_what_is_in_it(rigid):

@@ -5,8 +5,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.continuation import BranchEvent, bifurcation_sensitivities
-from jaxbiped.continuation._critical_values import range_of
-from jaxbiped.continuation._cycle import CycleProblem
+from tests.compiler.one_shot import count_runs
 
 pytestmark = pytest.mark.slow
 
@@ -29,19 +28,12 @@ def test_it_is_that_of_the_whole_branch(gait):
 
 def test_it_follows_each_side_to_its_first_event_alone(gait, monkeypatch):
     """Far fewer cycles than a branch that goes on beyond them."""
-    counts = [0]
-    cycle = CycleProblem.cycle
-
-    def counted(*given):
-        counts[-1] += 1
-        return cycle(*given)
-
-    monkeypatch.setattr(CycleProblem, "cycle", counted)
+    runs, own = count_runs(monkeypatch), float(RIGID.ground.slope)
     found = jb.continuation.nearest_bifurcation(RIGID, gait, factor=12.0)
-    counts.append(0)
-    branch = jb.continue_gait(RIGID, "slope", bounds=range_of(RIGID, "slope", 12.0), guess=gait)
+    few = len(runs)
+    branch = jb.continue_gait(RIGID, "slope", bounds=(own / 12.0, own * 12.0), guess=gait)
     assert found.value in [each.value for each in branch.bifurcations]
-    assert 0 < counts[0] < 0.8 * counts[1]
+    assert 0 < few < 0.8 * (len(runs) - few)
 
 
 def test_level_ground_is_left_to_both_sides():

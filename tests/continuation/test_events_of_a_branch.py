@@ -1,24 +1,33 @@
 """Events of branches, errors, cascades and deflation, against numbers that are written down."""
 
+from itertools import islice
 from types import SimpleNamespace
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from jaxbiped.continuation import _switch_branch
-from jaxbiped.continuation._bifurcations import (
+from jaxbiped.continuation import (
+    Axis,
+    Branch,
     BranchEvent,
+    BranchStop,
+    DoublingCascade,
+    _switch_branch,
+)
+from jaxbiped.continuation._bifurcation_curve import _extended_curve
+from jaxbiped.continuation._bifurcations import (
     _with_multiplier_errors,
     critical_multiplier,
     multiplier_test,
 )
-from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._continue_gait import _events_at
-from jaxbiped.continuation._deflation import _DeflatedNewton
-from jaxbiped.continuation._switch_branch import DoublingCascade, doubling_cascade
-from jaxbiped.continuation._trace import BranchEnd, BranchStop, _closes, is_bound, leaves_range
+from jaxbiped.continuation._deflation import _DeflatedNewton, _scattered_about
+from jaxbiped.continuation._switch_branch import _NEARER
+from jaxbiped.continuation._trace import _closes, is_bound, leaves_range
+from jaxbiped.gait import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint
+from tests.continuation.maps import twice
 
 
 def at(*multipliers, value=0.0, errors=0.01):
@@ -62,6 +71,17 @@ def test_the_error_of_a_value_is_that_of_the_multiplier_over_its_rate():
     assert error(float("nan")) == pytest.approx(2.0 * 0.02 + 2.0 * 1e-4)
 
 
+def test_the_rate_of_a_pair_on_the_circle_is_that_of_its_modulus():
+    """It grows from 0.9 to 1.1 over 0.4 of the parameter, while its angle turns by more."""
+    pair = lambda one, **how: at(one, np.conj(one), **how)
+    before, after = 0.9 * np.exp(1.2j), 1.1 * np.exp(1.9j)
+    ends = [pair(before, value=1.0, errors=0.02), pair(after, value=1.4, errors=0.01)]
+    for middle in (1j, np.exp(1.5j)):
+        there = pair(middle, value=1.2, errors=0.005)
+        error = _with_multiplier_errors(1e-9, BranchEvent.NEIMARK_SACKER, there, ends)
+        assert error == pytest.approx(2.0 * 0.02)
+
+
 def point(*place, tangent):
     return CurvePoint(*[None] * len(CurvePoint._fields))._replace(
         place=np.array(place), tangent=np.array(tangent)
@@ -85,9 +105,10 @@ def test_a_branch_is_closed_where_it_passes_its_beginning_the_same_way():
     assert not _closes(point(0.0, 0.35, tangent=[0, 1.0]), here, there)
 
 
-def test_a_geometric_cascade_has_its_ratio_and_its_limit(monkeypatch):
-    """Doublings at 2 − 4⁻ᵏ: intervals shrink by 4 and add up to 2."""
-    values = [2.0 - 0.25**k for k in range(4)]
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_geometric_cascade_has_its_ratio_and_its_limit(way):
+    """Doublings at ±(2 − 4⁻ᵏ): intervals shrink by 4 and add up to 2, and so does the search."""
+    values, distances = [way * (2.0 - 0.25**k) for k in range(4)], []
 
     def doubling(k):
         place = np.array([0.1 * k, values[k]])
@@ -101,13 +122,57 @@ def test_a_geometric_cascade_has_its_ratio_and_its_limit(monkeypatch):
         return Mock(spec=Branch, **known)
 
     following = iter([branch(1), branch(2), branch(3)])
-    monkeypatch.setattr(_switch_branch, "_doubled_branch", lambda *_, **__: next(following))
-    found = doubling_cascade(branch(0), 4)
+
+    def doubled(branch, doubling, step, near):
+        distances.append(near)
+        return next(following)
+
+    found = _switch_branch._cascade_from(branch(0), doubling(0), 4, 0.02, 1.0, doubled)
     assert isinstance(found, DoublingCascade)
     assert found.values == pytest.approx(values)
     assert found.ratios == pytest.approx([4.0, 4.0])
-    assert found.accumulation == pytest.approx(2.0)
+    assert found.accumulation == pytest.approx(way * 2.0)
+    assert distances[1:] == pytest.approx([0.75 / _NEARER, 0.75 / 4.0 / _NEARER])
     assert [each.footsteps for each in found.branches] == [1, 2, 4, 8]
+
+
+def test_the_derivatives_of_a_curve_of_doublings_are_those_of_its_values():
+    """Of x → r x (1 − x) + q, r by factors; the witness of a cycle is off by a tenth."""
+    first, second = Axis("g", 2.0, 4.0, True, 0), Axis("slope", -0.1, 0.3, False, 1)
+
+    def cycle(point, leaves, values, arrivals):
+        (x, _), (r, q) = point, values
+        jacobian = np.array([[r * (1.0 - 2.0 * x), 0.0, x * (1.0 - x), 1.0], np.zeros(4)])
+        seen = twice(
+            recurring=[r * x * (1.0 - x) + q, 0.0], jacobian=jacobian, monodromy=np.eye(2),
+            velocity=[0.0, 1.0], period=1.0, advance=1.0, peak=0.0, code=0, sound=True, grazes=0,
+        )  # fmt: skip
+        return seen._replace(jacobian=np.stack([jacobian, 0.9 * jacobian]))
+
+    setup = SimpleNamespace(
+        curve=SimpleNamespace(sizes=np.array([0.5, 2.0, 1.0])), axis=first, arrivals=1,
+        problem=SimpleNamespace(cycle=cycle),
+    )  # fmt: skip
+    curve = _extended_curve(setup, second, BranchEvent.PERIOD_DOUBLING)
+    place, step = np.array([0.6, 0.1, 0.4, 0.7]), 1e-5
+    change = curve.change(place[:-1], place[-1])
+    ends = [
+        [curve.change((place + h)[:-1], (place + h)[-1]).value for h in (shift, -shift)]
+        for shift in step * np.eye(4)
+    ]
+    quotients = np.array([(more - less) / (2.0 * step) for more, less in ends]).T
+    given = np.column_stack([change.by_point, change.by_s])
+    np.testing.assert_allclose(given, quotients, rtol=0.0, atol=1e-3)
+
+
+def test_starts_of_deflation_scatter_about_the_gait_by_five_sizes_in_turn():
+    middle = np.array([2.0, -0.5])
+    first, *others = islice(_scattered_about(middle, 0), 1001)
+    np.testing.assert_array_equal(first, middle)
+    off = np.abs(np.array(others) / middle - 1.0).reshape(-1, 5, 2)
+    spreads = np.array([0.003, 0.01, 0.03, 0.1, 0.3])
+    reach = np.max(off, axis=(0, 2))
+    assert np.all((0.98 * spreads < reach) & (reach <= spreads * (1.0 + 1e-12)))
 
 
 def test_deflated_newton_finds_the_roots_one_after_the_other():

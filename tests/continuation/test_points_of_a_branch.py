@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.continuation import _trace
-from jaxbiped.continuation._bifurcations import BranchEvent, explains, not_located
-from jaxbiped.continuation._branch_point import Axis, axis_of, branch_point, change_of, start_of
+from jaxbiped.continuation import Axis, BranchEvent, _trace
+from jaxbiped.continuation._bifurcations import explains, not_located
+from jaxbiped.continuation._branch_point import axis_of, branch_point, change_of, start_of
+from jaxbiped.continuation._continue_gait import continuation_setup
 from jaxbiped.continuation._cycle import NO_WALK, Cycle
 from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint
+from tests.mechanisms import scene_of
 
 RIGID = jb.ladder()["rigid"]
 
@@ -117,24 +119,14 @@ def test_a_point_has_the_numbers_of_its_cycle():
 
 
 @pytest.mark.parametrize(
-    ("load", "before", "beyond", "words"),
+    ("before", "beyond", "slides"),
     [
-        (5e-4, 0.0, 0.0, "no touch"),
-        (2e-3, 0.0, 0.0, None),
-        (1.0, 0.2, 0.31, "slip"),
-        (1.0, 0.2, 0.29, None),
-        (1.0, 0.001, 0.012, "slip"),
-        (1.0, 0.001, 0.0105, None),
+        (0.0, 0.0, False), (0.2, 0.31, True), (0.2, 0.29, False), (0.001, 0.012, True),
+        (0.001, 0.0105, False),
     ],
-)
-def test_a_limit_comes_from_a_foot_that_is_unloaded_or_begins_to_slide(
-    load, before, beyond, words, monkeypatch
-):
-    monkeypatch.setattr(_trace, "_load", lambda scene, state: load if scene == "here" else 0.0)
-    shares = {"before": before, "beyond": beyond}
-    monkeypatch.setattr(_trace, "_slipping_load", lambda scene, *_: shares[scene])
-    found = _trace.limit_cause("here", "before", "beyond", None, 0.5)
-    assert found is None if words is None else found.startswith(words)
+)  # fmt: skip
+def test_a_foot_begins_to_slide_where_more_of_its_load_slips(before, beyond, slides):
+    assert _trace.slides(before, beyond) is slides
 
 
 def test_a_foot_that_stands_carries_its_weight():
@@ -145,6 +137,12 @@ def test_a_foot_that_stands_carries_its_weight():
     state = scene.state(theta_1=-0.5, standing="2")
     state = state._replace(hip_z=state.hip_z - depth)
     assert _trace._load(scene, state) == pytest.approx(1.0, rel=1e-3)
+    for share, unloaded in ((5e-4, True), (2e-3, False)):
+        lifted = state._replace(hip_z=state.hip_z + depth * (1.0 - share ** (1.0 / 1.5)))
+        words = _trace.limit_cause(scene, scene, scene, lifted, 1e-3)
+        assert words == (
+            "no touch: the stance foot carries nothing on the section" if unloaded else None
+        )
 
 
 def test_bifurcations_explain_as_many_multipliers_as_they_take_out():
@@ -177,3 +175,14 @@ def test_an_entry_that_is_not_located_has_the_multiplier_nearest_to_the_circle()
     )  # fmt: skip
     found = not_located(point, 0.7)
     assert found[2:] == (-1.1, 0.01, pytest.approx(0.3), 0.7)
+
+
+@pytest.mark.parametrize(("name", "footsteps"), [("torso", 3), ("unequal", 6)])
+def test_a_cycle_is_as_many_arrivals(name, footsteps):
+    scene = scene_of(name)
+    axis = axis_of(scene, "slope", (0.02, 0.04), None)
+    how = dict(accuracy="balanced", engine="auto")
+    setup = continuation_setup(scene, axis, footsteps=footsteps, **how)
+    assert (setup.arrivals, setup.footsteps) == (3, footsteps)
+    setup = continuation_setup(scene, axis, footsteps=None, **how)
+    assert (setup.arrivals, setup.footsteps) == (1, footsteps // 3)

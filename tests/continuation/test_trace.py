@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from jaxbiped._ending import Ending
-from jaxbiped.continuation._bifurcations import BranchEvent
+from jaxbiped import Ending
+from jaxbiped.continuation import BranchEvent
 from jaxbiped.continuation._branch_point import is_stable
 from jaxbiped.continuation._cycle import NO_WALK
 from jaxbiped.continuation._trace import passed_before, trace
-from jaxbiped.gait._search_provenance import BranchEnd
+from jaxbiped.gait import BranchEnd
 from tests.continuation.maps import (
     begin_at,
     curve_of,

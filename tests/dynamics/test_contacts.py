@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._footfalls import FootMotion, landings, standing_leg, touches
+from jaxbiped.dynamics import FootMotion, touches
+from jaxbiped.dynamics._footfalls import landings, standing_leg
 from tests.mechanisms import scene_of
 
 LEGS = jb.seed_scene().mechanism.structure

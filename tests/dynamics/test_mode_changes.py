@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped import Body, Foot, Mechanism, Stop
 from jaxbiped.dynamics._holds import Holds, on_held
 from jaxbiped.dynamics._mode_changes import change_mode
 from jaxbiped.dynamics._stance import stance_on
-from jaxbiped.scene._bodies import Body, Foot
-from jaxbiped.scene._joint_parts import HOLDS, Stop
-from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.hybrid import Rolling
+from jaxbiped.scene._joint_parts import HOLDS
 from jaxbiped.scene._modes import leg_after_strike, rigid_modes
-from jaxbiped.variational._hybrid_system import Rolling
 from tests.dynamics.test_modes import (
     ANGLES,
     HEEL_TOE,
@@ -125,7 +124,7 @@ def test_a_load_that_has_fallen_to_zero_is_let_go_on_either_side_of_it():
         above, below = (middle, below) if least(middle) > 0.0 else (above, middle)
     assert 0.0 < least(above) < 1e-12
     for angle in (above, below):
-        assert mode_of(scene, Rolling().reset_at_switch(scene, flat(angle)))[0] == [True, False]
+        assert mode_of(scene, Rolling().reset_at_switch(scene, flat(angle), 1))[0] == [True, False]
 
 
 def test_a_foot_that_comes_down_flat_turns_no_more():
@@ -192,7 +191,7 @@ def test_a_stop_is_hit_by_what_moves_into_it_alone(limits, speed):
     state = scene.state(
         theta_leg_1=limit + SLOPE, theta_leg_2=-0.1, omega_leg_1=speed, omega_leg_2=-0.7, held=()
     )
-    after = Rolling().reset_at_switch(scene, state)
+    after = Rolling().reset_at_switch(scene, state, 1)
     if speed * limit < 0.0:
         assert [float(x) for x in after] == [float(x) for x in state]
     else:

@@ -9,13 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
+from jaxbiped import Body, Foot, Mechanism, Spring, Stop
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._mode_changes import change_mode, foot_loads, mode_switches
+from jaxbiped.dynamics._mode_changes import change_mode, foot_loads
 from jaxbiped.dynamics._stance import stance_on
 from jaxbiped.dynamics._stance_motion import turning_of
-from jaxbiped.scene._bodies import Body, Foot, Point
-from jaxbiped.scene._joint_parts import HOLDS, Spring, Stop
-from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.hybrid._rigid_guards import mode_switches
+from jaxbiped.scene._bodies import Point
+from jaxbiped.scene._joint_parts import HOLDS
 from jaxbiped.scene._modes import Mode, _touch_within, rigid_modes
 from tests.dynamics.test_rolling_mechanisms import (
     a_state,

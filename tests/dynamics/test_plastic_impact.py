@@ -9,12 +9,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxbiped import Mechanism, Stop
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._mode_changes import settled, with_mode
 from jaxbiped.dynamics._stance import stance_on
 from jaxbiped.dynamics._stance_motion import Grip, plastic_impact
-from jaxbiped.scene._joint_parts import Stop
-from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode, rigid_modes
 from tests.dynamics.test_modes import HEEL_TOE, couples
 from tests.dynamics.test_rolling_mechanisms import rigid, sole_of, whole
@@ -30,14 +29,14 @@ PARTS = dict(root_mass=0.3, bodies=HEEL_TOE.bodies, feet=HEEL_TOE.feet, mirror=M
 WALKER, BARE = Mechanism(**PARTS, joints=STOPS), Mechanism(**PARTS)
 SCENE = rigid(WALKER)
 TOLERANCE = 1e-9
+YES, NO = np.bool_(True), np.bool_(False)
 
 
 @host_jit()
-def struck(scene, state, held):
-    """Behind an impact of both ends of the foot that stands, with limits that may let go."""
+def struck(scene, state, held, down):
+    """Behind an impact of those ends of the foot that are down, with limits that may let go."""
     grip, feet = Grip(held, (True,) * len(held)), WALKER.structure.feet_of_leg[1]
-    flat = (state.mode == state.mode,) * 2
-    found = plastic_impact(stance_on(scene, state, 1), feet, flat, None, rigid_modes(WALKER), grip)
+    found = plastic_impact(stance_on(scene, state, 1), feet, down, None, rigid_modes(WALKER), grip)
     motion = found.stance.pose.motion
     return motion.rates, found.impulse, found.stands, found.held
 
@@ -53,10 +52,10 @@ def drawn(seed):
     return jax.tree.map(np.float64, state), tuple(map(np.bool_, held))
 
 
-def allowed(motion, held, before):
-    """Of all sets of contacts and limits those with no pull and no penetration.
+def responses(motion):
+    """By contacts, a foot's along the ground and up, and limits: its speed, and what it moves.
 
-    Each with what becomes of `before`, rates or accelerations.
+    Of rates, or of accelerations.
     """
     limits = rigid_modes(WALKER).limits
     count = 2 + len(motion.rates)
@@ -78,6 +77,22 @@ def allowed(motion, held, before):
         rows[i] = np.array([0.0, 0.0, *(limit.gap.of(e) for e in np.eye(count - 2))])
         given = couples(SCENE, still, [limit], [1.0])
         answers[i] = maximal_accelerations(BARE, still, SLOPE, 0.0, given) - free
+    return rows, answers
+
+
+def brought_to_rest(used, rows, answers, before):
+    """What these contacts and limits make of rates, or accelerations; and their impulses."""
+    matrix = np.array([[rows[a] @ answers[b] for b in used] for a in used])
+    impulses = np.linalg.solve(matrix, -np.array([rows[a] @ before for a in used]))
+    return before + sum(p * answers[b] for p, b in zip(impulses, used, strict=True)), impulses
+
+
+def allowed(motion, held, before):
+    """Of all sets of contacts and limits those with no pull and no penetration.
+
+    Each with what becomes of `before`, rates or accelerations.
+    """
+    rows, answers = responses(motion)
     able = [i for i, each in enumerate(held) if each]
     feet = [(2,), (3,), (2, 3)]
     subsets = [s for n in range(len(able) + 1) for s in itertools.combinations(able, n)]
@@ -85,9 +100,7 @@ def allowed(motion, held, before):
     for stand, stay in itertools.product(feet, subsets):
         presses = [(foot, 1) for foot in stand] + list(stay)
         used = [(stand[0], 0), *presses]
-        matrix = np.array([[rows[a] @ answers[b] for b in used] for a in used])
-        impulses = np.linalg.solve(matrix, -np.array([rows[a] @ before for a in used]))
-        after = before + sum(p * answers[b] for p, b in zip(impulses, used, strict=True))
+        after, impulses = brought_to_rest(used, rows, answers, before)
         others = {(2, 1), (3, 1), *able} - set(presses)
         leaves = [rows[each] @ after for each in others]
         if min([*impulses[1:], *leaves]) >= -TOLERANCE:
@@ -102,7 +115,7 @@ def test_an_impact_holds_the_one_set_that_neither_pulls_nor_penetrates():
         state, held = drawn(seed)
         motion = whole(SCENE, state)
         expected = allowed(motion, held, np.array([motion.vx, motion.vz, *motion.rates]))
-        rates, impulse, stands, _ = struck(SCENE, state, held)
+        rates, impulse, stands, _ = struck(SCENE, state, held, (YES, YES))
         sets.add(expected[0][0] if expected else ())
         if not expected:
             assert any(stands)
@@ -112,6 +125,18 @@ def test_an_impact_holds_the_one_set_that_neither_pulls_nor_penetrates():
             assert tuple(k for k, each in zip((2, 3), stands, strict=True) if each) == stand
         assert float(impulse.z) > -TOLERANCE
     assert sets == {(), (2,), (3,), (2, 3)}
+
+
+def test_one_end_of_a_foot_comes_to_rest_and_the_other_stays_free():
+    for seed, (foot, down) in itertools.product(range(5), ((2, (YES, NO)), (3, (NO, YES)))):
+        state, _ = drawn(seed)
+        motion = whole(SCENE, state)
+        before = np.array([motion.vx, motion.vz, *motion.rates])
+        after, impulses = brought_to_rest([(foot, 0), (foot, 1)], *responses(motion), before)
+        rates, impulse, stands, _ = struck(SCENE, state, (NO,) * 4, down)
+        np.testing.assert_allclose(rates, after[2:], atol=1e-8)
+        np.testing.assert_allclose((impulse.x, impulse.z), impulses, atol=1e-8)
+        assert tuple(stands) == down
 
 
 @host_jit()

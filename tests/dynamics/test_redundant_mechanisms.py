@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped import Body, Foot, Mechanism
 from jaxbiped.compiler import host_jit
-from jaxbiped.scene._bodies import Body, Foot
-from jaxbiped.scene._mechanism import Mechanism
 from tests.mechanisms import FEET, LAWS, LEGS, WALKERS, scene_of, start_of
 
 WHEEL = Body("wheel", mass=1.0, inertia=0.5, centre=0.0)

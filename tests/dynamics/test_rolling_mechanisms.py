@@ -1,5 +1,7 @@
 """Mechanisms that roll and strike, against maximal coordinates with hinges as constraints."""
 
+from collections import namedtuple
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -7,15 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.dynamics._energy import kinetic_energy
-from jaxbiped.dynamics._joint_loads import motion_of
-from jaxbiped.dynamics._tree import Motion
-from jaxbiped.scene._bodies import Body, Foot, Point
-from jaxbiped.scene._joint_parts import Coupling, Latch, Motor, Spring
-from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped import Body, Coupling, Foot, Latch, Mechanism, Motor, Spring
 from tests.mechanisms import FEET as STRAIGHT
-from tests.mechanisms import LEGS, PAIR, SLOPE, TORSO, WALKERS, G
+from tests.mechanisms import LEGS, PAIR, SLOPE, TORSO, WALKERS, G, scene_of
 from tests.random_mechanisms import arm, maximal_accelerations
+
+Motion = namedtuple("Motion", "x z vx vz angles rates")
+Place = namedtuple("Place", "along ahead")
 
 floats = lambda low, high: st.floats(low, high, allow_subnormal=False)
 places = st.one_of(floats(-0.2, 0.2), st.tuples(floats(-0.2, 0.2), floats(-0.2, 0.2)))
@@ -70,10 +70,19 @@ def a_state(draw, scene):
 
 
 def whole(scene, state):
-    """Place of the root point, angles and rates of all bodies."""
-    found = jb.dynamics.whole_state(scene, state)
-    half = len(found) // 2
-    return motion_of(scene.mechanism, scene.ground, found[:half], found[half:])
+    """Place of the root point, angles and rates of all bodies; a coupled torso bisects its legs."""
+    found, bodies = (
+        jb.dynamics.whole_state(scene, state)._asdict(),
+        scene.mechanism.structure.bodies,
+    )
+
+    def of_bodies(kind):
+        legs = [found[f"{kind}_a{i}"] for i in (1, 2)]
+        return tuple(np.asarray(found.get(f"{kind}_{name}", np.mean(legs))) for name in bodies)
+
+    x, z = list(found.values())[:2]
+    vx, vz = (found[name] for name in found if name.endswith(("_vx", "_vz")))
+    return Motion(x, z, vx, vz, of_bodies("theta"), of_bodies("omega"))
 
 
 def sole_of(scene, motion, number):
@@ -84,7 +93,7 @@ def sole_of(scene, motion, number):
     radius = 0.0 if foot.radius is None else float(foot.radius)
     sine, cosine = np.sin(motion.angles[body]), np.cos(motion.angles[body])
     ahead = 0.0 if centre.ahead is None else float(centre.ahead)
-    lowest = Point(float(centre.along) + radius * cosine, ahead - radius * sine)
+    lowest = Place(float(centre.along) + radius * cosine, ahead - radius * sine)
     place = np.array([motion.x, motion.z], float)
     speed = np.array([motion.vx, motion.vz], float)
     chain = s.chains[body]
@@ -137,7 +146,7 @@ def test_an_impact_is_that_of_maximal_coordinates(push, data, mechanism):
         centre = np.array(_centre(scene, before))
         along = 0.2 * -centre / np.hypot(*centre)
         # On the root point, as a force on the pelvis or on a leg at its hinge.
-        forces.append((s.children[-1][0], Point(0.0), *along))
+        forces.append((s.children[-1][0], Place(0.0, None), *along))
     still = before._replace(vx=0.0, vz=0.0, rates=(0.0,) * n)
     gained = maximal_accelerations(mechanism, still, SLOPE, 0.0, forces)
     gained = gained - maximal_accelerations(mechanism, still, SLOPE, 0.0)
@@ -166,11 +175,12 @@ def _speed(scene, motion, number):
 
 @pytest.mark.parametrize("name", ["torso", "coupled"])
 def test_kinetic_energy_is_the_compliant_walkers_and_push_off_works(name):
-    """Kinetic energy is the compliant walker's in the same motion."""
+    """In the same motion."""
     scene = rigid(WALKERS[name], jb.actuation.PushOff(0.1))
     state = scene.state(theta_leg_1=0.2, theta_leg_2=-0.25, omega_leg_1=-0.3, omega_leg_2=-1.4)
-    kinetic = jb.dynamics.energies(scene, state).kinetic
-    assert float(kinetic_energy(scene, state)) == pytest.approx(float(kinetic), rel=1e-13)
+    whole = jb.dynamics.whole_state(scene, state)
+    ours, same = jb.dynamics.energies(scene, state), jb.dynamics.energies(scene_of(name), whole)
+    assert float(ours.kinetic) == pytest.approx(float(same.kinetic), rel=1e-13)
     assert float(jb.dynamics.push_off_work(scene, state)) > 0.0
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._surfaces import straight_legs, switches
-from jaxbiped.scene.laws._catalogue import normal_law_like
-from jaxbiped.variational._hybrid_system import Rolling
+from jaxbiped.dynamics._surfaces import straight_legs
+from jaxbiped.hybrid import Rolling, switches
+from jaxbiped.scene.laws import normal_law_like
 from tests.mechanisms import FEET, LEGS, PAIR, scene_of, start_of
 
 SEED = jb.seed_scene()

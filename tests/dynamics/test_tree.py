@@ -9,14 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
+from jaxbiped import Body, Coupling, Foot, Latch, Mechanism, Spring, Stop
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._implicit_field import force_balance, free_mass_entries
+from jaxbiped.dynamics._force_balance import force_balance, free_mass_entries
 from jaxbiped.dynamics._joint_loads import motion_of, with_constraint_torques, with_joint_loads
 from jaxbiped.dynamics._tree import Loads, point_motion, pose_of
 from jaxbiped.dynamics._tree_inertia import composites, eliminate, inertial_loads
-from jaxbiped.scene._bodies import Body, Foot, Point
-from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
-from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._bodies import Point
 from tests.random_mechanisms import maximal_accelerations, mechanisms, motions
 
 SLOPE, GRAVITY = 0.1, 9.8

@@ -20,8 +20,7 @@ def test_true_errors_lie_within_their_bars(tmp_path):
 
 
 def test_few_labels_change_and_those_in_doubt_are_told(tmp_path):
-    bare = ("relative tolerance", "share of labels that a finer solve changes")
-    numbers, _ = drawn_run("label_accuracy", tmp_path, unitless=bare)
+    numbers, _ = drawn_run("label_accuracy", tmp_path)
     changed = {row["way"]: row["changed"] for row in numbers["named"]["rows"]}
     assert changed["tight"] <= changed["draft"] <= 0.02 * numbers["starts"]
     assert numbers["named"]["references_differ"] <= 1

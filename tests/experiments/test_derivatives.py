@@ -25,6 +25,14 @@ def test_every_derivative_through_an_ending_is_right_or_refused(tmp_path):
     assert "kelvin-voigt" in (tmp_path / "event_derivatives.md").read_text()
 
 
+def test_every_option_of_a_simulation_returns_what_a_finer_walk_does(tmp_path):
+    numbers, _ = quick_run("simulation_matrix", tmp_path)
+    for cells in numbers["cells"].values():
+        assert len(cells) == 4
+        assert max(cells.values()) < 5e-6
+    assert "| `save=times` |" in (tmp_path / "simulation_matrix.md").read_text()
+
+
 def test_every_parameter_s_derivative_of_a_mechanism_is_right(tmp_path):
     numbers, _ = quick_run("mechanism_derivatives", tmp_path)
     (row,) = numbers["rows"]

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._types import Scalar
-from jaxbiped.dynamics._surfaces import Switch
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from tests.systems import Plain, orbit_near
+from jaxbiped.hybrid import Switch
+from tests.systems import Plain, map_of, orbit_near
 
 HEIGHT, DRIFT = 0.3, 0.7
 """Height of the section [m], and what the cyclic coordinate gains of the squared speed [s/m]."""
@@ -23,13 +21,13 @@ class Numbers(NamedTuple):
     `kick` + `keep` v − `curb` v² of the mass's speed v as it comes up through the section.
     """
 
-    g: Scalar
-    k: Scalar
-    push: Scalar
-    level: Scalar
-    kick: Scalar
-    keep: Scalar
-    curb: Scalar
+    g: jax.Array
+    k: jax.Array
+    push: jax.Array
+    level: jax.Array
+    kick: jax.Array
+    keep: jax.Array
+    curb: jax.Array
 
 
 class Trampoline(Plain):
@@ -84,7 +82,7 @@ def gait(n):
 def test_an_orbit_with_its_multiplier_and_all_derivatives():
     """Energy is kept: what the switch adds to second derivatives must cancel."""
     active = (0, 1, 3, 4, 5, 6)
-    spec = ReturnMapSpec(Trampoline(False), ABOVE, jb.solvers.Rodas4(), 20.0, 1, 32768, "lanes")
+    spec = map_of(Trampoline(False), ABOVE, engine="lanes")
     guess = tuple(map(jnp.asarray, (0.0, HEIGHT, 2.0)))
 
     found = jax.jit(lambda args: orbit_near(spec, args, guess, active))(

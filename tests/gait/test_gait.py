@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
+from tests.compiler.one_shot import count_runs
 
 pytestmark = pytest.mark.slow
 
@@ -25,18 +25,12 @@ def test_seed_gait(seed_gait):
 
 def test_no_return_is_solved_twice(seed_gait, monkeypatch):
     """The records of two turns are read at a search's end: they waited on the host."""
-    most, run_table = [], CompiledProgram.run_table
-
-    def counted(self, *args, **options):
-        most.append(options.get("room", 0))
-        return run_table(self, *args, **options)
-
-    monkeypatch.setattr(CompiledProgram, "run_table", counted)
+    runs = count_runs(monkeypatch)
     again = jb.find_gait(jb.seed_scene())
     # A run for each turn; a looser one from the gait itself, for its bars; that of the parameters,
     # and the second derivatives there and back.
-    assert len(most) == int(again.evaluations) + 4
-    assert [room > 0 for room in most] == [True] * (len(most) - 1) + [False]
+    assert len(runs) == int(again.evaluations) + 4
+    assert [room > 0 for _, _, room in runs] == [True] * (len(runs) - 1) + [False]
     np.testing.assert_array_equal(again.orbit[0], seed_gait.orbit[0])
 
 

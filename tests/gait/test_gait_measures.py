@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait import _gait_measures
 
 pytestmark = pytest.mark.slow
 
@@ -57,10 +56,12 @@ def test_gradient_must_be_a_mode():
         jb.gait_measures(jb.seed_scene(), gradient="forward")
 
 
-def test_second_derivatives_are_refused(monkeypatch):
-    """Those of measures before a search."""
-    monkeypatch.setattr(_gait_measures, "find_gait", None)
+def test_second_derivatives_are_refused(monkeypatch, tmp_path):
+    """Before a search, whose programs would be kept: no other test has this scene's actuators."""
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path))
     rigid = jb.ladder()["rigid"]
+    pulses = tuple(jb.actuation.HipPulse(0.0, phase=phase) for phase in (0.1, 0.2, 0.3))
+    rigid = jb.RigidScene(rigid.walker, rigid.ground, pulses)
     start = jb.dynamics.rigid_state(jb.seed_state())
 
     def period(slope):
@@ -75,6 +76,7 @@ def test_second_derivatives_are_refused(monkeypatch):
     ):
         with pytest.raises(jb.ArgumentError, match=said):
             jax.make_jaxpr(jax.hessian(function))(at)
+    assert not list(tmp_path.rglob("*"))
 
 
 def test_pieces_left_out_do_not_shift_a_scenes_leaves():

@@ -247,4 +247,43 @@ def test_bars_hold_what_a_tight_solve_changes(changes):
         shares.extend(np.abs(told - right) / bars)
     assert len(shares) == 75
     assert max(shares) <= 1.0
-    assert np.median(shares) >= 0.01
+    # On the steep slope, 0.0134 where the search ended and 0.0054 at Newton's next correction: the
+    # bars are the same, the errors are not.
+    assert np.median(shares) >= 0.004
+
+
+def test_bars_of_the_radius_at_draft_hold_the_error_that_small_columns_have():
+    """Friction's decay moves the orbit by less than columns are solved to: its derivative of the
+    radius was 3.3 and 2.3 bars off."""
+    for slope, m, J, K, c, v0, xi, mu_static in (
+        (0.0212, 0.861, 0.00958, 1.65e6, 1.55e7, 1.41e-4, 1330.0, 0.641),
+        (0.0226, 0.913, 0.01, 6.06e5, 5.36e6, 1.29e-4, 902.0, 0.552),
+    ):
+        scene = jb.seed_scene(slope=slope, m=m, J=J, K=K, c=c, v0=v0, xi=xi, mu_static=mu_static)
+        draft, tight = (jb.find_gait(scene, accuracy=how) for how in ("draft", "tight"))
+        told, right, bars = (
+            each.spectral_radius
+            for each in (draft.sensitivities, tight.sensitivities, draft.sensitivity_errors)
+        )
+        assert np.max(np.abs(told - right) / bars) <= 1.0
+
+
+def test_gaits_at_draft_resolve_how_friction_builds_up():
+    """At the tolerance of the name, multipliers were 8.7 bars off, by 0.012, and on the second
+    scene lengths of steps 5 bars."""
+    for slope, m, J, K, c, v0, xi, mu_static in (
+        (0.0206, 0.984, 0.00923, 1.66e6, 9.15e6, 5.29e-6, 1880.0, 0.793),
+        (0.0185, 0.874, 0.00905, 1.12e6, 1.19e7, 6.59e-6, 576.0, 0.524),
+    ):
+        scene = jb.seed_scene(slope=slope, m=m, J=J, K=K, c=c, v0=v0, xi=xi, mu_static=mu_static)
+        how = dict(parameters=(), radius_sensitivities=False)
+        draft, tight = (jb.find_gait(scene, accuracy=name, **how) for name in ("draft", "tight"))
+        off = np.abs(np.abs(draft.multipliers) - np.abs(tight.multipliers))
+        assert np.all(off <= draft.multiplier_errors)
+        assert off.max() < 2e-3
+        for name in ("period", "step_length", "speed", "peak_normal"):
+            told, right, bar = (
+                float(getattr(each, name))
+                for each in (draft.measures, tight.measures, draft.measure_errors)
+            )
+            assert abs(told - right) <= bar, name

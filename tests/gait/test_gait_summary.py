@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait import _gait_summary
+from jaxbiped.gait import FoundBy, LinearisedReturn, Slopes, Stability
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
-from jaxbiped.gait._orbit_derivatives import Orbit, Slopes
-from jaxbiped.gait._poincare_map import LinearisedReturn
+from jaxbiped.gait._gait_summary import summary_of
+from jaxbiped.gait._orbit_derivatives import Orbit
 from jaxbiped.gait._return_map_spec import return_map_spec
-from jaxbiped.gait._search_provenance import FoundBy, single_stage_origin
-from jaxbiped.gait._stability import Stability
+from jaxbiped.gait._search_provenance import single_stage_origin, warn_of_unknown
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._solve_to_section import Nodes
@@ -55,20 +54,9 @@ def summary():
         orbit = Orbit(found, state, stability, slopes, errors, RADIUS, 0.1 * RADIUS, SIZES)
         return jax.tree.map(jnp.asarray, orbit)
 
-    patch = pytest.MonkeyPatch()
-    patch.setattr(_gait_summary, "nodes_of", lambda *_: (jnp.zeros((1, 1)), start))
     problem = FixedPointProblem(spec, scene, active, start, Precision(0.0, 0.0))
-    origin = single_stage_origin(problem, FoundBy.GUESS)
-
-    @jax.jit
-    def summarised(ending):
-        orbit = both(ending)
-        patch.setattr(_gait_summary, "orbit_of", lambda *_, **__: orbit)
-        patch.setattr(_gait_summary, "with_parameter_columns", lambda *given: given[-1])
-        return _gait_summary.summarise_gait.__wrapped__(problem, orbit.found, NAMES, True, origin)
-
-    yield summarised
-    patch.undo()
+    origin, path = single_stage_origin(problem, FoundBy.GUESS), (jnp.zeros((1, 1)), start)
+    return jax.jit(lambda ending: summary_of(problem, both(ending), path, NAMES, origin))
 
 
 def test_sensitivities_are_in_the_units_of_the_parameters(summary):
@@ -119,3 +107,8 @@ def test_what_never_returned_is_not_a_number_and_at_no_bifurcation(summary):
     best = summary(jnp.asarray(int(jb.gait.Search.NOT_CONVERGED)))
     assert float(best.measures.period) == 0.5
     assert not bool(best.stable)
+
+
+def test_a_gait_that_grazes_a_switch_warns(summary):
+    with pytest.warns(RuntimeWarning, match="its sensitivities are not known"):
+        warn_of_unknown(summary(jnp.asarray(0)))

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._state import state_type
-from jaxbiped.gait._search_provenance import warn_of_unknown
 from tests.rigid_walkers import rigid_seed, simplest_walker
 
 AT_THE_PEAK = (
@@ -175,12 +173,12 @@ def test_a_scene_with_bristles_is_searched_in_stages_too():
 def test_multipliers_hold_where_the_load_peaks_as_the_clearance_rule_admits_a_foot():
     """An unstable gait of the bristles; central differences of the return map."""
     scene = jb.with_parameters(jb.ladder()["bristles"], {"slope": 0.0592})
-    start = state_type(scene)(0.0, *AT_THE_PEAK)
+    start = jb.dynamics.BristleState(0.0, *AT_THE_PEAK)
     gait = jb.find_gait(scene, start, **PLAIN)
     state = np.array([float(each) for each in gait.measures.state[1:]])
 
     def returned(point):
-        found = jb.return_map(scene, state_type(scene)(0.0, *point), accuracy="tight").state
+        found = jb.return_map(scene, jb.dynamics.BristleState(0.0, *point), accuracy="tight").state
         return np.array([float(each) for each in found[1:]])
 
     step = 1e-6 * np.eye(len(state))
@@ -191,13 +189,10 @@ def test_multipliers_hold_where_the_load_peaks_as_the_clearance_rule_admits_a_fo
 
 def test_a_gait_that_grazes_a_switch_is_told():
     scene = jb.ladder()["rigid"]
-    gait = jb.find_gait(scene, **PLAIN)
-    assert int(gait.grazes) == 0
-    assert "grazes" not in jb.gait.explain_search(scene, gait)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warn_of_unknown(gait)
+        gait = jb.find_gait(scene, **PLAIN)
+    assert int(gait.grazes) == 0
+    assert "grazes" not in jb.gait.explain_search(scene, gait)
     grazing = eqx.tree_at(lambda each: each.grazes, gait, jnp.asarray(2))
     assert "the gait grazes a switch 2 times" in jb.gait.explain_search(scene, grazing)
-    with pytest.warns(RuntimeWarning, match="its sensitivities are not known"):
-        warn_of_unknown(grazing)

@@ -1,15 +1,19 @@
 """Homotopy: its scenes against both ends, branches along it against curves in closed form."""
 
+import dataclasses
+from types import SimpleNamespace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.gait import BranchEnd
 from jaxbiped.gait._branch_along import follow_branch
-from jaxbiped.gait._homotopy import homotopy_to
+from jaxbiped.gait._homotopy import _is_ahead, homotopy_to
 from jaxbiped.gait._pseudo_arclength import Change
-from jaxbiped.gait._search_provenance import BranchEnd
+from tests.mechanisms import seed_walker
 
 SCENES = {
     "seed": jb.seed_scene(slope=0.05, K=1e8, hip_mass=2.0),
@@ -39,6 +43,26 @@ def test_the_line_joins_the_seed_to_the_scene(name):
             np.testing.assert_allclose(got, wanted, rtol=1e-14, atol=0.0)
     assert float(line.first.walker.l) == float(jb.seed_scene().walker.l)
     assert float(line.first.ground.slope) == 0.02
+
+
+def test_a_walker_without_a_mass_at_its_hip_has_none_on_the_line_either():
+    scene = dataclasses.replace(jb.seed_scene(slope=0.05), walker=seed_walker())
+    scene = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype=float), scene)
+    line = homotopy_to(scene)
+    assert jax.tree.structure(line.first) == jax.tree.structure(scene)
+    assert line.first.walker.root_mass is None
+    assert float(line.first.walker.total_mass) == pytest.approx(float(scene.walker.total_mass))
+
+
+def test_the_line_ends_in_the_very_numbers_of_the_scene():
+    """A ratio that is multiplied out again need not give its numerator back."""
+    generator = np.random.default_rng(2)
+    for stiffness, damping, mass in generator.uniform(1.0, 9.0, (10, 3)).tolist():
+        scene = jb.seed_scene(K=1e7 * stiffness, c=1e7 * damping, hip_mass=mass)
+        for got, wanted in zip(
+            jax.tree.leaves(homotopy_to(scene).at(1.0)), jax.tree.leaves(scene), strict=True
+        ):
+            assert float(got) == float(wanted)
 
 
 def test_positive_parameters_go_geometrically_and_slopes_are_derivatives():
@@ -140,3 +164,25 @@ def test_a_branch_of_several_components_is_in_their_own_units():
         assert branch.s[[0, -1]] == pytest.approx([0.25, 1.0], abs=1e-12)
         expected = np.stack([branch.s, branch.s**2, 3.0 - branch.s], axis=1)
         np.testing.assert_allclose(branch.points, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("latest_s", "point", "ahead"),
+    [
+        (0.2, 1.4, True),
+        (0.2, 1.3, True),
+        (0.2, 1.2, False),
+        (0.2, 1.0, False),
+        (0.0, 1.0, True),
+        (0.0, 0.8, True),
+        (0.0, 1.2, False),
+    ],
+)
+def test_a_gait_is_ahead_where_those_before_it_point_or_at_first_where_it_is_near(
+    latest_s, point, ahead
+):
+    """From 0.9 they point to 1.4: a longer way may lead farther aside, by half its length."""
+    way = SimpleNamespace(
+        at=jnp.array([0.0, latest_s]), latest_point=jnp.array([0.9]), ahead=jnp.array([1.4])
+    )
+    assert bool(_is_ahead(way, jnp.array([point]))) is ahead

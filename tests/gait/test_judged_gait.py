@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.gait import Measures, Search
 from jaxbiped.gait._accurate_gait import judge_gait
-from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.gait._gait import Measures
 
 SCENE = jb.with_parameters(jb.seed_scene(), {"hip_mass": 0.0, "slope": -0.02})
 STATE = jax.tree.map(np.asarray, jb.seed_state())

@@ -9,7 +9,6 @@ from reference.mechanism_flow import checked_cycle
 from reference.mechanism_pieces import Field, pieces_at
 
 import jaxbiped as jb
-from jaxbiped.solve._accuracy import Precision
 from tests.mechanism_numbers import directions_of, tree_of
 
 CASES = cases()
@@ -96,11 +95,12 @@ def test_derivatives_of_the_peak_fall_with_the_tolerance():
     friction slows to so fast has rates that are off by more, and by these the peak's time."""
     case = CASES["torso on a spring"]
 
-    def peak(accuracy, solver="rodas4"):
+    def peak(rtol, tangent_rtol, solver="rodas4"):
+        accuracy = jb.ACCURACIES["tight"].gait._replace(rtol=rtol, tangent_rtol=tangent_rtol)
         how = dict(accuracy=accuracy, solver=solver, parameters=("slope", "n"))
         gait = jb.find_gait(case.scene, case.guess, radius_sensitivities=False, **how)
         return np.asarray(gait.elasticities.peak_normal)
 
-    exact = peak(Precision(1e-10, 1e-10), "rodas5p")
+    exact = peak(1e-10, 1e-10, "rodas5p")
     for rtol in (1.8e-9, 5.6e-10, 3.2e-10):
-        np.testing.assert_allclose(peak(Precision(rtol, 10.0 * rtol)), exact, rtol=2e-9)
+        np.testing.assert_allclose(peak(rtol, 10.0 * rtol), exact, rtol=2e-9)

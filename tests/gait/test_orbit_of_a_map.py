@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._types import Scalar
-from jaxbiped.gait import _orbit_derivatives
+from jaxbiped import Gait
+from jaxbiped.gait import LinearisedReturn, Measures, _orbit_derivatives, slopes_of
 from jaxbiped.gait._accurate_gait import judge_gait
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
@@ -19,28 +19,31 @@ from jaxbiped.gait._fixed_point_search import (
     takes_steps,
     walks_only,
 )
-from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gait_measures import _by_correction
 from jaxbiped.gait._gait_summary import elasticities_of, measure_errors, measure_slopes
 from jaxbiped.gait._newton import Method, Stage, initial_progress, newton_iteration
-from jaxbiped.gait._orbit_derivatives import SecondVariation, slopes_of
-from jaxbiped.gait._poincare_map import LinearisedReturn
+from jaxbiped.gait._orbit_derivatives import SecondVariation
 from jaxbiped.gait._return_map_spec import return_map_spec
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._solve_to_section import Nodes
+from tests.systems import map_of
+from tests.variational.test_grazing import ABOVE, PULL, PUSH, Pulled
+from tests.variational.test_grazing import start as pulled_from
 
 P = np.array([0.7, -0.4])
 TURN = np.array([[0.5, -0.6, 0.1], [0.6, 0.4, 0.0], [0.2, 0.1, 0.3]])
 """With a complex leading pair."""
+LEAST = 1e-3 * jnp.array([1.0, 2.0, 4.0])
 SHEAR = np.array([[0.8, 0.3, 0.0], [0.0, 0.2, 0.1], [0.1, 0.0, 0.3]])
 
 
 class Triple(NamedTuple):
     """A state of one cyclic and three recurring components."""
 
-    hip_x: Scalar
-    theta_1: Scalar
-    omega_1: Scalar
-    omega_2: Scalar
+    hip_x: jax.Array
+    theta_1: jax.Array
+    omega_1: jax.Array
+    omega_2: jax.Array
 
 
 def returned(linear, x, p):
@@ -116,18 +119,24 @@ def test_sensitivities_are_differences_of_fixed_points(linear, monkeypatch):
     @jax.jit
     def told(last):
         slopes, length = slopes_of(last), last.advance[0]
-        radius, terms, _ = _orbit_derivatives._radius_slopes(problem, (last, None))
+        radius, terms, floor = _orbit_derivatives._radius_slopes(problem, LEAST, (last, None))
         measured = Measures(last.period, length, length / last.period, last.peak, None, zero)
         seven = slopes._replace(recurring=jnp.concatenate([slopes.recurring, jnp.zeros((4, 2))]))
         found = measure_slopes(SimpleNamespace(), measured, seven, radius)
         values = Measures(2.0, *[4.0] * 4, jnp.asarray(8.0))
         of = problem._replace(args=(1.0, 0.0))
         relative = elasticities_of(of, values, found._replace(state=found.period))
-        return slopes.recurring, found, relative, terms
+        return slopes.recurring, found, relative, terms, floor
 
     last = linearised(linear, x, P)
-    recurring, found, relative, terms = told(last)
+    recurring, found, relative, terms, floor = told(last)
     assert np.all(terms >= np.abs(found.spectral_radius) * (1.0 - 1e-12))
+    # Columns are wrong by LEAST: 0.3 of what terms have of columns that are no larger than that.
+    moved = {
+        size: told(last._replace(jacobian=last.jacobian.at[:, 3:].set(size * LEAST[:, None])))[3]
+        for size in (0.0, 1.0)
+    }
+    np.testing.assert_allclose(floor, 0.3 * (moved[1.0] - moved[0.0]), rtol=1e-6)
     ours = [*recurring, found.period, found.step_length, found.speed, found.peak_normal]
     expected = differences(linear)
     np.testing.assert_allclose(
@@ -141,36 +150,96 @@ def test_sensitivities_are_differences_of_fixed_points(linear, monkeypatch):
 def test_bars_of_slopes_hold_two_witnesses_and_a_floor():
     """A derivative that no other solve changes, even one that is zero, has that of its column."""
     last = linearised(TURN, jnp.asarray(fixed_point(TURN, P)), P)
-    moved = {"jacobian": last.jacobian.at[:, 3].multiply(1.0 + 1e-6)}
-    found = SimpleNamespace(last=last, coarse=last, recurring=last.recurring, again=None)
+    moved = {"jacobian": last.jacobian.at[:, 1].multiply(1.0 + 1e-6)}
+    found = SimpleNamespace(last=last, fine=last, loose=last, recurring=last.recurring)
     slopes, least = slopes_of(last), 1e-9 * jnp.array([1.0, 2.0, 4.0])
     floor = _orbit_derivatives._slope_errors(found, slopes, least)
     inverse = np.abs(np.linalg.inv(np.eye(3) - np.asarray(last.jacobian)[:, :3]))
     expected = 0.3 * inverse @ np.asarray(least)
     np.testing.assert_allclose(floor.recurring, np.stack([expected] * 2, axis=1), rtol=1e-9)
-    for witness in ("coarse", "again"):
+    for witness in ("loose", "last"):
         other = SimpleNamespace(**(vars(found) | {witness: last._replace(**moved)}))
         bars = _orbit_derivatives._slope_errors(other, slopes, least)
         change = np.abs(slopes_of(last._replace(**moved)).period - slopes.period)
+        assert np.all(change > floor.period)
         assert np.all(bars.period >= change + floor.period - 1e-18)
+
+
+def one_component(by_state, *by_parameters, period_row=(0.0, 0.0, 0.0)):
+    """A return of one component, with derivatives with respect to it and to two parameters."""
+    one, rows = jnp.ones(1), jnp.zeros(3)
+    jacobian = jnp.array([[by_state, *by_parameters]])
+    return LinearisedReturn(
+        one, jacobian, rows[None], one, one[0], jnp.array(period_row), one, rows[None], one[0],
+        rows, 0, 0, 0, 0, None,
+    )  # fmt: skip
+
+
+def bars_of(fine, loose, last):
+    found = SimpleNamespace(fine=fine, loose=loose, last=last, recurring=fine.recurring)
+    return _orbit_derivatives._slope_errors(found, slopes_of(fine), jnp.zeros(1))
 
 
 def test_a_derivative_that_by_chance_is_not_changed_has_a_share_of_the_pooled_change():
     """x ← x/2 + p + q: dx/dp = dx/dq = 2. A looser solve says 2 and 2.2, shares 0 and 0.1 of the
     terms, with the root mean square 0.1/√2; seven tenths of that of 2 are 0.0989949."""
-    one, rows = jnp.ones(1), jnp.zeros(3)
-    last = LinearisedReturn(
-        one, jnp.array([[0.5, 1.0, 1.0]]), rows[None], one, one[0], rows, one, rows[None], one[0],
-        rows, 0, 0, 0, 0, None,
-    )  # fmt: skip
-    coarse = last._replace(jacobian=jnp.array([[0.5, 1.0, 1.1]]))
-    found = SimpleNamespace(last=last, coarse=coarse, again=None)
-    bars = _orbit_derivatives._slope_errors(found, slopes_of(last), jnp.zeros(1))
-    np.testing.assert_allclose(bars.recurring, [[0.0989949, 0.2]], rtol=1e-5)
-    both = _orbit_derivatives._slope_errors(
-        SimpleNamespace(last=last, coarse=coarse, again=coarse), slopes_of(last), jnp.zeros(1)
+    fine, loose = one_component(0.5, 1.0, 1.0), one_component(0.5, 1.0, 1.1)
+    np.testing.assert_allclose(bars_of(fine, loose, fine).recurring, [[0.0989949, 0.2]], rtol=1e-5)
+    # By the search's own x/2.2, both are 11/6.
+    other = one_component(1.0 / 2.2, 1.0, 1.0)
+    np.testing.assert_allclose(
+        bars_of(fine, loose, other).recurring, [[0.0989949 + 1 / 6, 0.2 + 1 / 6]], rtol=1e-5
     )
-    np.testing.assert_allclose(both.recurring, [[0.0989949, 0.4]], rtol=1e-5)
+
+
+def test_a_parameter_that_moves_one_quantity_more_than_others_do_is_as_uncertain_in_the_rest():
+    """The same, and a period of 4 p + q: a looser solve says 4 p (1 + 0.3) + q, a share of 0.3,
+    and of dx/dq the 0.1. Of shares 0, 0.1 and 0.3, 0, and 0 of what has no derivatives, √0.09 by p
+    is √(2·0.9) of all; by that much 0.1/√2 of dx/dp = 2 is expected to be wrong: 0.189737."""
+    fine = one_component(0.5, 1.0, 1.0, period_row=(0.0, 4.0, 1.0))
+    loose = one_component(0.5, 1.0, 1.1, period_row=(0.0, 5.2, 1.0))
+    bars = bars_of(fine, loose, fine)
+    np.testing.assert_allclose(bars.recurring, [[0.189737, 0.2]], rtol=1e-5)
+    np.testing.assert_allclose(bars.period, [1.2, 0.7 * 0.3 / np.sqrt(2.0)], rtol=1e-5)
+
+
+def test_a_component_that_the_section_holds_leaves_the_others_their_bars():
+    """Its derivatives are rounding, which a looser solve changes wholly: by p and not by q."""
+    fine, loose = one_component(0.5, 1.0, 1.0), one_component(0.5, 1.0, 1.1)
+    expected = bars_of(fine, loose, fine)
+
+    def beside(once, *rounding):
+        rows = jnp.stack([once.jacobian[0, :1], jnp.zeros(1)])
+        by_state = jnp.concatenate([rows, jnp.zeros((2, 1))], axis=1)
+        by_parameter = jnp.stack([once.jacobian[0, 1:], jnp.array(rounding)])
+        jacobian = jnp.concatenate([by_state, by_parameter], axis=1)
+        no = jnp.zeros(4)
+        return once._replace(
+            recurring=jnp.ones(2), jacobian=jacobian, monodromy=jacobian, period_row=no,
+            advance_rows=no[None], peak_row=no,
+        )  # fmt: skip
+
+    fine, loose = beside(fine, 1e-17, 1e-17), beside(loose, -2e-17, 1e-17)
+    found = SimpleNamespace(fine=fine, loose=loose, last=fine, recurring=fine.recurring)
+    least = 1e-9 * jnp.ones(2)
+    bars = _orbit_derivatives._slope_errors(found, slopes_of(fine), least).recurring
+    np.testing.assert_allclose(bars[0], expected.recurring[0], rtol=1e-6)
+    np.testing.assert_allclose(bars[1], 0.3e-9, rtol=1e-6)
+
+
+def test_a_quantity_without_derivatives_leaves_the_others_their_bars():
+    fine, loose = one_component(0.5, 1.0, 1.0), one_component(0.5, 1.0, 1.1)
+    expected = bars_of(fine, loose, fine)
+    fine, loose = (each._replace(peak_row=jnp.full(3, jnp.nan)) for each in (fine, loose))
+    found = bars_of(fine, loose, fine)
+    np.testing.assert_allclose(found.recurring, expected.recurring)
+    assert np.all(np.isnan(found.peak))
+
+
+WALKING = SimpleNamespace(
+    spec=SimpleNamespace(system=SimpleNamespace(cyclic_coordinates=(0,))), loaded=True
+)
+"""What measures ask of the problem of a walker."""
 
 
 def test_errors_of_measures_hold_what_the_looser_solve_and_the_last_correction_change():
@@ -190,7 +259,7 @@ def test_errors_of_measures_hold_what_the_looser_solve_and_the_last_correction_c
         )
         length, period = last.advance[0], last.period
         told = Measures(period, length, length / period, last.peak, 0.5, orbit.state)
-        return measure_errors(told, orbit)
+        return measure_errors(WALKING, told, orbit)
 
     errors = errors_of(last, coarse)
     true = measures(TURN, P)
@@ -209,9 +278,23 @@ def test_errors_of_measures_hold_what_the_looser_solve_and_the_last_correction_c
     coarse = last._replace(
         recurring=last.recurring + moved, period=last.period - row @ inverse @ moved
     )
+    reach, signless = inverse @ moved, np.abs(inverse) @ np.abs(moved)
+    # Changes of period, length and peak, and the terms of them; of the speed they add up.
+    changes, terms = [0.0], [abs(row @ inverse @ moved) + np.abs(row) @ signless]
+    for slopes in (last.advance_rows[0], last.peak_row):
+        changes.append(abs(np.asarray(slopes)[:3] @ reach))
+        terms.append(np.abs(np.asarray(slopes)[:3]) @ signless)
+    length, period = float(last.advance[0]), float(last.period)
+    changes.append(changes[1] / period)
+    terms.append((terms[1] + length / period * terms[0]) / period)
+    share = np.sqrt(np.mean((np.array(changes) / terms) ** 2))
     errors = errors_of(last, coarse)
-    expected = 0.08 * (abs(row @ inverse @ moved) + np.abs(row) @ np.abs(inverse) @ np.abs(moved))
-    assert float(errors.period) == pytest.approx(expected, rel=1e-6)
+    assert 0.25 < share < 0.9
+    assert float(errors.period) == pytest.approx(share * terms[0], rel=1e-6)
+    for error, change, size in zip(
+        errors[:4], np.array(changes)[[0, 1, 3, 2]], np.array(terms)[[0, 1, 3, 2]], strict=True
+    ):
+        assert float(error) == pytest.approx(max(change, share * size), rel=1e-6)
 
 
 def test_newton_goes_quadratically_to_the_fixed_point_and_stops_there():
@@ -225,13 +308,15 @@ def test_newton_goes_quadratically_to_the_fixed_point_and_stops_there():
     assert int(now.stage) == Stage.FOUND
     np.testing.assert_allclose(now.base, x, atol=1e-9)
     assert float(now.base_residual) <= 1e-10
-    # The witness of its error is solved from there.
-    np.testing.assert_array_equal(now.coarse.recurring, linearised(SHEAR, now.base, P).recurring)
+    np.testing.assert_array_equal(now.coarse.recurring, linearised(SHEAR, now.trial, P).recurring)
     assert int(now.evaluations) <= 9
     for off, stage in ((1e-11, Stage.WITNESS), (1e-9, Stage.FINE)):
         latest = linearised(SHEAR, x + off, P)
         near = initial_progress(jnp.asarray(x + off), jnp.asarray(0.0), method, latest)
-        assert int(iteration(near._replace(stage=jnp.asarray(3)), latest).stage) == stage
+        then = iteration(near._replace(stage=jnp.asarray(3)), latest)
+        assert int(then.stage) == stage
+        # The witness of the error, too, is solved from Newton's next correction.
+        np.testing.assert_allclose(then.trial, x, rtol=0.0, atol=1e-14)
     lost = linearised(SHEAR, now.trial, P)._replace(code=jnp.asarray(3))
     begin = initial_progress(jnp.asarray(x), jnp.asarray(0.0), method, lost)
     assert int(iteration(begin, lost).stage) == Stage.NO_RETURN
@@ -346,9 +431,9 @@ def test_an_arrival_may_take_fifty_swings(length):
 class Point(NamedTuple):
     """One of two."""
 
-    hip_x: Scalar
-    theta_1: Scalar
-    omega_1: Scalar
+    hip_x: jax.Array
+    theta_1: jax.Array
+    omega_1: jax.Array
 
 
 def test_a_differentiable_correction_has_the_derivatives_of_the_fixed_point():
@@ -362,9 +447,39 @@ def test_a_differentiable_correction_has_the_derivatives_of_the_fixed_point():
             measures=SimpleNamespace(state=state), return_jacobian=jacobian, ending=jnp.asarray(0)
         )
         once = SimpleNamespace(time=2.0 + state.theta_1, state=after)
-        found = _by_correction(gait, once)
+        found = _by_correction(jb.ladder()["rigid"], gait, once)
         return jnp.stack([found.state.theta_1, found.period, found.step_length])
 
     value, slope = jax.jit(lambda a: jax.jvp(measured, (a,), (jnp.ones(()),)))(0.6)
     np.testing.assert_allclose(value, [7.5, 9.5, 3.75])
     np.testing.assert_allclose(slope, np.array([1.0, 1.0, 0.5]) * 7.5 / (1.0 - 0.6))
+
+
+@pytest.mark.slow
+def test_an_orbit_that_grazes_has_no_sensitivities_and_multipliers_of_infinite_error():
+    args = (jnp.asarray(PULL), jnp.asarray(PUSH))
+    how = dict(rtol=1e-9, tangent_rtol=1e-8, section=ABOVE, system=Pulled(), engine="lanes")
+
+    def orbit(depth):
+        once = jb.gait.linearise_return_map(args, pulled_from(depth), **how)
+        zero = jnp.asarray(0)
+        found = Found(
+            ending=zero,
+            code=zero,
+            recurring=once.recurring,
+            residual=jnp.zeros(()),
+            both=jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), once),
+            evaluations=zero,
+            history=jnp.zeros(1),
+            sound=jnp.asarray(True),
+        )
+        spec = map_of(Pulled(), ABOVE, engine="lanes")
+        problem = FixedPointProblem(spec, args, (0, 1), pulled_from(depth), Precision(1e-9, 1e-8))
+        return _orbit_derivatives.orbit_of(problem, found, radius=False)
+
+    known, grazing = orbit(1e-3), orbit(1e-12)
+    assert np.all(np.isfinite(known.stability.errors))
+    assert np.all(np.isfinite(known.slopes.period))
+    assert np.all(np.isinf(grazing.stability.errors))
+    assert np.all(np.isfinite(grazing.stability.multipliers))
+    assert np.all(np.isnan(grazing.slopes.period))

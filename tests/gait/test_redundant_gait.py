@@ -23,7 +23,7 @@ def find_alike(*arguments, **options):
 
 @pytest.fixture(scope="module")
 def gaits():
-    """The seed's gait: by lanes in minimal coordinates, and by diffrax in redundant ones."""
+    """The seed's gait in minimal coordinates, and in redundant ones."""
     scene = jb.seed_scene()
     minimal = find_alike(scene)
     redundant = find_alike(jb.RedundantScene(scene), minimal.measures.state)
@@ -34,7 +34,7 @@ def gaits():
 def test_gait_multipliers_and_sensitivities_agree(gaits):
     minimal, redundant = gaits
     assert redundant.outcome is jb.gait.Search.FOUND
-    assert redundant.engine == "xla"
+    assert redundant.engine == "lanes"
     assert redundant.multipliers.shape == (6,)
     ours, expected = redundant.measures, minimal.measures
     for name in ("period", "step_length", "speed", "spectral_radius"):
@@ -91,6 +91,12 @@ def test_return_map_takes_tangents_in_redundant_coordinates():
     assert slope.time.shape == slope.state.hip_x.shape == ()
 
 
-def test_other_engines_are_refused():
-    with pytest.raises(jb.ArgumentError, match="redundant coordinates are diffrax's"):
-        jb.find_gait(jb.RedundantScene(jb.seed_scene()), engine="lanes")
+@pytest.mark.nightly
+def test_a_return_is_diffraxs():
+    """In redundant coordinates from the start, of a method that projects."""
+    scene = jb.RedundantScene(jb.seed_scene(), "described")
+    start = jb.dynamics.redundant_state(scene, jb.seed_state())
+    lanes, xla = (jb.return_map(scene, start, engine=engine) for engine in ("lanes", "xla"))
+    assert float(lanes.time) == pytest.approx(float(xla.time), abs=1e-6)
+    for a, b in zip(jax.tree.leaves(lanes.state), jax.tree.leaves(xla.state), strict=True):
+        assert float(a) == pytest.approx(float(b), abs=1e-5)

@@ -7,13 +7,11 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._progress import Stage
-from jaxbiped.gait import _guess_free_search, _walk_waves
+from jaxbiped.gait import BranchEnd, FoundBy, LinearisedReturn, _guess_free_search, _walk_waves
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
 from jaxbiped.gait._guess_free_search import origin_of, search_in_stages, spectral_radius
-from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.gait._search_provenance import BranchEnd, FoundBy
-from jaxbiped.gait._walk_waves import walks_from
-from jaxbiped.solve._accuracy import Precision, recurring_sizes
+from jaxbiped.hybrid._scales import recurring_sizes
+from jaxbiped.solve._accuracy import Precision
 
 SCENE = jb.ladder()["rigid"]
 START = jb.dynamics.RigidState(0.0, -0.2, 0.3, -1.0, -2.0)
@@ -119,7 +117,7 @@ def test_a_jacobian_that_is_no_number_has_no_radius():
     assert spectral_radius(found(np.nan)) == np.inf
 
 
-def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
+def test_walks_are_settled_that_hardly_move_any_more():
     """Of six walks the one that repeats every other footstep, and one that still drifts; the last
     stands, and its foot chatters."""
     sizes = recurring_sizes(SCENE, START)
@@ -135,12 +133,12 @@ def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
     places = np.where(np.arange(6)[:, None] < 5, 0.2, 1e-8) * last
     states = jb.dynamics.RigidState(places, angle, zero, zero, zero)
     counts = np.array([40, 40, 40, 39, 40, 40])
-    monkeypatch.setattr(_walk_waves, "_arrivals", lambda *_: (counts, states, counts))
-    assert walks_from(SCENE, START).attempted == 239
-    chosen = walks_from(SCENE, START).settled()
+    walks = _walk_waves._walks_at(SCENE, counts, states, counts)
+    assert walks.attempted == 239
+    chosen = walks.settled()
     # The third is where the first one is; the fourth fell.
     assert [float(point[0]) for point in chosen] == pytest.approx([0.5, 0.2400001, 0.3])
-    assert len(walks_from(SCENE, START).settled(most=1)) == 1
+    assert len(walks.settled(most=1)) == 1
 
 
 def gait(

@@ -1,10 +1,13 @@
 """Starts of a search: the fitted one against walkers of any size, others against rolling."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import jaxbiped as jb
 from jaxbiped.gait._search_starts import default_guess
+from tests.mechanisms import KNEE, KNEES, TORSO, leg
 from tests.solve.test_accuracy import sized
 
 
@@ -19,6 +22,24 @@ def test_a_walker_of_any_size_starts_alike(length, time):
     np.testing.assert_allclose(np.array(fitted), np.array(start), rtol=1e-12)
     walk = jb.simulate(scene, fitted, duration=0.45 * time, save="end", engine="lanes")
     assert walk.outcome == jb.Ending.WALKING
+
+
+def test_knees_begin_at_their_stops_and_a_torso_upright_whatever_springs_there_are():
+    walker = jb.Mechanism(
+        root_mass=1.0,
+        bodies=(TORSO, *leg(1), *leg(2)),
+        feet=tuple(jb.Foot(f"shank_{i}", centre=0.136, radius=0.08) for i in (1, 2)),
+        joints=(
+            *(jb.Stop(f"shank_{i}", upper=0.2, lower=-0.5, law=KNEE) for i in (1, 2)),
+            *(jb.Spring(f"shank_{i}", stiffness=2.0, damping=0.1) for i in (1, 2)),
+        ),
+        mirror=KNEES,
+    )
+    start = default_guess(dataclasses.replace(jb.seed_scene(), walker=walker))
+    assert float(start.theta_torso) == 0.0
+    for i in (1, 2):
+        bent = float(getattr(start, f"theta_shank_{i}") - getattr(start, f"theta_thigh_{i}"))
+        assert bent == pytest.approx(0.2, abs=1e-14)
 
 
 def test_rolling_starts_do_not_slip_and_begin_with_the_seeds():

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.dynamics._footfalls import FootMotion
+from jaxbiped.dynamics import FootMotion
 from jaxbiped.gait._gait_summary import (
     _distances,
     _first_strikes,

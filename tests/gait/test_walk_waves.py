@@ -3,51 +3,46 @@
 import dataclasses
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped import parameter_values
 from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait import _walk_waves
 from jaxbiped.gait._homotopy import homotopy_to, line_from_model
-from jaxbiped.gait._walk_waves import Walks, walks_of
-from jaxbiped.scene._parameter_access import parameter_values
+from jaxbiped.gait._walk_waves import Walks
 from tests.mechanisms import FEET, LEGS, PAIR, TORSO, scene_of
 
 LEVEL = dict(ground=jb.Ground(slope=0.0), clearance=jb.laws.StanceRotation())
 PLAIN = dict(parameters=(), radius_sensitivities=False)
 
 
-def made_up(monkeypatch, target, *, reach, attempted=0):
+def made_up(target, *, reach, attempted=0):
     """Walks that get the farther the nearer their scatter is to a target; `reach` is how near all
     the way needs, `attempted` how many steps they take."""
-    scene, begun = scene_of("torso"), []
+    begun = []
 
-    def starts(scene, scatter):
-        begun.append(scatter.T)
-        kind = type(scene.state())
-        return kind(*[jnp.zeros(scatter.shape[1])] * len(kind._fields))
-
-    def walks(scene, states):
-        off = np.linalg.norm(begun[-1] - target, axis=1)
+    def walk(scatter, others):
+        begun.append(scatter)
+        off = np.linalg.norm(scatter - target, axis=1)
         counts = np.where(off < reach, 40, np.clip(6.0 - 2.0 * off, 0.0, 39.0)).astype(int)
-        m = len(recurring_names(states))
         gone = np.arange(40) < counts[:, None]
-        points = np.where(gone[..., None], np.broadcast_to(off[:, None, None], (len(off), 40, m)),
-                          np.nan)  # fmt: skip
+        points = np.where(gone, off[:, None], np.nan)[..., None]
         places = np.where(gone, 0.4 * np.arange(40), np.nan)
-        return Walks(counts, points, np.ones(m), places, attempted)
+        return Walks(counts, points, np.ones(1), places, attempted)
 
-    monkeypatch.setattr(_walk_waves, "starts_scattered_by", starts)
-    monkeypatch.setattr(_walk_waves, "walks_from", walks)
-    return scene, begun
+    return walk, begun
 
 
-def test_waves_come_to_walks_far_from_the_first_starts(monkeypatch):
+def waves_of(walk):
+    return _walk_waves._waves(6, walk, list)
+
+
+def test_waves_come_to_walks_far_from_the_first_starts():
     target = np.array([1.5, -1.0, 0.8, -0.7, 0.3, 0.2])
-    scene, begun = made_up(monkeypatch, target, reach=0.3)
-    waves = list(walks_of(scene, list))
+    walk, begun = made_up(target, reach=0.3)
+    waves = list(waves_of(walk))
     assert not waves[0].settled()
     assert waves[-1].settled()
     assert len(waves) < 10
@@ -55,21 +50,20 @@ def test_waves_come_to_walks_far_from_the_first_starts(monkeypatch):
     assert nearest[-1] < 0.3 < nearest[0]
     # They are the same each time.
     first = begun[0].copy()
-    next(walks_of(scene, list))
+    next(waves_of(walk))
     assert np.array_equal(begun[-1], first)
 
 
-def test_waves_end_where_none_gets_farther(monkeypatch):
-    scene, _ = made_up(monkeypatch, np.zeros(6), reach=0.0)
-    assert 5 <= len(list(walks_of(scene, list))) < 24
-    assert len(list(walks_of(scene, list, most=1))) == 1
+def test_waves_end_where_none_gets_farther():
+    walk, _ = made_up(np.zeros(6), reach=0.0)
+    assert 5 <= len(list(waves_of(walk))) < 24
 
 
-def test_waves_end_where_walks_take_too_many_steps(monkeypatch):
+def test_waves_end_where_walks_take_too_many_steps():
     """As on ground so stiff that feet bounce: three waves of 15 million, but one of 50."""
     for attempted, waves in ((15_000_000, 3), (50_000_000, 1)):
-        scene, _ = made_up(monkeypatch, np.zeros(6), reach=0.0, attempted=attempted)
-        assert len(list(walks_of(scene, list))) == waves
+        walk, _ = made_up(np.zeros(6), reach=0.0, attempted=attempted)
+        assert len(list(waves_of(walk))) == waves
 
 
 def test_walks_get_as_far_as_they_step_ahead_and_all_but_return():
@@ -83,6 +77,16 @@ def test_walks_get_as_far_as_they_step_ahead_and_all_but_return():
     np.testing.assert_allclose(walks.progress(), [3.0 + 1.0 / 1.1, 0.0, 0.0], atol=1e-6)
     # The arrival from which a step led nearest to itself, in the state's own size.
     assert [point.tolist() for point in walks.near_returns(8)] == [[0.6]]
+
+
+@pytest.mark.parametrize(("advance", "steps"), [(0.025, 39), (0.01, 0)])
+def test_steps_of_a_fortieth_of_the_height_walk_and_those_of_a_hundredth_chatter(advance, steps):
+    """To all that is asked of walks: how far they get, where they settle and where they return."""
+    places = 0.1 + advance * np.arange(40)[None]
+    walks = Walks(np.array([40]), np.full((1, 40, 1), 0.3), np.array([2.0]), places)
+    assert walks.progress().tolist() == [steps + (1.0 if steps else 0.0)]
+    for points in (walks.settled(), walks.near_returns(8)):
+        assert [point.tolist() for point in points] == ([[0.6]] if steps else [])
 
 
 def test_a_relaxed_walker_is_straight_and_passive_and_of_legs_alone():
@@ -134,9 +138,15 @@ def _shape(scene):
     }
 
 
-def test_a_line_begins_at_a_model_of_the_scenes_size_and_weight():
+OTHER_PLACES = {"thigh.centre": 0.3, "shank.centre": 0.1, "shank.centre_ahead": 0.02,
+                "shank.at": 0.5, "shank.foot.centre": 0.22}  # fmt: skip
+"""Masses and feet of a person whose joints lie elsewhere, at the same height [m]."""
+
+
+@pytest.mark.parametrize("places", [{}, OTHER_PLACES])
+def test_a_line_begins_at_a_model_of_the_scenes_size_and_weight(places):
     """Where nothing can be relaxed: in its own units the first walker is McGeer's with knees."""
-    line = homotopy_to(person())
+    line = homotopy_to(jb.with_parameters(person(), places))
     model = jb.models.mcgeer(knees=True)
     wanted = _shape(dataclasses.replace(model, walker=model.mechanism))
     begun = _shape(line.first)

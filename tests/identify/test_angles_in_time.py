@@ -7,6 +7,7 @@ import pytest
 
 from jaxbiped.identify import MeasuredAngles
 from jaxbiped.identify._predicted_gait import AnglesInTime, _curves, clock_zero
+from tests.identify.test_fit_of_mechanisms import TORSO
 
 States = namedtuple("States", "hip_x theta_1 theta_2 omega_1 omega_2")
 FIRST, SECOND = 0.4, 0.6
@@ -73,3 +74,24 @@ def test_a_clock_is_set_by_where_its_angles_fit_best(angles, other, shift):
     alone = MeasuredAngles(times, 1e-3, theta_2=legs[1])
     assert clock_zero(angles, alone) == pytest.approx(shift, abs=1e-7)
     assert clock_zero(angles, MeasuredAngles(times, 1e-3, *legs, since="mid-stance")) == 0.1
+
+
+@pytest.mark.slow
+def test_legs_exchange_their_parts_and_a_torso_goes_on(torso_gait):
+    """A step later each leg does what the other one did, and the torso the same again."""
+    gait = torso_gait
+    curves, period = AnglesInTime.of(TORSO, gait), float(gait.measures.period)
+    clock = np.linspace(0.05, 0.45, 9)
+    names = ("theta_leg_1", "theta_leg_2", "theta_torso")
+
+    def at(shift, *order):
+        blank = {name: np.zeros(9) for name in order}
+        seen = MeasuredAngles(clock, 1e-3, **blank)
+        return curves.at(seen, shift)[0]
+
+    now = at(0.0, *names)
+    np.testing.assert_allclose(at(period, names[1], names[0], names[2]), now, atol=1e-6)
+    np.testing.assert_allclose(at(2.0 * period, *names), now, atol=1e-6)
+    states = gait.orbit[1]
+    here = np.interp(clock, np.asarray(gait.orbit[0][0]), np.asarray(states.theta_torso[0]))
+    np.testing.assert_allclose(now[18:], here, atol=1e-3)

@@ -19,6 +19,12 @@ SEEN = jb.identify.MeasuredGait(
 )
 
 
+@pytest.fixture
+def predicts(monkeypatch):
+    """Lets fits predict by a model instead of by gaits."""
+    return lambda model: monkeypatch.setattr(_fit_gait, "predict", model)
+
+
 def linear(matrix, center, scene=SCENE):
     """Predicts center + matrix · log(parameters / the scene's own)."""
     own = jb.parameter_values(scene)
@@ -33,11 +39,11 @@ def linear(matrix, center, scene=SCENE):
 
 
 @pytest.mark.parametrize("vary", [("J",), ("J", "d")])
-def test_a_linear_model_has_the_covariance_of_least_squares(vary, monkeypatch):
+def test_a_linear_model_has_the_covariance_of_least_squares(vary, predicts):
     """(AᵀA)⁻¹ of the weighed slopes, and intervals of 1.96 standard errors in the logarithm."""
     matrix = np.array([[0.3, -0.1], [0.1, 0.4], [0.2, 0.3]])[:, : len(vary)]
     off = np.array([0.02, -0.01, 0.03])
-    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values + off))
+    predicts(linear(matrix, SEEN.values + off))
     fit = jb.fit_gait(SCENE, vary, SEEN)
     weighed = matrix / SEEN.deviations[:, None]
     covariance = np.linalg.inv(weighed.T @ weighed)
@@ -60,11 +66,11 @@ def test_a_linear_model_has_the_covariance_of_least_squares(vary, monkeypatch):
 
 
 @pytest.mark.parametrize("bent", [False, True])
-def test_an_end_at_a_bound_is_none_that_data_set(bent, monkeypatch):
+def test_an_end_at_a_bound_is_none_that_data_set(bent, predicts):
     """One number, log J ± σ: chi squared grows by a quarter of what an end takes to the bound above
     it, by all of it below; and by less on both sides where the bounds are narrow."""
     deviation = 0.1 if bent else 0.01  # followed by further scenes, or linear
-    monkeypatch.setattr(_fit_gait, "predict", linear(np.ones((1, 1)), np.ones(1)))
+    predicts(linear(np.ones((1, 1)), np.ones(1)))
     seen = jb.identify.MeasuredGait({"period": (1.0, deviation)})
     own = float(jb.parameter_values(SCENE)["J"])
     low, near = own * np.exp(-1.959964 * deviation), own * np.exp(0.5 * 1.959964 * deviation)
@@ -92,13 +98,13 @@ def test_a_bound_beyond_which_nothing_fits_is_no_end():
     assert interval_end(model, np.zeros(1), known, 1.96**2, 0, 1.0, 0.1 * limits) == np.inf
 
 
-def test_parameters_below_zero_are_fitted_as_those_above(monkeypatch):
+def test_parameters_below_zero_are_fitted_as_those_above(predicts):
     """Estimates, errors and correlations of parameters of both signs, by linear least squares."""
     names, matrix = ("torso.centre", "torso.mass"), np.array([[0.3, -0.1], [0.1, 0.4], [0.2, 0.3]])
     scene = scene_of("torso")
     scene = jb.with_parameters(scene, {"torso.centre": -0.15})
     off = np.array([0.002, -0.001, 0.003])
-    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values + off, scene))
+    predicts(linear(matrix, SEEN.values + off, scene))
     own = np.array([float(jb.parameter_values(scene)[name]) for name in names])
     weighed = matrix / SEEN.deviations[:, None]
     covariance = np.linalg.inv(weighed.T @ weighed)
@@ -115,7 +121,7 @@ def test_parameters_below_zero_are_fitted_as_those_above(monkeypatch):
 
 
 @pytest.mark.parametrize("first", [0.03, 0.0, -0.04])
-def test_between_bounds_that_hold_zero_a_parameter_changes_its_sign(first, monkeypatch):
+def test_between_bounds_that_hold_zero_a_parameter_changes_its_sign(first, predicts):
     """A line in the parameter itself, whose truth lies below zero: its estimate and errors."""
     truth, rate = -0.02, np.array([[3.0], [0.0], [1.0]])
 
@@ -123,7 +129,7 @@ def test_between_bounds_that_hold_zero_a_parameter_changes_its_sign(first, monke
         moved = rate @ (np.array(list(values.values())) - truth)
         return Prediction(SEEN.values + moved, rate * sizes, 0.0 * rate, (), (), True)
 
-    monkeypatch.setattr(_fit_gait, "predict", predicted)
+    predicts(predicted)
     scene = jb.with_parameters(SCENE, {"slope": first})
     fit = jb.fit_gait(scene, {"slope": (-0.05, 0.1)}, SEEN)
     error = 1.0 / np.linalg.norm(rate[:, 0] / SEEN.deviations)
@@ -136,19 +142,19 @@ def test_between_bounds_that_hold_zero_a_parameter_changes_its_sign(first, monke
         jb.fit_gait(scene, {"slope": (-2.0, 0.1)}, SEEN)
 
 
-def test_two_parameters_that_make_up_for_each_other_are_told(monkeypatch):
+def test_two_parameters_that_make_up_for_each_other_are_told(predicts):
     matrix = np.outer([0.3, 0.1, 0.2], [1.0, -2.0])
-    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values))
+    predicts(linear(matrix, SEEN.values))
     fit = jb.fit_gait(SCENE, ("J", "d"), SEEN)
     assert fit.undetermined == ("J", "d")
     assert np.isnan(fit.standard_errors["J"])
     assert fit.freedom == 2  # one combination of both is told
 
 
-def test_a_bound_that_holds_a_parameter_is_named_and_takes_its_interval(monkeypatch):
+def test_a_bound_that_holds_a_parameter_is_named_and_takes_its_interval(predicts):
     """The other's interval is the profile within the bounds: the end where none is held."""
     matrix = np.array([[0.3, -0.1], [0.1, 0.4], [0.2, 0.3]])
-    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values))
+    predicts(linear(matrix, SEEN.values))
     own = {name: float(jb.parameter_values(SCENE)[name]) for name in ("J", "d")}
     start = jb.with_parameters(SCENE, {"J": 1.1 * own["J"]})
     bounds = {"J": (1.05 * own["J"], 2.0 * own["J"]), "d": (0.5 * own["d"], 2.0 * own["d"])}
@@ -168,7 +174,7 @@ def test_a_bound_that_holds_a_parameter_is_named_and_takes_its_interval(monkeypa
         assert np.log(end / own["d"]) == pytest.approx(tried[squares <= square][place], abs=1e-4)
 
 
-def test_an_interval_follows_the_profile_where_the_model_bends(monkeypatch):
+def test_an_interval_follows_the_profile_where_the_model_bends(predicts):
     """y = K (1 − e^(−c)) measured once well and c badly: the profile's ends, found on a grid."""
 
     def curve(k, c):
@@ -179,7 +185,7 @@ def test_an_interval_follows_the_profile_where_the_model_bends(monkeypatch):
         slopes = np.array([[k * (1 - np.exp(-c)), k * c * np.exp(-c)], [0.0, c], [0.0, 0.0]])
         return Prediction(curve(k, c), slopes, 0.0 * slopes, (), (), True)
 
-    monkeypatch.setattr(_fit_gait, "predict", predicted)
+    predicts(predicted)
     seen = jb.identify.MeasuredGait(
         {"period": (0.632, 0.01), "step_length": (1.0, 0.35), "speed": (0.0, 1.0)}
     )
@@ -201,7 +207,7 @@ def test_an_interval_follows_the_profile_where_the_model_bends(monkeypatch):
 
 @pytest.mark.parametrize(("tilt", "bend"), [(0.1, 0.5), (0.03, 1.0)])
 def test_an_interval_ends_in_a_bent_valley_where_derivatives_alone_would_cycle(
-    tilt, bend, monkeypatch
+    tilt, bend, predicts
 ):
     """y₁ = x + tilt y − bend y², measured 40 times better than y₂ = y: each y has its own x."""
 
@@ -211,7 +217,7 @@ def test_an_interval_ends_in_a_bent_valley_where_derivatives_alone_would_cycle(
         told = np.array([x + tilt * y - bend * y**2, y, 0.0])
         return Prediction(told, slopes, 0.0 * slopes, (), (), True)
 
-    monkeypatch.setattr(_fit_gait, "predict", predicted)
+    predicts(predicted)
     seen = {"period": (0.0, 0.002), "step_length": (0.0, 0.08), "speed": (0.0, 1.0)}
     fit = jb.fit_gait(SCENE, ("J", "d"), jb.identify.MeasuredGait(seen))
     assert (fit.one_sided, fit.undetermined) == ((), ())
@@ -226,7 +232,7 @@ def test_an_interval_ends_in_a_bent_valley_where_derivatives_alone_would_cycle(
     assert fit.evaluations <= 30
 
 
-def test_a_parameter_may_be_limited_on_one_side_and_moves_the_others(monkeypatch):
+def test_a_parameter_may_be_limited_on_one_side_and_moves_the_others(predicts):
     """y₁ = log c − log(1 + K) and y₂ = K / (1 + K), which is best where K vanishes. No derivative
     tells of K there, but larger ones fit within the 95 %, too, and c with them."""
 
@@ -236,7 +242,7 @@ def test_a_parameter_may_be_limited_on_one_side_and_moves_the_others(monkeypatch
         slopes = np.array([[-k / (1.0 + k), 1.0], [k / (1.0 + k) ** 2, 0.0], [0.0, 0.0]])
         return Prediction(told, slopes, np.full((3, 2), 1e-6), (), (), True)
 
-    monkeypatch.setattr(_fit_gait, "predict", predicted)
+    predicts(predicted)
     seen = jb.identify.MeasuredGait(
         {"period": (1e-9, 0.1), "step_length": (1e-9, 0.5), "speed": (1e-9, 1.0)}
     )
@@ -257,7 +263,7 @@ def test_a_parameter_may_be_limited_on_one_side_and_moves_the_others(monkeypatch
 
 
 @pytest.mark.parametrize("far", [1.0, 10.0])
-def test_no_end_is_told_where_a_derivative_dies_out(far, monkeypatch):
+def test_no_end_is_told_where_a_derivative_dies_out(far, predicts):
     """y = K / (1 + K / far) was measured 0.67 standard deviations below what it comes to at last,
     and 2.67 above nothing: K has a lower end alone, where y lies 1.96 below the measured value."""
 
@@ -268,7 +274,7 @@ def test_no_end_is_told_where_a_derivative_dies_out(far, monkeypatch):
         told = np.array([k * share, 0.2, 0.35])
         return Prediction(told, slopes, np.full((3, 1), 1e-9), (), (), True)
 
-    monkeypatch.setattr(_fit_gait, "predict", predicted)
+    predicts(predicted)
     seen = {"period": (0.8 * far, 0.3 * far), "step_length": (0.2, 0.02), "speed": (0.35, 0.03)}
     fit = jb.fit_gait(SCENE, ("J",), jb.identify.MeasuredGait(seen))
     assert fit.one_sided == ("J",)
@@ -277,21 +283,21 @@ def test_no_end_is_told_where_a_derivative_dies_out(far, monkeypatch):
     assert fit.intervals["J"] == pytest.approx((lowest, np.inf), rel=0.01)
 
 
-def test_a_fit_that_does_not_fit_says_so(monkeypatch):
+def test_a_fit_that_does_not_fit_says_so(predicts):
     matrix = np.array([[0.3], [0.1], [0.2]])
     off = np.array([0.1, -0.1, 0.0])
-    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values + off))
+    predicts(linear(matrix, SEEN.values + off))
     with pytest.warns(RuntimeWarning, match="the model does not fit the data: chi squared is"):
         fit = jb.fit_gait(SCENE, ("J",), SEEN)
     # Of two degrees of freedom the tail is exp(−χ²/2).
     assert fit.p_value == pytest.approx(np.exp(-0.5 * fit.chi_squared))
 
 
-def test_without_a_gait_nothing_is_fitted(monkeypatch):
+def test_without_a_gait_nothing_is_fitted(predicts):
     def lost(*_, **__):
         return Prediction(SEEN.values, np.ones((3, 1)), np.zeros((3, 1)), (), (), False)
 
-    monkeypatch.setattr(_fit_gait, "predict", lost)
+    predicts(lost)
     fit = jb.fit_gait(SCENE, ("J",), SEEN)
     assert fit.ending is jb.identify.FitEnding.NO_GAIT
     assert fit.evaluations == 9  # the start, and others about it

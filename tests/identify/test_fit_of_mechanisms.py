@@ -7,7 +7,6 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.identify import FitEnding, MeasuredAngles, MeasuredGait, read_measured
-from jaxbiped.identify._predicted_gait import AnglesInTime
 from tests.mechanisms import WALKERS, scene_of
 
 SEED = jb.seed_scene(slope=0.03)
@@ -18,13 +17,9 @@ NEAR = TORSO.state(
 )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def gait():
-    return jb.find_gait(TORSO, NEAR, parameters=(), radius_sensitivities=False)
-
-
 @pytest.mark.slow
-def test_a_torsos_spring_is_found_by_its_angle_from_a_guess(gait):
+def test_a_torsos_spring_is_found_by_its_angle_from_a_guess(torso_gait):
+    gait = torso_gait
     times, states = gait.orbit
     chosen = np.flatnonzero(np.isfinite(np.asarray(times[0])))[2:-1:4]
     clock, leg, torso = (
@@ -38,26 +33,6 @@ def test_a_torsos_spring_is_found_by_its_angle_from_a_guess(gait):
     assert fit.ending is FitEnding.CONVERGED
     assert fit.estimates[name] == pytest.approx(16.0, rel=1e-4)
     assert fit.standard_errors[name] < 0.1
-
-
-@pytest.mark.slow
-def test_legs_exchange_their_parts_and_a_torso_goes_on(gait):
-    """A step later each leg does what the other one did, and the torso the same again."""
-    curves, period = AnglesInTime.of(TORSO, gait), float(gait.measures.period)
-    clock = np.linspace(0.05, 0.45, 9)
-    names = ("theta_leg_1", "theta_leg_2", "theta_torso")
-
-    def at(shift, *order):
-        blank = {name: np.zeros(9) for name in order}
-        seen = MeasuredAngles(clock, 1e-3, **blank)
-        return curves.at(seen, shift)[0]
-
-    now = at(0.0, *names)
-    np.testing.assert_allclose(at(period, names[1], names[0], names[2]), now, atol=1e-6)
-    np.testing.assert_allclose(at(2.0 * period, *names), now, atol=1e-6)
-    states = gait.orbit[1]
-    here = np.interp(clock, np.asarray(gait.orbit[0][0]), np.asarray(states.theta_torso[0]))
-    np.testing.assert_allclose(now[18:], here, atol=1e-3)
 
 
 def test_angles_that_a_walker_does_not_have_are_refused(tmp_path):

@@ -92,6 +92,12 @@ def test_derivative_of_a_solution():
     np.testing.assert_allclose(tangent, truth, rtol=1e-11)
 
 
+@jax.jit
+def _block_solutions(columns, right):
+    factors = factorise(columns)
+    return factors.solve(right), factors.solve_transposed(right)
+
+
 @pytest.mark.parametrize(("size", "count"), [(1, 3), (2, 3), (4, 3), (5, 1)])
 def test_by_blocks(size, count):
     """Blocks on the diagonal that have inverses; rows of each take turns as pivots."""
@@ -105,11 +111,8 @@ def test_by_blocks(size, count):
             matrix[k, k] *= 0.0 if size > 1 else 1.0
         right = rng.normal(size=n)
         blocks = matrix.reshape(count, size, count, size)
-        factors = factorise(jnp.asarray(np.transpose(blocks, (3, 0, 2, 1))))
-        for found, whole in (
-            (factors.solve(jnp.asarray(right)), matrix),
-            (factors.solve_transposed(jnp.asarray(right)), matrix.T),
-        ):
+        both = _block_solutions(np.transpose(blocks, (3, 0, 2, 1)), right)
+        for found, whole in zip(both, (matrix, matrix.T), strict=True):
             np.testing.assert_allclose(found, np.linalg.solve(whole, right), rtol=1e-11, atol=1e-12)
 
 

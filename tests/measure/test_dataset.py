@@ -78,9 +78,34 @@ def test_every_law_goes_into_a_file(name, short_walk, tmp_path):
         assert np.isfinite(read.normal_force).all()
 
 
-def test_a_rigid_walker_is_refused(seed_walk):
-    with pytest.raises(jb.ArgumentError, match="scene = a RigidScene"):
-        jb.measure.trajectory_dataset(jb.ladder()["rigid"], seed_walk[1])
+def test_forces_on_rigid_feet_carry_the_mass_and_nothing_else():
+    # A point mass at the hip: the ground's force is what accelerates it beside gravity.
+    scene, slope = jb.models.garcia(), 0.009
+    state = scene.state(theta_1=-0.2, theta_2=0.2, omega_1=-0.1834, omega_2=-0.2)
+    times, step = np.linspace(0.5, 3.0, 6), 1e-4
+    near = np.sort(np.concatenate([times - step, times, times + step]))
+    walk = jb.simulate(scene, state, duration=4.5, save=near, accuracy="tight")
+    place = jb.dynamics.whole_state(scene, walk.state)
+    x, z = (np.asarray(leaf).reshape(-1, 3) for leaf in (place.hip_x, place.hip_z))
+    along, up = ((leaf @ [1.0, -2.0, 1.0]) / step**2 for leaf in (x, z))
+    data = jb.measure.trajectory_dataset(scene, walk).isel(time=slice(1, None, 3))
+    np.testing.assert_allclose(data.normal_force[1], up + np.cos(slope), atol=1e-6)
+    np.testing.assert_allclose(data.tangential_force[1], along - np.sin(slope), atol=1e-6)
+    np.testing.assert_array_equal(data.normal_force[0], 0.0)
+    assert {"penetration", "slip_speed", "touches"}.isdisjoint(data)
+
+
+def test_a_dataset_of_rigid_steps_has_both_sides_of_each_strike():
+    scene = jb.models.garcia()
+    state = scene.state(theta_1=-0.2, theta_2=0.2, omega_1=-0.1834, omega_2=-0.2)
+    walk = jb.simulate(scene, state, footsteps=2, save="steps")
+    data = jb.measure.trajectory_dataset(scene, walk)
+    (before,) = np.nonzero(np.diff(data.time) == 0.0)
+    assert len(before) == 2
+    lost = np.asarray(data.kinetic_energy)[before] - np.asarray(data.kinetic_energy)[before + 1]
+    assert np.all(lost > 0.0)
+    total = data.kinetic_energy + data.gravitational_energy
+    np.testing.assert_allclose(total[: before[0] + 1], total[0], rtol=1e-6)
 
 
 def test_actuators_are_told_by_their_places(short_walk):

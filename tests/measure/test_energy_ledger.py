@@ -5,11 +5,8 @@ import pytest
 from reference.walks import walk as independent_walk
 
 import jaxbiped as jb
-from jaxbiped.dynamics._energy import Energies
 from jaxbiped.measure import _energy_ledger
 from jaxbiped.measure._samples import NODES, ModeChanges
-
-SCENE = jb.ladder()["rigid"]
 
 
 def test_the_ledger_closes_at_the_tight_setting(seed_walk):
@@ -51,7 +48,7 @@ def test_parts_add_up_to_the_whole(seed_walk):
 
 def test_gravitys_work_is_its_potential(seed_walk):
     """Also by integrating its power along the solution."""
-    from jaxbiped.dynamics._energy import powers
+    from jaxbiped.dynamics import powers
     from jaxbiped.measure._samples import sample
 
     scene, walk = seed_walk
@@ -66,7 +63,7 @@ def test_times_that_do_not_increase_are_refused(seed_walk, times):
         jb.measure.energy_ledger(*seed_walk, np.array(times))
 
 
-def test_what_a_change_of_mode_takes_is_the_energy_beside_it(monkeypatch):
+def test_what_a_change_of_mode_takes_is_the_energy_beside_it():
     """Energies that fall steadily but where a mode changes, once in one footstep, twice in another.
 
     What joints lose on the way is no loss of the change's; NaN where a change was left out.
@@ -74,37 +71,27 @@ def test_what_a_change_of_mode_takes_is_the_energy_beside_it(monkeypatch):
     changes = np.array([0, 2, 2]), np.array([0.25, 0.5, 0.75])
     taken = np.array([2.0, 0.5, 0.125])
 
-    def held(_, states, energies):
-        number, time = states
-        gone = [
-            sum(taken[(changes[0] == k) & (changes[1] < t)])
-            for k, t in zip(number, time, strict=True)
-        ]
-        return Energies(5.0 - 0.5 * time, 1.0 - 0.25 * time, -np.array(gone))
+    def energy(number, since):
+        past = (changes[0] == number[:, None]) & (changes[1] < since[:, None])
+        return 6.0 - 0.75 * since - past @ taken
 
-    monkeypatch.setattr(_energy_ledger, "evaluate_along", held)
-    monkeypatch.setattr(_energy_ledger, "rows_of", lambda starts, number: number)
-    monkeypatch.setattr(_energy_ledger, "states_after", lambda _, rows, times: (rows, times))
     known = np.array([True, True, True, False])
-    found = _energy_ledger._stop_losses(SCENE, None, np.ones(4), ModeChanges(*changes, known))
+    found = _energy_ledger._stop_losses(energy, np.ones(4), ModeChanges(*changes, known))
     np.testing.assert_allclose(found, [2.0, 0.0, 0.625, np.nan], atol=1e-12)
 
 
-def test_works_of_powers_that_jump_and_bend_within_a_footstep(monkeypatch):
+def test_works_of_powers_that_jump_and_bend_within_a_footstep():
     """Closed forms; in the second footstep everything is twice as strong."""
     periods, strengths = np.array([0.7, 0.9]), np.array([1.0, 2.0])
 
-    def powers(_, numbers, begins, widths):
+    def powers(numbers, begins, widths):
         times = begins[:, None] + widths[:, None] * 0.5 * (1.0 + NODES)
         total, lost = np.abs(times - 0.31), np.maximum(times - 0.42, 0.0)
         jumps, steady = np.where(times > 0.4, 2.0, -1.0), times
         return strengths[numbers][:, None] * np.array([total, lost, jumps, steady])
 
-    monkeypatch.setattr(_energy_ledger, "_sampled_powers", powers)
-    monkeypatch.setattr(_energy_ledger, "is_driven", lambda scene: True)
-    monkeypatch.setattr(_energy_ledger, "rows_of", lambda starts, number: number)
     change = ModeChanges(np.array([1]), np.array([0.4]), np.array([True, True]))
-    found = _energy_ledger._works(SCENE, None, periods, change)
+    found = _energy_ledger._works(powers, periods, change)
     total = 0.5 * (0.31**2 + (periods - 0.31) ** 2)
     motors = 2.0 * (periods - 0.4) + 0.5 * periods**2
     lost = 0.5 * (periods - 0.42) ** 2

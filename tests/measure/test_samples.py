@@ -52,3 +52,16 @@ def test_samples_lie_at_gauss_points_and_integrate_what_is_above_zero():
     np.testing.assert_allclose(samples.integral(times**9), np.diff(edges**10) / 10)
     np.testing.assert_allclose(samples.positive_integral(times - 1.0), [0.0, 0.5])
     np.testing.assert_allclose(samples.positive_integral(1.0 - times), [0.375, 0.125])
+
+
+def test_roughness_is_how_much_a_rule_of_order_four_errs():
+    """Its points are those at ±x₁: of a fourth power it integrates 2x₁²/3 where 2/5 is right."""
+    edges = np.array([0.0, 0.5, 2.0])
+    middles, halves = 0.5 * (edges[1:] + edges[:-1])[:, None], 0.5 * np.diff(edges)
+    times = middles + halves[:, None] * NODES
+    samples = Samples(edges, None)
+    np.testing.assert_allclose(samples.roughness(times**3 - times), 0.0, atol=1e-14)
+    square = (5.0 - 2.0 * np.sqrt(10.0 / 7.0)) / 9.0
+    off = 2.0 / 3.0 * square - 2.0 / 5.0
+    wanted = np.abs(off) * halves**5
+    np.testing.assert_allclose(samples.roughness((times - middles) ** 4), wanted, rtol=1e-12)

@@ -122,6 +122,13 @@ def test_the_starts_of_knees_and_of_the_wheel_repeat_themselves():
     assert start["omega_wheel"] == pytest.approx(-wheel_rate(0.5), abs=0.02)
 
 
+def test_the_compliant_knee_that_stands_presses_on_its_stop_and_turns_with_its_thigh():
+    start = MODELS["mcgeer-kneed"].starts["gait"]
+    pressed = start["theta_shank_2"] - start["theta_thigh_2"] - 0.2
+    assert 0.0 < pressed < 0.01
+    assert start["omega_shank_2"] == start["omega_thigh_2"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "gait"), sorted(RIGID))
 def test_gaits_are_those_of_equations_by_hand(name, gait):

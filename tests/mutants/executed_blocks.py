@@ -169,8 +169,7 @@ def _forget_programs() -> None:
     import jax
 
     import jaxbiped as jb
-    from jaxbiped.caching._disk_cache import CACHE_VARIABLE
 
     jax.clear_caches()
     jb.clear_caches()
-    os.environ[CACHE_VARIABLE] = tempfile.mkdtemp(dir=os.environ[CACHE_VARIABLE])
+    os.environ["JAXBIPED_CACHE"] = tempfile.mkdtemp(dir=os.environ["JAXBIPED_CACHE"])

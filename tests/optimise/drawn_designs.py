@@ -6,9 +6,10 @@ import numpy as np
 
 import jaxbiped as jb
 from jaxbiped._progress import stage
+from jaxbiped.optimise import Evaluation
 from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem, requirements_of, variables_of
-from jaxbiped.optimise._objective_values import Evaluation, Evaluations
+from jaxbiped.optimise._objective_values import Evaluations
 from jaxbiped.optimise._runs import Runs
 
 SCENE = jb.ladder()["rigid"]

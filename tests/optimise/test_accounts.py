@@ -11,9 +11,8 @@ import pytest
 from _mechanisms import cases
 
 import jaxbiped as jb
-from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
-from jaxbiped.optimise._objective_values import evaluate
 from tests.mechanisms import BISECTING, FEET, LEGS, PAIR
+from tests.optimise.evaluations import evaluated, integrals_of
 
 pytestmark = pytest.mark.slow
 
@@ -85,7 +84,7 @@ def objectives_of(scene, start, accuracy):
     gait = jb.find_gait(scene, start, accuracy=accuracy, **HOW)
     names = ("cost_of_transport", "impact_loss", "friction_loss", "motor_work")
     names = [name for name in names if jb.optimise.OBJECTIVES[name].lacks(scene) is None]
-    values = evaluate(scene, gait, names, accuracy).values
+    values = evaluated(scene, gait, names, accuracy).values
     return gait, {name: values[name] for name in names}
 
 
@@ -119,8 +118,7 @@ def assert_told(scene, gait, told, near):
 def test_a_walker_that_is_driven_and_damped_accounts_for_everything():
     scene = jb.RigidScene(EVERYTHING, jb.Ground(slope=0.02), A.PushOff(0.04))
     gait = jb.find_gait(scene, scene.state(**LEANING), parameters=(), accuracy="tight", **HOW)
-    integrals = cycle_functionals(scene, gait.measures.state, accuracy="tight")
-    told = dict(zip(integral_names(scene), np.asarray(integrals.values).tolist(), strict=True))
+    told = integrals_of(scene, gait.measures.state, accuracy="tight")
     del told["foot_clearance"]
     assert_told(scene, gait, told, 1e-6)
 

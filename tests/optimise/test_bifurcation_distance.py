@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.continuation._critical_values import STEPS
 from jaxbiped.optimise import Sought
-from jaxbiped.optimise._objective_values import evaluate
+from tests.optimise.evaluations import evaluated
 
 pytestmark = pytest.mark.slow
 STEP = 2e-3
@@ -62,7 +61,7 @@ def test_the_bifurcations_are_those_of_the_branch():
         assert 0.0 < found.error < 1e-5
 
 
-def test_a_walker_without_a_fold_is_told_from_one_that_is_lost(monkeypatch):
+def test_a_walker_without_a_fold_is_told():
     scene = jb.ladder()["rigid"]
     gait, own = gait_of(scene), float(scene.ground.slope)
     found = jb.optimise.bifurcation_distance(scene, gait)
@@ -72,17 +71,13 @@ def test_a_walker_without_a_fold_is_told_from_one_that_is_lost(monkeypatch):
     assert np.isnan(found.value)
     assert np.all(np.isnan(found.slopes))
     assert jb.optimise.bifurcation_distance(scene, gait, "period-doubling").outcome is Sought.MET
-    monkeypatch.setitem(STEPS, "max_points", 2)
-    lost = jb.optimise.bifurcation_distance(scene, gait)
-    assert lost.outcome is Sought.UNKNOWN
-    assert np.isnan(lost.distance)
 
 
 def test_an_evaluation_tells_what_lies_beyond_the_range():
     scene = jb.ladder()["rigid"]
     gait = jb.find_gait(scene, radius_sensitivities=False, engine="lanes")
     names = ("fold_distance", "doubling_distance")
-    known = evaluate(scene, gait, names, "balanced")
+    known = evaluated(scene, gait, names)
     assert known.beyond_range == ("fold_distance",)
     assert known.values["fold_distance"] > known.values["doubling_distance"]
     assert not np.any(known.slopes["fold_distance"])

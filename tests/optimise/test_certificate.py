@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped import _progress
 from jaxbiped.optimise import _certificate
 
 pytestmark = pytest.mark.slow
@@ -18,7 +17,7 @@ def best():
     )
 
 
-def test_a_stable_gait_is_certified(best, capsys, monkeypatch):
+def test_a_stable_gait_is_certified(best, capsys, monkeypatch, stages_at_once):
     named, stage = [], _certificate.stage
 
     def noting(doing, **how):
@@ -26,7 +25,6 @@ def test_a_stable_gait_is_certified(best, capsys, monkeypatch):
         return stage(doing, **how)
 
     monkeypatch.setattr(_certificate, "stage", noting)
-    monkeypatch.setattr(_progress, "_PATIENCE", 0.0)
     found = jb.optimise.certify(
         best, starts=256, footsteps=50, bifurcations_along=(), progress=True
     )

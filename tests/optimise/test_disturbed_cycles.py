@@ -12,11 +12,11 @@ from reference.scipy_solves import solution
 import jaxbiped as jb
 from jaxbiped.compiler import host_jit
 from jaxbiped.gait._poincare_map import linearised_return, recurring_components, seed_directions
+from jaxbiped.hybrid._sections import section_of
 from jaxbiped.optimise._augmented_system import MotionSection, integrals_of
 from jaxbiped.optimise._cycle_functionals import cycle_spec
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.solve._accuracy import precision_of
-from jaxbiped.variational._hybrid_system import section_of
 from tests.mechanisms import SEED_WITH_TORSO
 
 pytestmark = pytest.mark.slow

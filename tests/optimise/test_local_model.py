@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.optimise import _runs
+from jaxbiped.optimise import Outcome, _runs
 from jaxbiped.optimise._design_functions import radius_of
 from jaxbiped.optimise._design_problem import Design, variables_of
 from jaxbiped.optimise._local_model import Local, Model
-from jaxbiped.optimise._optimum import Outcome
-from jaxbiped.optimise._runs import RunEnding, Runs, follow_designs, rank_of
+from jaxbiped.optimise._runs import RunEnding, Runs, rank_of
 
 MIDDLE = np.array([0.5, 0.4])
 FREE = np.zeros(0), np.zeros((0, 2)), np.zeros(0, bool)
@@ -181,21 +180,20 @@ def test_designs_that_keep_requirements_come_before_better_ones_that_do_not():
         (0.0, (), True, "", True, Outcome.FLAT),
     ],
 )
-def test_the_outcome_of_runs(monkeypatch, excess, beyond, converged, doubt, flat, outcome):
+def test_the_outcome_of_runs(excess, beyond, converged, doubt, flat, outcome):
     known = SimpleNamespace(excess=excess, value=1.0, beyond_range=beyond)
     problem = problem_of(
         asked=[Design(np.zeros(1), known)], excess=lambda known: known.excess,
         objective=lambda known: SimpleNamespace(value=known.value),
     )  # fmt: skip
-    monkeypatch.setattr(_runs, "doubt_of", lambda *_: doubt)
-    monkeypatch.setattr(_runs, "is_flat", lambda *_: flat)
+    given = (problem.asked[0], converged, lambda: doubt, lambda: flat)
+    assert _runs.outcome_of(problem, *given) is outcome
     runs = Runs(problem, 5, "trust-region", None, ended=RunEnding(converged, "words"))
-    assert runs.outcome() is outcome
     runs.interrupted = True
     assert runs.outcome() is Outcome.INTERRUPTED
 
 
-def test_gaits_of_designs_are_followed_by_their_derivatives_in_four_steps(monkeypatch):
+def test_gaits_of_designs_are_followed_by_their_derivatives_in_four_steps():
     """A state that is quadratic in the variable, whose derivative is that where it was found."""
     scene = jb.ladder()["rigid"]
     names = jb.parameter_names(scene)
@@ -206,21 +204,19 @@ def test_gaits_of_designs_are_followed_by_their_derivatives_in_four_steps(monkey
     def state(value):
         return np.array([value, 5.0 * value**2])
 
-    def gaits(problem, u, points):
+    def gaits(u, points):
         values = variables.values(u)[:, 0]
         seen.append((values, points))
         slopes = np.zeros((len(u), 2, len(names)))
         slopes[:, 0, place], slopes[:, 1, place] = 1.0, 10.0 * values
         return np.stack([state(value) for value in values]), slopes
 
-    monkeypatch.setattr(_runs, "_gaits_of_designs", gaits)
     begin, u = np.array([0.5]), np.array([[0.1], [0.9]])
     first = float(variables.values(begin)[0])
     slopes = np.zeros((2, len(names)))
     slopes[0, place], slopes[1, place] = 1.0, 10.0 * first
     known = SimpleNamespace(state=state(first), state_slopes=slopes)
-    problem = SimpleNamespace(variables=variables)
-    found = follow_designs(problem, Design(begin, known), u)
+    found = _runs._followed(variables, Design(begin, known), u, gaits)
     before = np.full(2, first)
     for share, (values, points) in zip((0.25, 0.5, 0.75, 1.0), seen, strict=True):
         np.testing.assert_allclose(values, variables.values(begin + share * (u - begin))[:, 0])

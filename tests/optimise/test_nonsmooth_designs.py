@@ -5,9 +5,10 @@ import pytest
 from scipy.optimize import lsq_linear
 
 import jaxbiped as jb
-from jaxbiped.optimise._design_functions import conditions, radius_of
+from jaxbiped.optimise import Outcome
+from jaxbiped.optimise._design_functions import ClusterRow, conditions, radius_of
+from jaxbiped.optimise._jacobian_functionals import SYMMETRIC
 from jaxbiped.optimise._optimality import optimality_of
-from jaxbiped.optimise._optimum import Outcome
 from tests.optimise.drawn_designs import SCENE, best_of, difference
 
 
@@ -115,6 +116,17 @@ def test_the_conditions_hold_where_all_three_multipliers_lie_inside(kind):
         np.testing.assert_allclose(told.by_symmetric @ along, by_symmetric, atol=1e-7)
         by_radius = difference(lambda h, s=symmetric: conditions(s, 0.4 + h).values)
         np.testing.assert_allclose(told.by_radius, by_radius, atol=1e-6)
+
+
+def test_a_condition_is_kept_too_well_by_three_tenths_of_its_error_within_a_range():
+    """By 1e-7 at least, of what is known exactly, and by 1e-5 at most."""
+    values = np.array([0.5, 0.08, 0.004])
+    known = (dict(zip(SYMMETRIC, values, strict=True)),) * 4
+    for place, along in enumerate(conditions(values, 0.4).by_symmetric):
+        for error, margin in ((0.0, 1e-7), (1e-5, 3e-6), (1e-3, 1e-5)):
+            errors = np.full(3, error / np.abs(along).sum())
+            row = ClusterRow("spectral_radius", 0.4, -1.0, False, place, tuple(errors))
+            assert row.margin(known) == pytest.approx(margin)
 
 
 def test_a_radius_is_least_where_two_multipliers_meet():

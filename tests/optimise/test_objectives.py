@@ -9,14 +9,8 @@ import pytest
 from reference.rigid import rigid_walker
 
 import jaxbiped as jb
-from jaxbiped.dynamics._energy import kinetic_energy
-from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._stance_motion import rolling_field
-from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
-from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
-from jaxbiped.optimise._objective_values import evaluate
-from jaxbiped.optimise._objectives import check_objective
-from jaxbiped.scene._state_types import RigidState
+from jaxbiped.dynamics import RigidState, impact, rolling_field
+from tests.optimise.evaluations import evaluated, integrals_of, of_return_jacobian
 
 pytestmark = pytest.mark.slow
 SCENES = jb.ladder() | {"heavy hip": jb.seed_scene(hip_mass=0.5, slope=0.025, r=0.1)}
@@ -75,7 +69,7 @@ def usual_gait(scene, guess=None, accuracy="balanced"):
 
 def evaluation(scene, names, guess=None, accuracy="balanced"):
     gait = usual_gait(scene, guess, accuracy)
-    return evaluate(scene, gait, names, accuracy), gait.measures.state
+    return evaluated(scene, gait, names, accuracy), gait.measures.state
 
 
 @pytest.mark.parametrize(
@@ -178,8 +172,7 @@ def test_costs_of_driven_walkers_are_those_of_the_ledger(which):
 def test_the_rigid_clearance_is_that_of_the_rigid_checks():
     scene = SCENES["rigid"]
     gait = usual_gait(scene)
-    found = cycle_functionals(scene, gait.measures.state)
-    clearance = float(found.values[integral_names(scene).index("foot_clearance")])
+    clearance = integrals_of(scene, gait.measures.state)["foot_clearance"]
     lowest = float(jb.dynamics.rigid_checks(scene, gait.orbit[1]).clearance.min())
     assert clearance <= lowest
     assert clearance == pytest.approx(lowest, rel=0.2)
@@ -190,7 +183,7 @@ def test_the_bound_is_above_the_radius_and_the_moduli_are_the_multipliers(which)
     scene = SCENES[which]
     gait = usual_gait(scene)
     names = ("spectral_radius", "modulus_2", "radius_bound")
-    found = jacobian_functionals(scene, gait.measures.state, names)
+    found = of_return_jacobian(scene, gait.measures.state, names)
     values = dict(zip(names, np.asarray(found.values), strict=True))
     upper = np.asarray(gait.multipliers)
     upper = np.sort(np.abs(upper[upper.imag >= 0.0]))[::-1]
@@ -207,7 +200,7 @@ def test_a_push_over_a_cycle_of_two_has_the_gradient_of_differences():
     def told(d):
         there = jb.with_parameters(scene, {"d": d})
         state = usual_gait(there).measures.state
-        return jacobian_functionals(there, state, names, arrivals=2)
+        return of_return_jacobian(there, state, names, arrivals=2)
 
     place = jb.parameter_names(scene).index("d")
     norms = {k: float(told(own * (1.0 + k * step)).values[0]) for k in PLACES}
@@ -230,7 +223,8 @@ def test_the_divergence_of_the_foot_strike_is_that_of_its_saltation_matrix():
         """Of momenta for each of rates: the determinant of the mass matrix."""
 
         def kinetic(rates):
-            return kinetic_energy(scene, RigidState(jnp.zeros(()), *y[:2], *rates))
+            state = RigidState(jnp.zeros(()), *y[:2], *rates)
+            return jb.dynamics.energies(scene, state).kinetic
 
         return jnp.linalg.det(jax.hessian(kinetic)(y[2:]))
 
@@ -240,7 +234,7 @@ def test_the_divergence_of_the_foot_strike_is_that_of_its_saltation_matrix():
     saltation = by_state + jnp.outer(leaving - by_state @ coming, normal) / (normal @ coming)
     change = jnp.linalg.det(saltation) * volume(after) / volume(before)
     names = ("strike_divergence",)
-    told = jacobian_functionals(scene, gait.measures.state, names, accuracy="tight")
+    told = of_return_jacobian(scene, gait.measures.state, names, accuracy="tight")
     assert float(told.values[0]) == pytest.approx(float(jnp.log(jnp.abs(change))), rel=1e-7)
     assert float(told.values[0]) < 0.0
 
@@ -273,9 +267,10 @@ def test_error_bars_of_values_hold_against_a_tight_solve(which, names):
         ("strike_divergence", "stribeck", {}, r"strike_divergence.*striking at once"),
         ("strike_divergence", "push-off", {}, r"strike_divergence.*drives"),
         ("fatal_push", "stribeck", {}, r"fatal_push.*minimal_fatal_shock"),
-        ("beauty", "stribeck", {}, "objective = 'beauty'"),
+        ("beauty", "stribeck", {}, "minimise = 'beauty'"),
     ],
 )
 def test_an_objective_that_a_scene_lacks_is_refused_in_a_sentence(name, which, changes, sentence):
+    scene = dataclasses.replace(SCENES[which], **changes)
     with pytest.raises(jb.ArgumentError, match=sentence):
-        check_objective(name, dataclasses.replace(SCENES[which], **changes))
+        jb.optimise_gait(scene, vary={"d": (0.08, 0.12)}, minimise=name)

@@ -9,10 +9,12 @@ import optax
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.optimise import Evaluation
 from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem
-from jaxbiped.optimise._objective_values import Evaluation, Evaluations
+from jaxbiped.optimise._objective_values import Evaluations
 from jaxbiped.optimise._optimise_gait import _problem_settings
+from tests.cli.commands import interrupt_after
 
 pytestmark = pytest.mark.slow
 RIGID = jb.ladder()["rigid"]
@@ -210,15 +212,7 @@ def test_a_front_keeps_the_evaluations_of_all_its_points(tmp_path):
 
 
 def test_ctrl_c_keeps_the_best(monkeypatch):
-    plain, calls = Evaluations.add, []
-
-    def add(self, u, known):
-        plain(self, u, known)
-        calls.append(u)
-        if len(calls) == 4:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Evaluations, "add", add)
+    interrupt_after(monkeypatch, 3)
     best = best_of()
     assert best.outcome is jb.optimise.Outcome.INTERRUPTED
     assert best.objective >= best.history[0].objective

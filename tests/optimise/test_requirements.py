@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._checks import ArgumentError
+from jaxbiped import ArgumentError
 from jaxbiped.optimise._cycle_functionals import Functional, weighted_sum
 from jaxbiped.optimise._design_functions import Row, conditions, radius_of, rows_of
 from jaxbiped.optimise._design_problem import (

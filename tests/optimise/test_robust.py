@@ -4,34 +4,31 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.optimise._design_gaits import GaitSettings, ensemble_of, evaluate_ensemble
-from jaxbiped.optimise._objective_values import evaluate
+from tests.optimise.evaluations import evaluated, evaluated_over_members
 
 pytestmark = pytest.mark.slow
 RIGID = jb.ladder()["rigid"]
-SCATTER = {"slope": 0.1, "d": 0.05}
+SCATTERED = "slope", "d"
 WANTED = ("speed", "spectral_radius", "impact_loss")
 
 
 def over_members(scene, criterion, larger):
     gait = jb.find_gait(scene, radius_sensitivities=False)
-    nominal = evaluate(scene, gait, (), "balanced")
-    ensemble = ensemble_of(scene, SCATTER, 4, criterion, larger, seed=1)
-    return ensemble, evaluate_ensemble(ensemble, scene, nominal, WANTED, GaitSettings())
+    return evaluated_over_members(scene, gait, WANTED, criterion, larger)
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("criterion", ["mean", "worst"])
 def test_measures_are_those_of_the_members_one_by_one(criterion):
     larger = {"speed": False, "spectral_radius": True, "impact_loss": True}
-    ensemble, known = over_members(RIGID, criterion, larger)
+    members, known = over_members(RIGID, criterion, larger)
     own = jb.parameter_values(RIGID)
     rows = []
-    for factors in ensemble.factors:
-        values = {n: float(own[n]) * f for n, f in zip(SCATTER, factors, strict=True)}
+    for factors in members:
+        values = {n: float(own[n]) * f for n, f in zip(SCATTERED, factors, strict=True)}
         scene = jb.with_parameters(RIGID, values)
         gait = jb.find_gait(scene, radius_sensitivities=False)
-        rows.append(evaluate(scene, gait, WANTED, "balanced").values)
+        rows.append(evaluated(scene, gait, WANTED).values)
     for name in WANTED:
         column = np.asarray([row[name] for row in rows])
         worst = column.max() if larger[name] else column.min()

@@ -12,7 +12,6 @@ from PIL import Image
 import jaxbiped as jb
 from jaxbiped import plot
 from jaxbiped.plot import style
-from jaxbiped.plot._contact_charts import sampled_forces
 from tests.drawn import assert_is_drawn, assert_ticks_apart
 
 WIDTHS = {1: 3.4, 2: 7.0}
@@ -231,7 +230,9 @@ def test_lines_and_markers_hold_without_colour():
 def test_no_peak_of_a_force_is_thinned_away_in_a_file(seed_walk, tmp_path):
     """Against the largest force of a recording right to 1e-5, in the path that the SVG holds."""
     scene, walk = seed_walk
-    t, forces = sampled_forces(scene, walk)
+    t = np.linspace(0.0, 2.0, 20_001)
+    fine = jb.simulate(scene, jb.seed_state(), duration=2.0, accuracy="tight", save=t)
+    forces = jb.dynamics.foot_forces(scene, fine.state)
     with plot.figure_style("paper"):
         figure = plot.contact_forces(scene, walk)
     (path,) = plot.save_figure(figure, tmp_path / "forces.svg")
@@ -243,7 +244,7 @@ def test_no_peak_of_a_force_is_thinned_away_in_a_file(seed_walk, tmp_path):
                             path.read_text())
     ])  # fmt: skip
     for foot in (1, 2):
-        force = forces[f"normal_{foot}"]
+        force = np.asarray(forces[foot - 1].normal)
         peak = (t[np.argmax(force)], np.max(force))
         x, y = ax.transData.transform(peak) * 72.0 / figure.dpi
         assert np.min(np.hypot(*(points - (x, height - y)).T)) < 0.2

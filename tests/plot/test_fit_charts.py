@@ -7,9 +7,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped import plot
-from jaxbiped.optimise._objective_values import Evaluation
-from jaxbiped.optimise._optimality import Held, Optimality
-from jaxbiped.optimise._optimum import Iteration
+from jaxbiped.optimise import Evaluation, Held, Iteration, Optimality
 from tests.drawn import assert_is_drawn, assert_ticks_apart, points_of
 from tests.plot.test_figure_style import assert_fits
 from tests.plot.test_parameter_charts import branch_point, make_branch

@@ -49,3 +49,13 @@ def test_a_cubic_needs_no_knots_between_its_ends():
     tolerances = Tolerances({"angle": ("rate", 1e-12)}, {}, shortest=1e-6)
     t, _ = adaptive_knots(cubic, np.linspace(0.0, 1.0, 33), tolerances)
     assert t.tolist() == [0.0, 1.0]
+
+
+def test_where_hardly_any_knot_is_needless_all_stay():
+    """To drop one of a hundred, which lies between its neighbours, is not worth a pass."""
+    t = np.arange(101.0)
+    force = np.random.default_rng(0).normal(size=101)
+    force[51] = 0.5 * (force[50] + force[52])
+    tolerances = Tolerances({}, {"force": 1e-3}, shortest=2.0)
+    knots, _ = adaptive_knots(lambda at: {"force": np.interp(at, t, force)}, t, tolerances)
+    assert knots.tolist() == t.tolist()

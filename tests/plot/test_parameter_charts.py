@@ -1,6 +1,7 @@
 """Figures of branches, against branches made by hand: nothing is compiled."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,6 @@ from jaxbiped.continuation import (
     BranchStop,
     DoublingCascade,
 )
-from jaxbiped.continuation._branch_point import CycleFootsteps
 from jaxbiped.plot import bifurcation_curves, branch
 from tests.drawn import assert_is_drawn, legend_of, points_of
 
@@ -83,7 +83,10 @@ def _doubled(bifurcations=()):
     for value, apart in ((0.06, 0.01), (0.07, 0.02)):
         lengths = np.array([value + apart, value - apart])
         states = np.stack([POINTS[0].recurring, POINTS[0].recurring + 1.0])
-        steps = CycleFootsteps(states, np.array([0.5, 0.3]), lengths, np.array([20.0, 30.0]))
+        steps = SimpleNamespace(
+            recurring=states, period=np.array([0.5, 0.3]), step_length=lengths,
+            peak_normal=np.array([20.0, 30.0]),
+        )  # fmt: skip
         point = branch_point(value, 0.9, length=lengths.sum())
         points.append(point._replace(footsteps=steps, period=0.8))
     events = [BifurcationPoint(kind, points[-1], -1.0 + 0j, 1e-9) for kind in bifurcations]

@@ -11,10 +11,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.scene._bodies import Body, Foot
-from jaxbiped.scene._joint_parts import Coupling, Latch, Motor, Spring, Stop
-from jaxbiped.scene._mechanism import Mechanism
-from jaxbiped.scene._structure import pair_name
+from jaxbiped import Body, Coupling, Foot, Latch, Mechanism, Motor, Spring, Stop
 from tests.mechanisms import BISECTING, FEET, LEGS, PAIR, TORSO, leg
 
 LAW = jb.laws.RistowSchafer(K=300.0, c=3000.0, n=1.0)
@@ -94,7 +91,10 @@ def test_structures_pickle_and_are_their_own_identity():
     ],
 )
 def test_pairs_are_called_by_what_they_share(first, second, expected):
-    assert pair_name(first, second) == expected
+    bodies = tuple(jb.Body(name, mass=1.0, inertia=0.01, centre=0.1) for name in (first, second))
+    feet = tuple(jb.Foot(name, centre=0.3) for name in (first, second))
+    walker = jb.Mechanism(bodies=bodies, feet=feet, mirror=((first, second),))
+    assert f"{expected}.mass" in jb.parameter_names(walker)
 
 
 ONE_FOOT = Foot("x", centre=0.3)

@@ -1,5 +1,6 @@
 """Names of parameters against the rules of mechanisms, and values set by name against leaves."""
 
+import itertools
 import warnings
 
 import equinox as eqx
@@ -9,9 +10,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.scene._parameter_access import scene_identity, select_parameters
 from tests.mechanisms import leg
 from tests.scene.test_mechanism import BISECTING, LAW, LEGS, TORSO, kneed, two_legs
+from tests.sweep.walkers import gaitless
 
 SEED = jb.seed_scene()
 
@@ -56,7 +57,7 @@ def test_own_walkers_are_named_by_their_fields():
     assert {"m_thigh", "epsilon", "stop.K", "stop.c", "walker.g"} <= set(values)
     assert float(values["stop.K"]) == 300.0
     assert float(values["walker.g"]) == 0.136
-    assert select_parameters(OWN, None)[0] == (
+    assert jb.parameter_names(OWN) == (
         "m_thigh", "g", "epsilon", "stop.K", "stop.c", "stop.n"
     )  # fmt: skip
 
@@ -152,15 +153,35 @@ def test_a_stop_that_is_its_own_image_has_one_limit():
     assert "leg.spring.rest" not in two_legs(spring).parameter_names()
 
 
+def identity_of(walker):
+    """A scene as settings of a labelling tell it: its numbers, and what it is made of."""
+    scene = scene_of(walker)
+    settings = gaitless(scene, scene.state()).settings()
+    return settings["scene"], settings["models"]["scene"]
+
+
 def test_identities_tell_mechanisms_apart():
-    told = [scene_identity(scene_of(each)) for each in (kneed(), kneed(root="pelvis"), OWN)]
-    assert told[0]["scene"]["shank.stop.K"] == 300.0
-    assert "pelvis.mass" in told[1]["scene"]
-    assert told[0]["model"] != told[1]["model"]
-    assert told == [scene_identity(scene_of(each)) for each in (kneed(), kneed(root="pelvis"), OWN)]
+    told = [identity_of(each) for each in (kneed(), kneed(root="pelvis"), OWN)]
+    assert told[0][0]["shank.stop.K"] == 300.0
+    assert "pelvis.mass" in told[1][0]
+    assert told[0][1] != told[1][1]
+    assert told == [identity_of(each) for each in (kneed(), kneed(root="pelvis"), OWN)]
     held = kneed(
         joints=tuple(
             jb.Stop(f"shank_{i}", upper=0.2, law=LAW, holds="until heel strike") for i in (1, 2)
         )
     )
-    assert scene_identity(scene_of(held))["model"] != told[0]["model"]
+    assert identity_of(held)[1] != told[0][1]
+
+
+@pytest.mark.parametrize("scene", [jb.seed_scene(hip_mass=0.5), jb.ladder()["bristles"]])
+def test_changed_leaves_are_those_of_the_names_in_their_order(scene):
+    values, leaves = jb.parameter_values(scene), jax.tree.leaves(scene)
+    assert len(jb.parameter_names(scene)) == len(leaves)
+    for names in itertools.permutations(("slope", "K", "mu_static", "d"), 3):
+        given = {name: 1.01 * float(values[name]) for name in names}
+        changed = jb.with_parameters(scene, given)
+        pairs = zip(jax.tree.leaves(changed), leaves, strict=True)
+        assert sorted(float(a) for a, b in pairs if a != b) == sorted(given.values())
+        known = jb.parameter_values(changed)
+        assert {name: float(known[name]) for name in names} == given

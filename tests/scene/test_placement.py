@@ -8,19 +8,25 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.scene._placement import placement
 from tests.mechanisms import WALKERS
 from tests.scene.test_mechanism import BISECTING, FEET, LEGS, TORSO, kneed, two_legs
 
 SEED = jb.seed_scene().walker
 
 
+def placed(walker, slope, standing=None, **values):
+    """The state in which a walker stands on compliant ground."""
+    seed = jb.seed_scene(slope=slope)
+    scene = jb.Scene(walker, seed.ground, seed.normal, seed.friction)
+    return scene.state(standing=standing, **values)
+
+
 def test_a_walker_just_touches_with_its_lowest_foot():
-    placed = placement(SEED.mechanism(), 0.0, {"theta_1": 0.3, "theta_2": -0.1})
-    assert list(placed) == list(jb.State._fields)
-    assert float(placed["hip_z"]) == pytest.approx(0.08 + 0.32 * math.cos(0.1), rel=1e-15)
-    assert float(placed["theta_1"]) == 0.3
-    assert {float(placed[name]) for name in ("hip_x", "hip_vx", "hip_vz", "omega_2")} == {0.0}
+    found = placed(SEED, 0.0, theta_1=0.3, theta_2=-0.1)
+    assert type(found) is jb.State
+    assert float(found.hip_z) == pytest.approx(0.08 + 0.32 * math.cos(0.1), rel=1e-15)
+    assert float(found.theta_1) == 0.3
+    assert {float(x) for x in (found.hip_x, found.hip_vx, found.hip_vz, found.omega_2)} == {0.0}
 
 
 def test_a_standing_foot_rolls_as_the_rigid_walkers_does():
@@ -28,7 +34,7 @@ def test_a_standing_foot_rolls_as_the_rigid_walkers_does():
     scene = jb.RigidScene(SEED, jb.Ground(slope=0.02))
     rigid = jb.dynamics.RigidState(**{k: jnp.asarray(v) for k, v in values.items()})
     expected = jb.dynamics.whole_state(scene, rigid)
-    found = jb.State(**placement(SEED.mechanism(), 0.02, values, "2"))
+    found = placed(SEED, 0.02, "2", **values)
     np.testing.assert_allclose(found, expected, rtol=1e-14)
 
 
@@ -38,13 +44,13 @@ def test_a_knee_and_a_point_ahead_by_hand():
         theta_thigh_2=thigh, theta_shank_2=shank,
         omega_thigh_2=omega_thigh, omega_shank_2=omega_shank,
     )  # fmt: skip
-    found = placement(kneed(), 0.0, values, standing="shank_2")
+    found = placed(kneed(), 0.0, "shank_2", **values)
     height = 0.184 * math.cos(thigh) + 0.136 * math.cos(shank) + 0.08
-    assert float(found["hip_z"]) == pytest.approx(height, rel=1e-15)
+    assert float(found.hip_z) == pytest.approx(height, rel=1e-15)
     along = 0.184 * math.cos(thigh) * omega_thigh + (0.136 * math.cos(shank) + 0.08) * omega_shank
     up = 0.184 * math.sin(thigh) * omega_thigh + 0.136 * math.sin(shank) * omega_shank
-    assert float(found["hip_vx"]) == pytest.approx(-along, rel=1e-14)
-    assert float(found["hip_vz"]) == pytest.approx(-up, rel=1e-14)
+    assert float(found.hip_vx) == pytest.approx(-along, rel=1e-14)
+    assert float(found.hip_vz) == pytest.approx(-up, rel=1e-14)
 
 
 @pytest.mark.parametrize("pitch", [-0.1, 0.1])
@@ -52,43 +58,42 @@ def test_of_a_flat_foot_the_lower_end_stands(pitch):
     end = {"foot_2.heel": -0.04, "foot_2.toe": 0.08}
     name = "foot_2.heel" if pitch > 0.0 else "foot_2.toe"
     values = {"theta_foot_2": pitch, "omega_foot_2": 2.0}
-    found = placement(WALKERS["flat"], 0.0, values, standing="foot_2")
+    found = placed(WALKERS["flat"], 0.0, "foot_2", **values)
     height = 0.36 + 0.03 * math.cos(pitch) - end[name] * math.sin(pitch) + 0.01
-    assert float(found["hip_z"]) == pytest.approx(height, rel=1e-15)
-    by_name = placement(WALKERS["flat"], 0.0, values, standing=name)
-    assert [float(a) for a in found.values()] == [float(a) for a in by_name.values()]
+    assert float(found.hip_z) == pytest.approx(height, rel=1e-15)
+    by_name = placed(WALKERS["flat"], 0.0, name, **values)
+    assert found == by_name
 
 
 def test_coupled_bodies_follow_the_legs_and_the_vertical():
     foot = (*FEET, jb.Foot("torso", centre=0.6))
     leaning = jb.Coupling({"torso": 1, "vertical": -1}, rest=0.2)
     walker = two_legs(leaning, bodies=(*LEGS, TORSO), feet=foot)
-    found = placement(walker, 0.3, {"omega_leg_1": 1.0}, standing="torso")
-    assert float(found["hip_z"]) == pytest.approx(0.6 * math.cos(0.5), rel=1e-15)
-    assert float(found["hip_vx"]) == 0.0
+    found = placed(walker, 0.3, "torso", omega_leg_1=1.0)
+    assert float(found.hip_z) == pytest.approx(0.6 * math.cos(0.5), rel=1e-15)
+    assert float(found.hip_vx) == 0.0
     bisecting = two_legs(jb.Coupling(BISECTING), bodies=(*LEGS, TORSO), feet=foot)
-    turning = placement(bisecting, 0.3, {"omega_leg_1": 1.0}, standing="torso")
-    assert float(turning["hip_vx"]) == pytest.approx(-0.3, rel=1e-15)
+    turning = placed(bisecting, 0.3, "torso", omega_leg_1=1.0)
+    assert float(turning.hip_vx) == pytest.approx(-0.3, rel=1e-15)
 
 
 def test_arrays_make_a_batch_and_derivatives_pass():
     angles = np.linspace(-0.3, 0.3, 5)
-    many = placement(SEED.mechanism(), 0.0, {"theta_2": angles, "omega_2": -1.0}, "2")
-    assert {leaf.shape for leaf in many.values()} == {(5,)}
-    np.testing.assert_allclose(many["hip_z"], 0.08 + 0.32 * np.cos(angles), rtol=1e-15)
+    many = placed(SEED, 0.0, "2", theta_2=angles, omega_2=-1.0)
+    assert {leaf.shape for leaf in many} == {(5,)}
+    np.testing.assert_allclose(many.hip_z, 0.08 + 0.32 * np.cos(angles), rtol=1e-15)
 
     def height(angle):
-        return placement(SEED.mechanism(), 0.0, {"theta_2": angle}, "2")["hip_z"]
+        return placed(SEED, 0.0, "2", theta_2=angle).hip_z
 
     assert float(jax.jit(jax.grad(height))(0.2)) == pytest.approx(-0.32 * math.sin(0.2), rel=1e-14)
 
 
 def test_what_is_named_is_kept():
     values = {"hip_z": 1.0, "hip_vx": 0.2, "bristle_1": 0.5}
-    names = (*jb.State._fields, "bristle_1", "bristle_2")
-    found = placement(SEED.mechanism(), 0.0, values, "2", names)
-    assert tuple(found) == names
-    assert [float(found[name]) for name in values] == [1.0, 0.2, 0.5]
+    found = jb.ladder()["bristles"].state(standing="2", **values)
+    assert found._fields == (*jb.State._fields, "bristle_1", "bristle_2")
+    assert [float(getattr(found, name)) for name in values] == [1.0, 0.2, 0.5]
 
 
 @pytest.mark.parametrize(
@@ -103,7 +108,7 @@ def test_what_is_named_is_kept():
 def test_unknown_names_are_refused(values, standing, words):
     walker = two_legs(jb.Coupling(BISECTING), bodies=(*LEGS, TORSO))
     with pytest.raises(jb.ArgumentError, match=words):
-        placement(walker, 0.0, values, standing)
+        placed(walker, 0.0, standing, **values)
 
 
 @pytest.mark.parametrize("angle", np.linspace(-0.4, 0.4, 9))

@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._minimal_motion import WalkerField
-from jaxbiped.dynamics._redundant_motion import BodiesField
-from jaxbiped.dynamics._state import field_of, state_type
-from jaxbiped.scene._joint_parts import Stop
-from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped import Mechanism, Stop
+from jaxbiped.dynamics._state import state_type
+from jaxbiped.hybrid._walker_systems import BodiesField, WalkerField, system_of
 from jaxbiped.scene._scene import AbstractScene, is_compliant, is_rigid
 from jaxbiped.scene._state_types import state_type_of
 from tests.mechanisms import FEET, LEGS, WALKERS, scene_of
@@ -73,7 +71,7 @@ RIGID = jb.RigidScene(SEED.walker, SEED.ground)
     [
         (SEED, True, False, jb.State, WalkerField()),
         (BRISTLES, True, False, jb.dynamics.BristleState, WalkerField()),
-        (RIGID, False, False, jb.dynamics.RigidState, jb.dynamics.rolling_field),
+        (RIGID, False, False, jb.dynamics.RigidState, jb.hybrid.Rolling().vector_field),
         (
             jb.RedundantScene(SEED),
             True,
@@ -93,7 +91,7 @@ RIGID = jb.RigidScene(SEED.walker, SEED.ground)
 def test_every_scene_says_of_what_kind_it_is(scene, compliant, redundant, state, field):
     assert (scene.compliant, scene.redundant) == (compliant, redundant)
     assert (is_compliant(scene), is_rigid(scene)) == (compliant, not compliant)
-    assert (state_type(scene), field_of(scene)) == (state, field)
+    assert (state_type(scene), system_of(scene).vector_field) == (state, field)
     assert scene.has_bristles == (state_type(scene.minimal) is jb.dynamics.BristleState)
     assert scene.minimal.minimal is scene.minimal
     assert not scene.minimal.redundant
@@ -114,7 +112,7 @@ def test_what_is_no_scene_is_of_no_kind():
     with pytest.raises(jb.ArgumentError, match="scene is a float"):
         state_type(3.0)
     with pytest.raises(jb.ArgumentError, match="scene is a float"):
-        field_of(3.0)
+        system_of(3.0)
 
 
 class Wheel(AbstractScene):

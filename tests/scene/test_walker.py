@@ -1,14 +1,11 @@
 """Named walkers and their parameters, against the mechanisms they stand for and written numbers."""
 
-import itertools
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.scene._parameter_access import select_parameters
 from tests.scene.test_mechanism import BISECTING, LAW, LEGS, TORSO, kneed, two_legs
 
 WALKER = dict(m=1.5, J=0.01, l=0.4, d=0.1, r=0.08, hip_mass=0.7)
@@ -41,18 +38,6 @@ def test_numbers_that_no_walker_has_are_refused(change, said):
     jb.Walker(**WALKER | {"l": 0.08, "d": 0.0})
 
 
-@pytest.mark.parametrize("scene", [jb.seed_scene(hip_mass=0.5), jb.ladder()["bristles"]])
-def test_selected_leaves_are_those_of_the_names_in_their_order(scene):
-    values, leaves = jb.parameter_values(scene), jax.tree.leaves(scene)
-    for names in itertools.permutations(("slope", "K", "mu_static", "d"), 3):
-        told, active = select_parameters(scene, names)
-        assert told == names
-        assert [float(leaves[i]) for i in active] == [float(values[name]) for name in names]
-    every, active = select_parameters(scene, None)
-    assert every == jb.parameter_names(scene)
-    assert sorted(active) == list(range(len(leaves)))
-
-
 KNEED = jb.Kneed(
     m_thigh=0.2, J_thigh=5.8e-4, l_thigh=0.184, d_thigh=0.08,
     m_shank=0.124, J_shank=6.9e-4, l_shank=0.216, d_shank=0.096, w_shank=-0.004,
@@ -71,7 +56,7 @@ def test_a_kneed_walker_is_its_mechanism():
 
 
 def test_a_kneed_walkers_parameters_are_its_fields():
-    names, _ = select_parameters(KNEED, None)
+    names = jb.parameter_names(KNEED)
     assert names[:2] == ("m_thigh", "J_thigh")
     assert names[-4:] == ("epsilon", "stop.K", "stop.c", "stop.n")
     slopes = jax.grad(lambda walker: walker.mechanism().total_mass)(KNEED)
@@ -93,7 +78,7 @@ def test_a_torso_bisects_the_legs_or_is_held_by_a_spring():
     spring = jb.Spring({"torso": 1, "vertical": -1}, stiffness=60.0, damping=1.0)
     held = jb.WithTorso(KNEED, 0.3, 0.0015, 0.1, spring)
     assert "theta_torso" in held.mechanism().structure.coordinates
-    names, _ = select_parameters(held, None)
+    names = jb.parameter_names(held)
     assert {"walker.m_thigh", "walker.stop.K", "h", "spring.stiffness"} <= set(names)
 
 

@@ -7,8 +7,6 @@ from reference.rigid_walks import rigid_walks
 from reference.scipy_solves import final_of
 
 import jaxbiped as jb
-from jaxbiped.dynamics._stance_motion import rolling_rates
-from jaxbiped.solve._rolling_step import rolling_step
 from tests.rigid_walkers import STABLE, rigid_seed, simplest_state, simplest_walker
 
 SCENE, STATE = jb.seed_scene(), jb.seed_state()
@@ -159,34 +157,3 @@ def test_what_a_rigid_walk_cannot_meet_is_told_with_what_was_reached():
     with pytest.warns(RuntimeWarning, match="the solve ended as out of steps"):
         short = jb.rigid_walk(rigid_seed(), START, footsteps=9, accuracy=1e-6, max_solver_steps=20)
     assert np.isinf(short.error.relative)
-
-
-def test_the_embedded_method_is_one_order_lower():
-    """Its error of one step falls by 2⁸ where that is halved, and is the larger one."""
-    scene = rigid_seed()
-
-    def end(step, state=START, *, embedded=False):
-        rates = rolling_rates(scene, state)
-        return rolling_step(scene, state, rates, step, 1e-6, embedded=embedded)[0]
-
-    gaps = []
-    for step in (0.06, 0.03):
-        finer = np.array(end(0.5 * step, end(0.5 * step)))
-        own, other = (np.abs(np.array(end(step, embedded=e)) - finer).max() for e in (False, True))
-        assert own < 0.5 * other
-        gaps.append(other)
-    assert np.log2(gaps[0] / gaps[1]) == pytest.approx(8.0, abs=0.4)
-
-
-def test_an_error_of_a_step_is_the_difference_of_the_two_orders_in_units_of_the_tolerance():
-    """Relative, and absolute by a hundredth; the root mean square over angles and rates."""
-    scene, rtol, step = rigid_seed(), 1e-7, 0.05
-    rates = rolling_rates(scene, START)
-    (end, error, _), (other, *_) = (
-        rolling_step(scene, START, rates, step, rtol, embedded=embedded)
-        for embedded in (False, True)
-    )
-    ends = np.array([START, end, other], dtype=float)[:, 1:5]
-    allowed = rtol * (0.01 + np.max(np.abs(ends[:2]), axis=0))
-    expected = np.sqrt(np.mean(((ends[1] - ends[2]) / allowed) ** 2))
-    assert float(error) == pytest.approx(expected, rel=1e-4)

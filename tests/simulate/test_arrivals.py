@@ -112,3 +112,16 @@ def test_many_give_what_each_gives_alone():
     for k, speed in enumerate(speeds):
         for a, b in zip(jax.tree.leaves(together), jax.tree.leaves(one(speed)), strict=True):
             np.testing.assert_array_equal(a[k], b)
+
+
+@pytest.mark.nightly
+def test_the_loop_of_xla_arrives_where_lanes_do():
+    lanes, xla = (_walk(save=jb.HeelStrike(), max_arrivals=6, engine=e) for e in ("lanes", "xla"))
+    assert xla.engine == "xla"
+    count = int(lanes.arrivals.total)
+    assert int(xla.arrivals.total) == count >= 2
+    np.testing.assert_allclose(xla.arrivals.t[:count], lanes.arrivals.t[:count], rtol=1e-5)
+    assert np.all(np.isinf(xla.arrivals.t[count:]))
+    np.testing.assert_allclose(
+        xla.arrivals.state.theta_1[:count], lanes.arrivals.state.theta_1[:count], atol=1e-5
+    )

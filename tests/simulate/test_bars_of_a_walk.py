@@ -5,11 +5,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._ending import Ending
+from jaxbiped import Ending, Simulation, Trajectory
 from jaxbiped.simulate._accurate_walk import Witness, judge_walk
 from jaxbiped.simulate._backends import lane_request
-from jaxbiped.simulate._simulation import Simulation
-from jaxbiped.solve._trajectory import Trajectory
 
 SCENE, STATE = jb.seed_scene(), jb.seed_state()
 TIME = np.sqrt(0.4 / 9.8)

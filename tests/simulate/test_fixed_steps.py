@@ -14,6 +14,8 @@ import jaxbiped as jb
 pytestmark = pytest.mark.slow
 
 SEED, STATE = jb.seed_scene(), jb.seed_state()
+END = dict(save="end", watch=())
+"""Of walks of the seed's that end before anything could be watched: fewer surfaces to compile."""
 SCENE = grazing_scene("kelvin-voigt")
 """Its force jumps at touchdown, so that even a shallow contact is felt."""
 NUMBERS = check_numbers(SCENE)
@@ -80,7 +82,14 @@ def test_by_tolerances_nothing_is_counted():
 @pytest.mark.parametrize("dt", [1e-1, 1e-3])
 def test_steps_of_one_size_that_are_too_long_are_told(dt):
     with pytest.warns(RuntimeWarning, match=f"dt = {dt:g} is too long"):
-        jb.simulate(SEED, STATE, duration=0.03, dt=dt, save="end")
+        jb.simulate(SEED, STATE, duration=0.03, dt=dt, **END)
+
+
+@pytest.mark.parametrize(("steps", "factor"), [(7, 0.5), (8, 2.0)])
+def test_other_steps_are_longer_from_eight_steps_on(steps, factor):
+    dt = 2.0**-9
+    with pytest.warns(RuntimeWarning, match=f"too long: with steps of {factor * dt:g} s"):
+        jb.simulate(SEED, STATE, duration=steps * dt, dt=dt, **END)
 
 
 def test_steps_whose_other_solve_is_as_wrong_by_chance_are_told():
@@ -94,9 +103,23 @@ def test_steps_whose_other_solve_is_as_wrong_by_chance_are_told():
 
 
 def test_short_steps_of_one_size_are_not(recwarn):
-    walk = jb.simulate(SEED, STATE, duration=3e-3, dt=1e-6, save="end")
+    walk = jb.simulate(SEED, STATE, duration=3e-3, dt=1e-6, **END)
     assert walk.outcome is jb.Ending.WALKING
     assert not [each for each in recwarn if each.category is RuntimeWarning]
+
+
+@pytest.mark.parametrize("most", [16, 24])
+def test_a_few_short_steps_are_not_where_few_are_allowed(most, recwarn):
+    walk = jb.simulate(SEED, STATE, duration=7.5e-6, dt=1e-6, max_solver_steps=most, **END)
+    assert walk.outcome is jb.Ending.WALKING
+    assert int(walk.accepted) == 8
+    assert not [each for each in recwarn if each.category is RuntimeWarning]
+
+
+def test_one_step_that_is_too_long_is_told_where_24_are_allowed():
+    """Longer steps end with the walk, as this one does: only shorter ones lead elsewhere."""
+    with pytest.warns(RuntimeWarning, match="dt = 0.1 is too long"):
+        jb.simulate(SEED, STATE, duration=0.03, dt=0.1, max_solver_steps=24, **END)
 
 
 def test_a_tolerance_far_too_coarse_for_the_slip_is_told(recwarn):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.solve._accuracy import ACCURACIES
+from jaxbiped import ACCURACIES
 from tests.compliant_walkers import frictionless_walker
 
 pytestmark = pytest.mark.slow

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.simulate._start import check_start_height, start_for
 
 SEED = jb.seed_scene()
 WIDTHS = {
@@ -18,25 +17,30 @@ WIDTHS = {
 }
 
 
+def begun(scene, state):
+    """The start of a simulation, checked and converted."""
+    return jb.Simulation.prepare(scene, state, duration=1.0).state
+
+
 @pytest.mark.parametrize("kind", WIDTHS)
 def test_a_start_in_float32_stays_so(kind):
-    start, _ = start_for(SEED, jb.State(*[WIDTHS[kind](float(x)) for x in jb.seed_state()]))
+    start = begun(SEED, jb.State(*[WIDTHS[kind](float(x)) for x in jb.seed_state()]))
     assert {leaf.dtype for leaf in start} == {np.dtype("float32")}
 
 
 def test_one_leaf_in_float32_loses_nothing_of_the_others():
     for field in ("hip_x", "theta_1"):
-        start, _ = start_for(SEED, jb.seed_state()._replace(**{field: np.float32(0.1)}))
+        start = begun(SEED, jb.seed_state()._replace(**{field: np.float32(0.1)}))
         assert {leaf.dtype for leaf in start} == {np.dtype("float64")}
 
 
 def test_a_redundant_start_is_put_on_its_constraints_in_64_bits():
-    start, _ = start_for(jb.RedundantScene(SEED), jax.tree.map(np.float32, jb.seed_state()))
+    start = begun(jb.RedundantScene(SEED), jax.tree.map(np.float32, jb.seed_state()))
     assert {leaf.dtype for leaf in start} == {np.dtype("float64")}
 
 
 def test_plain_numbers_are_float64():
-    start, _ = start_for(SEED, jb.State(*map(float, jb.seed_state())))
+    start = begun(SEED, jb.State(*map(float, jb.seed_state())))
     assert {leaf.dtype for leaf in start} == {np.dtype("float64")}
 
 
@@ -56,9 +60,10 @@ def _start(**values):
     ],
 )
 def test_refused(scene, start, words):
-    for state in (start, jb.dynamics.BristleState(*start, jnp.zeros(()), jnp.zeros(()))):
+    with_bristles = dataclasses.replace(scene, friction=jb.ladder()["bristles"].friction)
+    for each in (scene, with_bristles):
         with pytest.raises(jb.ArgumentError) as caught:
-            check_start_height(scene, state)
+            begun(each, start)
         assert all(word in str(caught.value) for word in words)
     with pytest.raises(jb.ArgumentError, match="below the"):
         jb.simulate(scene, start, duration=1.0)
@@ -68,7 +73,7 @@ def test_refused(scene, start, words):
 
 def test_the_foot_that_would_just_touch_is_named_by_a_height_at_which_it_does():
     with pytest.raises(jb.ArgumentError) as caught:
-        check_start_height(SEED, _start(hip_z=0.2))
+        begun(SEED, _start(hip_z=0.2))
     height = float(str(caught.value).split("hip_z = ")[-1].rstrip("."))
     foot = jb.dynamics.feet(SEED, _start(hip_z=height))[1]
     assert float(foot.penetration) == pytest.approx(0.0, abs=1e-9)
@@ -86,8 +91,8 @@ def test_the_foot_that_would_just_touch_is_named_by_a_height_at_which_it_does():
     ],
 )
 def test_allowed(scene, start):
-    check_start_height(scene, start)
+    begun(scene, start)
 
 
 def test_what_is_traced_passes():
-    jax.make_jaxpr(lambda z: check_start_height(SEED, _start()._replace(hip_z=z)))(0.2)
+    jax.eval_shape(lambda z: begun(SEED, _start()._replace(hip_z=z)), 0.2)

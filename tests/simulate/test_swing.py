@@ -70,7 +70,7 @@ def test_a_swing_that_does_not_finish_says_why(how, ending):
     scene = jb.dynamics.LinkageScene(one_leg(), jb.constraints.Baumgarte(a=1e20, b=1e20))
     found = jb.swing(scene, ONE_LEG_START, times=TIMES, **how)
     assert found.outcome is ending
-    assert repr(found).startswith(f"Trajectory({ending}, engine=xla, shape=(201,), dtype=float64")
+    assert repr(found).startswith(f"Trajectory({ending}, engine=lanes, shape=(201,), dtype=float64")
 
 
 def test_projected_steps_agree_with_scipy(angles):
@@ -79,6 +79,22 @@ def test_projected_steps_agree_with_scipy(angles):
     for k, expected in enumerate(angles):
         cosine, sine = (found.state.q[4 * k + i][-1] for i in (2, 3))
         assert float(2.0 * jnp.arctan2(sine, cosine)) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("how", [dict(rtol=1e-9), dict(solver="runge2", dt=1e-3)])
+def test_lanes_swing_as_diffrax_does(how):
+    """By the same steps to rounding, by others to the tolerance."""
+    scene = jb.dynamics.LinkageScene(one_leg(), jb.constraints.Index1())
+    lanes, xla = (
+        jb.swing(scene, ONE_LEG_START, times=TIMES, adjoint=adjoint, **how)
+        for adjoint in (None, diffrax.RecursiveCheckpointAdjoint())
+    )
+    assert (lanes.engine, xla.engine) == ("lanes", "xla")
+    bound = 1e-12 if "dt" in how else 1e-7
+    for a, b in zip(jax.tree.leaves(lanes.state), jax.tree.leaves(xla.state), strict=True):
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=bound)
+    np.testing.assert_array_equal(lanes.t, xla.t)
 
 
 def test_a_four_bar_keeps_its_energy_and_its_joints():

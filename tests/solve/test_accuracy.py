@@ -10,17 +10,17 @@ import pytest
 from reference.scipy_solves import final_of
 
 import jaxbiped as jb
-from jaxbiped.solve._accuracy import (
-    ACCURACIES,
+from jaxbiped import ACCURACIES
+from jaxbiped.hybrid._scales import (
     check_precision,
     recurring_inverse_units,
     recurring_sizes,
     relative_to_scene,
-    rms_norm,
     sizes_of,
-    tolerances,
     units_of,
 )
+from jaxbiped.solve._accuracy import precision_of, tolerances
+from jaxbiped.solve.solvers import rms_norm
 
 SEED, START = jb.seed_scene(), jb.seed_state()
 DURATION = 0.8
@@ -53,6 +53,19 @@ def test_derivatives_have_ten_times_the_tolerance_of_the_state():
             assert precision.tangent_rtol == pytest.approx(10.0 * precision.rtol)
     draft, balanced, tight = ACCURACIES.values()
     assert draft.gait.rtol > 100.0 * balanced.gait.rtol > 1e4 * tight.gait.rtol
+
+
+def test_gaits_resolve_the_slip_speed_with_their_columns():
+    """Half of 1e-5 m/s, of √(g l) = 1.98 m/s, is 2.5e-6: a gait's tolerance is four times that."""
+    sticky = jb.seed_scene(v0=1e-5)
+    found = precision_of("draft", sticky)
+    assert float(found.rtol) == pytest.approx(2e-5 / np.sqrt(9.8 * 0.4))
+    assert float(found.tangent_rtol) == pytest.approx(2e-4 / np.sqrt(9.8 * 0.4))
+    for name, scene in (("draft", SEED), ("balanced", sticky), ("draft", jb.ladder()["rigid"])):
+        named = ACCURACIES[name].gait if scene.compliant else ACCURACIES[name].rigid_gait
+        assert tuple(map(float, precision_of(name, scene))) == tuple(named)
+    traced = jax.jit(lambda v0: precision_of("draft", jb.seed_scene(v0=v0)).rtol)(1e-5)
+    assert float(traced) == pytest.approx(float(found.rtol))
 
 
 def test_a_slip_speed_is_resolved_and_what_is_given_stays():

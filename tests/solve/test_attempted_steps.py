@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from jaxbiped._ending import Ending
+from jaxbiped import Ending
 from jaxbiped.dynamics._stance_motion import rolling_rates
 from jaxbiped.solve import _rigid_steps
 from jaxbiped.solve._rigid_steps import (
+    FallWatch,
     ModeProgress,
     RigidProgress,
     RigidWalk,
@@ -20,7 +21,7 @@ from jaxbiped.solve._rigid_steps import (
     initial_progress,
     with_next_step,
 )
-from jaxbiped.solve._rolling_step import ModeEvents, StepOnto, SurfaceCourse
+from jaxbiped.solve._rolling_step import DOPRI8, ModeEvents, StepOnto, SurfaceCourse
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.solve.test_step_events import AHEAD, FALLS, STEP, TIPS, ends_of, of_controls
 
@@ -67,8 +68,10 @@ def onto_of(state, near=NO, rest=1e-5, ahead=YES, closing=-0.5):
 @jax.jit
 def by_landing_on_falls(walk, now, trial, error, rates, onto, changes):
     return [
-        _after_free_step(walk, now, trial, error, rates, onto, lands, changes)
-        for lands in (True, False)
+        _after_free_step(
+            walk, now, trial, error, DOPRI8.length(error), DOPRI8, rates, onto, falls, changes
+        )
+        for falls in (FallWatch.LOCATED, FallWatch.TOLD)
     ]
 
 

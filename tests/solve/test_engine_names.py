@@ -1,19 +1,20 @@
 """Engines by name, against what is refused, and in which words."""
 
 import diffrax
+import jax
+import numpy as np
 import pytest
 
 import jaxbiped as jb
 from jaxbiped.compiler import BY_NAME, CUDA, LANES, XLA
-from jaxbiped.solve._engine_names import engine_for
-from jaxbiped.sweep._labelling_preparation import effort_of
 from tests.compiler.fake_driver import install
+from tests.sweep.walkers import gaitless
 
 SCENE, STATE = jb.seed_scene(), jb.seed_state()
 
 
-def by_device(**how):
-    return jb.simulate(SCENE, STATE, duration=0.1, engine="cuda", **how)
+def by_device(state=STATE, **how):
+    return jb.simulate(SCENE, state, duration=0.1, engine="cuda", **how)
 
 
 def test_names():
@@ -38,10 +39,11 @@ def test_devices_are_refused_where_there_is_none(monkeypatch):
     ("ask", "why"),
     [
         (lambda: jb.find_gait(SCENE, engine="cuda"), "run walks and labels, no searches"),
-        (lambda: by_device(solver="tsit5"), "Tsit5 is not one of its solvers"),
         (lambda: by_device(adjoint=diffrax.ForwardMode()), "an adjoint is diffrax's"),
         (
-            lambda: engine_for("cuda", obstacle="it computes in 64 bits", by_device=True),
+            lambda: jb.simulate(
+                SCENE, jax.tree.map(np.float32, STATE), duration=0.1, engine="cuda"
+            ),
             'in 64 bits; use engine="xla"',
         ),
     ],
@@ -54,13 +56,13 @@ def test_what_devices_cannot_do(monkeypatch, ask, why):
 
 def test_auto_takes_a_device_for_labels_that_keep_it_busy(monkeypatch):
     def engines(**options):
-        effort = effort_of(SCENE, **options)
+        effort = gaitless(SCENE, STATE, **{"engine": "auto"} | options).effort
         return [effort.engine_of(count) for count in (1, 100_000)]
 
     install(monkeypatch, multiprocessors=132)
     assert engines() == ["lanes", "cuda"]
     assert engines(engine="cuda") == ["cuda", "cuda"]
     assert engines(engine="lanes") == ["lanes", "lanes"]
-    assert engine_for("auto", obstacle=None, by_device=True) == "lanes"
+    assert jb.Simulation.prepare(SCENE, STATE, duration=0.1).engine == "lanes"
     install(monkeypatch, devices=0)
     assert engines() == ["lanes", "lanes"]

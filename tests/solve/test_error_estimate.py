@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._error_estimate import error_numbers, error_sentence, refine
+from jaxbiped.solve.solvers import rms_norm
 
 DOUBLE = np.dtype(float)
 

@@ -70,6 +70,26 @@ def test_one_euler_step_leads_onto_a_surface_that_is_near():
     assert float(far.rest) == pytest.approx(1.0)
 
 
+ROOT = float(jnp.sqrt(RTOL))
+
+
+@pytest.mark.parametrize(
+    ("rate", "lies"),
+    [(0.0, True), (0.5 * ROOT, True), (ROOT, True), (-ROOT, True), (1.1 * ROOT, False)],
+)
+def test_what_is_near_its_surface_and_moves_by_no_more_than_the_tolerances_root_lies_on_it(
+    rate, lies
+):
+    value = -0.05 * RTOL
+    near, far = (
+        onto(SurfaceCourse(*(jnp.array([x]) for x in (at, rate, True)), jnp.zeros(0)), 0)
+        for at in (value, 1e3 * value)
+    )
+    assert bool(near.near)
+    assert float(near.rest) == pytest.approx(0.0 if lies else -value / rate, rel=1e-12)
+    assert not bool(far.near)
+
+
 @pytest.mark.parametrize("bend", [0.0, -3.0, 3.0])
 def test_a_gap_is_met_from_farther_away_by_what_is_known_of_its_bend(bend):
     """A parabola, which one step meets to the third order of the time that is left."""

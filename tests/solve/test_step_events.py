@@ -8,11 +8,14 @@ import pytest
 from numpy.polynomial import Polynomial
 
 import jaxbiped as jb
-from jaxbiped.dynamics._stance_motion import rolling_field, rolling_rates
+from jaxbiped.dynamics import rolling_field
+from jaxbiped.dynamics._stance_motion import rolling_rates
+from jaxbiped.solve._explicit_methods import ExplicitMethod
 from jaxbiped.solve._rolling_step import euler_step_onto, events_within, rolling_step
 from tests.rigid_walkers import STABLE, compass_gait, simplest_state, simplest_walker
 
 RTOL, STEP = 1e-6, 0.4
+ROLLING = jb.dynamics.rigid_state(jb.seed_state())
 SCENE = simplest_walker()
 AHEAD, BEHIND = [-0.2] * 6, [0.2] * 6
 """Control values of the stance leg's angle: that of a swing leg ahead is larger by 0.4."""
@@ -242,7 +245,9 @@ def test_a_step_is_that_of_dormand_and_prince_with_its_error():
     @jax.jit
     def both(state, step):
         begin = state, rolling_rates(scene, state), step, jnp.asarray(RTOL)
-        own = [rolling_step(scene, *begin, embedded=embedded) for embedded in (False, True)]
+        own = [
+            rolling_step(scene, *begin, method=ExplicitMethod(embedded=e)) for e in (False, True)
+        ]
         term, solver = diffrax.ODETerm(rolling_field), diffrax.Dopri8(scan_kind="lax")
         first = solver.init(term, 0.0, step, state, scene)
         end, error, *_ = solver.step(term, 0.0, step, state, scene, first, made_jump=False)
@@ -250,9 +255,42 @@ def test_a_step_is_that_of_dormand_and_prince_with_its_error():
 
     own, expected, errors, behind = jax.tree.map(np.asarray, both(state, step))
     errors, expected = np.array(errors)[1:], np.array(expected)[1:]
-    for (end, error, rates), shift in zip(own, (0.0, errors), strict=True):
+    for (end, error, stages), shift in zip(own, (0.0, errors), strict=True):
         assert float(end[0]) == float(state[0])
         np.testing.assert_allclose(end[1:], expected - shift, rtol=1e-12)
         size = RTOL * (0.01 + np.maximum(np.abs(state[1:]), np.abs(end[1:])))
         assert float(error) == pytest.approx(np.sqrt(np.mean((errors / size) ** 2)), rel=1e-4)
-        np.testing.assert_allclose(rates, np.array(behind)[1:], rtol=1e-3)
+        np.testing.assert_allclose(stages[-1], np.array(behind)[1:], rtol=1e-3)
+
+
+METHODS = ExplicitMethod(), ExplicitMethod(embedded=True)
+
+
+def test_the_embedded_method_is_one_order_lower():
+    """Its error of one step falls by 2⁸ where that is halved, and is the larger one."""
+    scene = jb.ladder()["rigid"]
+
+    def end(step, state=ROLLING, **how):
+        rates = rolling_rates(scene, state)
+        return rolling_step(scene, state, rates, step, 1e-6, **how)[0]
+
+    gaps = []
+    for step in (0.06, 0.03):
+        finer = np.array(end(0.5 * step, end(0.5 * step)))
+        own, other = (np.abs(np.array(end(step, method=m)) - finer).max() for m in METHODS)
+        assert own < 0.5 * other
+        gaps.append(other)
+    assert np.log2(gaps[0] / gaps[1]) == pytest.approx(8.0, abs=0.4)
+
+
+def test_an_error_of_a_step_is_the_difference_of_the_two_orders_in_units_of_the_tolerance():
+    """Relative, and absolute by a hundredth; the root mean square over angles and rates."""
+    scene, rtol, step = jb.ladder()["rigid"], 1e-7, 0.05
+    rates = rolling_rates(scene, ROLLING)
+    (end, error, _), (other, *_) = (
+        rolling_step(scene, ROLLING, rates, step, rtol, method=method) for method in METHODS
+    )
+    ends = np.array([ROLLING, end, other], dtype=float)[:, 1:5]
+    allowed = rtol * (0.01 + np.max(np.abs(ends[:2]), axis=0))
+    expected = np.sqrt(np.mean(((ends[1] - ends[2]) / allowed) ** 2))
+    assert float(error) == pytest.approx(expected, rel=1e-4)

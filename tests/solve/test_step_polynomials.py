@@ -1,11 +1,17 @@
-"""Polynomials of a step, against NumPy's of the same coefficients and against known roots."""
+"""Polynomials of a step against NumPy's and known roots; Runge–Kutta steppers against diffrax's."""
 
+import diffrax
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
+from jaxbiped.hybrid._scales import Units
+from jaxbiped.solve._runge_kutta import dense_rows, stepper_of, weights_of
+from jaxbiped.solve._solvers import SOLVERS, with_root_tolerances
 from jaxbiped.solve._step_polynomials import Quintic, StepCubic
+from jaxbiped.solve._stepper import Tolerance
 
 STEP = 0.4
 PLACES = np.linspace(0.0, 1.0, 7)
@@ -121,3 +127,62 @@ def test_changes_of_sign_with_what_is_known_to_a_width():
     ):
         found = quintic.sign_changes(shift, from_second=jnp.asarray(from_second))
         assert int(found) == expected, (shift, from_second)
+
+
+EXPLICIT = [diffrax.Heun, diffrax.Bosh3, diffrax.Tsit5, diffrax.Dopri5, diffrax.Dopri8]
+STIFFNESS = jnp.asarray(900.0)
+ENDS = jnp.asarray(0.0), jnp.asarray(0.01)
+
+
+def field(t, y, stiffness):
+    place, speed = y
+    return speed, -stiffness * jnp.sin(place) - speed + jnp.cos(t)
+
+
+@pytest.mark.parametrize("kind", [*EXPLICIT, diffrax.Euler])
+def test_dense_output_is_diffraxs(kind):
+    weights = jnp.asarray(weights_of(kind).end)
+    increments = jax.random.normal(jax.random.key(1), weights.shape)
+    ends = dict(t0=1.0, t1=1.5, y0=jnp.asarray(0.3), y1=0.3 + weights @ increments)
+    stages = {} if kind is diffrax.Euler else {"k": increments}
+    expected = kind.interpolation_cls(**ends, **stages)
+    coefficients = tuple(jnp.asarray(dense_rows(kind)) @ increments)
+    found = stepper_of(kind()).interpolation_cls(**ends, coefficients=coefficients)
+    times = jnp.linspace(1.0, 1.5, 11)
+    states = (jax.vmap(course.evaluate)(times) for course in (found, expected))
+    np.testing.assert_allclose(*states, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["euler", "runge2", "tsit5", "dopri8", "kvaerno3", "kvaerno5"])
+def test_a_step_is_diffraxs(name):
+    """Of a nonlinear equation, in which the rate of one component is another component."""
+    start, term = (jnp.asarray(1.0), jnp.asarray(0.2)), diffrax.ODETerm(field)
+    tolerance = Tolerance(1e-11, 1e-11, Units((1.0, 1.0), 1.0))
+    found = stepper_of(SOLVERS[name]()).advance(term, *ENDS, start, STIFFNESS, tolerance)
+    solver = with_root_tolerances(SOLVERS[name](), jnp.asarray(1e-11), jnp.asarray(1e-11))
+    begun = solver.init(term, *ENDS, start, STIFFNESS)
+    end, error, *_ = solver.step(term, *ENDS, start, STIFFNESS, begun, False)
+    np.testing.assert_allclose(found.end, end, rtol=1e-11)
+    assert (found.error is None) == (error is None)
+    if error is not None:
+        np.testing.assert_allclose(found.error, error, rtol=0.0, atol=1e-11)
+
+
+def test_a_stage_that_is_not_found_makes_the_error_infinite():
+    """Of many turns in a step, by iterations with the Jacobian at its start."""
+    start, term = (jnp.asarray(0.0), jnp.asarray(1e3)), diffrax.ODETerm(field)
+    tolerance = Tolerance(1e-10, 1e-10, Units((1.0, 1.0), 1.0))
+    found = stepper_of(SOLVERS["kvaerno3"]()).advance(term, 0.0, 1.0, start, STIFFNESS, tolerance)
+    assert np.all(np.isinf(found.error))
+
+
+@pytest.mark.parametrize(
+    "solver",
+    [
+        diffrax.HalfSolver(diffrax.Tsit5()),
+        diffrax.ImplicitEuler(),
+        diffrax.Kvaerno3(root_finder=diffrax.VeryChord(rtol=1e-3, atol=1e-3)),
+    ],
+)
+def test_other_solvers_have_no_stepper(solver):
+    assert stepper_of(solver) is None

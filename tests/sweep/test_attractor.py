@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins import FatalShock
-from jaxbiped.basins._labels import Label
+from jaxbiped.basins import Label
 from jaxbiped.sweep import _nearest_failure
-from jaxbiped.sweep._gait_family import attractor_without_radius, component_scales
+from jaxbiped.sweep._attractor import attractor_without_radius, component_scales
 from jaxbiped.sweep._labelling_preparation import effort_of
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
-from tests.sweep.walkers import gaitless, with_attractor
+from tests.sweep.walkers import as_kind, gaitless, with_attractor
 
 SCENE = simplest_walker(0.009)
 LABELLING = gaitless(SCENE, simplest_state(*STABLE))
@@ -68,27 +67,28 @@ def test_recurrences_are_looked_for_above_the_tolerance():
 ALONG = np.array([0.0, 0.6, 0.0, 0.8])
 
 
-def test_every_label_but_walking_is_a_failure(monkeypatch):
-    asked = {}
+class BeyondAPlane(jb.labels.Labelling):
+    """Pushes along one direction by more than a half fail, with a label for each side."""
 
-    def shock(fails, origin, **options):
-        asked.update(options, origin=origin, found=fails(np.zeros((5, 4))))
-        return FatalShock(0.5, 0.5 * ALONG, 0.4 * ALONG, 1, ALONG, 0.0, 0.5, 0, 5, 1)
+    def __call__(self, states, *, parameters=None):
+        gait, scales = self.family.rows[0][0], self.family.scales[0]
+        pushes = (np.stack(states[1:], axis=1) - gait.point) / scales
+        failures = np.array([int(Label.STUMBLED), int(Label.UNRESOLVED), 1, 9])
+        sides = (pushes[:, 1] * 0.8 > pushes[:, 3] * 0.6) + 2 * (pushes[:, 0] > 0.0)
+        label = np.where(pushes @ ALONG > 0.5, failures[sides], int(Label.WALKING))
+        return SimpleNamespace(label=label)
 
-    codes = np.array([int(Label.WALKING), 1, int(Label.STUMBLED), int(Label.UNRESOLVED), 9])
-    monkeypatch.setattr(_nearest_failure, "minimal_fatal_shock", shock)
-    monkeypatch.setattr(
-        jb.labels.Labelling, "__call__", lambda *_, **__: SimpleNamespace(label=codes), raising=True
-    )
-    knows = with_attractor(LABELLING)
-    found = jb.labels.nearest_failure(knows, gradients=False, max_distance=0.7)
-    assert asked["found"].tolist() == [0, 1, 1, 1, 1]
-    np.testing.assert_array_equal(asked["origin"], np.zeros(4))
-    np.testing.assert_array_equal(asked["scales"], np.ones(4))
+
+def test_every_label_but_walking_is_a_failure():
+    knows = as_kind(BeyondAPlane, with_attractor(LABELLING))
+    found = jb.labels.nearest_failure(knows, gradients=False, max_distance=0.7, tolerance=1e-6)
     point, scales = knows.family.rows[0][0].point, knows.family.scales[0]
-    np.testing.assert_array_equal(found.push, 0.5 * ALONG * scales)
-    np.testing.assert_array_equal(found.boundary_point, point + 0.4 * ALONG * scales)
-    assert (asked["max_distance"], asked["normal"]) == (0.7, None)
+    assert found.distance == pytest.approx(0.5, abs=1e-5)
+    np.testing.assert_allclose(found.push / scales, 0.5 * ALONG, atol=1e-3)
+    on = (found.boundary_point - point) / scales
+    assert on @ ALONG == pytest.approx(0.5, abs=1e-5)
+    near = jb.labels.nearest_failure(knows, gradients=False, max_distance=0.4)
+    assert np.isinf(near.distance)
 
 
 def test_starts_of_other_parameters_have_no_gait_to_come_to():
@@ -106,7 +106,7 @@ def test_settings_tell_scene_family_and_effort():
     assert settings["scene"]["slope"] == pytest.approx(float(jnp.asarray(0.009)))
 
 
-def test_the_normal_is_the_gradient_of_the_distance_after_the_footsteps_that_are_left(monkeypatch):
+def test_the_normal_is_the_gradient_of_the_distance_after_the_footsteps_that_are_left():
     """A linear map: |W (Aᵏ e)|² / 2 has the gradient (Aᵏ)ᵀ Wᵀ W Aᵏ e; without a footstep none."""
     random = np.random.default_rng(3)
     slopes = 0.5 * random.standard_normal((4, 4))
@@ -114,19 +114,19 @@ def test_the_normal_is_the_gradient_of_the_distance_after_the_footsteps_that_are
     fails = np.array([[0, 0, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0], [4, 0, 0, 0, 0, 0]])
     counts = []
 
-    def arrivals(scene, kind, points):
-        off = np.asarray(points) - knows.point
+    def arrivals(points):
+        off = points - knows.point
         changes, codes = np.tile(slopes, (len(off), 1, 1)), np.zeros(len(off), dtype=int)
         codes[:3] = fails[:, min(len(counts), 5)]
         counts.append(1)
         return changes, (knows.point + off @ slopes.T, codes)
 
-    monkeypatch.setattr(_nearest_failure, "_arrivals", arrivals)
+    normal = _nearest_failure._normal_by(arrivals, knows)
     starts = knows.point + 0.01 * random.standard_normal((3, 4))
-    found = _nearest_failure.boundary_normal(SCENE, knows)(starts)
+    found = normal(starts)
     for row, steps in ((0, len(counts)), (1, 2)):
         power = np.linalg.matrix_power(slopes, steps)
         squared = power.T @ knows.metric.T @ knows.metric @ power
         np.testing.assert_allclose(found[row], squared @ (starts - knows.point)[row], rtol=1e-10)
     assert np.isnan(found[2]).all()
-    assert _nearest_failure.boundary_normal(SCENE, knows)(np.zeros((0, 4))).shape == (0, 4)
+    assert normal(np.zeros((0, 4))).shape == (0, 4)

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped.basins._labels import Witness
-from jaxbiped.sweep._follow_starts import Labelled
 from jaxbiped.sweep._labelling import relabel_doubtful
 from jaxbiped.sweep._labelling_preparation import effort_of
 from jaxbiped.sweep._sweep import tally_disagreements
+from jaxbiped.sweep.labels import Labelled
 from tests.sweep.walkers import same
 
 SCENE = jb.seed_scene()

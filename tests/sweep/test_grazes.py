@@ -8,7 +8,7 @@ from extreme_cases.case import check_numbers
 from extreme_cases.grazing import START, grazing_scene, lowest
 
 import jaxbiped as jb
-from jaxbiped.sweep._labelling_preparation import effort_of
+from tests.sweep.walkers import gaitless
 
 pytestmark = pytest.mark.slow
 
@@ -29,7 +29,7 @@ def test_starts_whose_walk_grazes_are_counted(states):
     # Of the seed's gait, for only the way is looked at.
     label = jb.labelling(jb.seed_scene(), accuracy=1e-3)
     label = dataclasses.replace(label, scene=SCENE)
-    effort = effort_of(SCENE, accuracy=1e-3, solver="rodas4", footsteps=1)
+    effort = gaitless(SCENE, jb.State(*START), accuracy=1e-3, footsteps=1).effort
     told = label._label_once(states, {}, effort)
     assert np.array_equal(told.grazes > 0, np.abs(DEPTHS) < 1e-6)
     plain = label._label_once(states, {}, effort._replace(wanted=None))

@@ -1,6 +1,7 @@
 """Verdicts, against arrivals that are written down, and feet that roll, slide and arrive."""
 
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -8,11 +9,12 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins._labels import Label
+from jaxbiped.basins import Label
 from jaxbiped.dynamics._contacts import contact_places, slip_distances
-from jaxbiped.solve._saved_outputs import LastStep
+from jaxbiped.dynamics._state import recurring_periods, turned_difference
+from jaxbiped.solve._recorders import LastStep, Step
 from jaxbiped.sweep._convergence_test import NO_GAIT, UNDECIDED, Goals, after_arrival, empty_history
-from jaxbiped.sweep._follow_starts import CompliantLabelling, Progress, Start, _outcome
+from jaxbiped.sweep._label_recorders import LabelMemory, LabelRecorder, Pursuit, _outcome
 
 RADIUS, GAP, RTOL = 0.1, 1e-4, 1e-7
 ONWARD = jax.jit(after_arrival, static_argnums=3)
@@ -122,6 +124,20 @@ def test_a_cycle_of_two_is_told_by_every_other_footstep():
     assert float(now.rate) == pytest.approx(0.6)
 
 
+@pytest.mark.parametrize("length", [1, 2])
+@pytest.mark.parametrize(("share", "walks"), [(0.88, True), (0.93, True), (0.97, False)])
+def test_two_cycles_must_lead_nearer_by_half_of_what_the_multiplier_promises(length, share, walks):
+    """Of 0.9 a cycle: what is left after two of them may be up to (1 + 0.81)/2 of the offset."""
+    assert (share**2 <= 0.5 * (1.0 + 0.9**2)) is walks
+    places = [5.0 * g for g in range(length)]
+    model = goals(*places, radii=[-1.0] * length)._replace(
+        models=jnp.full((length, 1, 1), 0.9), contractions=jnp.full(length, 0.95)
+    )
+    sequence = [(places[k % length] + 0.03 * share ** (k / length), 1.0) for k in range(20)]
+    _, now = first_verdict(sequence, model, (length,) * length)
+    assert (int(now.verdict) == int(Label.WALKING)) is walks
+
+
 @pytest.mark.parametrize(("period", "arrivals"), [(1, 4), (2, 5), (3, 6), (4, 7)])
 def test_an_unknown_cycle_is_one_that_repeats_three_times(period, arrivals):
     sequence = [(5.0 + (k % period), 1.0) for k in range(20)]
@@ -191,7 +207,7 @@ def test_a_foot_that_rolls_does_not_slide_and_one_that_slides_does(leg):
 class Straight:
     """A continuous solution along a straight line."""
 
-    def __init__(self, *, t0, t1, y0, y1, coefficients):
+    def __init__(self, *, t0, t1, y0, y1):
         self.ends = t0, t1, y0, y1
 
     def evaluate(self, time):
@@ -201,42 +217,30 @@ class Straight:
 
 @pytest.fixture(scope="module")
 def attempt():
-    """One attempt of a labelling whose solver steps from one given state to another."""
-    loop = CompliantLabelling(jb.solvers.Rodas4(), (1,), fenced=False)
+    """One step of a labelling, from one given state to another."""
+    recorder = LabelRecorder((1,))
 
     @jax.jit
     def one(before, after, t, strike, landed, radius):
-        loop.steps = SimpleNamespace(
-            attempt=lambda solve, now: (now, jnp.asarray(False)),
-            solver=SimpleNamespace(interpolation_cls=Straight),
+        how = SimpleNamespace(
+            system=jb.hybrid.Walking(),
+            course=lambda solve, last, t1, y1: Straight(t0=last.t, t1=t1, y0=last.state, y1=y1),
         )
-        zero = jnp.zeros(())
-        last = LastStep(True, t - 0.01, before, ())
-        step = _Step(t, after, (zero, zero, zero), last)
-        trace = empty_history(zero, 7, (1,))
         flat, none = jnp.zeros((1, 6, 7)), jnp.asarray([NO_GAIT])
         far = Goals(
             jnp.zeros((1, 7)), flat, flat[..., 1:], flat[:, :2], jnp.zeros(1), none, jnp.ones(7)
         )
-        solve = SimpleNamespace(scene=SCENE, rtol=zero)
-        found, over = loop.attempt(
-            Start(solve, far, 0.0, 2.0), Progress(step, trace, strike, landed)
+        pursuit = Pursuit(far, 0.0, 2.0)
+        solve = SimpleNamespace(scene=SCENE, rtol=jnp.zeros(()), recording=pursuit)
+        yes, no = jnp.asarray(True), jnp.asarray(False)
+        step = Step(t - 0.01, before, t, after, yes, lambda course: (), strikes=no)
+        memory = LabelMemory(
+            LastStep(no, t, before, ()), empty_history(strike, 7, (1,)), strike, landed
         )
-        return found.trace, over
+        memory = recorder.follow(how, solve, memory, step)
+        return memory.trace, recorder.decides(memory)
 
     return one
-
-
-class _Step(SimpleNamespace):
-    def __init__(self, t, state, control, last):
-        super().__init__(t=t, state=state, control=control, last=last)
-
-
-jax.tree_util.register_pytree_node(
-    _Step,
-    lambda s: ((s.t, s.state, s.control), s.last),
-    lambda last, parts: _Step(*parts, last),
-)
 
 
 def test_arrivals_at_mid_stance_are_those_of_either_leg(attempt):
@@ -265,3 +269,33 @@ def test_a_foot_may_slide_a_leg_and_a_footstep_may_take_its_time(attempt):
         assert bool(over) is (verdict != UNDECIDED)
     for time, verdict in ((2.49, UNDECIDED), (2.51, int(Label.TIMED_OUT))):
         assert int(attempt(state, state, time, 0.5, place, 0.0)[0].verdict) == verdict
+
+
+class Clock(NamedTuple):
+    """A state with a phase."""
+
+    place: float
+    phase: float
+
+    periodic = {"phase": 2.0 * np.pi}  # noqa: RUF012
+
+
+def test_differences_of_phases_are_those_modulo_their_period():
+    turn = 2.0 * np.pi
+    assert recurring_periods(Clock) == (None, turn)
+    assert recurring_periods(jb.State) == ()
+    assert turned_difference(turn - 0.1, turn) == pytest.approx(-0.1)
+    flat, none = jnp.zeros((1, 1, 2)), jnp.asarray([NO_GAIT])
+    far = Goals(
+        jnp.zeros((1, 2)), flat, flat[..., 1:], jnp.zeros((1, 2, 2)), jnp.zeros(1), none,
+        jnp.ones(2),
+    )  # fmt: skip
+    onward = jax.jit(after_arrival, static_argnums=(3, 6))
+    repeats = []
+    for periods in ((), recurring_periods(Clock)):
+        history = empty_history(jnp.zeros(()), 2, (1,))
+        for phase in (1e-6, turn - 1e-6, 1e-6, turn - 1e-6):
+            state = (jnp.asarray(1.0), jnp.asarray(phase))
+            history = onward(history, state, far, (1,), 1e-4, 1e-6, periods)
+        repeats.append(int(history.repeats[0]))
+    assert repeats == [0, 3]

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped.dynamics._state import recurring_names
+from jaxbiped.hybrid._admissible_directions import admissible_directions, independent_names
 from jaxbiped.sweep._follow_starts import passes_a_stop
 from jaxbiped.sweep.starts._starts import sequence_points
-from jaxbiped.variational._hybrid_system import admissible_directions, independent_names
 from tests.dynamics.test_modes import ANGLES, RATES, hsu_chen
 from tests.sweep.walkers import gaitless, same
 
@@ -116,6 +116,18 @@ def test_states_beyond_a_stop_are_seen_one_by_one():
     np.testing.assert_array_equal(found, shank > ANGLES["theta_thigh_1"])
     seed = jb.seed_scene()
     assert not passes_a_stop(seed, {"theta_1": np.array([3.0])}).any()
+
+
+def test_a_held_knee_of_a_start_turns_as_the_thigh_that_an_axis_names():
+    """By as much as it was off the thigh; all others stay the base's, and so does the mode."""
+    angles, rates = np.array([0.1, 0.2, 0.25]), np.array([-1.0, -1.3])
+    axes = {"theta_thigh_2": angles, "omega_thigh_2": rates}
+    batch = jb.starts.grid(KNEED, axes, place=True, base=HELD).batch(gaitless(KNEED, HELD), 0, 6)
+    expected = {name: np.full(6, float(value)) for name, value in HELD._asdict().items()}
+    for body in ("thigh_2", "shank_2"):
+        expected |= {f"theta_{body}": np.repeat(angles, 2), f"omega_{body}": np.tile(rates, 3)}
+    for name, value in batch.states._asdict().items():
+        np.testing.assert_allclose(value, expected[name], rtol=0.0, atol=1e-15, err_msg=name)
 
 
 def test_what_is_held_moves_with_what_holds_it():

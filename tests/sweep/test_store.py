@@ -1,7 +1,6 @@
 """Stores, against what was labelled and cut: opened by anybody, continued, never mixed."""
 
 import errno
-import importlib
 import json
 import math
 import os
@@ -17,15 +16,21 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped._identity import provenance
-from jaxbiped.sweep import _store, _store_files
-from jaxbiped.sweep._store import FIELDS, Layout, Store
+from jaxbiped.sweep._store import DOUBT_FIELDS, FIELDS, Layout, Store, fields_of
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
-from tests.sweep.walkers import gaitless, same_results, simplest_grid, stacked
+from tests.sweep.walkers import (
+    ByFormula,
+    Killed,
+    as_kind,
+    gaitless,
+    same_results,
+    simplest_grid,
+    stacked,
+)
 
-SWEEP = importlib.import_module("jaxbiped.sweep._sweep")
 SCENE, STATE = simplest_walker(0.009), simplest_state(*STABLE)
-LABELLING = gaitless(SCENE, STATE)
-MOVED = gaitless(simplest_walker(0.01), STATE)
+LABELLING = as_kind(ByFormula, gaitless(SCENE, STATE))
+MOVED = as_kind(ByFormula, gaitless(simplest_walker(0.01), STATE))
 
 
 def grid(low=0.1, high=0.3, count=6, omegas=(-1.2, -1.0), **options):
@@ -36,6 +41,18 @@ def grid(low=0.1, high=0.3, count=6, omegas=(-1.2, -1.0), **options):
 def swept(path=None, starts=None, *, labelling=LABELLING, chunk=4, look=False, **options):
     starts = grid() if starts is None else starts
     return jb.sweep(labelling, starts, store=path, chunk=chunk, look_for_gaits=look, **options)
+
+
+def test_of_labels_that_were_in_doubt_it_is_kept_which_ones(by_formula):
+    starts = grid()
+    batch = starts.batch(LABELLING, 0, 3)
+    certain = LABELLING(batch.states)
+    marks = {name: np.arange(3, dtype=np.int8) + k for k, name in enumerate(DOUBT_FIELDS)}
+    for found, names in ((certain, set()), (certain._replace(**marks), set(DOUBT_FIELDS))):
+        kept = fields_of(starts, found, batch)
+        assert kept.keys() & (FIELDS.keys() | DOUBT_FIELDS.keys()) == FIELDS.keys() | names
+        for name in FIELDS.keys() | names:
+            np.testing.assert_array_equal(kept[name], getattr(found, name))
 
 
 @pytest.mark.parametrize("on_disk", [False, True])
@@ -115,15 +132,15 @@ def test_a_chunk_that_was_begun_is_labelled_again(tmp_path, by_formula):
 
 def test_two_clients_begin_one_store(tmp_path, by_formula, monkeypatch):
     """The other one makes the same store while this one writes its own."""
-    plain, inner = _store._write_empty, []
+    plain, inner = zarr.create_group, []
 
-    def write(*args):
+    def create(*given, **options):
         if not inner:
             inner.append(1)
             swept(tmp_path / "a")
-        plain(*args)
+        return plain(*given, **options)
 
-    monkeypatch.setattr(_store, "_write_empty", write)
+    monkeypatch.setattr(zarr, "create_group", create)
     found = swept(tmp_path / "a")
     assert (found.label.values >= 0).all()
     assert [each.name for each in tmp_path.iterdir()] == ["a"]
@@ -136,19 +153,22 @@ def test_a_store_in_the_home_folder(tmp_path, by_formula, monkeypatch):
     assert [each.name for each in tmp_path.iterdir()] == ["a"]
 
 
-@pytest.mark.parametrize("step", ["consolidate", "note", "create_store", "writing"])
-@pytest.mark.parametrize("after", [False, True])
-def test_killed_before_the_first_chunk(tmp_path, monkeypatch, by_formula, step, after):
-    """Cut off before or after each step of a store's making, the same call makes it all."""
-    path, own = tmp_path / "store", getattr(_store_files, step)
+STEPS = [(zarr, "create_group"), (zarr.Group, "create_array"), (zarr, "consolidate_metadata")]
 
-    def cut(*told):
+
+@pytest.mark.parametrize(("owner", "step"), STEPS, ids=[step for _, step in STEPS])
+@pytest.mark.parametrize("after", [False, True])
+def test_killed_before_the_first_chunk(tmp_path, monkeypatch, by_formula, owner, step, after):
+    """Cut off before or after each step of a store's making, the same call makes it all."""
+    path, own = tmp_path / "store", getattr(owner, step)
+
+    def cut(*told, **options):
         if after:
-            own(*told)
+            own(*told, **options)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(_store_files, step, cut)
+        patched.setattr(owner, step, cut)
         with pytest.raises(KeyboardInterrupt):
             swept(path)
     same_results(swept(path), swept())
@@ -191,16 +211,15 @@ def test_other_settings_are_refused_by_name(first, other, difference, tmp_path, 
         swept(tmp_path / "a", **(other if first is None else {"starts": other}))
 
 
-def test_what_cannot_be_continued_is_refused_before_gaits_are_sought(
-    tmp_path, by_formula, monkeypatch
-):
+def test_what_cannot_be_continued_is_refused_before_gaits_are_sought(tmp_path, by_formula):
     swept(tmp_path / "a")
-    monkeypatch.setattr(SWEEP, "with_gaits_met", None)
+    labelled = len(by_formula)
     with pytest.raises(jb.ArgumentError, match="other settings"):
         swept(tmp_path / "a", labelling=MOVED, look=True)
     zarr.open_group(str(tmp_path / "a"), mode="r+").attrs.update({"git_revision": "other"})
     with pytest.raises(jb.ArgumentError, match="another version"):
         swept(tmp_path / "a", look=True)
+    assert len(by_formula) == labelled
 
 
 @pytest.mark.parametrize("name", ["version_jaxbiped", "git_revision", "user_code"])
@@ -260,14 +279,14 @@ def _full(*_, **__):
 
 
 def test_a_full_disk_is_told_and_what_is_complete_stays(tmp_path, by_formula, monkeypatch):
-    path, mark, marked = tmp_path / "store", Store._mark, []
+    path, write, marked = tmp_path / "store", zarr.Array.__setitem__, []
 
-    def filling(self, chunk, complete):
-        marked.append(chunk)
-        (_full if len(marked) > 2 else mark)(self, chunk, complete)
+    def filling(self, *place_and_value):
+        marked.extend(["done"] if self.basename == "done" else [])
+        (_full if len(marked) > 3 else write)(self, *place_and_value)
 
     with monkeypatch.context() as patched:
-        patched.setattr(Store, "_mark", filling)
+        patched.setattr(zarr.Array, "__setitem__", filling)
         with pytest.raises(jb.ResourceError) as raised:
             swept(path)
     sentence = str(raised.value)
@@ -304,22 +323,21 @@ def test_a_directory_without_permission_is_told(tmp_path, monkeypatch):
         swept(closed / "store")
 
 
-def test_memory_is_bounded_by_the_chunk(tmp_path, by_formula, monkeypatch):
+class Three(ByFormula):
+    """Labels three times."""
+
+    def __call__(self, states, *, parameters=None):
+        if len(self.asked) == 3:
+            raise Killed
+        return super().__call__(states, parameters=parameters)
+
+
+def test_memory_is_bounded_by_the_chunk(tmp_path, by_formula):
     """A grid of 400 million starts: what is made of it at once, and what a store of it takes."""
     starts = grid(count=20_000, omegas=np.linspace(-0.3, -0.1, 20_000))
-    path, label = tmp_path / "store", jb.labels.Labelling._label_once
-
-    class Enough(BaseException):
-        pass
-
-    def counting(*arguments):
-        if len(by_formula) == 3:
-            raise Enough
-        return label(*arguments)
-
-    monkeypatch.setattr(jb.labels.Labelling, "_label_once", counting)
-    with pytest.raises(Enough):
-        swept(path, starts, chunk=512)
+    path = tmp_path / "store"
+    with pytest.raises(Killed):
+        swept(path, starts, labelling=as_kind(Three, LABELLING), chunk=512)
     assert by_formula == [512] * 3
     written = sum(each.stat().st_size for each in path.rglob("*") if each.is_file())
     assert written < 3_000_000

@@ -7,12 +7,11 @@ import pytest
 import xarray as xr
 
 import jaxbiped as jb
-from jaxbiped.sweep._store_files import store_path
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
-from tests.sweep.walkers import gaitless, same_results
+from tests.sweep.walkers import ByFormula, as_kind, gaitless, same_results
 
 SCENE, STATE = simplest_walker(0.009), simplest_state(*STABLE)
-LABELLING = gaitless(SCENE, STATE)
+LABELLING = as_kind(ByFormula, gaitless(SCENE, STATE))
 ADDRESS = "s3://walks/of/basin.zarr"
 
 
@@ -92,11 +91,11 @@ def test_gaits_go_into_a_bucket(bucket):
 def test_a_missing_package_and_an_unknown_address_are_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "upath", None)
     with pytest.raises(jb.ResourceError, match=r"is missing: pip install jaxbiped\[s3\]"):
-        store_path("s3://walks/basin.zarr")
+        jb.gait_sweep(SCENE, {"slope": [0.009]}, store="s3://walks/gaits.zarr")
     monkeypatch.undo()
     pytest.importorskip("upath", reason="universal-pathlib is not installed")
     with pytest.raises(jb.ArgumentError, match="must be a directory, or an address"):
-        store_path("nothing://walks/basin.zarr")
+        jb.gait_sweep(SCENE, {"slope": [0.009]}, store="nothing://walks/gaits.zarr")
 
 
 def test_a_store_at_a_file_address_is_the_one_at_its_path(tmp_path, by_formula):

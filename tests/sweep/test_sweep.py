@@ -1,41 +1,51 @@
 """Sweeps, against the same ones cut otherwise; gaits met on the way."""
 
-import importlib
 import json
 
+import equinox as eqx
 import numpy as np
 import pytest
+import zarr
 
 import jaxbiped as jb
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
-from tests.sweep.walkers import gaitless, killed_at, same_results, simplest_grid
+from tests.sweep.walkers import as_kind, gaitless, killed_at, same_results, simplest_grid
 
 pytestmark = pytest.mark.slow
 
-SWEEP = importlib.import_module("jaxbiped.sweep._sweep")
 SCENE = simplest_walker(0.009)
 LABELLING = gaitless(SCENE, simplest_state(*STABLE))
 STARTS = simplest_grid(SCENE)
 
 
-def _none_met(labelling, starts):
-    """No start is looked at beforehand, so that gaits are found from unresolved ones at last."""
-    return labelling
+class Overlooking(jb.labels.Labelling):
+    """Sees no cycle in the starts that are looked at beforehand: gaits are met at last."""
+
+    looked: list = eqx.field(static=True)
+
+    def __call__(self, states, *, parameters=None):
+        found = super().__call__(states, parameters=parameters)
+        if self.looked:
+            return found
+        self.looked.append(True)
+        return found._replace(cycle_footsteps=0 * found.cycle_footsteps)
 
 
-@pytest.mark.parametrize("late", [False, True])
-def test_labels_do_not_depend_on_the_chunks(late, monkeypatch):
-    if late:
-        monkeypatch.setattr(SWEEP, "with_gaits_met", _none_met)
-    whole = jb.sweep(LABELLING, STARTS)
+def overlooking():
+    return as_kind(Overlooking, LABELLING, [])
+
+
+@pytest.mark.parametrize("make", [lambda: LABELLING, overlooking], ids=["early", "late"])
+def test_labels_do_not_depend_on_the_chunks(make):
+    whole = jb.sweep(make(), STARTS)
     assert whole.label.dims == ("theta_stance", "omega_stance")
     assert set(np.unique(whole.label)) == {0, 1, 2}
     (gait,) = json.loads(whole.attrs["gaits"])[0]["gaits"]
     assert gait["cycle_footsteps"] == 1
     assert gait["point"][1] == pytest.approx(STABLE[0], abs=1e-8)
     for chunk in (1, 3, 16):
-        same_results(jb.sweep(LABELLING, STARTS, chunk=chunk), whole)
-    if not late:
+        same_results(jb.sweep(make(), STARTS, chunk=chunk), whole)
+    if make() is LABELLING:
         known = jb.labels.with_gaits_met(LABELLING, STARTS)
         batch = STARTS.batch(known, 0, STARTS.size)
         found = known(batch.states)
@@ -54,17 +64,20 @@ def test_starts_keep_their_numbers_in_the_results():
     np.testing.assert_array_equal(again.time, found.time)
 
 
-@pytest.mark.parametrize("writes", [0, 1])
-def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, writes):
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.6])
+def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, share):
     """After the labels comes a second round; wherever it is cut off, the results are the same."""
     path = tmp_path / "store"
-    monkeypatch.setattr(SWEEP, "with_gaits_met", _none_met)
-    expected = jb.sweep(LABELLING, STARTS, chunk=8)
+    expected = jb.sweep(overlooking(), STARTS, chunk=8)
     assert jb.basins.Label.WALKING in expected.label
     assert len(json.loads(expected.attrs["gaits"])[0]["gaits"]) == 1
-    with killed_at(monkeypatch, 9 + writes):
-        jb.sweep(LABELLING, STARTS, store=path, chunk=8)
-    same_results(jb.sweep(LABELLING, STARTS, store=path, chunk=8), expected)
+    how = dict(chunk=8, look_for_gaits=False)
+    with killed_at(monkeypatch) as first:
+        jb.sweep(LABELLING, STARTS, store=tmp_path / "a", **how)
+    with killed_at(monkeypatch, round((1.0 + share) * len(first))):
+        jb.sweep(overlooking(), STARTS, store=path, chunk=8)
+    assert len({0, 1, 2} & set(zarr.open_group(str(path))["done"][:])) > 1
+    same_results(jb.sweep(overlooking(), STARTS, store=path, chunk=8), expected)
 
 
 def test_positions_of_gaits_follow_when_more_are_met():

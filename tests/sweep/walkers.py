@@ -1,14 +1,16 @@
 """Starts of sweeps, and labellings that need no gait to be found."""
 
 import contextlib
+from typing import ClassVar
 
 import jax.tree_util as jtu
 import numpy as np
+import zarr
 
 import jaxbiped as jb
-from jaxbiped.sweep._gait_family import component_scales
+from jaxbiped.basins import Label
+from jaxbiped.sweep._attractor import component_scales
 from jaxbiped.sweep._labelling_preparation import effort_of
-from jaxbiped.sweep._store import Store
 
 
 def gaitless(scene, state, **options):
@@ -23,6 +25,27 @@ def gaitless(scene, state, **options):
     return jb.labels.Labelling(
         scene, jb.labels.Family((), np.zeros((1, 0)), ((),), (state,), scales), effort
     )
+
+
+class ByFormula(jb.labels.Labelling):
+    """Labels by the sign of a difference of angles, and counts the starts it labels."""
+
+    asked: ClassVar[list[int]] = []
+
+    def __call__(self, states, *, parameters=None):
+        count, column = len(states.hip_x), np.asarray(states.theta_2, float)
+        self.asked.append(count)
+        whole = np.zeros(count, int)
+        label = np.where(column > 0.2, int(Label.FELL_BACK), int(Label.STUMBLED)).astype(np.int8)
+        return jb.labels.Labelled(
+            label, whole - 1, whole, whole, column, 10.0 * column, column, column, whole + 7,
+            np.zeros((count, 4)),
+        )  # fmt: skip
+
+
+def as_kind(kind, labelling, *more):
+    """The labelling, as one of another class."""
+    return kind(labelling.scene, labelling.family, labelling.effort, *more)
 
 
 def with_attractor(labelling):
@@ -73,24 +96,22 @@ def simplest_grid(scene, count=8):
     return jb.starts.grid(scene, axes)
 
 
-class _Killed(BaseException):
-    pass
+class Killed(BaseException):
+    """As if the process ended there."""
 
 
 @contextlib.contextmanager
-def killed_at(monkeypatch, number):
-    """Kills a sweep amid the write of this number of its store, whose chunk is half new then."""
-    write, marks = Store.write, []
+def killed_at(monkeypatch, number=None):
+    """Kills what writes into a store at this number of its arrays' writes; counts them if none."""
+    write, writes = zarr.Array.__setitem__, []
 
-    def killing(self, chunk, fields, **mark):
-        marks.append(mark.get("mark"))
-        if len(marks) == number:
-            self._mark(chunk, 0)
-            self._data["label"][self.layout.region(chunk)] = 77
-            raise _Killed
-        write(self, chunk, fields, **mark)
+    def killing(self, *place_and_value):
+        writes.append(1)
+        if len(writes) == number:
+            raise Killed
+        write(self, *place_and_value)
 
-    with monkeypatch.context() as patched, contextlib.suppress(_Killed):
-        patched.setattr(Store, "write", killing)
-        yield marks
-    assert len(marks) == number
+    with monkeypatch.context() as patched, contextlib.suppress(Killed):
+        patched.setattr(zarr.Array, "__setitem__", killing)
+        yield writes
+    assert number in (None, len(writes))

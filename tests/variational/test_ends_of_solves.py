@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from jaxbiped._ending import Ending
-from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas4
+import jaxbiped as jb
+from jaxbiped import Ending
+from jaxbiped.dynamics import vector_field
+from jaxbiped.hybrid import switches
+from jaxbiped.solve._watch import Watch
+from jaxbiped.solve.solvers import Rodas4, Rodas5P
 from jaxbiped.variational._solve_to_section import (
     SectionArrival,
     _code,
@@ -21,11 +25,15 @@ from jaxbiped.variational._tangents import (
     Seeded,
     Tangents,
     VariationalSolution,
-    Watch,
     along_columns,
     along_columns_in_turn,
 )
 from jaxbiped.variational._variational_program import AdaptiveColumns
+from jaxbiped.variational._variational_solve import (
+    motion_solve,
+    seeded_directions,
+    solve_variational,
+)
 
 G, HEIGHT, SPEED, SIZE = 9.8, 0.7, 0.4, 0.5
 """Gravity, height and speed at the start; and by how much a column moves gravity."""
@@ -193,6 +201,7 @@ def now_at(time, peak=0.2, code=0, arrived=YES, lost=NO, jumps_at_peak=NO, shift
     columns, later = met_at(time, shifts)
     peaks, peak_later = met_at(peak, np.negative(shifts))
     return SimpleNamespace(
+        resets=None,
         t=jnp.asarray(time), state=tangents(time).state, columns=columns, shifts=later,
         landed=landed, peak_columns=peaks, peak_shifts=peak_later, attempted=8, lost=lost,
     )  # fmt: skip
@@ -257,5 +266,23 @@ def test_the_code_of_a_program(how, max_time, code):
     assert int(told.code) == code
     assert float(told.t) == BEHIND
     np.testing.assert_array_equal(told.state, tangents(BEHIND).state)
-    np.testing.assert_allclose(told.columns, columns_at(BEHIND).T, rtol=1e-12)
+    np.testing.assert_allclose(told.columns, columns_at(BEHIND).T, rtol=1e-12, atol=1e-15)
     np.testing.assert_array_equal(told.time_columns, np.zeros(3))
+
+
+@pytest.mark.slow
+def test_columns_that_a_graze_left_undetermined_cost_no_steps():
+    scene, start = jb.seed_scene(), jb.seed_state()
+    watch = Watch(field=vector_field, switches=switches)
+    how = motion_solve(watch, Rodas5P(), 1e-6)._replace(max_time=0.3)
+    at, seeded = seeded_directions(scene, start, (2, 5), ())
+
+    def followed(columns):
+        found, _ = solve_variational(how, at._replace(columns=columns), seeded, jnp.zeros(0))
+        return found
+
+    plain, lost = followed(at.columns), followed(at.columns.at[:, 0].set(jnp.nan))
+    assert abs(int(lost.attempted) - int(plain.attempted)) < 0.5 * int(plain.attempted)
+    assert np.isnan(lost.columns[0]).all()
+    np.testing.assert_allclose(lost.columns[1], plain.columns[1], rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(lost.state, plain.state, atol=1e-6)

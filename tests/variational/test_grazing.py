@@ -6,19 +6,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._surfaces import Switch, switches
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
-from jaxbiped.gait._orbit_derivatives import orbit_of, slopes_of
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
-from jaxbiped.variational._tangents import Watch
-from jaxbiped.variational._variational_solve import (
-    motion_solve,
-    seeded_directions,
-    solve_variational,
-)
+from jaxbiped.gait import slopes_of
+from jaxbiped.hybrid import Switch
 from tests.systems import Plain
 
 pytestmark = pytest.mark.slow
@@ -122,49 +111,3 @@ def test_a_linearised_return_counts_its_grazes(engine):
     assert counts[:2].tolist() == [0, 0]
     assert np.all(counts[2:] > 0)
     assert np.all(np.isnan(slopes[2:]))
-
-
-def test_an_orbit_that_grazes_has_no_sensitivities_and_multipliers_of_infinite_error():
-    args = (jnp.asarray(PULL), jnp.asarray(PUSH))
-    how = dict(rtol=1e-9, tangent_rtol=1e-8, section=ABOVE, system=Pulled(), engine="lanes")
-
-    def orbit(depth):
-        once = jb.gait.linearise_return_map(args, start(depth), **how)
-        zero = jnp.asarray(0)
-        found = Found(
-            ending=zero,
-            code=zero,
-            recurring=once.recurring,
-            residual=jnp.zeros(()),
-            both=jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), once),
-            evaluations=zero,
-            history=jnp.zeros(1),
-            sound=jnp.asarray(True),
-        )
-        spec = ReturnMapSpec(Pulled(), ABOVE, jb.solvers.Rodas4(), 10.0, 1, 4096, "lanes")
-        problem = FixedPointProblem(spec, args, (0, 1), start(depth), Precision(1e-9, 1e-8))
-        return orbit_of(problem, found, radius=False)
-
-    known, grazing = orbit(1e-3), orbit(1e-12)
-    assert np.all(np.isfinite(known.stability.errors))
-    assert np.all(np.isfinite(known.slopes.period))
-    assert np.all(np.isinf(grazing.stability.errors))
-    assert np.all(np.isfinite(grazing.stability.multipliers))
-    assert np.all(np.isnan(grazing.slopes.period))
-
-
-def test_columns_that_a_graze_left_undetermined_cost_no_steps():
-    scene, start = jb.seed_scene(), jb.seed_state()
-    watch = Watch(field=vector_field, switches=switches)
-    how = motion_solve(watch, Rodas5P(), 1e-6)._replace(max_time=0.3)
-    at, seeded = seeded_directions(scene, start, (2, 5), ())
-
-    def followed(columns):
-        found, _ = solve_variational(how, at._replace(columns=columns), seeded, jnp.zeros(0))
-        return found
-
-    plain, lost = followed(at.columns), followed(at.columns.at[:, 0].set(jnp.nan))
-    assert abs(int(lost.attempted) - int(plain.attempted)) < 0.5 * int(plain.attempted)
-    assert np.isnan(lost.columns[0]).all()
-    np.testing.assert_allclose(lost.columns[1], plain.columns[1], rtol=1e-4, atol=1e-4)
-    np.testing.assert_allclose(lost.state, plain.state, atol=1e-6)

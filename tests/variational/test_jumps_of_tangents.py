@@ -8,10 +8,13 @@ import pytest
 from scipy.optimize import brentq
 
 import jaxbiped as jb
-from jaxbiped.dynamics._surfaces import Switch
-from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.hybrid import RedundantWalking, Rolling, Switch, Walking
+from jaxbiped.solve._watch import Watch
+from jaxbiped.solve.controllers._grazing import grazes, turns_of
 from jaxbiped.solve.controllers._step_size import step_control
+from jaxbiped.solve.controllers._switch_locator import SwitchLocator
 from jaxbiped.solve.controllers._wrapped_control import Adapted, Attempt
+from jaxbiped.solve.solvers import rms_norm
 from jaxbiped.variational._collocated_step import RADAU, KnownStep
 from jaxbiped.variational._flow import (
     SIDES,
@@ -22,8 +25,6 @@ from jaxbiped.variational._flow import (
     sides_of,
     tangent_on_section,
 )
-from jaxbiped.variational._grazing import turns_of
-from jaxbiped.variational._hybrid_system import RedundantWalking, Rolling, Walking
 from jaxbiped.variational._saltation import at_fixed_time, meet, meeting_at, saltation_at
 from jaxbiped.variational._solve_to_section import (
     TangentControl,
@@ -32,8 +33,7 @@ from jaxbiped.variational._solve_to_section import (
     _nodes,
     worst_norm,
 )
-from jaxbiped.variational._switch_locator import SwitchLocator
-from jaxbiped.variational._tangents import Seeded, Tangents, Watch
+from jaxbiped.variational._tangents import Seeded, Tangents
 from tests.systems import Plain
 
 BEFORE, AFTER = -9.8, 14.0
@@ -136,6 +136,29 @@ def test_of_the_switches_within_a_step_the_first_one_ends_it(levels, corner, whi
     assert bool(crossed.switch)
     # The first step of a solve is no arrival.
     assert (bool(crossed.section), bool(arrives.section)) == (False, True)
+
+
+@pytest.mark.parametrize("share", [0.65, 0.9])
+def test_a_step_across_a_switch_tells_how_long_before_its_end_that_was(share):
+    """So short that it is kept: 10 ps, at 1 m/s through a level."""
+    watch = Watch(
+        field=lambda t, y, args: (-1.0 + 0.0 * y[0],),
+        switches=lambda args, y: (Switch(y[0], True, force_jumps=True),),
+    )
+    locator = SwitchLocator(step_control(1e-6, 1e-8, rms_norm), watch)
+    zero, span = jnp.zeros(()), 1e-11
+
+    @jax.jit
+    def stepped(part):
+        before, after = (part * span,), ((part - 1.0) * span,)
+        memory = locator.init(None, zero, zero + span, before, zero, (), None, 4.0)[1]
+        attempt = Attempt(zero, zero + span, before, after, (), (zero,), 4.0, memory)
+        adapted = locator.adapt(attempt)
+        return adapted.keep, adapted.memory.crossed_field, adapted.memory.past
+
+    keep, which, past = stepped(jnp.asarray(share))
+    assert (bool(keep), int(which)) == (True, 1)
+    assert float(past) == pytest.approx((1.0 - share) * span, rel=1e-6)
 
 
 def test_a_step_behind_a_jump_carries_the_columns_of_the_exact_motion():
@@ -299,6 +322,16 @@ def test_a_switch_that_turns_within_a_step_is_told_by_how_near_it_comes(lowest, 
     assert bool(found.touches[0]) is touches
     assert bool(found.graze) is graze
     assert float(found.places[0]) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("later", "slows"), [(-0.0999, True), (-0.1, False), (-0.1001, False)])
+def test_a_foot_that_touches_down_grazes_only_if_it_is_slowed(later, slows):
+    """Known to metres, every depth at which it might turn is near the ground."""
+    falls = jb.seed_state()._replace(hip_vz=jnp.asarray(-0.1))
+    above = falls._replace(hip_z=jnp.asarray(0.396))
+    below = falls._replace(hip_z=jnp.asarray(0.395), hip_vz=jnp.asarray(later))
+    old, new = (jb.hybrid.Walking().gaps(jb.seed_scene(), y) for y in (above, below))
+    assert bool(grazes(old, new, jnp.asarray(0.01), jnp.asarray(10.0))) is slows
 
 
 def test_radau_is_exact_for_polynomials_and_its_clock_runs_in_the_root_of_time():

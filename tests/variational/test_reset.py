@@ -4,9 +4,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped.dynamics._surfaces import Switch
+from jaxbiped.hybrid import Switch
+from jaxbiped.solve._watch import Watch
 from jaxbiped.variational._saltation import at_fixed_time, behind_reset, meet, meeting_at
-from jaxbiped.variational._tangents import Seeded, Watch
+from jaxbiped.variational._tangents import Seeded
 
 G = 9.8
 LEVEL, BOUNCE = 0.5, 0.8
@@ -18,7 +19,7 @@ def field(t, y, args):
     return y[1], -G + 0.0 * y[1]
 
 
-def bounced(args, y):
+def bounced(args, y, which):
     _, bounce = args
     return y[0], -bounce * y[1]
 
@@ -44,7 +45,7 @@ def through_the_bounce(state, by_state, met, past=0.0):
     meeting = meeting_at(WATCH, state, args, jnp.asarray(1))
     columns, shifts = meet(meeting, columns, shifts, jnp.asarray(SIZES))
     after, columns = behind_reset(
-        WATCH, met, jnp.asarray(past), state, columns, args, jnp.asarray(SIZES)
+        WATCH, met, jnp.asarray(1), jnp.asarray(past), state, columns, args, jnp.asarray(SIZES)
     )
     return after, at_fixed_time(field(0.0, after, args.args), columns, shifts)
 

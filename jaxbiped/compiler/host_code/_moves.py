@@ -153,6 +153,8 @@ def _concatenate(w: HostWriter, op: Operation) -> list[Value]:
     shape, dtype = op.result()
     axis = op.params["dimension"]
     given = [each for each in op.inputs if each.shape[axis]]
+    if not given:
+        return [w.constant(np.zeros(shape, dtype))]
     pieces: list[Value] = []
 
     def single(value: Value) -> object:

@@ -394,8 +394,14 @@ def product(
     left, left_sizes = ordered(a, a_batch, a_summed)
     right, right_sizes = ordered(b, b_batch, b_summed)
     multiply, add = (functools.partial(ELEMENTWISE[name], block) for name in ("mul", "add"))
+
+    def summed(row: Array, column: Array) -> Value:
+        terms = [multiply(x, y) for x, y in zip(row, column, strict=True)]
+        # A sum of no terms: of directions of which there are none.
+        return functools.reduce(add, terms) if terms else block.const(0.0, Kind.F64)
+
     found = [
-        functools.reduce(add, [multiply(x, y) for x, y in zip(row, column, strict=True)])
+        summed(row, column)
         for rows, columns in zip(left, right, strict=True)
         for row in rows
         for column in columns

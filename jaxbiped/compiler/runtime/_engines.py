@@ -163,8 +163,8 @@ class LoopEngine(AbstractEngine):
 
     def can(self, request: Request) -> str | None:
         """None, or which part of a request only lanes have."""
-        if request.times is not None or request.program.scheduled:
-            return "records at given times are the lanes'"
+        if request.program.scheduled and request.times is None:
+            return "records at times that are not given are the lanes'"
         if request.batch and (request.room or request.program.stream):
             return "records and streams of a batch are the lanes'"
         return None
@@ -172,20 +172,26 @@ class LoopEngine(AbstractEngine):
     def run(self, request: Request) -> Result:
         if request.batch:
             return Result(_run_batch(request.program, request.inputs, self.slots))
-        outputs, records = _run_one(request.program, request.inputs, request.stream, request.room)
+        times = None if request.times is None else jnp.asarray(request.times)
+        room = request.room if times is None else len(times)
+        outputs, records = _run_one(request.program, request.inputs, request.stream, room, times)
         return Result(outputs, records, records if request.keeps_records else None)
 
 
 @cached_jit
 def _run_one(
-    program: Program, inputs: PyTree, stream: Recorded | Array | None, room: int
+    program: Program,
+    inputs: PyTree,
+    stream: Recorded | Array | None,
+    room: int,
+    times: Array | None,
 ) -> tuple[PyTree, Recorded | None]:
     first = program.start(inputs)
     records = None
     if isinstance(stream, jax.Array):
         stream = Recorded(stream, jnp.asarray(len(stream)))  # type: ignore[arg-type]
     if program.record is not None:
-        _, row = jax.eval_shape(lambda: _record(program, inputs, first))
+        _, row = jax.eval_shape(lambda: _record(program, inputs, first, jnp.inf))
         records = jnp.zeros((room, *row.shape), row.dtype)
 
     def read(attempts: Scalar) -> tuple[Array, ...]:
@@ -197,14 +203,26 @@ def _run_one(
         place = last - place if program.backwards else place
         return (jax.lax.dynamic_index_in_dim(jnp.asarray(stream.values), place, keepdims=False),)
 
+    def keep(after: PyTree, count: Scalar, kept: Array) -> tuple[Scalar, Scalar, Array]:
+        """Writes the row behind an attempt, if there is one: whether, and how many there are."""
+        due = jnp.inf if times is None else times[jnp.minimum(count, room - 1)]
+        is_one, row = _record(program, inputs, after, due)
+        if times is not None:
+            is_one = is_one & (count < room)
+        # Where there is none, the place is past the end, and nothing is written.
+        kept = kept.at[jnp.where(is_one, count, room)].set(row, mode="drop")
+        return is_one, count + is_one.astype(count.dtype), kept
+
     def advance(loop: _Loop) -> _Loop:
         now, _, attempts, count, kept = loop
         after, over = program.attempt(inputs, now, *read(attempts))
-        if kept is not None:
-            is_one, row = _record(program, inputs, after)
-            # Where there is none, the place is past the end, and nothing is written.
-            kept = kept.at[jnp.where(is_one, count, room)].set(row, mode="drop")
-            count = count + is_one.astype(count.dtype)
+        if kept is not None and times is None:
+            _, count, kept = keep(after, count, kept)
+        elif kept is not None and room:
+            # Several times may be due in one step.
+            _, count, kept = jax.lax.while_loop(
+                lambda rows: rows[0], lambda rows: keep(after, *rows[1:]), keep(after, count, kept)
+            )
         return after, over, attempts + 1, count, kept
 
     begin = (first, jnp.asarray(False), jnp.asarray(0), jnp.asarray(0), records)
@@ -213,10 +231,13 @@ def _run_one(
     return program.finish(inputs, end), recorded
 
 
-def _record(program: Program, inputs: PyTree, now: PyTree) -> tuple[Scalar, Array]:
-    """Whether there is something to record, and its numbers one behind the other."""
+def _record(
+    program: Program, inputs: PyTree, now: PyTree, due: Scalar | float
+) -> tuple[Scalar, Array]:
+    """Whether there is something to record at a time, and its numbers one behind the other."""
     assert program.record is not None
-    is_one, values = program.record(inputs, now, jnp.asarray(jnp.inf))
+    precision = jnp.result_type(*jtu.tree_leaves(inputs))
+    is_one, values = program.record(inputs, now, jnp.asarray(due, precision))
     return is_one, jnp.concatenate([jnp.ravel(value) for value in values])
 
 

@@ -119,6 +119,9 @@ _LOADED: weakref.WeakValueDictionary[str, MachineCode] = weakref.WeakValueDictio
 """Code that some program still has, by what it was made from."""
 _LOCK = threading.Lock()
 _KIND = "lanes"
+EFFORT = 2
+"""Highest level of LLVM's code generation. 0 leaves its passes out, too: the same results, from
+code that compiles in a fraction of the time and runs slower; tests choose it."""
 
 
 def machine_code(text: str, entry: str, *, as_written: bool) -> MachineCode:
@@ -136,7 +139,7 @@ def machine_code(text: str, entry: str, *, as_written: bool) -> MachineCode:
 def code_name(text: str, entry: str, *, as_written: bool) -> str:
     """By what the code of a module is found again."""
     versions = llvmlite.__version__, llvm.llvm_version_info
-    parts = [text, entry, *map(str, (as_written, *host(), *versions))]
+    parts = [text, entry, *map(str, (as_written, EFFORT, *host(), *versions))]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
@@ -181,13 +184,13 @@ def _object_code(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> bytes:
 
 
 def _target_machine(as_written: bool) -> llvm.TargetMachine:
-    cpu, effort = host(), 1 if as_written else 2
+    cpu, effort = host(), min(EFFORT, 1 if as_written else 2)
     target = llvm.Target.from_triple(cpu.triple)
     return target.create_target_machine(cpu=cpu.cpu, features=cpu.features, opt=effort, jit=True)
 
 
 def _module(text: str, machine: llvm.TargetMachine, as_written: bool) -> llvm.ModuleRef:
-    if not as_written:
+    if EFFORT and not as_written:
         return optimised_module(text, machine)
     module = llvm.parse_assembly(text, llvm.create_context())
     module.verify()

@@ -2,11 +2,9 @@
 
 import base64
 import dataclasses
-import functools
 import math
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 import numpy.typing as npt
 
@@ -15,9 +13,7 @@ from jaxbiped._types import JsonObject, Scalar
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._energy import Energies, energies, is_driven, powers
 from jaxbiped.dynamics._equivalent_states import whole_state
-from jaxbiped.dynamics._mode_changes import foot_loads
-from jaxbiped.dynamics._stance import Stance, of_stance
-from jaxbiped.dynamics._stance_motion import ground_force, turning_of
+from jaxbiped.dynamics._foot_forces import foot_forces
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._samples import evaluate_along, places_of_standing, sample
 from jaxbiped.plot._contact_charts import forces_in
@@ -258,33 +254,13 @@ def _knot_times(motion: RigidMotion, apart: float) -> np.ndarray:
 
 
 def _quantities(scene: RigidScene, state: Any) -> dict[str, Scalar]:
-    forces = of_stance(scene, state, functools.partial(_forces, scene))
+    forces = {
+        f"{word}_{k}": force
+        for k, both in enumerate(foot_forces(scene, state), 1)
+        for word, force in both._asdict().items()
+    }
     held = energies(scene, state)._asdict()
     return body_motion(scene, whole_state(scene, state)) | forces | held
-
-
-def _forces(scene: RigidScene, stance: Stance) -> dict[str, Scalar]:
-    """The ground's forces on all feet [N]: of two that stand the tangential one is the first's."""
-    turning = turning_of(scene, stance)
-    force = ground_force(scene, stance, turning.free)
-    normal, tangential = force.normal, jnp.asarray(force.tangential)
-    nothing = jnp.zeros_like(normal)
-    names = range(1, len(scene.mechanism.feet) + 1)
-    found = {f"{word}_{k}": nothing for word in ("normal", "tangential") for k in names}
-    by_foot = [(normal, tangential)]
-    if stance.stands:
-        first, second = stance.stands
-        loads = foot_loads(scene, stance, turning)
-        by_foot = [
-            (jnp.where(first & second, load, jnp.where(stands, normal, 0.0)), along)
-            for load, stands, along in (
-                (loads[0], first, jnp.where(first, tangential, 0.0)),
-                (loads[1], second, jnp.where(first, 0.0, tangential)),
-            )
-        ]
-    for k, (down, along) in zip(stance.feet, by_foot, strict=True):
-        found |= {f"normal_{k + 1}": down, f"tangential_{k + 1}": along}
-    return found
 
 
 def _rigid_footprints(motion: RigidMotion) -> list[Footprint]:

@@ -196,9 +196,9 @@ def view(
 
     Args:
         scene: the scene that was simulated.
-        trajectory: the motion, saved step by step; for a rigid walker, with its heel strikes
-            (`max_arrivals`).
-        start: start of a rigid walk. Default: the walk is shown from its first heel strike on.
+        trajectory: the motion, saved step by step; of a rigid walk, the steps or heel strikes.
+        start: start of a rigid walk whose heel strikes alone were saved. Default: it is shown from
+            the first of these on.
         name: name of the walk.
 
     Returns:

@@ -15,7 +15,8 @@ be the scene.
 """
 
 import functools
-from typing import Any, cast
+from collections.abc import Callable
+from typing import Any, TypeAlias, cast
 
 import diffrax
 import equinox as eqx
@@ -24,12 +25,10 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import RealScalarLike, Scalar
-from jaxbiped.dynamics._contacts import Gap, feet, gaps
-from jaxbiped.dynamics._footfalls import any_of, landings, standing_leg
-from jaxbiped.scene._scene import CompliantScene
-from jaxbiped.solve._failure_events import ending_events, ending_surface
-from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped._types import RealScalarLike, Scalar, any_of
+from jaxbiped.compiler import fusion_barrier
+from jaxbiped.hybrid._guards import Gap
+from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractMemorylessControl,
@@ -46,7 +45,8 @@ _OVERSHOOT = 5e-5
 _PAST_ENDING = 1e-9
 """Part of the way to an ending that the last step may go past it."""
 _MARGIN = 1e-12
-"""Time that either does besides [s]: on which side a step ends must be beyond doubt."""
+"""Time, in the system's unit, that either does besides: on which side a step ends must be beyond
+doubt."""
 _BARELY = 1e-2
 """Depth and speed in the ground at a step's end, in units of height and speed at its beginning,
 below which a contact is shallow."""
@@ -60,38 +60,45 @@ _LESS_PAST = 0.03
 """How far the next attempt goes past a touchdown, as a share of the rejected one's way."""
 _LARGEST = 0.95
 """The next attempt, at most, as a share of the rejected one."""
+_Gaps: TypeAlias = Callable[[PyTree], tuple[Gap, ...]]
+"""The gaps of a system at a state."""
 
 
 class ShallowContact(AbstractMemorylessControl):
-    """Wraps a controller; a step in which a foot dips into the ground is retried up to there."""
+    """Wraps a controller; a step in which a foot dips into the ground is retried up to there.
+
+    Attributes:
+        system: what moves; its gaps are watched.
+    """
+
+    system: AbstractSystem
 
     def adapt(self, attempt: Attempt) -> Adapted:
         adapted = attempt.by(self.controller)
         start, span = cast(Scalar, attempt.t0), cast(Scalar, attempt.t1 - attempt.t0)
-        found = _touchdown(attempt.args, start, span, adapted.keep, attempt.y0, attempt.y1)
+        gaps = functools.partial(self.system.gaps, attempt.args)
+        found = _touchdown(gaps, start, span, adapted.keep, attempt.y0, attempt.y1)
         again, target = jax.lax.stop_gradient(found)
         return try_again(attempt, adapted, again, target)
 
 
 def _touchdown(
-    scene: PyTree, t0: Scalar, span: Scalar, keep: Scalar, y0: PyTree, y1: PyTree
+    gaps: _Gaps, t0: Scalar, span: Scalar, keep: Scalar, y0: PyTree, y1: PyTree
 ) -> tuple[Scalar, Scalar]:
     """Whether a step, which is to be kept or not, is to end at a contact instead, and when [s]."""
     part = jnp.ones_like(span)
-    for k, before in enumerate(gaps(scene, y0)):
+    for k, before in enumerate(gaps(y0)):
         if before.admitted is False:
             continue
         near = jnp.abs(before.penetration) < _REACH * span * before.penetration_rate
         near = near if before.admitted is None else near & before.admitted
-        above = functools.partial(_part_above, scene, span, keep, k, before, y1)
+        above = functools.partial(_part_above, gaps, span, keep, k, before, y1)
         part = jnp.minimum(part, jnp.where(near, fusion_barrier(near, above), 1.0))
     target = t0 + span * part * (1.0 + _OVERSHOOT) + _MARGIN
     return (part < _ALL) & (target < t0 + span), target
 
 
-def _part_above(
-    scene: PyTree, span: Scalar, keep: Scalar, k: int, before: Gap, y1: PyTree
-) -> Scalar:
+def _part_above(gaps: _Gaps, span: Scalar, keep: Scalar, k: int, before: Gap, y1: PyTree) -> Scalar:
     """The part of a step after which a foot comes into the ground, barely; 1 if it does not.
 
     Or that after which it is lowest, where it may come into the ground. A step that is tried again
@@ -100,7 +107,7 @@ def _part_above(
     part after which a foot is deepest that begins barely in the ground and ends out of it: a smooth
     force is not felt yet where the step begins. Of a step that is not kept the end tells nothing.
     """
-    after = gaps(scene, y1)[k]
+    after = gaps(y1)[k]
     rates = span * before.penetration_rate, span * after.penetration_rate
     depth = StepCubic(before.penetration, after.penetration, *rates)
     off, rises = depth.start <= 0.0, keep & (depth.end_slope < 0.0)
@@ -126,23 +133,30 @@ def _part_above(
 
 
 class TouchdownAhead(AbstractMemorylessControl):
-    """Wraps a controller; the attempt after a rejected step may be longer than it proposes."""
+    """Wraps a controller; the attempt after a rejected step may be longer than it proposes.
+
+    Attributes:
+        system: what moves; its gaps are watched.
+    """
+
+    system: AbstractSystem
 
     def adapt(self, attempt: Attempt) -> Adapted:
         adapted = attempt.by(self.controller)
         span = jnp.asarray(attempt.t1 - attempt.t0)
-        target = jnp.asarray(attempt.t0) + _to_touchdown(attempt.args, span, attempt.y0)
+        gaps = self.system.gaps(attempt.args, attempt.y0)
+        target = jnp.asarray(attempt.t0) + _to_touchdown(gaps, span)
         target = jax.lax.stop_gradient(jnp.maximum(adapted.t1, target))
         return adapted._replace(t1=jnp.where(adapted.keep, adapted.t1, target))
 
 
-def _to_touchdown(scene: CompliantScene, span: Scalar, state: PyTree) -> Scalar:
+def _to_touchdown(gaps: tuple[Gap, ...], span: Scalar) -> Scalar:
     """Time to just past where the last foot comes down that does in `span` [s]; 0 if none does.
 
     At the speed that it has: where that falls short, once more the next time.
     """
     found = jnp.zeros_like(span)
-    for gap in gaps(scene, state):
+    for gap in gaps:
         if gap.admitted is False:
             continue
         falls = (gap.penetration < 0.0) & (gap.penetration_rate > 0.0)
@@ -155,7 +169,13 @@ def _to_touchdown(scene: CompliantScene, span: Scalar, state: PyTree) -> Scalar:
 
 
 class MissedContacts(AbstractWrappedControl):
-    """Wraps a controller; its state carries the number of contacts between two steps."""
+    """Wraps a controller; its state carries the number of contacts between two steps.
+
+    Attributes:
+        system: what moves; its gaps are watched.
+    """
+
+    system: AbstractSystem
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
         first, inner = self.controller.init(*request)
@@ -165,7 +185,7 @@ class MissedContacts(AbstractWrappedControl):
         inner, count = attempt.memory
         adapted = attempt.by(self.controller, memory=inner)
         span = jnp.asarray(attempt.t1 - attempt.t0)
-        ends = (gaps(attempt.args, y) for y in (attempt.y0, attempt.y1))
+        ends = (self.system.gaps(attempt.args, y) for y in (attempt.y0, attempt.y1))
         for before, after in zip(*ends, strict=True):
             missed = adapted.keep & _misses(span, before, after)
             count = count + jnp.where(missed, 1, 0).astype(count.dtype)
@@ -195,22 +215,22 @@ class FootstepLimit(AbstractWrappedControl):
 
     Attributes:
         limit: number of heel strikes after which the solve ends.
+        system: what moves; its landings are counted.
     """
 
     limit: RealScalarLike
+    system: AbstractSystem
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
         first, inner = self.controller.init(*request)
         _, _, _, y0, _, args, *_ = request
-        last = standing_leg(args.mechanism.structure, feet(args, y0))
+        last = self.system.standing_leg(args, y0)
         return first, (inner, last, jnp.zeros_like(last))
 
     def adapt(self, attempt: Attempt) -> Adapted:
         inner, last, count = attempt.memory
         adapted = attempt.by(self.controller, memory=inner)
-        structure = attempt.args.mechanism.structure
-        before, after = feet(attempt.args, attempt.y0), feet(attempt.args, attempt.y1)
-        lands = landings(structure, before, after)
+        lands = self.system.landings(attempt.args, attempt.y0, attempt.y1)
         # Of several legs another one made the strike before; a single leg hops.
         strikes = [
             adapted.keep & landed & (last != leg if len(lands) > 1 else True)
@@ -235,11 +255,13 @@ class LocatedEnding(AbstractMemorylessControl):
     wrapped controller ends the solve.
 
     Attributes:
+        system: what moves; its failures are watched.
         watch: failures that end the solve.
         probe: a state near the step's end at which failures are looked for first, if that costs
             less; None if there is no such state.
     """
 
+    system: AbstractSystem
     watch: tuple[str, ...] = eqx.field(static=True)
     probe: PyTree = None
 
@@ -251,7 +273,7 @@ class LocatedEnding(AbstractMemorylessControl):
         probe = y1 if self.probe is None else self.probe
         failures = {
             name: happens
-            for name, happens in ending_events(self.watch).items()
+            for name, happens in self.system.failures(self.watch).items()
             if name != Ending.SOLVER_FAILED
         }
         ends = adapted.keep & walked
@@ -262,14 +284,16 @@ class LocatedEnding(AbstractMemorylessControl):
             code = jnp.asarray(int(Ending.WALKING))
             for name, happens in failures.items():
                 code = jnp.where(happens(t1, y1, scene), int(name), code)
-            before, after = (ending_surface(code, scene, y1, y) for y in (attempt.y0, y1))
+            surface = functools.partial(self.system.ending_surface, code, scene, y1)
+            before, after = surface(attempt.y0), surface(y1)
             crossed = (before < 0.0) & (after > 0.0)
             crossed = crossed & (walked | (code != int(Ending.WALKING)))
             return jnp.where(crossed, before / jnp.where(crossed, before - after, 1.0), 1.0)
 
         way = span * jnp.where(ends, fusion_barrier(ends, part_before), 1.0)
-        again = ends & (span - way > jnp.maximum(_PAST_ENDING * way, 4.0 * _MARGIN))
-        target = start + way * (1.0 + 0.5 * _PAST_ENDING) + _MARGIN
+        margin = _MARGIN * self.system.time_unit
+        again = ends & (span - way > jnp.maximum(_PAST_ENDING * way, 4.0 * margin))
+        target = start + way * (1.0 + 0.5 * _PAST_ENDING) + margin
         possible = (target > start) & (target < start + span)
         again, target = jax.lax.stop_gradient((again & possible, target))
         result = diffrax.RESULTS.where(again, diffrax.RESULTS.successful, adapted.result)

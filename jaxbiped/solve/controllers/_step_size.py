@@ -19,11 +19,9 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, RealScalarLike, Scalar
-from jaxbiped.dynamics._contacts import feet, foot_force, limits_of
-from jaxbiped.dynamics._footfalls import FootMotion
-from jaxbiped.scene._scene import CompliantScene
-from jaxbiped.scene.laws.friction._coulomb import Frictionless
-from jaxbiped.solve._accuracy import Units, rms_norm
+from jaxbiped.hybrid._scales import Units
+from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._event_steps import ShallowContact, TouchdownAhead
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractControl,
@@ -50,14 +48,13 @@ _ROUNDING = 1.01
 """Times the smallest step that counts as it."""
 _WILD = 1e3
 """Of each leaf of the state, in its unit: no step of a walk changes one by as much."""
-_SAME_SLIP = 3.0
-"""Factor by which the slip speed may change in a step: a Stribeck curve is bent on that scale."""
 
 
 def walk_control(
     rtol: RealScalarLike,
     atol: RealScalarLike,
     units: Units,
+    system: AbstractSystem,
     *,
     switch_weight: float = 1.0,
     probe: PyTree = None,
@@ -67,13 +64,14 @@ def walk_control(
     Args:
         rtol, atol: tolerances; the absolute one in units of each leaf.
         units: units of the state's leaves and of time.
+        system: what moves.
         switch_weight: factor of the errors of steps that cross a switch.
         probe: as of `CrossedSwitches`.
     """
     control: StepControl = ErrorControl(rtol, atol, units)
     if switch_weight != 1.0:
-        control = CrossedSwitches(control, switch_weight, probe)
-    return ShallowContact(TouchdownAhead(control))
+        control = CrossedSwitches(control, system, switch_weight, probe)
+    return ShallowContact(TouchdownAhead(control, system), system)
 
 
 class ErrorControl(AbstractControl):
@@ -171,53 +169,23 @@ def _root(square: Scalar, order: RealScalarLike | None) -> Scalar:
 class CrossedSwitches(AbstractMemorylessControl):
     """Wraps a controller; errors of steps that cross a switch of the contact count `weight` times.
 
-    The solve's `args` must be the scene.
-
     Attributes:
+        system: what moves.
         weight: factor of those errors [–].
         probe: a state as close to the step's end as its error, whose contacts cost less; None if
             there is no such state.
     """
 
+    system: AbstractSystem
     weight: float
     probe: PyTree = None
 
     def adapt(self, attempt: Attempt) -> Adapted:
         end = attempt.y1 if self.probe is None else self.probe
-        factor = jnp.where(crosses(attempt.args, attempt.y0, end), self.weight, 1.0)
+        crosses = self.system.contact_changes(attempt.args, attempt.y0, end)
+        factor = jnp.where(crosses, self.weight, 1.0)
         error = jtu.tree_map(lambda leaf: leaf * factor.astype(leaf.dtype), attempt.error)
         return attempt.by(self.controller, error=error)
-
-
-def crosses(scene: CompliantScene, y0: PyTree, y1: PyTree) -> Scalar:
-    """Whether a contact is of a different kind at a step's end than at its start (boolean).
-
-    The kind of a stop is whether it is pressed. The kind of a foot is whether it carries load, in
-    which direction it slips, and whether below the slip speed of friction's peak, above it, or
-    much faster.
-    """
-    found = jnp.zeros(jnp.shape(y0[0]), dtype=bool)
-    for before, after in zip(feet(scene, y0), feet(scene, y1), strict=True):
-        if before.admitted is not False:
-            found = found | _changes(scene, before, after)
-    stops = zip(limits_of(scene, y0), limits_of(scene, y1), strict=True)
-    for (law, *was), (_, *now) in stops:
-        pressed = (law.force(each.penetration, each.rate) > 0.0 for each in (*was, *now))
-        found = found | functools.reduce(operator.ne, pressed)
-    return found
-
-
-def _changes(scene: CompliantScene, before: FootMotion, after: FootMotion) -> Scalar:
-    carried, carries = (foot_force(scene, foot).normal > 0.0 for foot in (before, after))
-    if isinstance(scene.friction, Frictionless):
-        return carried != carries
-    old, new = before.slip_speed, after.slip_speed
-    slow, fast = jnp.abs(old), jnp.abs(new)
-    changes = (fast > _SAME_SLIP * slow) | (slow > _SAME_SLIP * fast) | ((old > 0.0) != (new > 0.0))
-    friction = scene.friction.switches
-    for one, other in zip(friction(old), friction(new), strict=True):
-        changes = changes | ((one > 0.0) != (other > 0.0))
-    return (carried != carries) | (carries & changes)
 
 
 def step_control(

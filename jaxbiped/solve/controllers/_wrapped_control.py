@@ -7,6 +7,7 @@ import abc
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 
+import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -14,7 +15,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Numbers, RealScalarLike, Scalar, Time, select
+from jaxbiped._types import Numbers, RealScalarLike, Scalar, Time, by_numpy, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._accuracy import rms_norm
 
@@ -102,6 +103,35 @@ class AbstractControl(_Control):  # type: ignore[type-arg]
 
     def adapt_step_size(self, *step: Any) -> Adapted:
         return self.adapt(Attempt(*step))
+
+
+class EqualSteps(eqx.Module):
+    """A `StepControl` of steps of one size, of which none is tried again.
+
+    An attempt is in vain whose error is infinite.
+
+    Its state is the number of steps to the end of the next one. As in diffrax, times are multiples
+    of the size, rounded once each, but for the first one.
+
+    Attributes:
+        count: number of steps to the end of the solve.
+        end: that time [s].
+    """
+
+    count: RealScalarLike
+    end: RealScalarLike
+
+    def init(self, *request: Any) -> tuple[Scalar, Scalar]:
+        _, t0, _, _, size, *_ = request
+        return jnp.asarray(t0 + size), jnp.ones_like(jnp.asarray(t0))
+
+    def adapt_step_size(self, *step: Any) -> Adapted:
+        attempt = Attempt(*step)
+        keep = jtu.tree_leaves(attempt.error)[0] < jnp.inf
+        steps = attempt.memory + 1.0
+        until = jnp.asarray(self.end * (steps / self.count))
+        jump, success = jnp.asarray(False), diffrax.RESULTS.successful
+        return Adapted(keep, jnp.asarray(attempt.t1), until, jump, steps, success)
 
 
 def try_again(attempt: Attempt, adapted: Adapted, again: Scalar, target: Scalar) -> Adapted:
@@ -213,6 +243,26 @@ class GivenFirstStep(AbstractWrappedControl):
 def first_step(duration: Numbers, time_unit: RealScalarLike = 1.0) -> Scalar:
     """The first step to try [s] in a solve of at most `duration` [s]."""
     return jnp.minimum(jnp.full_like(duration, _FIRST_STEP) * time_unit, duration)
+
+
+class StepsOfOneSize(NamedTuple):
+    """Steps that control no error.
+
+    Attributes:
+        size: of the first one [s].
+        total: how many there are to the end, into which they divide the duration.
+    """
+
+    size: Numbers
+    total: Numbers
+
+    @staticmethod
+    def of(size: Numbers, duration: Numbers) -> "StepsOfOneSize":
+        """Those of about this size [s], as diffrax has them."""
+        total = by_numpy(
+            lambda np, size, end: np.ceil(end / np.nextafter(size, np.inf)), size, duration
+        )
+        return StepsOfOneSize(size, total)
 
 
 @cached_jit  # many small operations

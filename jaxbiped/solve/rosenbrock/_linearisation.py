@@ -21,7 +21,7 @@ from jaxtyping import PyTree
 from jaxbiped._jax_versions import ClosedJaxpr, called_program
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import partial_derivatives
-from jaxbiped.dynamics._implicit_field import AbstractImplicitField, Residual
+from jaxbiped.hybrid._implicit_field import AbstractImplicitField, Residual
 from jaxbiped.linalg._small_matrices import Matrix, inverse
 from jaxbiped.linalg._sparse_lu import (
     Entry,

@@ -14,7 +14,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import BoolScalarLike, Scalar, SomeTree, Time
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.compiler import fusion_barrier
+from jaxbiped.solve._stepper import Stepped, Tolerance
 from jaxbiped.solve.rosenbrock._linearisation import (
     AbstractLinearisation,
     Components,
@@ -38,9 +39,10 @@ else:
 
 
 class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
-    """Dense output of a Rosenbrock step.
+    """Dense output of a step, by a Rosenbrock or a Runge–Kutta method.
 
     With θ = (t − t0)/(t1 − t0): y = (1 − θ) y0 + θ (y1 + (1 − θ)(k_1 + θ (k_2 + θ k_3 …))).
+    Without coefficients it is linear.
 
     Attributes:
         t0, t1: ends of the step [s].
@@ -63,7 +65,7 @@ class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
 
         def value(y0: Scalar, y1: Scalar, *coefficients: Scalar) -> Scalar:
             theta = jnp.asarray(fraction, dtype=y0.dtype)
-            inner = coefficients[-1]
+            inner = coefficients[-1] if coefficients else jnp.zeros_like(y0)
             for coefficient in reversed(coefficients[:-1]):
                 inner = coefficient + theta * inner
             return (1.0 - theta) * y0 + theta * (y1 + (1.0 - theta) * inner)
@@ -108,6 +110,18 @@ class AbstractRosenbrock(AbstractMemorylessSolver):
     def order(self, terms: Any) -> int:
         """Order of convergence."""
         return self.tableau.order
+
+    @property
+    def dense_count(self) -> int:
+        """Number of coefficients of the states within a step."""
+        return len(self.tableau.dense)
+
+    def advance(
+        self, terms: Any, t0: Time, t1: Time, y0: PyTree, args: PyTree, tolerance: Tolerance
+    ) -> Stepped:
+        """One step of a program; no tolerance decides on what it is."""
+        del tolerance
+        return Stepped(*step_of(self.tableau, terms, t0, t1, y0, args))
 
     def step(
         self,

@@ -1,6 +1,7 @@
 """Coordinates in which starts differ: of the state, and the scene's parameters."""
 
 from collections.abc import Collection, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -9,10 +10,17 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
+from jaxbiped.hybrid._hybrid_system import HybridSystem
 from jaxbiped.scene._modes import AT_LIMIT, limit_motions, rigid_modes
 from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, with_parameters
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
+from jaxbiped.scene._scene import (
+    AbstractScene,
+    AbstractWalkerScene,
+    RigidScene,
+    Scene,
+    is_walker,
+)
 from jaxbiped.sweep._follow_starts import passes_a_stop
 
 START_QUANTITIES = {
@@ -24,14 +32,17 @@ START_QUANTITIES = {
 """What angles and rates of two legs "1" and "2" are, by what the leg does where a cycle begins."""
 
 
-def state_coordinates(scene: AbstractWalkerScene) -> dict[str, str]:
+def state_coordinates(scene: AbstractScene) -> dict[str, str]:
     """The state's coordinates that starts can differ in, and the leaves that they stand for.
 
     Where the bodies "1" and "2" are legs, `theta_stance`, `theta_swing` and their rates are other
     names of theirs.
     """
-    names, structure = recurring_names(state_type(scene)), scene.mechanism.structure
-    found = {}
+    names = recurring_names(state_type(scene))
+    found: dict[str, str] = {}
+    if not is_walker(scene):
+        return found | {name: name for name in names}
+    structure = scene.mechanism.structure
     swing, stance = (structure.bodies[j] for j in structure.roles)
     if {swing, stance} == {"1", "2"}:
         found = {
@@ -41,16 +52,16 @@ def state_coordinates(scene: AbstractWalkerScene) -> dict[str, str]:
     return found | {name: name for name in names}
 
 
-def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
+def coordinate_names(scene: Scene | RigidScene | HybridSystem) -> tuple[str, ...]:
     """Names of all coordinates in which starts of a scene can differ.
 
     Args:
-        scene: the walker, compliant or rigid.
+        scene: the walker, compliant or rigid, or a hybrid system.
 
     Returns:
-        Names of the state's coordinates except `ROOT_x`, and then of the scene's parameters. For
-        two legs "1" and "2", the aliases `theta_stance`, `theta_swing` and those of their rates
-        come first.
+        Names of the state's coordinates except cyclic ones such as `ROOT_x`, and then of the
+        scene's parameters. For two legs "1" and "2", the aliases `theta_stance`, `theta_swing` and
+        those of their rates come first.
 
     Examples:
         >>> import jaxbiped as jb
@@ -60,23 +71,27 @@ def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
     return (*state_coordinates(scene), *parameter_names(scene))
 
 
-def coordinate_quantities(scene: Scene | RigidScene) -> dict[str, Quantity]:
+def coordinate_quantities(scene: Scene | RigidScene | HybridSystem) -> dict[str, Quantity]:
     """Words, symbol and unit of each coordinate in which starts of a scene can differ, by name.
 
     Args:
-        scene: the walker, compliant or rigid.
+        scene: the walker, compliant or rigid, or a hybrid system.
 
     Returns:
         A `Quantity` (words, symbol and SI unit) for each name.
     """
-    own = {
-        name: START_QUANTITIES.get(name) or state_quantity(name)
-        for name in state_coordinates(scene)
-    }
+    if is_walker(scene):
+        own = {
+            name: START_QUANTITIES.get(name) or state_quantity(name)
+            for name in state_coordinates(scene)
+        }
+    else:
+        units = getattr(state_type(scene), "own_units", {})
+        own = {name: Quantity(name, unit=units.get(name, "")) for name in state_coordinates(scene)}
     return {name: each for name, each in own.items() if each} | parameter_quantities(scene)
 
 
-def check_coordinates(scene: Scene | RigidScene, names: Iterable[str]) -> None:
+def check_coordinates(scene: Scene | RigidScene | HybridSystem, names: Iterable[str]) -> None:
     """Raises `ArgumentError` for what is no coordinate of the scene's starts, or named twice."""
     leaves, told = state_coordinates(scene), dict[str, str]()
     for name in names:
@@ -103,7 +118,7 @@ def axis_values(name: str, values: npt.ArrayLike) -> np.ndarray:
 
 
 def parameter_axes(
-    scene: AbstractWalkerScene, given: Mapping[str, npt.ArrayLike], argument: str
+    scene: Any, given: Mapping[str, npt.ArrayLike], argument: str
 ) -> dict[str, np.ndarray]:
     """`axis_values` of parameters that the scene has and allows, of an `argument` of that name."""
     check_type(argument, given, Mapping)
@@ -116,13 +131,13 @@ def parameter_axes(
 
 
 def parameters_among(
-    scene: AbstractWalkerScene, columns: Mapping[str, np.ndarray]
+    scene: AbstractScene, columns: Mapping[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
     own = state_coordinates(scene)
     return {name: column for name, column in columns.items() if name not in own}
 
 
-def state_at(scene: AbstractWalkerScene, base: PyTree, columns: Mapping[str, np.ndarray]) -> PyTree:
+def state_at(scene: AbstractScene, base: PyTree, columns: Mapping[str, np.ndarray]) -> PyTree:
     """The states (n,) with these coordinates, all else from the base's leaves (n,)."""
     leaves = state_coordinates(scene)
     return base._replace(**{leaves[name]: columns[name] for name in columns if name in leaves})

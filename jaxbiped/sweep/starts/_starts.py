@@ -17,8 +17,9 @@ from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.dynamics._state import state_for
+from jaxbiped.hybrid._hybrid_system import HybridSystem, start_of_system
 from jaxbiped.scene._parameter_access import with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import RigidScene, Scene, is_walker
 from jaxbiped.scene._state_types import State
 from jaxbiped.sweep._follow_starts import broadcast_leaves
 from jaxbiped.sweep._labelling import Labelling, check_leaves_of_starts
@@ -110,7 +111,7 @@ class Rest(eqx.Module):
 
 
 def rest_of(
-    scene: Scene | RigidScene,
+    scene: Scene | RigidScene | HybridSystem,
     names: Iterable[str],
     place: bool | None,
     follow: Completion | None,
@@ -118,14 +119,22 @@ def rest_of(
 ) -> Rest:
     """Where starts that name these coordinates have the rest from; raises `ArgumentError`."""
     if base is not None:
-        base = state_for(scene, base, "base")
+        if isinstance(scene, HybridSystem):
+            base = start_of_system(scene, base, "base")
+        else:
+            base = state_for(scene, base, "base")
         if np.ndim(base[0]):
             raise ArgumentError(
                 f"base has leaves of shape {np.shape(base[0])}, which is not allowed: give one "
                 "state."
             )
         base = type(base)(*map(float, base))
-    if place is None:
+    if place and not is_walker(scene):
+        raise ArgumentError(
+            f"place = {place!r} is not allowed for a {type(scene).__name__}, which has no leg to "
+            "place: leave it out, and complete starts by follow."
+        )
+    if place is None and is_walker(scene):
         structure = scene.mechanism.structure
         turning = {*structure.coordinates[2:], *structure.rates[2:]}
         place = not turning.isdisjoint(names)
@@ -173,7 +182,7 @@ class Grid(AbstractStarts):
 
 
 def grid(
-    scene: Scene | RigidScene,
+    scene: Scene | RigidScene | HybridSystem,
     values: Mapping[str, Sequence[float] | np.ndarray],
     *,
     place: bool | None = None,
@@ -183,13 +192,13 @@ def grid(
     """A regular grid of starts over coordinates of the state and parameters of the scene.
 
     Args:
-        scene: the walker.
+        scene: the walker, or a hybrid system.
         values: values of each coordinate (see `coordinate_names`); the last one runs fastest.
         place: whether the stance leg is placed on the ground: unless they are named, height and
             velocity of the root point then follow from its lowest foot, with the penetration and
             slip speed of the gait, or of the base. Default: if an axis is an angle or rate of a
             body under its name in the state, whereas `theta_stance` and similar names give a slice
-            with the gait's own root point.
+            with the gait's own root point. A hybrid system has nothing to place.
         follow: a function of (scene, states), with leaves of shape (n,), that finally modifies the
             starts. For workers in other processes, it must be defined in a module.
         base: a state of the scene that provides the coordinates that are not named. Default: the
@@ -231,7 +240,7 @@ def batch_at(
         base = broadcast_leaves(rest.base, count)
     scene = with_parameters(labelling.scene, parameters)
     states = state_at(scene, base, columns)
-    if rest.place:
+    if rest.place and is_walker(scene):
         states = place_states(scene, base, states, columns)
     if rest.follow is not None:
         states = rest.follow(scene, states)
@@ -239,7 +248,9 @@ def batch_at(
     return Batch(type(states)(*leaves), parameters, columns)
 
 
-def check_parameters(scene: Scene | RigidScene, columns: dict[str, np.ndarray]) -> None:
+def check_parameters(
+    scene: Scene | RigidScene | HybridSystem, columns: dict[str, np.ndarray]
+) -> None:
     """Raises `ArgumentError` for values that the scene's parameters must not have."""
     for name, column in parameters_among(scene, columns).items():
         with_parameters(scene, {name: column})
@@ -380,7 +391,7 @@ class Sample(AbstractStarts):
 
 
 def sample(
-    scene: Scene | RigidScene,
+    scene: Scene | RigidScene | HybridSystem,
     bounds: Mapping[str, tuple[float, float]],
     count: int,
     *,
@@ -396,7 +407,7 @@ def sample(
     other methods draw only those of the chunk.
 
     Args:
-        scene: the walker.
+        scene: the walker, or a hybrid system.
         bounds: lower and upper bound of each coordinate (see `coordinate_names`), in its SI unit.
         count: how many starts.
         method: one of `SAMPLINGS`.

@@ -6,15 +6,9 @@ import jax
 import jax.numpy as jnp
 import pytest
 
-from jaxbiped.compiler.codegen._ptx_kernel import (
-    ARCHITECTURES,
-    THREADS,
-    architecture_of,
-    device_target,
-    ptx_text,
-)
+from jaxbiped.compiler import ARCHITECTURES, Program, ptx_text
+from jaxbiped.compiler.codegen._ptx_kernel import THREADS, architecture_of, device_target
 from jaxbiped.compiler.runtime._kernel import Kernel
-from jaxbiped.compiler.runtime._program import Program
 from tests.compiler.assembler import assembled
 
 NUMBER = jax.ShapeDtypeStruct((), jnp.float64)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.caching._disk_cache import CACHE_VARIABLE
 from jaxbiped.compiler import host_jit
 from jaxbiped.compiler.host_code import _host_jit
 
@@ -73,10 +72,10 @@ def test_shapes_are_known_before_it_runs():
 
 
 @pytest.mark.usefixtures("converted")
-def test_kept_for_the_next_process(monkeypatch, tmp_path):
+def test_kept_for_the_next_process(monkeypatch, tmp_path, xla_refuses):
     """A gait search, whose host programs hold programs of lanes; XLA compiles none of it."""
-    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
-    monkeypatch.setattr("jaxbiped.caching._cached_jit.trace_call", _refuse)
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path))
+    xla_refuses()
 
     jb.clear_caches()
     first = _rigid_gait()

@@ -36,6 +36,17 @@ def test_products_over_any_number_of_axes():
     check_against_xla(function, A, C, rtol=1e-12)
 
 
+def test_products_of_batches_along_different_axes():
+    """Of one batch, then of two that lie the other way round in the second factor."""
+
+    def function(c):
+        behind = jnp.moveaxis(c, 0, 1)
+        once = jax.lax.dot_general(c, behind, (((2,), (0,)), ((0,), (1,))))
+        return once, jax.lax.dot_general(c, behind, (((2,), (2,)), ((0, 1), (1, 0))))
+
+    check_against_xla(function, C, rtol=1e-12)
+
+
 @pytest.mark.parametrize("rows", [1, 3])
 def test_systems(rows):
     def function(a, b):

@@ -56,6 +56,16 @@ def test_any_two_moves_one_behind_the_other():
         assert np.shape(own) == expected.shape, name
 
 
+def test_nothing_behind_nothing_is_nothing():
+    def joined(leaves):
+        (x,) = leaves
+        empty = jax.lax.slice_in_dim(x, 0, 0)
+        return jax.lax.concatenate([empty, empty], 0)
+
+    found = write_host_program(joined, [X])([X])
+    assert (found.shape, found.dtype) == ((0, X.shape[1]), X.dtype)
+
+
 @pytest.mark.parametrize("starts", [(1, 2), (-3, 3), (9, -1)])
 def test_a_window_is_moved_inwards_whether_its_place_is_known_or_not(starts):
     inside = [min(max(start, 0), 4 - size) for start, size in zip(starts, (2, 3), strict=True)]

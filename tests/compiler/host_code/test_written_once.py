@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.compiler.host_code._host_jit import write_host_program
 from jaxbiped.compiler.host_code._host_writer import NAMES
+from tests.compiler.host_code.host_runs import written
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def calls(monkeypatch):
 
 def run(function, *given):
     given = [np.asarray(each, float) for each in given]
-    return write_host_program(lambda leaves: function(*leaves), given)(given)
+    return written(function, given)(given)
 
 
 def test_equal_operations_are_one_and_what_nothing_needs_is_none(calls):

@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 
+from jaxbiped.compiler import host
 from jaxbiped.compiler.codegen._kernel_target import KernelTarget, host_target
 from jaxbiped.compiler.codegen._llvm_function import FunctionBuilder, literal, vector
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.ir._liveness import Liveness, sink_code, sources_of
-from jaxbiped.compiler.runtime._machine_code import host
 
 NUMBERS = [-2.0, -0.0, 0.0, 0.75, 1.0, 3.0, np.inf, np.nan]
 FLOATS = {

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.compiler import jacobian, partial_derivatives
 from jaxbiped.compiler.ir import _lower_jaxpr
 from jaxbiped.compiler.ir._graph import Block
 from jaxbiped.compiler.ir._liveness import Liveness
-from jaxbiped.compiler.ir._vertex_elimination import jacobian, partial_derivatives
 from jaxbiped.compiler.runtime._program import inputs_of, lower_function
 from tests.compiler.one_shot import evaluate
 

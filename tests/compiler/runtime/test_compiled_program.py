@@ -15,14 +15,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped._checks import ArgumentError
-from jaxbiped.compiler import LANES, Request
-from jaxbiped.compiler.runtime import _compiled_program, _machine_code
-from jaxbiped.compiler.runtime._machine_code import default_threads, host
-from jaxbiped.solve._accuracy import units_of
+from jaxbiped import ArgumentError
+from jaxbiped.compiler import LANES, Request, default_threads, host
+from jaxbiped.compiler.runtime import _machine_code
+from jaxbiped.hybrid._scales import units_of
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
 from jaxbiped.solve.controllers._wrapped_control import just_before_end
-from tests.compiler.one_shot import stepped
+from tests.compiler.one_shot import let_threads_run, stepped
 
 SCENE = jb.seed_scene()
 SEED = np.array([float(leaf) for leaf in jb.seed_state()])
@@ -30,7 +29,9 @@ WATCH = ("fall", "stop", "stumble")
 
 
 def _program():
-    steps = AdaptiveSolve(jb.solvers.Rodas4(), WATCH, counting=False, located=True)
+    steps = AdaptiveSolve(
+        jb.hybrid.Walking(), jb.solvers.Rodas4(), WATCH, counting=False, located=True
+    )
     one = jtu.tree_map(lambda leaf: leaf[0], _inputs([SEED]))
     return LANES.compile(Request(adaptive_program(steps), one, quick=True))
 
@@ -147,15 +148,15 @@ def test_an_interrupt_ends_a_run(monkeypatch):
     """It raises, and none of its threads is still at work on memory that may be given back."""
     program, at_work = _endless(), []
 
-    def counted(work, workers, stop, *, quick):
+    def counted(run, work, *given, **how):
         def one():
             at_work.append(threading.get_ident())
             work()
             at_work.remove(threading.get_ident())
 
-        _machine_code.run_in_threads(one, workers, stop, quick=quick)
+        run(one, *given, **how)
 
-    monkeypatch.setattr(_compiled_program, "run_in_threads", counted)
+    let_threads_run(monkeypatch, counted)
     program.kernel.code(host().width)
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
@@ -196,11 +197,11 @@ def test_a_run_that_is_stopped_attempts_nothing_more(attempts, monkeypatch):
     inputs = np.full(20, float(attempts))
     np.testing.assert_array_equal(program.run(inputs).outputs, inputs)
 
-    def stopped(work, workers, stop, *, quick):
+    def stopped(run, work, workers, stop, **how):
         stop[0] = 1
-        _machine_code.run_in_threads(work, workers, stop, quick=quick)
+        run(work, workers, stop, **how)
 
-    monkeypatch.setattr(_compiled_program, "run_in_threads", stopped)
+    let_threads_run(monkeypatch, stopped)
     assert np.isnan(program.run(inputs).outputs).all()
 
 
@@ -236,3 +237,15 @@ def test_records_at_the_times_of_a_schedule():
     np.testing.assert_array_equal(ran.recorded.values[1, :, 0], times)
     np.testing.assert_array_equal(ran.recorded.values[1, :, 1], [0.5, 0.5, 1.0, 2.0])
     assert np.isnan(ran.recorded.values[2, 2:]).all()
+
+
+def test_without_room_all_records_are_counted_and_none_is_kept():
+    program = stepped(
+        lambda inputs, carried: (carried + 1.0, carried + 1.0 >= inputs),
+        start=jnp.zeros_like,
+        record=lambda inputs, carried, time: (carried >= 0.0, [carried]),
+    )
+    for room in ({}, dict(room=0), dict(room=2)):
+        recorded = program.run(np.array([1.0, 3.0]), **room).recorded
+        assert recorded.values.shape == (2, room.get("room", 0), 1)
+        assert recorded.counts.tolist() == [1, 3]

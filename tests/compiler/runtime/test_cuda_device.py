@@ -9,11 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped._checks import ResourceError
+from jaxbiped import ResourceError
 from jaxbiped.compiler import CUDA, LANES, LaneEngine, Program, Request
-from jaxbiped.compiler.runtime import _cuda_device, _processors
 from jaxbiped.compiler.runtime._cuda_device import CudaDriver, CudaError, devices
-from tests.compiler.fake_driver import FakeDriver, install
+from tests.compiler.fake_driver import FakeDriver, install, limit_room, load
 
 NEVER = 2000.0
 
@@ -87,7 +86,7 @@ def test_an_endless_or_poisoned_start_does_not_hold_up_the_others(monkeypatch):
 @pytest.mark.parametrize(("many", "room"), [(3, 1 << 30), (1, 4000)])
 def test_devices_share_a_batch_in_parts_that_have_room(monkeypatch, many, room):
     fake = install(monkeypatch, devices=many, lanes=2, multiprocessors=1)
-    monkeypatch.setattr(_processors, "_MOST_BYTES", room)
+    limit_room(monkeypatch, room)
     lengths = 1 + np.arange(300) % 17
     _same(run_counting(CUDA, lengths), run_counting(LANES, lengths))
     assert len(fake.launches) == 3 if many == 3 else len(fake.launches) > 4
@@ -168,7 +167,7 @@ def test_an_interrupt_stops_the_kernel(monkeypatch):
 )
 def test_why_there_is_no_device(monkeypatch, options, why):
     fake = FakeDriver(**options)
-    monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
+    load(monkeypatch, fake)
     found = devices.__wrapped__()
     assert not found.usable
     assert why in found.missing
@@ -177,9 +176,9 @@ def test_why_there_is_no_device(monkeypatch, options, why):
 def test_a_driver_that_fails_is_no_device(monkeypatch):
     fake = FakeDriver()
     fake.cuInit = functools.partial(lambda *args: 100)
-    monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
+    load(monkeypatch, fake)
     assert "finds no device" in devices.__wrapped__().missing
-    monkeypatch.setattr(_cuda_device, "load_library", lambda: None)
+    load(monkeypatch, None)
     assert devices.__wrapped__().missing == "no CUDA driver is installed"
     with pytest.raises(CudaError, match="cuInit: launch failed"):
         CudaDriver(fake).call("cuInit", 0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES, ptx_text
+from jaxbiped.compiler import ARCHITECTURES, ptx_text
 from tests.compiler.assembler import assembled
 from tests.compiler.fake_driver import install
 from tests.mechanisms import scene_of, start_of

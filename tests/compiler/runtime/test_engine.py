@@ -53,6 +53,25 @@ def test_records_are_those_that_the_program_makes(engine):
     np.testing.assert_allclose(kept[-1], 100.0, rtol=1e-15)
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("times", [[0.5, 1.0, 1.25, 1.5, 1.75, 4.0], [9.0], []])
+def test_records_come_at_the_times_of_a_schedule(engine, times):
+    """A clock of steps of 1 that ends at 3.5 or later: rows up to there, several in one step."""
+    clock = Program(
+        lambda end: jnp.zeros(()),
+        lambda end, now: (now + 1.0, now + 1.0 >= end),
+        lambda end, now: now,
+        record=lambda end, now, due: (due <= now, [due, now]),
+        scheduled=True,
+    )
+    found = engine.run(Request(clock, jnp.asarray(3.5), times=np.array(times)))
+    expected = [(due, max(np.ceil(due), 1.0)) for due in times if due <= 4.0]
+    assert int(found.records.counts) == len(expected)
+    rows = np.asarray(found.records.values)
+    assert rows.shape == (len(times), 2)
+    np.testing.assert_array_equal(rows[: len(expected)], np.reshape(expected, (-1, 2)))
+
+
 def test_a_batch_larger_than_the_slots_keeps_its_order():
     values = np.linspace(1.0, 50.0, 23)
     found = LoopEngine(slots=4).run(Request(ROOT, values, batch=True)).outputs[0]
@@ -70,7 +89,9 @@ def test_engines_say_what_hinders():
     assert XLA.can(Request(ROOT, number)) is None
     assert "'erf'" in LANES.can(Request(ERF, number))
     assert XLA.can(Request(ERF, number)) is None
-    assert "given times" in XLA.can(Request(ROOT, number, times=np.ones(2)))
+    scheduled = replace(RECORDED, scheduled=True)
+    assert "not given" in XLA.can(Request(scheduled, number))
+    assert XLA.can(Request(scheduled, number, times=np.ones(2))) is None
     for program in (STREAM, RECORDED):
         several = Request(program, np.ones(2), room=3, batch=True)
         assert LANES.can(several) is None

@@ -5,9 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.compiler.runtime._machine_code import host
-from jaxbiped.compiler.runtime._primitive import call
-from tests.compiler.one_shot import NUMBER, stepped, two_zeros
+from jaxbiped.compiler import host
+from tests.compiler.one_shot import NUMBER, called, stepped, two_zeros
 
 
 def _summing():
@@ -40,7 +39,7 @@ def test_streams_under_jit_and_vmap():
     streams = jnp.arange(24.0).reshape(4, 3, 2)
 
     def one(stream, weight):
-        return call(program, (weight, jnp.asarray(3.0)), stream=stream)[0][0]
+        return called(program, (weight, jnp.asarray(3.0)), stream=stream)[0]
 
     together = jax.jit(jax.vmap(one, in_axes=(0, None)))(streams, jnp.asarray(2.0))
     np.testing.assert_array_equal(together, [one(stream, jnp.asarray(2.0)) for stream in streams])

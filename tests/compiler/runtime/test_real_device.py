@@ -11,7 +11,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.compiler import CUDA, DEVICES, LANES
-from jaxbiped.compiler.runtime import _processors
+from tests.compiler.fake_driver import limit_room
 from tests.compiler.runtime.test_cuda_device import run_counting
 from tests.compiler.runtime.test_device_programs import CASES
 from tests.sweep.walkers import gaitless, same, with_attractor
@@ -49,7 +49,7 @@ def test_many_starts_get_the_lanes_labels():
 def test_counts_of_unlike_lengths(monkeypatch):
     lengths = 1 + np.arange(100_000) % 1237
     same(run_counting(CUDA, lengths), run_counting(LANES, lengths))
-    monkeypatch.setattr(_processors, "_MOST_BYTES", 400_000)
+    limit_room(monkeypatch, 400_000)
     same(run_counting(CUDA, lengths[:20_000]), run_counting(LANES, lengths[:20_000]))
 
 

@@ -8,10 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxbiped.compiler import Recording
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._lane_call import BufferPool, LaneCall, LaneRun, Part, RecordCache
-from jaxbiped.compiler.runtime._primitive import Recording, call
-from tests.compiler.one_shot import NUMBER, stepped, two_zeros
+from jaxbiped.compiler.runtime._primitive import call
+from tests.compiler.one_shot import NUMBER, count_runs, stepped, two_zeros
 
 ROOM = 8
 
@@ -57,16 +58,21 @@ def _last_sum():
 
 @pytest.fixture
 def runs(powers, monkeypatch):
-    """How many simulations each run of the program took."""
-    counts, run_table = [], CompiledProgram.run_table
+    """Asked for, how many simulations each run of the program took."""
+    every = count_runs(monkeypatch)
+    return lambda: [simulations for program, simulations, _ in every if program == powers]
 
-    def counted(program, table, **options):
-        if program == powers:
-            counts.append(table.simulations)
-        return run_table(program, table, **options)
 
-    monkeypatch.setattr(CompiledProgram, "run_table", counted)
-    return counts
+@pytest.fixture
+def holds(monkeypatch):
+    """Lets records be held up to so many bytes."""
+
+    def held(most):
+        monkeypatch.setattr(
+            "jaxbiped.compiler.runtime._lane_call._RECORDS", RecordCache(lambda: most)
+        )
+
+    return held
 
 
 def _recording(powers, factor, steps):
@@ -81,17 +87,17 @@ def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
     np.testing.assert_array_equal(counts, [0, 1, 2, 3, 4, *nothing])
     np.testing.assert_array_equal(values, [1, 3, 9, 27, 81, *nothing])
     assert float(last) == 81.0
-    assert runs == [1]
+    assert runs() == [1]
     _recording(powers, 3.0, 4.0)
-    assert runs == [1, 1]
+    assert runs() == [1, 1]
 
 
-def test_what_is_no_longer_held_is_run_again(powers, runs, monkeypatch):
-    monkeypatch.setattr("jaxbiped.compiler.runtime._lane_call._RECORDS", RecordCache(lambda: 0))
+def test_what_is_no_longer_held_is_run_again(powers, runs, holds):
+    holds(0)
     _, recording = _recording(powers, 1.5, 2.0)
     _, values = recording.columns(np.array([0.0, 1.0]))
     np.testing.assert_array_equal(values[:3], [1.0, 1.5, 2.25])
-    assert runs == [1, 1]
+    assert runs() == [1, 1]
 
 
 def test_a_recording_is_another_programs_stream(powers, runs):
@@ -106,7 +112,7 @@ def test_a_recording_is_another_programs_stream(powers, runs):
     totals, values = jax.jit(jax.vmap(both))(factors, steps)
     np.testing.assert_allclose(totals, [14.0, 3.0, 0.96875])
     np.testing.assert_allclose(np.nansum(values, axis=1), totals)
-    assert runs == [3]
+    assert runs() == [3]
     assert float(both(jnp.asarray(2.0), jnp.asarray(3.0))[0]) == 14.0
 
 
@@ -116,12 +122,12 @@ def test_what_is_read_but_once_is_then_no_longer_held(powers, runs):
     reader = _last_sum()
     sums = [float(call(reader, jnp.asarray(2.0), stream=recording)[0]) for _ in range(3)]
     assert sums == [0.3125] * 3
-    assert runs == [1, 1, 1]
+    assert runs() == [1, 1, 1]
 
 
 @pytest.mark.parametrize("most", [0, 1 << 20])
-def test_what_reads_a_recording_may_record_as_well(powers, monkeypatch, most):
-    monkeypatch.setattr("jaxbiped.compiler.runtime._lane_call._RECORDS", RecordCache(lambda: most))
+def test_what_reads_a_recording_may_record_as_well(powers, holds, most):
+    holds(most)
     doubled, reader = _doubled(), _last_sum()
 
     def total(factor, steps):

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.plot._skeleton import motion_names
-from jaxbiped.plot.viewer._view import _even_choice
 from tests.drawn import sent_in
 
 pytestmark = pytest.mark.slow
@@ -29,15 +27,22 @@ def basin(seed):
     return found, jb.plot.view_basin(seed, starts, found, most=12, footsteps=2)
 
 
-def test_the_choice_is_even_and_no_more_than_asked():
-    for shape in ((6, 7), (200, 200), (2, 500), (3, 2)):
-        rows, columns = _even_choice(shape, 12)
-        assert len(rows) * len(columns) <= 12
-        assert rows.max() < shape[0]
-        assert columns.max() < shape[1]
-        for chosen in (rows, columns):
-            assert np.ptp(np.diff(chosen)) <= 1 if chosen.size > 2 else True
-    assert [each.tolist() for each in _even_choice((3, 2), 100)] == [[0, 1, 2], [0, 1]]
+@pytest.mark.parametrize(
+    ("shape", "most"), [((6, 7), 12), ((20, 20), 12), ((2, 50), 12), ((3, 2), 12), ((3, 2), 100)]
+)
+def test_the_choice_is_even_and_no_more_than_asked(seed, shape, most):
+    axes = {name: np.linspace(-0.3, 0.3, n) for name, n in zip(AXES, shape, strict=True)}
+    starts = jb.starts.grid(seed.scene, axes)
+    found = jb.sweep(seed, starts, look_for_gaits=False)
+    sent = sent_in(jb.plot.view_basin(seed, starts, found, most=most, footsteps=2).html())["basin"]
+    rows, columns = (np.array(sent[name]) for name in ("rows", "columns"))
+    assert len(rows) * len(columns) <= most
+    assert rows.max() < shape[0]
+    assert columns.max() < shape[1]
+    for chosen in (rows, columns):
+        assert np.ptp(np.diff(chosen)) <= 1 if chosen.size > 2 else True
+    if most == 100:
+        assert (rows.tolist(), columns.tolist()) == ([0, 1, 2], [0, 1])
 
 
 def test_cells_are_the_labels(basin):
@@ -46,7 +51,7 @@ def test_cells_are_the_labels(basin):
     sent = sent_in(view.html())
     cells = np.frombuffer(base64.b64decode(sent["basin"]["cells"]), np.uint8)
     assert [sent["basin"]["names"][k] for k in cells] == names.ravel().tolist()
-    motion = set(motion_names(jb.seed_scene().mechanism.structure))
+    motion = {"hip_x", "hip_z", "hip_vx", "hip_vz", "theta_1", "theta_2", "omega_1", "omega_2"}
     assert {frozenset(each.channels) for each in view.recordings if each} == {frozenset(motion)}
 
 

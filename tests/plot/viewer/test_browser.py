@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.plot._samples import DrawnMotion
-from jaxbiped.plot._skeleton import poses
 from tests.browser import require_chromium
 from tests.drawn import leg_pixels
 from tests.mechanisms import scene_of, start_of
@@ -56,16 +54,28 @@ def page(browser, file):
     assert browser.errors() == []
 
 
+def _drawn(scene, *places):
+    """Places in the slope's frame [m], as a page has them: level, and downwards positive."""
+    sine, cosine = np.sin(float(scene.ground.slope)), np.cos(float(scene.ground.slope))
+    return [
+        [float(x * cosine + z * sine), float(x * sine - z * cosine)] for x, z in map(tuple, places)
+    ]
+
+
+def _centres(scene, state):
+    """Where the arcs of the feet have their centres, in the slope's frame [m]."""
+    return [(foot.x, foot.z) for foot in jb.dynamics.feet(scene, state)]
+
+
 def assert_is_there(page, walk):
     """The page's walker is where the simulation has it, to 0.1 mm."""
     shown = page.run(WHERE)
     scene, trajectory = walk
     time = min(shown["time"], float(trajectory.t[-1]))
-    there = poses(scene, DrawnMotion(scene, trajectory).at(np.array([time])))
-    for name, (x, z) in zip(
-        ("root", "foot_1", "foot_2"), (there.root[0], *(f[0] for f in there.feet)), strict=True
-    ):
-        assert np.allclose(shown[name], [[x, -z]], rtol=0.0, atol=1e-4), (name, time)
+    state = trajectory.at(time)
+    places = _drawn(scene, (state.hip_x, state.hip_z), *_centres(scene, state))
+    for name, place in zip(("root", "foot_1", "foot_2"), places, strict=True):
+        assert np.allclose(shown[name], [place], rtol=0.0, atol=1e-4), (name, time)
     assert shown["leg_1"] == shown["foot_1"]
     return shown["time"]
 
@@ -202,6 +212,38 @@ def test_charts_are_whole_and_motors_have_their_line(browser, driven, width):
     assert apart[:, 1].max() > 10.0
 
 
+@pytest.mark.parametrize("kind", ["seed", "driven"])
+@pytest.mark.parametrize("size", [(1000, 620), (1000, 700), (1150, 750), (1300, 800), (1600, 900)])
+def test_picture_charts_and_player_are_seen_without_a_scroll(browser, file, driven, kind, size):
+    page = browser.open(driven if kind == "driven" else file, width=size[0], height=size[1] + 200)
+    page.resize(width=size[0], height=size[1])
+    page.driver.execute_async_script(
+        "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done))"
+    )
+    seen = page.run("""
+    const box = (each) => each.getBoundingClientRect();
+    const all = (names) => [...document.querySelectorAll(names)].map(box);
+    return {
+      boxes: all(".stage, .reading, .charts figure"), charts: all(".chart"),
+      player: all(".player")[0],
+      drawn: [...document.querySelectorAll(".chart")].map(({ viewBox }) => viewBox.baseVal),
+      window: [innerWidth, innerHeight],
+    };""")
+    assert len(seen["boxes"]) == 2 + len(seen["charts"]) > 4
+    for box in seen["boxes"]:
+        assert box["top"] >= 0.0
+        assert box["bottom"] <= seen["player"]["top"]
+        assert box["left"] >= 0.0
+        assert box["right"] <= seen["window"][0]
+    assert seen["player"]["bottom"] <= seen["window"][1]
+    # Every chart is drawn for the room that it has, and ends within its figure.
+    for box, figure, drawn in zip(seen["charts"], seen["boxes"][2:], seen["drawn"], strict=True):
+        assert box["bottom"] <= figure["bottom"] + 0.5
+        assert box["height"] >= 90.0
+        for side in ("width", "height"):
+            assert drawn[side] == pytest.approx(box[side], abs=1.0)
+
+
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("width", [400, 800, 1600])
 def test_it_fits_any_width_by_day_and_by_night(page, file, tmp_path, dark, width):
@@ -263,13 +305,19 @@ def test_knees_feet_and_names_of_a_mechanism_are_shown(browser, tmp_path):
     page = browser.open(path)
     page.run(SCRUB, 0.5 * float(trajectory.t[-1]))
     time = page.run("return Number(document.querySelector('.stage').dataset.time)")
-    there = poses(scene, DrawnMotion(scene, trajectory).at(np.array([time])))
+    state = trajectory.at(time)
+    thigh, bodies = 0.184, scene.mechanism.bodies
+    assert {float(body.at.along) for body in bodies if body.parent is not None} == {thigh}
+    hinges = [(state.hip_x, state.hip_z)] * 2 + [
+        (state.hip_x + thigh * np.sin(angle), state.hip_z - thigh * np.cos(angle))
+        for angle in (state.theta_thigh_1, state.theta_thigh_2)
+    ]
     shown = page.run(
         "return [...document.querySelectorAll('[data-part=hinge], [data-part^=foot-]')].map("
         "(each) => ['cx', 'cy'].map((name) => Number(each.getAttribute(name))))"
     )
-    expected = [each[0] * [1.0, -1.0] for each in (*there.feet, *there.hinges)]
-    assert np.allclose(sorted(shown), sorted(map(list, expected)), rtol=0.0, atol=1e-4)
+    expected = _drawn(scene, *_centres(scene, state), *hinges)
+    assert np.allclose(sorted(shown), sorted(expected), rtol=0.0, atol=1e-4)
     said = page.run("return document.body.textContent")
     for name in scene.mechanism.structure.bodies:
         assert f"{name}: " in said

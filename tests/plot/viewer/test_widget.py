@@ -2,11 +2,11 @@
 
 import base64
 import json
+import sys
 
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.plot.viewer._view import asset, widget_script
 
 pytestmark = pytest.mark.slow
 
@@ -40,9 +40,11 @@ def viewed(seed_walk):
 
 def test_time_is_shared_with_python(viewed, browser, tmp_path):
     (tmp_path / "empty.html").write_text("<!doctype html><title>notebook</title>")
-    script = base64.b64encode(widget_script().encode()).decode()
+    pytest.importorskip("anywidget")
+    widget = viewed.widget()
+    script = base64.b64encode(widget._esm.encode()).decode()
     page = browser.open(tmp_path / "empty.html")
-    assert page.driver.execute_async_script(MODEL, script, asset("view.css"), viewed.sent())
+    assert page.driver.execute_async_script(MODEL, script, widget._css, viewed.sent())
     assert page.run(TIME) == 0.25
     # A notebook's cell has no lower edge in sight: the player is above the walker, and charts
     # stand beside it only where the cell, not the window, is wide.
@@ -75,7 +77,7 @@ def test_a_notebook_shows_the_widget(viewed):
 
 
 def test_without_anywidget_it_shows_the_page(viewed, monkeypatch):
-    monkeypatch.setattr("jaxbiped.plot.viewer._view.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "anywidget", None)
     shown = viewed._repr_mimebundle_()
     assert shown["text/plain"] == "View(seed: walking)"
     assert "<iframe srcdoc=" in shown["text/html"]

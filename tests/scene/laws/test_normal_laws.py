@@ -92,7 +92,7 @@ def test_the_jump_is_told_to_the_switches():
     for law in (jb.laws.KelvinVoigt(K=3e4, D=200.0), jb.laws.Tsuji(K=1e6, gamma=1e3)):
         changed = eqx.tree_at(lambda s: s.normal, scene, law)
         # Of each foot: touchdown, the reaction, three of friction, the clearance rule.
-        jumps = [switch.force_jumps for switch in jb.dynamics.switches(changed, jb.seed_state())]
+        jumps = [switch.force_jumps for switch in jb.hybrid.switches(changed, jb.seed_state())]
         assert jumps == 2 * [law.jumps_at_touchdown, False, False, False, False, True]
 
 

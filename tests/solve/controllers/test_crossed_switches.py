@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._contacts import feet
-from jaxbiped.dynamics._surfaces import Switch
-from jaxbiped.solve._accuracy import units_of
-from jaxbiped.solve.controllers._step_size import CrossedSwitches, ErrorControl, crosses
-from jaxbiped.variational._switch_locator import _crosses
+from jaxbiped.dynamics import feet
+from jaxbiped.hybrid import Switch
+from jaxbiped.hybrid._compliant_guards import contact_changes
+from jaxbiped.hybrid._scales import units_of
+from jaxbiped.solve.controllers._step_size import CrossedSwitches, ErrorControl
+from jaxbiped.solve.controllers._switch_locator import _crosses
 
 SCENE = jb.seed_scene()
 V0 = float(SCENE.friction.v0)
@@ -57,14 +58,14 @@ def _standing(depth=5e-4, slip=0.0, sinks=0.0, other=-0.01):
     ],
 )
 def test_a_contact_of_another_kind_at_the_end_is_a_crossed_switch(before, after, crossed):
-    assert bool(crosses(SCENE, _standing(**before), _standing(**after))) is crossed
+    assert bool(contact_changes(SCENE, _standing(**before), _standing(**after))) is crossed
 
 
 def test_without_friction_slip_makes_no_difference():
     scene = dataclasses.replace(SCENE, friction=jb.laws.Frictionless())
     slips, turns = _standing(slip=V0), _standing(slip=-V0)
-    assert not crosses(scene, slips, turns)
-    assert crosses(scene, slips, _standing(depth=-1e-4))
+    assert not contact_changes(scene, slips, turns)
+    assert contact_changes(scene, slips, _standing(depth=-1e-4))
 
 
 @pytest.mark.parametrize(("slip", "kept"), [(0.5 * V0, True), (-0.5 * V0, False)])
@@ -72,7 +73,7 @@ def test_its_error_counts_as_often_as_told(slip, kept):
     before, after = _standing(slip=0.4 * V0), _standing(slip=slip)
     units = units_of(SCENE, before)
     error = jb.State(*(0.2 * (1e-8 + 1e-6 * abs(leaf)) for leaf in after))
-    control = CrossedSwitches(ErrorControl(1e-6, 1e-8, units), 10.0)
+    control = CrossedSwitches(ErrorControl(1e-6, 1e-8, units), jb.hybrid.Walking(), 10.0)
     times = jnp.asarray(0.0), jnp.asarray(1e-3)
     keep, *_ = control.adapt_step_size(*times, before, after, SCENE, error, 4, jnp.asarray(False))
     assert bool(keep) is kept

@@ -9,9 +9,15 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.compiler.runtime._program import count_operations
-from jaxbiped.solve._accuracy import units_of
-from jaxbiped.solve.controllers._step_size import SAFETY, SMALLEST_STEP, ErrorControl
+from jaxbiped.compiler import count_operations
+from jaxbiped.hybrid._scales import units_of
+from jaxbiped.solve.controllers._step_size import (
+    SAFETY,
+    SMALLEST_STEP,
+    ErrorControl,
+    step_control,
+)
+from jaxbiped.solve.solvers import rms_norm
 
 RTOL, SPAN = 1e-6, 1e-3
 STATE = jb.seed_state()
@@ -74,10 +80,25 @@ def test_no_step_is_larger_than_the_one_before_it_that_followed_a_rejection():
 def test_the_smallest_step_is_taken_whatever_its_error(error):
     keep, start, end, *_ = _adapted(error, span=SMALLEST_STEP, at=0.0)
     assert keep
-    assert float(end - start) == pytest.approx(SMALLEST_STEP)
+    assert float(end - start) == pytest.approx(SMALLEST_STEP, abs=0.0)
     keep, start, end, *_ = _adapted(error, span=0.0, at=1e9)  # no time to be told apart
     assert keep
     assert end > start
+
+
+@pytest.mark.parametrize("time", [None, 7.0])
+def test_the_smallest_step_of_a_solve_with_derivatives_is_in_its_unit_of_time(time):
+    """It is taken whatever its error; SI units are those of a solve without units."""
+    control = step_control(
+        RTOL, RTOL, rms_norm, None if time is None else UNITS._replace(time=time)
+    )
+    smallest, state = SMALLEST_STEP * (time or 1.0), jtu.tree_map(jnp.asarray, STATE)
+    end, known = control.init(None, 0.0, 1.0, state, 2.0 * smallest, None, None, ORDER)
+    for kept in (False, True):
+        step = (state, state, None, jtu.tree_map(jnp.ones_like, state), ORDER, known)
+        keep, begin, end, _, known, _ = control.adapt_step_size(jnp.asarray(0.0), end, *step)
+        assert bool(keep) is kept
+        assert float(end - begin) == pytest.approx(smallest, abs=0.0)
 
 
 def test_tolerances_are_in_units_of_the_scene():

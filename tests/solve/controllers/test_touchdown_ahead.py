@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._contacts import feet
-from jaxbiped.solve._accuracy import units_of
+from jaxbiped.dynamics import feet
+from jaxbiped.hybrid._scales import units_of
 from jaxbiped.solve.controllers import _step_size
 from jaxbiped.solve.controllers._event_steps import TouchdownAhead
 from jaxbiped.solve.controllers._step_size import ErrorControl
@@ -31,7 +31,7 @@ def _next_end(state, error, span=1e-3):
     times = jnp.asarray(0.25), jnp.asarray(0.25 + span)
     rest = (state, state, SCENE, errors, 4, jnp.asarray(False))
     plain = control.adapt_step_size(*times, *rest)
-    ahead = TouchdownAhead(control).adapt_step_size(*times, *rest)
+    ahead = TouchdownAhead(control, jb.hybrid.Walking()).adapt_step_size(*times, *rest)
     assert bool(plain[0]) is bool(ahead[0])
     assert plain[1] == ahead[1]
     return float(plain[2] - plain[1]), float(ahead[2] - ahead[1])
@@ -80,7 +80,7 @@ def test_touchdowns_cost_fewer_attempts_and_no_exactness(monkeypatch):
     exact, _ = walked(1e-11, "rodas5p")
     ends, attempted = walked(1e-5)
     with monkeypatch.context() as patched:
-        patched.setattr(_step_size, "TouchdownAhead", lambda control: control)
+        patched.setattr(_step_size, "TouchdownAhead", lambda control, system: control)
         patched.setenv("JAXBIPED_CACHE", "")
         _forget_programs()
         plain_ends, plain = walked(1e-5)

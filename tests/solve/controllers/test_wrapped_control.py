@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.solve._accuracy import rms_norm
+import jaxbiped as jb
 from jaxbiped.solve.controllers._event_steps import (
     FootstepLimit,
     LocatedEnding,
@@ -17,25 +17,27 @@ from jaxbiped.solve.controllers._event_steps import (
     TouchdownAhead,
 )
 from jaxbiped.solve.controllers._step_size import CrossedSwitches, InUnits
+from jaxbiped.solve.controllers._switch_locator import SwitchLocator
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractMemorylessControl,
     AbstractWrappedControl,
     Extremes,
     just_before_end,
 )
+from jaxbiped.solve.solvers import rms_norm
 from jaxbiped.variational._solve_to_section import TangentControl
-from jaxbiped.variational._switch_locator import SwitchLocator
 
+WALKING = jb.hybrid.Walking()
 WRAPPERS = {
     Extremes: (lambda args, y: y,),
-    FootstepLimit: (3,),
+    FootstepLimit: (3, WALKING),
     InUnits: (1.0,),
-    LocatedEnding: (("fall",),),
-    CrossedSwitches: (10.0,),
-    ShallowContact: (),
+    LocatedEnding: (WALKING, ("fall",)),
+    CrossedSwitches: (WALKING, 10.0),
+    ShallowContact: (WALKING,),
     SwitchLocator: (None,),
     TangentControl: (1e-5, jnp.ones(1)),
-    TouchdownAhead: (),
+    TouchdownAhead: (WALKING,),
 }
 
 
@@ -46,13 +48,13 @@ def _largest(error):
 @pytest.mark.parametrize("kind", WRAPPERS)
 def test_tolerances_and_norm_are_the_innermost_controllers(kind):
     inner = diffrax.PIDController(rtol=1e-3, atol=1e-6, norm=_largest)
-    outer = FootstepLimit(kind(inner, *WRAPPERS[kind]), 1)
+    outer = FootstepLimit(kind(inner, *WRAPPERS[kind]), 1, WALKING)
     assert (outer.rtol, outer.atol, outer.norm) == (1e-3, 1e-6, _largest)
     assert outer.wrap(1) is outer
 
 
 def test_steps_of_one_size_have_no_tolerances():
-    outer = Extremes(FootstepLimit(diffrax.ConstantStepSize(), 1), lambda args, y: y)
+    outer = Extremes(FootstepLimit(diffrax.ConstantStepSize(), 1, WALKING), lambda args, y: y)
     assert (outer.rtol, outer.atol, outer.norm) == (0.0, 0.0, rms_norm)
 
 

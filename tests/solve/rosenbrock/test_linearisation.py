@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._state import field_of
-from jaxbiped.scene._state_types import BristleState
+from jaxbiped.dynamics import BristleState
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.solve.rosenbrock._linearisation import (
     ImplicitForm,
     ImplicitLinearisation,
@@ -152,7 +152,7 @@ def test_the_implicit_form_solves_the_dense_system(name):
     start = STANDS
     if name == "bristles":
         start = BristleState(*STANDS, jnp.asarray(0.1), jnp.asarray(-0.2))
-    field = field_of(scene)
+    field = system_of(scene).vector_field
     components, join = split(start, field)
 
     def rates(t, y):
@@ -175,7 +175,7 @@ def test_the_implicit_form_solves_the_dense_system(name):
 
 
 def test_legs_do_not_touch_each_other_in_the_tree_s_form():
-    field, scene = field_of(SCENES["seed"]), SCENES["seed"]
+    field, scene = system_of(SCENES["seed"]).vector_field, SCENES["seed"]
     components, join = split(STANDS, field)
     form = ImplicitForm(field, join, scene)
     lin = linearise(lambda t, y: list(field(t, join(y), scene)), jnp.zeros(()), components, form)
@@ -194,7 +194,8 @@ def test_steps_in_the_implicit_form_are_the_same():
             diffrax.ODETerm(field), jb.solvers.Rodas4(), 0.01, 0.0, -1e-4, STANDS, args=scene
         ).ys
 
-    implicit, plain = end(field_of(scene)), end(lambda t, y, args: field_of(args)(t, y, args))
+    field = system_of(scene).vector_field
+    implicit, plain = end(field), end(lambda t, y, args: field(t, y, args))
     np.testing.assert_allclose(np.stack(implicit), np.stack(plain), rtol=1e-9, atol=1e-11)
 
 

@@ -53,7 +53,7 @@ export class Basin {
   draw() {
     const { chart, edges, basin } = this;
     const span = (all) => [all[0], all.at(-1)];
-    chart.show(chart.element.parentElement.clientWidth, { x: span(edges.x), y: span(edges.y) });
+    chart.show({ x: span(edges.x), y: span(edges.y) }, chart.element.parentElement.clientWidth);
     const [left, right] = span(edges.x).map((x) => chart.px(x));
     const [bottom, top] = span(edges.y).map((y) => chart.py(y));
     const canvas = html("canvas", { width: Math.ceil(right - left), height: Math.ceil(bottom - top) });

@@ -5,7 +5,7 @@ import { fixed, setAttributes, svg } from "./dom.js";
 const MARGIN = { left: 56, right: 10, top: 8, bottom: 36 };
 /** Room for a letter of the upright axis's numbers, and for what lies left and right of them [px]. */
 const LETTER = 7.6;
-const LABEL = 17;
+const LABEL = 24;
 
 /**
  * Curves in axes. A curve is `{x, y, look}`, arrays of one length; `ranges` gives what is shown as
@@ -54,10 +54,10 @@ export class Chart {
     return this.width - this.left - MARGIN.right;
   }
 
-  /** Draws axes and curves anew for a width [px] and ranges. */
-  show(width, ranges) {
-    Object.assign(this, { width: Math.max(width, 200), ranges });
-    this.ticksY = niceTicks(...ranges.y, (this.height - MARGIN.top - MARGIN.bottom) / 32);
+  /** Draws axes and curves anew for ranges and a size [px]; the height stays if there is none. */
+  show(ranges, width, height = this.height) {
+    Object.assign(this, { width: Math.max(width, 200), height, ranges });
+    this.ticksY = niceTicks(...ranges.y, (this.height - MARGIN.top - MARGIN.bottom) / 24);
     const letters = Math.max(...this.ticksY.map(({ text }) => text.length));
     this.left = Math.max(MARGIN.left, LABEL + LETTER * letters);
     this.element.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);

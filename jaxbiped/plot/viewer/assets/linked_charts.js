@@ -29,7 +29,7 @@ function chartsOf({ skeleton }) {
 /** The charts of one walk. `walks` are all that are shown: they share their ranges. */
 export class LinkedCharts {
   constructor(walk, walks, pick) {
-    Object.assign(this, { walk, width: 0 });
+    this.walk = walk;
     const there = chartsOf(walk).filter(({ curves }) => curves.some(({ name }) => walk.channels[name]));
     this.charts = there.map((each) => this.build(each, walks, pick));
     this.element = html("div", { class: "charts" }, ...this.charts.map((each) => each.figure));
@@ -57,10 +57,18 @@ export class LinkedCharts {
     return { about, known, chart, figure, x, y };
   }
 
-  /** Draws everything for a width [px] and a span of time [s]. */
-  show(width, span) {
-    Object.assign(this, { width, span: span ?? null });
-    for (const each of this.charts) each.chart.show(width, { x: each.x || this.window(), y: each.y });
+  /** Widths and heights that the page gives the charts [px]. */
+  sizes() {
+    return this.charts.map(({ chart }) => {
+      const { width, height } = chart.element.getBoundingClientRect();
+      return width && height ? [Math.round(width), Math.round(height)] : [420, 170];
+    });
+  }
+
+  /** Draws everything in these sizes and for a span of time [s]. */
+  show(sizes, span) {
+    this.span = span ?? null;
+    this.charts.forEach(({ chart, x, y }, k) => chart.show({ x: x || this.window(), y }, ...sizes[k]));
   }
 
   window() {

@@ -39,7 +39,9 @@ export function showWalks(sent, el, { autoplay = false, playerFirst = false } = 
   };
   el.replaceChildren(root);
   const resized = new ResizeObserver(() => draw());
-  panels.forEach((each) => resized.observe(each.element));
+  for (const { element, charts } of panels) {
+    for (const each of [element, ...charts.charts.map(({ figure }) => figure)]) resized.observe(each);
+  }
   draw();
   player.say();
   if (autoplay && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.toggle();
@@ -52,9 +54,9 @@ export function showWalks(sent, el, { autoplay = false, playerFirst = false } = 
 
 /** Moves the cursor of a panel's charts; draws them anew only where what they show has changed. */
 function showCharts({ charts, element, walk }, { time, span }) {
-  const width = Math.round(charts.charts[0].figure.clientWidth) || 420;
-  const wanted = JSON.stringify([width, span && time, span]);
-  if (element.dataset.drawn !== wanted) charts.show(width, span ? around(walk, time, span) : null);
+  const sizes = charts.sizes();
+  const wanted = JSON.stringify([sizes, span && time, span]);
+  if (element.dataset.drawn !== wanted) charts.show(sizes, span ? around(walk, time, span) : null);
   element.dataset.drawn = wanted;
   charts.mark(time);
 }

@@ -36,7 +36,13 @@ def test_it_still_walks_after_a_hundred_footsteps():
 
 
 def test_out_of_steps():
-    assert _walk(0.02, max_solver_steps=50).outcome == Ending.OUT_OF_STEPS
+    rejected = set()
+    for most in range(2, 22):  # attempts are counted one by one, whatever becomes of them
+        walk = _walk(0.02, max_solver_steps=most)
+        assert walk.outcome == Ending.OUT_OF_STEPS
+        assert int(walk.accepted) + int(walk.rejected) == most
+        rejected.add(int(walk.rejected))
+    assert len(rejected) > 1
     few = _walk(0.02, duration=None, footsteps=100, max_solver_steps=50)
     assert few.outcome == Ending.OUT_OF_STEPS
 
@@ -84,5 +90,5 @@ def test_a_scuffing_foot_is_a_stumble():
 def test_names_in_words():
     failures = "fell forward, fell back, stopped, stumbled, out of steps, solver failed"
     names = [str(ending) for ending in Ending]
-    assert names == ["walking", *failures.split(", "), "timed out", "finished"]
-    assert [int(ending) for ending in Ending] == [0, 1, 2, 3, 4, 5, 6, 9, 10]
+    assert names == ["walking", *failures.split(", "), "timed out", "finished", "chatters"]
+    assert [int(ending) for ending in Ending] == [0, 1, 2, 3, 4, 5, 6, 9, 10, 11]

@@ -13,13 +13,9 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Numbers, Scalar
-from jaxbiped.dynamics._contacts import Gap, gaps
-from jaxbiped.dynamics._footfalls import any_of
-from jaxbiped.dynamics._surfaces import Switch
-from jaxbiped.scene._scene import CompliantScene
-from jaxbiped.scene._state_types import State
-from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped._types import Numbers, Scalar, any_of
+from jaxbiped.compiler import fusion_barrier
+from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.solve._step_polynomials import StepCubic
 
 ROUNDING = 1e-15
@@ -44,8 +40,17 @@ class Turns(NamedTuple):
 
 
 def _may_turn(old: Switch, new: Switch) -> Scalar:
-    """Whether it matters how a switch turns; one that resets the state may have begun on it."""
-    return jnp.asarray(old.live & (old.value > ROUNDING if old.resets else new.live))
+    """Whether it matters how a switch turns; one that resets the state may have begun on it.
+
+    Where the field jumps as well, the state may begin below the surface, as that of a runner who
+    lifts off lower than it touches down, and rise and fall through it within a step.
+    """
+    if not old.resets:
+        return jnp.asarray(old.live & new.live)
+    begins_off = old.value > ROUNDING
+    if old.force_jumps:
+        begins_off = begins_off | (old.value <= 0.0)
+    return jnp.asarray(old.live & begins_off)
 
 
 def turns_of(
@@ -92,16 +97,15 @@ def turns_of(
 
 
 def grazes(
-    scene: CompliantScene, span: Scalar, before: State, after: State, rtol: Numbers
+    old_gaps: tuple[Gap, ...], new_gaps: tuple[Gap, ...], span: Scalar, rtol: Numbers
 ) -> Scalar:
     """Whether a gap's depth turns nearer to zero within a step than it is known to (boolean).
 
-    Within the `span` [s] from the state before to that after. The depth of a foot counts as known
-    to the share `rtol` of the unit of length, that of a stop to as many radians.
+    Within the `span` [s] from the old gaps to the new ones. A depth counts as known to the share
+    `rtol` of the gap's size.
     """
-    pairs = list(zip(gaps(scene, before), gaps(scene, after), strict=True))
-    feet_of, length = len(scene.mechanism.feet), rtol * scene.mechanism.height
-    known = [length if k < feet_of else rtol for k in range(len(pairs))]
+    pairs = list(zip(old_gaps, new_gaps, strict=True))
+    known = [rtol * gap.size for gap in old_gaps]
     turns = [_turns(span, *each) for each in zip(known, *zip(*pairs, strict=True), strict=True)]
 
     def near() -> Scalar:

@@ -4,6 +4,7 @@ A step across a switch would ruin derivatives long before the state shows it.
 """
 
 import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple, cast
 
 import diffrax
@@ -13,32 +14,48 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._surfaces import Switch
-from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped._types import Scalar, Time, select
+from jaxbiped.compiler import fusion_barrier
+from jaxbiped.hybrid._guards import Switch
 from jaxbiped.solve._step_polynomials import StepCubic
+from jaxbiped.solve._watch import Watch
+from jaxbiped.solve.controllers._grazing import ROUNDING, turns_of
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractWrappedControl,
     Adapted,
     Attempt,
     try_again,
 )
-from jaxbiped.variational._grazing import ROUNDING, turns_of
-from jaxbiped.variational._tangents import Watch, plain_args, plain_state, surfaces_of
 
 _OVERSHOOT = 1e-4
 """Largest part of a step that may lie past a switch."""
 MARGIN = 1e-12
-"""Time past a switch [s] that a step may always end, and aims at: the side must be beyond doubt."""
+"""Time past a switch, in the watch's unit, that a step may always end, and aims at: the side must
+be beyond doubt."""
 NEAR = 1e-11
-"""Longest step [s] that crosses a switch where the field itself is not smooth: longer ones end
-before it, for a step's last stage lies on the other side, where the Jacobian may be any size."""
+"""Longest step, in that unit, that crosses a switch where the field itself is not smooth: longer
+ones end before it, for a step's last stage lies on the other side, where the Jacobian may be any
+size."""
+_MARGIN_TICKS, _NEAR_TICKS = 2e-15, 1e-12
+"""Both at least, as shares of the time that has passed, whose rounding they must exceed; `_BEFORE`
+of the latter is some roundings, too."""
 _BEFORE = 1e-3
 """How far before, as a share of the way to it."""
+_PEAK_ROUNDING = 1e-12
 _LAST, _LEFT = 1e-8, 0.1
-"""Longest last step to the section or a largest load where there are switches [s], and the share of
-the way that each step before leaves. A step's error in a stiff component of the state turns the
-rates by that error times the component's own rate, and so moves the time of a load."""
+"""Longest last step to the section or a largest load where there are switches, in that unit, and
+the share of the way that each step before leaves. A step's error in a stiff component of the state
+turns the rates by that error times the component's own rate, and so moves the time of a load."""
+
+
+def at_least(length: float, ticks: float, t: Time) -> Scalar:
+    """A length of time, no less than a share of the time that has passed."""
+    return jnp.maximum(length, ticks * jnp.abs(t))
+
+
+def nearest(watch: Watch, t: Time) -> Scalar:
+    """Longest step to a time that crosses a switch where the field is not smooth."""
+    return at_least(NEAR * watch.time_unit, _NEAR_TICKS, t)
 
 
 class SwitchLocatorState(NamedTuple):
@@ -81,6 +98,10 @@ class SwitchLocatorState(NamedTuple):
     at_peak: PyTree
 
 
+def _as_it_is(tree: PyTree) -> PyTree:
+    return tree
+
+
 class SwitchLocator(AbstractWrappedControl):
     """Wraps a controller; a step that crosses a switch is tried again, to end just past it.
 
@@ -94,10 +115,14 @@ class SwitchLocator(AbstractWrappedControl):
         watch: what is looked for.
         corners: whether steps also stop short of switches where only the slope of a force jumps,
             for columns that cross with the Jacobian of each side.
+        state_of, args_of: what the watch looks at, of the solve's state and of its arguments, which
+            may have derivatives beside them.
     """
 
     watch: Watch
     corners: bool = eqx.field(static=True, default=False)
+    state_of: Callable[[PyTree], PyTree] = eqx.field(static=True, default=_as_it_is)
+    args_of: Callable[[PyTree], PyTree] = eqx.field(static=True, default=_as_it_is)
 
     def init(self, *request: Any) -> tuple[Scalar, SwitchLocatorState]:
         first, inner = self.controller.init(*request)
@@ -105,10 +130,10 @@ class SwitchLocator(AbstractWrappedControl):
         zero, no = jnp.asarray(0), jnp.asarray(False)
         peak = None
         if self.watch.peak is not None:
-            peak = jax.lax.stop_gradient(self.watch.peak(plain_args(args), plain_state(y0)))
+            peak = jax.lax.stop_gradient(self.watch.peak(self.args_of(args), self.state_of(y0)))
         at_peak = None if peak is None else y0
-        state, sizes = plain_state(y0), None
-        if self.watch.switches(plain_args(args), state):
+        state, sizes = self.state_of(y0), None
+        if self.watch.switches(self.args_of(args), state):
             sizes = jax.lax.stop_gradient(jtu.tree_map(jnp.abs, state))
         counts = zero, zero, zero, zero
         return first, SwitchLocatorState(
@@ -120,19 +145,22 @@ class SwitchLocator(AbstractWrappedControl):
         known: SwitchLocatorState = attempt.memory
         attempt = attempt._replace(memory=known.inner)
         t0, t1 = attempt.t0, attempt.t1
+        margin = at_least(MARGIN * self.watch.time_unit, _MARGIN_TICKS, t1)
+        near, last = nearest(self.watch, t1), _LAST * self.watch.time_unit
         adapted = attempt.by(self.controller)
-        parts = (plain_args(attempt.args), plain_state(attempt.y0), plain_state(attempt.y1))
+        states = (self.state_of(y) for y in (attempt.y0, attempt.y1))
+        parts = (self.args_of(attempt.args), *states)
         scene, before, after = jax.lax.stop_gradient(parts)
         span = cast(Scalar, t1 - t0)
         crossed, first, place = self._crossings(span, scene, before, after, known)
         before_first, before_switch = span * first, span * place
-        far = span - before_first > jnp.maximum(_OVERSHOOT * before_first, 4.0 * MARGIN)
-        is_far = crossed.read & (before_first > _LAST)
-        again = crossed.any & (far | is_far | ((crossed.which != 0) & (span > 2.0 * NEAR)))
-        past_first = before_first * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
+        far = span - before_first > jnp.maximum(_OVERSHOOT * before_first, 4.0 * margin)
+        is_far = crossed.read & (before_first > last)
+        again = crossed.any & (far | is_far | ((crossed.which != 0) & (span > 2.0 * near)))
+        past_first = before_first * (1.0 + 0.5 * _OVERSHOOT) + margin
         # Whatever else comes first, the step ends on this side of the switch.
         short_of_switch = jnp.minimum(past_first, before_switch * (1.0 - _BEFORE))
-        approaches = (crossed.which != 0) & (before_switch > NEAR)
+        approaches = (crossed.which != 0) & (before_switch > near)
         past_first = jnp.where(is_far, before_first * (1.0 - _LEFT), past_first)
         target = t0 + jnp.where(approaches, short_of_switch, past_first)
         target = cast(Scalar, jax.lax.stop_gradient(target))
@@ -172,7 +200,7 @@ class SwitchLocator(AbstractWrappedControl):
             arrives = crossed[-1] & (at_end[-1].value > 0.0) & (landed.accepted > 0)
             crossed[-1] = arrives
             # Whether it counts is asked where the step ends just past it, not before.
-            arrives = arrives & at_end[-1].live
+            arrives = arrives & (at_start if watch.asked_before else at_end)[-1].live
         others = (watch.peak is not None) + (watch.section is not None)
         count = len(crossed) - others
         switching = crossed[:count]
@@ -275,6 +303,20 @@ class SwitchLocator(AbstractWrappedControl):
             peak=peak,
             at_peak=at_peak,
         )
+
+
+def surfaces_of(watch: Watch, peak: PyTree, scene: PyTree, state: PyTree) -> list[Switch]:
+    """Every surface to end steps on: switches, the peak quantity's maxima, and last the section."""
+    found = list(watch.switches(scene, state))
+    if watch.peak is not None:
+        rate = watch.field(jnp.zeros_like(peak), state, scene)
+        quantity = functools.partial(watch.peak, scene)
+        value, slope = jax.jvp(quantity, (state,), (rate,))
+        # The same value computed twice may differ by its rounding.
+        found.append(Switch(slope, value >= peak - _PEAK_ROUNDING * jnp.abs(peak)))
+    if watch.section is not None:
+        found.append(Switch(*watch.section(scene, state)))
+    return found
 
 
 def _crosses(before: Switch, after: Switch) -> Scalar:

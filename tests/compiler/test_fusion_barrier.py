@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.compiler import fusion_barrier
 
 
 def _compute(x, y):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.solve._mode_history import history_of
+from jaxbiped.hybrid._mode_history import history_of
 from tests.dynamics.test_modes import hsu_chen
 
 BEGIN = np.float64(2.0)

@@ -13,15 +13,15 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import Scalar, Time
+from jaxbiped._types import Scalar, Time, any_of
 from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.compiler import fusion_barrier
 from jaxbiped.dynamics._contacts import feet, legs_at
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._footfalls import (
     FootMotion,
     LegMotion,
-    any_of,
     leg_depth,
     leg_places,
     touches,
@@ -33,7 +33,6 @@ from jaxbiped.scene._clearance import AbstractClearance, StanceRotation
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.scene._structure import Structure
-from jaxbiped.solve._fusion_barrier import fusion_barrier
 
 REST_RATE = 1e-4
 """Rate of a leg at rest, in units of √(g/l)."""
@@ -202,14 +201,16 @@ def has_stumbled(scene: Scene, state: State) -> Scalar:
     return any_of([jnp.zeros_like(state[0], dtype=bool), *tripped])
 
 
-def rigid_ending(scene: RigidScene, state: Any) -> Scalar:
+def rigid_ending(scene: RigidScene, state: Any, *, falls: bool = True) -> Scalar:
     """Code of the `Ending` that has come to a rigid walker, 0 where it goes on.
 
-    Its root point comes down as a compliant one's does.
+    Its root point comes down as a compliant one's does, where `falls` are watched for.
     """
+    if not falls:
+        return jnp.where(jnp.isfinite(sum(state)), 0, int(Ending.SOLVER_FAILED))
     side = jnp.sign(lean(scene, state))
-    falls = jnp.where(side < 0.0, int(Ending.FELL_FORWARD), int(Ending.FELL_BACK))
-    code = jnp.where(uprightness(scene, state, side) < 0.0, falls, 0)
+    fallen = jnp.where(side < 0.0, int(Ending.FELL_FORWARD), int(Ending.FELL_BACK))
+    code = jnp.where(uprightness(scene, state, side) < 0.0, fallen, 0)
     return jnp.where(jnp.isfinite(sum(state)), code, int(Ending.SOLVER_FAILED))
 
 

@@ -1,0 +1,198 @@
+"""What `simulate` does for each kind of scene: every option, every engine, against a finer walk.
+
+Writes simulation_matrix.md: a table with a row for each option and a column for each kind. A cell
+is the largest difference of what the option returns from the same of a walk at the tight accuracy,
+by default options otherwise, in SI units; for derivatives, from central differences, relative to
+these. Or it is the number of the sentence that refuses it, below the table.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from _experiment import Options, experiment
+from _quote_words import markdown
+from tqdm import tqdm
+
+import jaxbiped as jb
+
+
+@dataclasses.dataclass(frozen=True)
+class Kind:
+    """A scene with a start, and how its walks are asked for.
+
+    Attributes:
+        duration: of a walk with two heel strikes or more [s].
+        moved: the number of the start that derivatives are with respect to.
+        stands: the angle of the leg that stands.
+        solver: another solver that fits.
+        dt: size of steps that resolve its motion [s].
+    """
+
+    scene: Any
+    state: Any
+    duration: float
+    moved: str
+    stands: str
+    solver: str
+    dt: float
+
+    @property
+    def section(self) -> jb.Section:
+        """Where a standing leg passes the normal of the slope."""
+        leg = self.stands
+        return jb.Section(lambda scene, state: -getattr(state, leg))
+
+    def walk(self, value: Any = None, **how: Any) -> Any:
+        """A walk; `save` is the end unless something else is asked for."""
+        state = self.state if value is None else self.state._replace(**{self.moved: value})
+        limits = {} if "footsteps" in how else {"duration": self.duration}
+        return jb.simulate(self.scene, state, **({"save": "end"} | limits | how))
+
+
+def published(name: str, gait: str, duration: float) -> Kind:
+    """A published walker on rigid feet near a gait."""
+    model = jb.models.MODELS[name]
+    scene = model.make()
+    state = scene.state(**model.starts[gait])
+    moved, *_, stands = (field for field in state._fields if field.startswith("theta"))
+    return Kind(scene, state, duration, moved, stands, "tsit5", duration / 400)
+
+
+def kinds() -> dict[str, Kind]:
+    """One of each kind."""
+    scene, state = jb.seed_scene(slope=0.02), jb.seed_state()
+    return {
+        "compliant": Kind(scene, state, 1.0, "omega_1", "theta_1", "rodas5p", 2e-5),
+        "rigid": published("garcia", "long", 9.0),
+        "rigid, pushed": published("kuo", "gait", 9.0),
+        "rigid, knees": published("hsu-chen", "gait", 1.3),
+    }
+
+
+def _end(kind: Kind, **how: Any) -> Any:
+    return kind.walk(**how).final
+
+
+def _times(kind: Kind, **how: Any) -> Any:
+    return kind.walk(save=kind.duration * np.linspace(0.05, 0.95, 7), **how).state
+
+
+def _steps(kind: Kind, **how: Any) -> Any:
+    walk = kind.walk(save="steps", **how)
+    return walk.at(kind.duration * np.linspace(0.05, 0.95, 7))
+
+
+def _arrivals(section: Callable[[Kind], Any]) -> Callable[..., Any]:
+    def arrivals(kind: Kind, **how: Any) -> Any:
+        passages = kind.walk(save=section(kind), **how).arrivals
+        return passages.t[: int(passages.total)]
+
+    return arrivals
+
+
+def _footsteps(kind: Kind, **how: Any) -> Any:
+    return kind.walk(footsteps=2, **how).t
+
+
+def _extremes(kind: Kind, **how: Any) -> Any:
+    walk = kind.walk(extremes=lambda scene, state: state[0], **how)
+    return walk.lowest, walk.highest
+
+
+def _slope(differentiate: Callable[..., Any]) -> Callable[..., Any]:
+    def slope(kind: Kind, **how: Any) -> Any:
+        at = getattr(kind.state, kind.moved)
+        return differentiate(lambda value: kind.walk(value, **how).final[1])(jnp.asarray(at))
+
+    return slope
+
+
+def _difference(kind: Kind, **how: Any) -> Any:
+    at, step = getattr(kind.state, kind.moved), 1e-5
+    ends = [kind.walk(at + shift, **how).final[1] for shift in (step, -step)]
+    return (ends[0] - ends[1]) / (2.0 * step)
+
+
+def _jitted(kind: Kind, **how: Any) -> Any:
+    return jax.jit(lambda value: kind.walk(value, **how).final)(getattr(kind.state, kind.moved))
+
+
+def _batched(kind: Kind, **how: Any) -> Any:
+    values = getattr(kind.state, kind.moved) * jnp.array([1.0, 0.99])
+    ends = jax.vmap(lambda value: kind.walk(value, **how).final)(values)
+    return jax.tree.map(lambda leaf: leaf[0], ends)
+
+
+ROWS: dict[str, tuple[Callable[..., Any], Callable[[Kind], dict[str, Any]], Callable[..., Any]]] = {
+    'save="end"': (_end, lambda kind: {}, _end),
+    "save=times": (_times, lambda kind: {}, _times),
+    'save="steps", at times': (_steps, lambda kind: {}, _times),
+    "save=HeelStrike()": (_arrivals(lambda kind: jb.HeelStrike()), lambda kind: {}, None),
+    "save=MidStance()": (_arrivals(lambda kind: jb.MidStance()), lambda kind: {}, None),
+    "save=Section(…)": (_arrivals(lambda kind: kind.section), lambda kind: {}, None),
+    "footsteps=2": (_footsteps, lambda kind: {}, _footsteps),
+    "extremes": (_extremes, lambda kind: {}, _extremes),
+    "watch=()": (_end, lambda kind: {"watch": ()}, _end),
+    "solver": (_end, lambda kind: {"solver": kind.solver}, _end),
+    "dt": (_end, lambda kind: {"dt": kind.dt}, _end),
+    "accuracy=1e-5": (_end, lambda kind: {"accuracy": 1e-5}, _end),
+    "jit": (_jitted, lambda kind: {}, _end),
+    "vmap": (_batched, lambda kind: {}, _end),
+    "jacfwd": (_slope(jax.jacfwd), lambda kind: {}, _difference),
+    "jacrev": (_slope(jax.jacrev), lambda kind: {}, _difference),
+    'engine="xla"': (_end, lambda kind: {"engine": "xla"}, _end),
+    'engine="xla", times': (_times, lambda kind: {"engine": "xla"}, _times),
+    'engine="xla", HeelStrike()': (
+        _arrivals(lambda kind: jb.HeelStrike()),
+        lambda kind: {"engine": "xla"},
+        None,
+    ),
+}  # fmt: skip
+"""Of each row what is returned, by which options, and what it should be; None: the same."""
+
+
+def cell_of(kind: Kind, name: str) -> float | str:
+    """The largest difference from a tight walk, or the sentence that refuses it."""
+    asked, how, truth = ROWS[name]
+    try:
+        returned = asked(kind, **how(kind))
+    except jb.ArgumentError as error:
+        return str(error)
+    right = (truth or asked)(kind, accuracy="tight")
+    gaps = jax.tree.map(lambda a, b: np.max(np.abs(np.asarray(a) - np.asarray(b))), returned, right)
+    size = float(abs(right)) if name.startswith("jac") else 1.0
+    return float(max(jax.tree.leaves(gaps))) / size
+
+
+@experiment
+def main(options: Options):
+    """Fills the table; the quick one has three rows of the kinds that compile soonest."""
+    chosen = kinds()
+    names = options.sized([*ROWS], [*ROWS][:4])
+    columns = options.sized([*chosen], ["compliant", "rigid"])
+    cells = {
+        kind: {name: cell_of(chosen[kind], name) for name in tqdm(names, desc=kind)}
+        for kind in columns
+    }
+    notes: list[str] = []
+
+    def written(value: float | str) -> str:
+        if isinstance(value, float):
+            return f"{value:.0e}"
+        if value not in notes:
+            notes.append(value)
+        return f"[{notes.index(value) + 1}]"
+
+    rows = [[f"`{name}`", *(written(cells[kind][name]) for kind in columns)] for name in names]
+    table = markdown(["option", *columns], rows)
+    text = [table, *(f"[{k}] {note}" for k, note in enumerate(notes, 1))]
+    options.path("simulation_matrix.md").write_text("\n\n".join(text) + "\n")
+    return {"cells": cells}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,171 @@
+"""Hybrid systems: a vector field with guards, endings and a reset map.
+
+A walker is only one of them: solves and searches ask this interface, so a user's own system does.
+"""
+
+import abc
+from collections.abc import Callable
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import PyTree
+
+from jaxbiped._ending import Ending
+from jaxbiped._types import Scalar, Time, select
+from jaxbiped.hybrid._guards import Gap, Switch
+from jaxbiped.hybrid._sections import AbstractSection
+
+
+class AbstractSystem(eqx.Module):
+    """An autonomous system whose periodic orbits can be found and differentiated.
+
+    The state and the parameters `args` are pytrees of scalars. Subclass it to study a system of
+    your own; the walker is only one subclass, `Walking`. Numbers to differentiate with respect to
+    belong in `args`; a system that holds arrays itself runs on XLA and in forward mode only.
+
+    Attributes:
+        cyclic_coordinates: positions of the leaves that only advance and need not return; no rate
+            may depend on them.
+        time_unit: size of the times in which the motion changes [s]: events are located to a share
+            of it. A property of the class.
+        lands: whether every solve ends a step on each switch; else only those with derivatives do,
+            and others weigh the errors of steps across. A property of the class.
+        resets: whether a plain solve resets the state at switches. A property of the class.
+    """
+
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = ()
+    time_unit: ClassVar[float] = 1.0
+    lands: ClassVar[bool] = False
+    resets: ClassVar[bool] = False
+
+    @abc.abstractmethod
+    def vector_field(self, t: Time, y: PyTree, args: PyTree) -> PyTree:
+        """Time derivative of the state, in the form that `diffrax.ODETerm` takes."""
+
+    @abc.abstractmethod
+    def switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
+        """Surfaces across which the vector field is not smooth."""
+
+    def reset_at_switch(self, args: PyTree, y: PyTree, which: Scalar) -> PyTree:
+        """The state after the switch of a number, from 1 on, that resets it. Default: as it is."""
+        return y
+
+    def repeats(self, args: PyTree, y: PyTree) -> Scalar:
+        """Whether a state just behind a reset is still where it is reset (boolean)."""
+        return jnp.asarray(False)
+
+    def unwrapped(self, before: PyTree, after: PyTree) -> PyTree:
+        """A state after a cycle, with coordinates that turn counted on from those before.
+
+        Default: the state as it is.
+        """
+        return after
+
+    def observed_at(self, section: AbstractSection) -> "AbstractSystem":
+        """The same with cycles that begin at a section. Default: the same."""
+        return self
+
+    def on_held(self, args: PyTree, y: PyTree) -> PyTree:
+        """The state with every held part at its place. Default: the state as it is.
+
+        A cycle begins with this state, so its multipliers are those of the free parts.
+        """
+        return y
+
+    @abc.abstractmethod
+    def ending(self, args: PyTree, y: PyTree) -> Scalar:
+        """Code of the `Ending` that has occurred; 0 if the motion goes on."""
+
+    @abc.abstractmethod
+    def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
+        """The state after an arrival: after a symmetry, an impact, or unchanged."""
+
+    def arrival(self, section: AbstractSection, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
+        """The section's value at a state just before it, and whether a crossing there counts."""
+        after_reset = self.section_state(args, self.reset_map(args, y))
+        return section.value(args, after_reset), section.counts(args, after_reset)
+
+    def section_state(self, args: PyTree, y: PyTree) -> PyTree:
+        """The state as sections take it. Default: as it is."""
+        return y
+
+    @abc.abstractmethod
+    def load(self, args: PyTree, y: PyTree) -> Scalar | None:
+        """The quantity whose largest value along the orbit is reported, or None."""
+
+    def load_exists(self, args: PyTree, y: PyTree) -> bool:
+        """Whether there is a load, known before anything runs."""
+        return eqx.filter_eval_shape(self.load, args, y) is not None
+
+    def gaps(self, args: PyTree, y: PyTree) -> tuple[Gap, ...]:
+        """The gaps whose closing no step may miss. Default: there are none."""
+        return ()
+
+    def contact_changes(self, args: PyTree, before: PyTree, after: PyTree) -> Scalar:
+        """Whether a step between two states crosses a corner of the field (boolean).
+
+        The error of such a step counts more. Default: it never does.
+        """
+        return jnp.asarray(False)
+
+    def projects(self, args: PyTree) -> bool:
+        """Whether a step's end is projected onto constraints. Default: it is not."""
+        return False
+
+    def project(self, args: PyTree, y: PyTree) -> PyTree:
+        """The state on the constraints. Default: the state as it is."""
+        return y
+
+    def failures(self, watch: tuple[str, ...]) -> dict[Ending, Callable[..., Scalar]]:
+        """The conditions `happens(t, y, args)` of the failures that are watched for.
+
+        They are the same functions each time: caches know by them what is compiled. Default: there
+        are none.
+        """
+        return {}
+
+    def ending_surface(self, code: Scalar, args: PyTree, past: PyTree, y: PyTree) -> Scalar:
+        """A value that rises through zero where the motion comes to the ending of a `code`.
+
+        `past` is a state just past the ending, which decides between causes of one code. Default:
+        NaN, for an ending that no state decides.
+        """
+        return jnp.full(jnp.shape(code), jnp.nan)
+
+    def standing_leg(self, args: PyTree, y: PyTree) -> Scalar:
+        """Number of the leg that stands alone, from 1 on. Default: 0, for none."""
+        return jnp.asarray(0)
+
+    def landings(self, args: PyTree, before: PyTree, after: PyTree) -> tuple[Scalar, ...]:
+        """Whether each leg comes down ahead between two states (booleans). Default: no legs."""
+        return ()
+
+    def namings(self, args: PyTree) -> tuple[int, ...]:
+        """Number of the leg at the section, in each of the names that a symmetry allows.
+
+        Default: there is one leg and one way to name it.
+        """
+        return (0,)
+
+    def renamed(self, args: PyTree, y: PyTree, times: int) -> PyTree:
+        """The same motion with its names exchanged so many times. Default: as it is."""
+        return y
+
+    def images(self, args: PyTree, y: PyTree) -> list[tuple[int, PyTree]]:
+        """The same motion in all names, those that it has last, each with the leg's number."""
+        legs = self.namings(args)
+        return [(leg, self.renamed(args, y, k)) for k, leg in enumerate(legs)][::-1]
+
+    def in_nearest_names(
+        self, section: AbstractSection, args: PyTree, near: PyTree, y: PyTree
+    ) -> PyTree:
+        """A state in those names, of all that there are, that bring another to a section."""
+        *others, (_, plain) = self.images(args, near)
+        *renamed, (_, image) = self.images(args, y)
+        nearest = jnp.abs(section.value(args, plain))
+        for (_, other), (_, named) in zip(others[::-1], renamed[::-1], strict=True):
+            off = jnp.abs(section.value(args, other))
+            image = select(off < nearest, named, image)
+            nearest = jnp.minimum(off, nearest)
+        return image

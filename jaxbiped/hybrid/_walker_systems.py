@@ -1,0 +1,190 @@
+"""Walkers as hybrid systems: with laws of contact in either coordinates, and on rigid feet."""
+
+import functools
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import PyTree
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped._ending import Ending
+from jaxbiped._types import Scalar, Time
+from jaxbiped.dynamics._constrained_motion import project
+from jaxbiped.dynamics._contacts import feet, foot_force
+from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
+from jaxbiped.dynamics._footfalls import landings, standing_leg
+from jaxbiped.dynamics._holds import on_held
+from jaxbiped.dynamics._impact import impact
+from jaxbiped.dynamics._minimal_motion import force_residual, mass_matrix, vector_field
+from jaxbiped.dynamics._mode_changes import change_mode_on_surface
+from jaxbiped.dynamics._redundant_motion import redundant_field
+from jaxbiped.dynamics._stance_motion import rolling, rolling_field
+from jaxbiped.dynamics._state import cyclic_names
+from jaxbiped.dynamics._surfaces import lead, opening
+from jaxbiped.hybrid._compliant_guards import contact_changes, gaps, switches
+from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface, rigid_ending
+from jaxbiped.hybrid._guards import Gap, Switch
+from jaxbiped.hybrid._implicit_field import AbstractImplicitField, Residual
+from jaxbiped.hybrid._rigid_guards import mode_switches
+from jaxbiped.hybrid._sections import AbstractSection
+from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.linalg._sparse_lu import SparseMatrix
+from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._state_types import State
+
+
+@functools.singledispatch
+def system_of(scene: object) -> AbstractSystem:
+    """The system that a scene describes; each kind of scene registers its own."""
+    raise ArgumentError(f"scene is a {type(scene).__name__}, which is not allowed: give a scene.")
+
+
+class WalkerField(AbstractImplicitField):
+    """`vector_field` with the tree's implicit form, in which bristles stand alone."""
+
+    def __call__(self, t: Time, y: PyTree, args: Scene) -> PyTree:
+        return vector_field(t, y, args)
+
+    def mass_matrix(self, y: PyTree, args: Scene) -> SparseMatrix:
+        return mass_matrix(args, y)
+
+    def residual(self, y: PyTree, rates: PyTree, args: Scene) -> Residual:
+        return force_residual(args, y, rates)
+
+
+class BodiesField(AbstractImplicitField):
+    """`redundant_field`, whose implicit form is its own: forces of constraints reach every body."""
+
+    def __call__(self, t: Time, y: PyTree, args: RedundantScene) -> PyTree:
+        return redundant_field(t, y, args)
+
+    def mass_matrix(self, y: PyTree, args: RedundantScene) -> SparseMatrix:
+        return {}
+
+    def residual(self, y: PyTree, rates: PyTree, args: RedundantScene) -> Residual:
+        here = redundant_field(jnp.zeros(()), y, args)
+        return {i: a - b for i, (a, b) in enumerate(zip(here, rates, strict=True))}
+
+
+class AbstractWalking(AbstractSystem):
+    """A walker on compliant ground: legs exchanged at each footstep."""
+
+    def switches(self, args: CompliantScene, y: PyTree) -> tuple[Switch, ...]:
+        return switches(args, y)
+
+    def gaps(self, args: CompliantScene, y: PyTree) -> tuple[Gap, ...]:
+        return gaps(args, y)
+
+    def contact_changes(self, args: CompliantScene, before: PyTree, after: PyTree) -> Scalar:
+        return contact_changes(args, before, after)
+
+    def ending(self, args: PyTree, y: PyTree) -> Scalar:
+        code = jnp.asarray(0)
+        for name, happens in ending_events(WATCHES).items():
+            code = jnp.where(happens(0.0, y, args), int(name), code)
+        return code
+
+    def failures(self, watch: tuple[str, ...]) -> dict[Ending, Callable[..., Scalar]]:
+        return ending_events(watch)
+
+    def ending_surface(self, code: Scalar, args: PyTree, past: PyTree, y: PyTree) -> Scalar:
+        return ending_surface(code, args, past, y)
+
+    def standing_leg(self, args: CompliantScene, y: PyTree) -> Scalar:
+        return standing_leg(args.mechanism.structure, feet(args, y))
+
+    def landings(self, args: CompliantScene, before: PyTree, after: PyTree) -> tuple[Scalar, ...]:
+        return landings(args.mechanism.structure, feet(args, before), feet(args, after))
+
+    def namings(self, args: CompliantScene) -> tuple[int, ...]:
+        return args.mechanism.structure.namings
+
+    def renamed(self, args: CompliantScene, y: PyTree, times: int) -> PyTree:
+        return exchange_legs(args, y, times)
+
+    def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
+        return exchange_legs(args, y)
+
+    def load(self, args: PyTree, y: PyTree) -> Scalar:
+        """Normal force on the foot that carries more [N]."""
+        first, *others = (foot_force(args, foot).normal for foot in feet(args, y))
+        for each in others:
+            # Versions of JAX differentiate a maximum by other operations.
+            first = jnp.where(first > each, first, each)
+        return first
+
+
+class Walking(AbstractWalking):
+    """The walker in minimal coordinates, of which the place along the slope need not return."""
+
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(
+        map(State._fields.index, cyclic_names(State))
+    )
+
+    vector_field: ClassVar[WalkerField] = WalkerField()
+
+
+class RedundantWalking(AbstractWalking):
+    """The walker in coordinates of each leg. Its constraints leave fewer directions than leaves.
+
+    `find_gait` tells its returns in minimal coordinates; by itself it is for `return_map`.
+    """
+
+    vector_field: ClassVar[BodiesField] = BodiesField()
+
+    def project(self, args: RedundantScene, y: PyTree) -> PyTree:
+        return project(args, y)
+
+    def section_state(self, args: RedundantScene, y: PyTree) -> PyTree:
+        return minimal_state(args, y)
+
+    def projects(self, args: RedundantScene) -> bool:
+        return args.method.projects
+
+
+class Rolling(AbstractSystem):
+    """The rigid walker: it rolls on one foot, and exchanges support at each heel strike."""
+
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = (0,)
+
+    def vector_field(self, t: Time, y: Any, args: RigidScene) -> Any:
+        return rolling_field(t, y, args)
+
+    def switches(self, args: RigidScene, y: Any) -> tuple[Switch, ...]:
+        return mode_switches(args, y)
+
+    def reset_at_switch(self, args: RigidScene, y: Any, which: Scalar) -> Any:
+        return change_mode_on_surface(args, y)
+
+    def on_held(self, args: RigidScene, y: Any) -> Any:
+        return on_held(args, y)
+
+    def ending(self, args: RigidScene, y: Any) -> Scalar:
+        return rigid_ending(args, y)
+
+    def reset_map(self, args: RigidScene, y: Any) -> Any:
+        return impact(args, y).state
+
+    def arrival(self, section: AbstractSection, args: RigidScene, y: Any) -> tuple[Scalar, Scalar]:
+        # The angles before the impact tell, without it.
+        return -opening(args, y), lead(args, y) > 0.0
+
+    def load(self, args: RigidScene, y: Any) -> Scalar:
+        """Normal force on the foot that rolls [N]; an impact has an impulse instead."""
+        return rolling(args, y).force.normal
+
+
+@system_of.register
+def _(scene: Scene) -> AbstractSystem:
+    return Walking()
+
+
+@system_of.register
+def _(scene: RedundantScene) -> AbstractSystem:
+    return RedundantWalking()
+
+
+@system_of.register
+def _(scene: RigidScene) -> AbstractSystem:
+    return Rolling()

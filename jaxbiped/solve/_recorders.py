@@ -1,0 +1,460 @@
+"""Recorders: what a solve in the lanes engine saves of its steps, and whether that ends it."""
+
+import abc
+import dataclasses
+from collections.abc import Callable
+from typing import ClassVar, NamedTuple, Protocol
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import Array, PyTree
+
+from jaxbiped._types import Scalar, select
+from jaxbiped.hybrid._sections import AbstractSection
+from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.solve._step_polynomials import StepCubic
+from jaxbiped.solve._stepper import Stepper
+
+NO_RESET, STRIKE, CHANGE = 0.0, 1.0, 2.0
+"""What resets the state behind a recorded step: nothing, a heel strike, a change of mode."""
+_BISECTIONS = 50
+_SECANTS = 8
+"""By which `arrival_time` is located, to rounding."""
+
+
+class Rise(NamedTuple):
+    """Where a section's value rises through zero within a step.
+
+    Attributes:
+        happens: whether it does, and it is an arrival.
+        since, until: times before and after [s].
+    """
+
+    happens: Scalar
+    since: Scalar
+    until: Scalar
+
+
+class Step(NamedTuple):
+    """An attempted step, as a recorder sees it.
+
+    Attributes:
+        t0, y0: time [s] and state where it began.
+        t1, y1: where the next one begins: its end where it was accepted.
+        keep: whether it was accepted, and its end is known.
+        coefficients: gives those of its continuous solution (True), or only those from which a
+            state within it is made (False).
+        end: gives the state at its end before a reset; None where there are no resets.
+        strikes: whether a footstep ends it; None where footsteps are not counted.
+        continues: whether it only tells the end of the step before; None: it never does.
+        grazes: number of steps so far in which a switch was grazed; None where no step ends on one.
+    """
+
+    t0: Scalar
+    y0: PyTree
+    t1: Scalar
+    y1: PyTree
+    keep: Scalar
+    coefficients: Callable[[bool], tuple[PyTree, ...]]
+    end: Callable[[], PyTree] | None = None
+    strikes: Scalar | None = None
+    continues: Scalar | None = None
+    grazes: Scalar | None = None
+
+
+class Moment(NamedTuple):
+    """Where a solve is behind an attempt.
+
+    Attributes:
+        t, state: time [s] and state, as they are told.
+        strikes: whether a footstep has just come; None where this is not asked.
+        changes: whether the mode has just changed; None where there is only one.
+    """
+
+    t: Scalar
+    state: PyTree
+    strikes: Scalar | None = None
+    changes: Scalar | None = None
+
+
+class LastStep(NamedTuple):
+    """The last attempt: when it began, its coefficients, and whether it is of note.
+
+    It is where it was accepted, or where there is a section, where there is an arrival within it.
+
+    Attributes:
+        leg: number of the last arrival's, from 1 on; at the start that which stands alone, 0 for
+            none. None without a section, as is `rise`.
+        rise: where the arrival lies.
+        end: the state at its end before a reset; None where this is not asked.
+    """
+
+    noted: Scalar
+    t: Scalar
+    state: PyTree
+    coefficients: tuple[PyTree, ...]
+    leg: Scalar | None = None
+    rise: Rise | None = None
+    end: PyTree = None
+
+
+class Motion(Protocol):
+    """What a recorder asks of a solve's functions."""
+
+    @property
+    def system(self) -> AbstractSystem:
+        """What moves."""
+
+    @property
+    def resets(self) -> bool:
+        """Whether steps may end in a reset of the state."""
+
+    def no_coefficients(self, solve: PyTree, course: bool) -> tuple[PyTree, ...]:
+        """The coefficients of a `Step` before the first one: zeros."""
+
+    def course(
+        self, solve: PyTree, last: LastStep, t: Scalar, state: PyTree
+    ) -> diffrax.AbstractLocalInterpolation:
+        """The continuous solution of a step that ended at this time in this state."""
+
+    def state_at(self, solve: PyTree, last: LastStep, now: Moment, time: Scalar) -> PyTree:
+        """The state at a time within the last step, as accurate as the step's end."""
+
+    def arrival_near(
+        self,
+        solve: PyTree,
+        last: LastStep,
+        now: Moment,
+        time: Scalar,
+        value: Callable[[PyTree], Scalar],
+    ) -> tuple[Scalar, PyTree]:
+        """Where a value of the state is zero, and that state, from a zero of the course."""
+
+
+def no_step(how: Motion, solve: PyTree, *, course: bool) -> LastStep:
+    """The last step before the first attempt. `course`: whether its continuous solution is kept."""
+    none, nothing = jnp.asarray(False), jtu.tree_map(jnp.zeros_like, solve.state)
+    coefficients = how.no_coefficients(solve, course)
+    zero = jnp.zeros_like(jtu.tree_leaves(solve.state)[0])
+    return LastStep(none, zero, nothing, coefficients)
+
+
+def last_step(step: Step, before: LastStep, *, course: bool) -> LastStep:
+    """An attempt as the last step, of note where its end is known."""
+    here = LastStep(step.keep, step.t0, step.y0, step.coefficients(course))
+    if step.continues is None:
+        return here
+    return select(step.continues, LastStep(step.keep, *before[1:4]), here)
+
+
+class AbstractRecorder(abc.ABC):
+    """What a program saves of a simulation, besides its end. All hashable.
+
+    It carries a memory from attempt to attempt, from which rows are read; it may end the solve.
+    `how` is the solve's functions, which know system and steps.
+    """
+
+    records: ClassVar[bool] = True
+    """Whether there are rows."""
+    scheduled: ClassVar[bool] = False
+    """Whether rows are made at the times of a schedule."""
+
+    @abc.abstractmethod
+    def begin(self, how: Motion, solve: PyTree) -> PyTree:
+        """The memory before the first attempt."""
+
+    @abc.abstractmethod
+    def follow(self, how: Motion, solve: PyTree, memory: PyTree, step: Step) -> PyTree:
+        """The memory after an attempt."""
+
+    def decides(self, memory: PyTree) -> Scalar | None:
+        """Whether the solve is over for what is known (boolean); None: never."""
+        return None
+
+    def finish(
+        self, solve: PyTree, memory: PyTree, solved: PyTree, footsteps: Scalar | None
+    ) -> PyTree:
+        """The solve's outputs, of which it has done so many footsteps. Default: as they are."""
+        return solved
+
+    def record(
+        self,
+        how: Motion,
+        solve: PyTree,
+        memory: PyTree,
+        now: Moment,
+        due: Scalar,
+    ) -> tuple[Scalar, list[Scalar]]:
+        """Whether there is a row (boolean), and its numbers; the step ended in time and state."""
+        raise NotImplementedError
+
+
+@dataclasses.dataclass(frozen=True)
+class StepRecorder(AbstractRecorder):
+    """Records every accepted step: its end, and the coefficients of the states within it.
+
+    Where there are resets a code follows the time, one of `NO_RESET`, `STRIKE` and `CHANGE`, and
+    the state before the reset comes before that behind it.
+    """
+
+    def begin(self, how: Motion, solve: PyTree) -> LastStep:
+        last = no_step(how, solve, course=False)
+        return last._replace(end=last.state) if how.resets else last
+
+    def follow(self, how: Motion, solve: PyTree, memory: LastStep, step: Step) -> LastStep:
+        here = last_step(step, memory, course=False)
+        return here if step.end is None else here._replace(end=step.end())
+
+    def record(
+        self,
+        how: Motion,
+        solve: PyTree,
+        memory: LastStep,
+        now: Moment,
+        due: Scalar,
+    ) -> tuple[Scalar, list[Scalar]]:
+        numbers = [*now.state, *(value for row in memory.coefficients for value in row)]
+        if memory.end is not None:
+            numbers = [_reset_code(now), *memory.end, *numbers]
+        return memory.noted, [now.t, *numbers]
+
+
+@dataclasses.dataclass(frozen=True)
+class TimeRecorder(AbstractRecorder):
+    """Records the state at the times of a schedule."""
+
+    scheduled: ClassVar[bool] = True
+
+    def begin(self, how: Motion, solve: PyTree) -> LastStep:
+        return no_step(how, solve, course=False)
+
+    def follow(self, how: Motion, solve: PyTree, memory: LastStep, step: Step) -> LastStep:
+        return last_step(step, memory, course=False)
+
+    def record(
+        self,
+        how: Motion,
+        solve: PyTree,
+        memory: LastStep,
+        now: Moment,
+        due: Scalar,
+    ) -> tuple[Scalar, list[Scalar]]:
+        state = how.state_at(solve, memory, now, due)
+        return memory.noted & (due <= now.t), [due, *jtu.tree_leaves(state)]
+
+
+@dataclasses.dataclass(frozen=True)
+class ArrivalRecorder(AbstractRecorder):
+    """Records time and state at arrivals at a section.
+
+    Attributes:
+        section: where a motion arrives.
+    """
+
+    section: AbstractSection
+
+    def begin(self, how: Motion, solve: PyTree) -> LastStep:
+        last = no_step(how, solve, course=True)
+        stands = jnp.asarray(how.system.standing_leg(solve.scene, solve.state))
+        rise = Rise(last.noted, last.t, last.t)
+        return last._replace(leg=stands, rise=rise)
+
+    def follow(self, how: Motion, solve: PyTree, memory: LastStep, step: Step) -> LastStep:
+        scene, here = solve.scene, last_step(step, memory, course=True)
+        assert memory.leg is not None
+        course = how.course(solve, here, step.t1, step.y1)
+        # The first step of a solve never counts, so it may start on its section.
+        counts = step.keep & (here.t > 0.0)
+        legs = [1 + leg for leg in how.system.namings(scene)]
+        alternates = self.section.alternates and len(legs) > 1
+        rises = []
+        for times, number in reversed(list(enumerate(legs))):
+            rise = rise_within(self.section, how.system, scene, course, times)
+            other = (memory.leg != number) | (not alternates)
+            rises.append(rise._replace(happens=rise.happens & counts & other))
+        rise, arrived = rises[-1], jnp.full_like(memory.leg, legs[0])
+        for number, image in zip(legs[1:], rises[-2::-1], strict=True):
+            earlier = image.happens & ~(rise.happens & (rise.until < image.until))
+            rise = select(earlier, image, rise)
+            arrived = select(earlier, jnp.full_like(arrived, number), arrived)
+        leg = jnp.where(rise.happens, arrived, memory.leg)
+        return here._replace(noted=rise.happens, leg=leg, rise=rise)
+
+    def record(
+        self,
+        how: Motion,
+        solve: PyTree,
+        memory: LastStep,
+        now: Moment,
+        due: Scalar,
+    ) -> tuple[Scalar, list[Scalar]]:
+        nothing = [jnp.zeros_like(now.t)] * (1 + len(now.state))
+        return memory.noted, jax.lax.cond(
+            memory.noted, lambda: self._arrival(how, solve, memory, now), lambda: nothing
+        )
+
+    def _arrival(self, how: Motion, solve: PyTree, last: LastStep, now: Moment) -> list[Scalar]:
+        if self.section.behind_reset:
+            return [now.t, *now.state]
+        assert last.rise is not None
+        dense = how.course(solve, last, now.t, now.state)
+
+        def value(state: PyTree) -> Scalar:
+            """Of the section, in the names of who arrives."""
+            *others, (_leg, own) = how.system.images(solve.scene, state)
+            for number, image in others:
+                own = select(jnp.asarray(last.leg == 1 + number), image, own)
+            return self.section.value(solve.scene, how.system.section_state(solve.scene, own))
+
+        def halve(_: Scalar, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+            middle = 0.5 * (ends[0] + ends[1])
+            before = value(dense.evaluate(middle)) < 0.0
+            return jnp.where(before, middle, ends[0]), jnp.where(before, ends[1], middle)
+
+        time = jax.lax.fori_loop(0, _BISECTIONS, halve, last.rise[1:])[1]
+        time, state = how.arrival_near(solve, last, now, time, value)
+        return [time, *state]
+
+
+@dataclasses.dataclass(frozen=True)
+class StrikeRecorder(AbstractRecorder):
+    """Records time and state just behind each footstep, or the modes of a walk that has several.
+
+    Attributes:
+        strikes: whether states are recorded, behind changes of mode too where there are any: then
+            a flag, 1 behind a footstep, follows the time. Else times and modes alone are.
+    """
+
+    strikes: bool = True
+
+    def begin(self, how: Motion, solve: PyTree) -> None:
+        return None
+
+    def follow(self, how: Motion, solve: PyTree, memory: None, step: Step) -> None:
+        return None
+
+    def record(
+        self, how: Motion, solve: PyTree, memory: None, now: Moment, due: Scalar
+    ) -> tuple[Scalar, list[Scalar]]:
+        assert now.strikes is not None
+        happens = now.strikes if now.changes is None else now.strikes | now.changes
+        if not self.strikes:
+            return happens, [now.t, now.state.mode]
+        flag = [] if now.changes is None else [jnp.where(now.strikes, 1.0, 0.0)]
+        return happens, [now.t, *flag, *now.state]
+
+
+def _reset_code(now: Moment) -> Scalar:
+    assert now.strikes is not None
+    code = jnp.where(now.strikes, STRIKE, NO_RESET)
+    return code if now.changes is None else jnp.where(now.changes, CHANGE, code)
+
+
+def rise_within(
+    section: AbstractSection,
+    system: AbstractSystem,
+    scene: PyTree,
+    course: diffrax.AbstractLocalInterpolation,
+    times: int = 0,
+) -> Rise:
+    """Where a section's value rises within a step, also if it falls again or fell before.
+
+    The names are exchanged so many times.
+    """
+
+    def at(time: Scalar) -> PyTree:
+        return system.section_state(scene, system.renamed(scene, course.evaluate(time), times))
+
+    def value(time: Scalar) -> Scalar:
+        return section.value(scene, at(time))
+
+    t0, t1 = jnp.asarray(course.t0), jnp.asarray(course.t1)
+    (old, old_rate), (new, new_rate) = (
+        jax.jvp(value, (end,), (jnp.ones_like(end),)) for end in (t0, t1)
+    )
+    span = t1 - t0
+    cubic = StepCubic(old, new, span * old_rate, span * new_rate)
+    turn = t0 + span * cubic.turning_point()
+    below = old < 0.0
+    returns = (below == (new < 0.0)) & cubic.turns()
+    no = jnp.zeros_like(returns)
+    crosses = jax.lax.cond(returns, lambda: (value(turn) < 0.0) != below, lambda: no)
+    until = jnp.where(crosses & below, turn, t1)
+    rises = crosses | (below & (new >= 0.0))
+    asked = t0 if section.behind_reset else until
+    happens = jax.lax.cond(rises, lambda: jnp.asarray(section.counts(scene, at(asked))), lambda: no)
+    return Rise(happens, jnp.where(crosses & ~below, turn, t0), until)
+
+
+def arrival_time(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -> Scalar:
+    """Where a function rises through zero between two times [s], by the Illinois method."""
+
+    def secant(_: Scalar, now: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+        a, b, at_a, at_b, side, _ = now
+        rise = at_b - at_a
+        middle = b - at_b * (b - a) / jnp.where(rise == 0.0, 1.0, rise)
+        found = value(middle)
+        left = found < 0.0
+        # An end that stays twice counts half, so that it moves the next time.
+        return (
+            jnp.where(left, middle, a),
+            jnp.where(left, b, middle),
+            jnp.where(left, found, jnp.where(side > 0.0, 0.5 * at_a, at_a)),
+            jnp.where(left, jnp.where(side < 0.0, 0.5 * at_b, at_b), found),
+            jnp.where(left, -1.0, 1.0),
+            middle,
+        )
+
+    start = (low, high, value(low), value(high), jnp.zeros_like(low), high)
+    return jax.lax.fori_loop(0, _SECANTS, secant, start)[-1]
+
+
+def recorded_steps(
+    start: PyTree, rows: np.ndarray, stepper: Stepper, *, resets: bool
+) -> tuple[Array, PyTree, diffrax.DenseInterpolation]:
+    """The times [s] of a start and of n steps' ends, (n + 1,), the states there, and the rest.
+
+    From the rows of `StepRecorder`, shape (n, numbers), as diffrax would have them. With `resets`,
+    each row ends with the state before the reset; where there is one, its time comes twice.
+    """
+    kind, size = type(start), len(start)
+    first = np.array([0.0, *(float(leaf) for leaf in start)])
+    begins = np.vstack([first[1:], rows[:, 1 : 1 + size]])[:-1]
+    if resets:
+        rows, begins = _with_both_sides(rows, begins)
+    ends = np.vstack([first, rows[:, : 1 + size]]).T.copy()
+    # One step more than there are: where there are none, diffrax looks into one all the same.
+    times = np.append(ends[0], np.inf)
+    infos = np.vstack([begins.T, rows[:, 1:].T])
+    infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
+    groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
+    # One transfer for all of them: each costs as much as several steps.
+    counts = len(rows) + 1, 1  # of a weak type, as a number in diffrax's own would be
+    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0), counts
+    times, groups, t, states, zero, (count, one) = jax.device_put(parts)
+    dense = diffrax.DenseInterpolation(
+        ts=times,
+        ts_size=count,
+        infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
+        interpolation_cls=stepper.interpolation_cls,
+        direction=one,
+        t0_if_trivial=zero,
+        y0_if_trivial=start,
+    )
+    return t, states, dense
+
+
+def _with_both_sides(rows: np.ndarray, begins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of steps to the states before resets, each followed by one of no length behind it."""
+    size = begins.shape[1]
+    behind, before = rows[:, 1 : 1 + size], rows[:, -size:]
+    to_reset, in_reset = rows[:, :-size].copy(), rows[:, :-size].copy()
+    to_reset[:, 1 : 1 + size] = before
+    in_reset[:, 1 + size :] = 0.0
+    kept = np.stack([np.ones(len(rows), bool), np.any(before != behind, axis=1)], axis=1)
+    both = (np.stack([to_reset, in_reset], axis=1), np.stack([begins, behind], axis=1))
+    steps, starts = (each[kept] for each in both)
+    return steps, starts

@@ -1,0 +1,116 @@
+"""Steps of a rigid walk as they are saved: its states on both sides of each reset, and between."""
+
+from typing import Any, NamedTuple
+
+import diffrax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import Array, PyTree
+
+from jaxbiped._types import Numbers, Scalar, by_numpy, is_traced
+from jaxbiped.solve._recorders import NO_RESET, STRIKE
+from jaxbiped.solve._rolling_step import root_place, shifted, state_after
+
+
+class RollingStep(diffrax.AbstractLocalInterpolation):
+    """States within a step, each by a step of its own: as accurate as the step's end.
+
+    Attributes:
+        t0, t1: its ends [s].
+        scene: what walks.
+        y0: the state where it began.
+        accelerations: of the angles there [rad/s²].
+    """
+
+    t0: Scalar  # type: ignore[misc]
+    t1: Scalar  # type: ignore[misc]
+    scene: PyTree
+    y0: Any
+    accelerations: tuple[Scalar, ...]
+
+    def evaluate(self, t0: Any, t1: Any = None, left: bool = True) -> Any:
+        del t1, left
+        start = shifted(self.y0, -root_place(self.scene, self.y0))
+        return state_after(self.scene, start, self.accelerations, jnp.asarray(t0 - self.t0))
+
+
+class RigidRecord(NamedTuple):
+    """The saved steps of a rigid walk, infinite beyond the last.
+
+    Attributes:
+        t: their ends [s], shape (n + 1,), those in a reset twice.
+        state: the states there, the one before a reset first.
+        dense: the continuous solution.
+        strikes: a time and the state behind it of each heel strike, shape (r, 1 + numbers).
+        resets: the same of each heel strike and each change of mode, and how many there were.
+    """
+
+    t: Array
+    state: Any
+    dense: diffrax.DenseInterpolation
+    strikes: Numbers
+    resets: tuple[Numbers, Scalar]
+
+
+def rigid_record(scene: PyTree, start: Any, rows: Numbers, total: Scalar) -> RigidRecord:
+    """The steps that a `StepRecorder` saved as rows, `total` in all, from a start."""
+    size, kind = len(start), type(start)
+
+    def steps_of(numpy: Any, rows: Any, total: Any, *start: Any) -> tuple[Any, ...]:
+        known = numpy.arange(len(rows)) < total
+        places = [1, 2, 2 + size, 2 + 2 * size]
+        t, code, before, after, accelerations = numpy.split(rows, places, axis=1)
+        begin = numpy.concatenate([numpy.stack(start)[None], after])[:-1]
+        reset, struck = known & (code[:, 0] != NO_RESET), known & (code[:, 0] == STRIKE)
+
+        def first(rows: Any, chosen: Any) -> Any:
+            """The chosen rows before all others, which are infinite."""
+            order = numpy.argsort(~chosen, stable=True)
+            return numpy.where(chosen[order][:, None], rows[order], numpy.inf)
+
+        # In a reset a step of no length leads from one side to the other.
+        sides = [numpy.hstack([t, end, begin, accelerations]) for end in (before, after)]
+        both = numpy.stack(sides, axis=1).reshape(2 * len(rows), -1)
+        steps = first(both, numpy.stack([known, reset], axis=1).reshape(-1))
+        behind = numpy.hstack([t, after])
+        passed, hits = numpy.sum(reset), numpy.sum(struck)
+        counts = numpy.sum(known) + passed, hits, passed
+        return (steps, first(behind, struck), first(behind, reset)), counts
+
+    tables, counts = by_numpy(steps_of, rows, total, *start)
+    if not is_traced(counts):
+        tables = tuple(table[: int(n)] for table, n in zip(tables, counts, strict=True))
+    (steps, strikes, resets), (count, _, passed) = tables, counts
+
+    def columns(numpy: Any, steps: Any, *start: Any) -> tuple[Any, Any]:
+        # One step more than there are: where there are none, diffrax looks into one all the same.
+        rest = numpy.full((1, steps.shape[1]), numpy.inf, steps.dtype)
+        begin = numpy.concatenate([numpy.zeros(1, steps.dtype), numpy.stack(start)])
+        ends = numpy.concatenate([begin[None], steps[:, : 1 + size], rest[:, : 1 + size]])
+        return ends.T, numpy.concatenate([steps[:, 1 + size :], rest[:, 1 + size :]]).T
+
+    (ends, *states), insides = by_numpy(columns, steps, *start)
+    dense = diffrax.DenseInterpolation(
+        ts=ends,
+        ts_size=1 + count.astype(np.int32),  # diffrax's own width
+        infos=dict(
+            scene=jtu.tree_map(lambda leaf: _repeated(leaf, len(insides[0])), scene),
+            y0=kind(*insides[:size]),
+            accelerations=tuple(insides[size:]),
+        ),
+        interpolation_cls=RollingStep,
+        direction=1,
+        t0_if_trivial=0.0,
+        y0_if_trivial=start,
+    )
+    state = kind(*(leaf[:-1] for leaf in states))
+    return RigidRecord(ends[:-1], state, dense, strikes, (resets, passed))
+
+
+def _repeated(leaf: Numbers, times: int) -> Array:
+    """A number of the scene as each step has it."""
+    repeated: Array = by_numpy(
+        lambda numpy, leaf: numpy.broadcast_to(leaf, (times, *leaf.shape)), jnp.asarray(leaf)
+    )
+    return repeated

@@ -1,0 +1,31 @@
+"""What optimisations evaluate at one gait, by name."""
+
+import numpy as np
+
+from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
+from jaxbiped.optimise._design_gaits import GaitSettings, ensemble_of, evaluate_ensemble
+from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
+from jaxbiped.optimise._objective_values import evaluate
+
+
+def evaluated(scene, gait, names, accuracy="balanced"):
+    """Objectives of a gait with their derivatives with respect to all parameters, and errors."""
+    return evaluate(scene, gait, tuple(names), accuracy)
+
+
+def evaluated_over_members(scene, gait, names, criterion, larger):
+    """The factors of four members that scatter in slope and d, and objectives over them."""
+    ensemble = ensemble_of(scene, {"slope": 0.1, "d": 0.05}, 4, criterion, larger, seed=1)
+    nominal = evaluated(scene, gait, ())
+    return ensemble.factors, evaluate_ensemble(ensemble, scene, nominal, names, GaitSettings())
+
+
+def integrals_of(scene, state, **how):
+    """What is summed over the cycle from a state."""
+    found = np.asarray(cycle_functionals(scene, state, **how).values)
+    return dict(zip(integral_names(scene), found.tolist(), strict=True))
+
+
+def of_return_jacobian(scene, state, names, **how):
+    """What is a function of the derivatives of the return map at a state."""
+    return jacobian_functionals(scene, state, names, **how)
