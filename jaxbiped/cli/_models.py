@@ -70,9 +70,8 @@ def _walker(seed: "jb.Scene", name: str, named: NamedWalker) -> JsonObject:
 
 
 def _size(scene: Any) -> dict[str, int]:
-    from jaxbiped.dynamics._state import state_type
 
-    return {"states": len(state_type(scene)._fields), "operations": _operations(scene)}
+    return {"states": len(scene.state_type._fields), "operations": _operations(scene)}
 
 
 def _units(infos: Mapping[str, ParameterInfo]) -> dict[str, str]:

@@ -16,7 +16,7 @@ from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch_point import Axis, BranchPoint, CycleFootsteps
 from jaxbiped.continuation._trace import BranchStop
-from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
+from jaxbiped.dynamics._state import recurring_names, state_quantity
 from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._gait import QUANTITIES
 from jaxbiped.gait._search_provenance import BranchEnd
@@ -245,7 +245,7 @@ def open_branch(
         raise ArgumentError(
             f"scene is not allowed: it differs from the branch's own in {difference}."
         )
-    kind = state_type(scene)
+    kind = scene.state_type
     special = _points(dataset, kind, settings["along"], "event_")
     events = [
         BifurcationPoint(EVENTS[int(kind)], point, complex(real, imaginary), *map(float, errors))

@@ -15,7 +15,7 @@ from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._footfalls import mean
 from jaxbiped.dynamics._joint_loads import motion_of
 from jaxbiped.dynamics._stance import angles_and_rates, of_stance, stance_on
-from jaxbiped.dynamics._state import OF_BODIES, state_type
+from jaxbiped.dynamics._state import OF_BODIES
 from jaxbiped.dynamics._tree import Motion, Pose, point_motion, pose_of
 from jaxbiped.scene._linkages import loaded_bodies
 from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, is_rigid
@@ -101,20 +101,6 @@ def poses_of(scene: AbstractWalkerScene, state: CompliantState) -> tuple[Pose, .
     return tuple(found)
 
 
-@state_type.register
-def _(scene: RedundantScene) -> type[BodiesState]:
-    structure, euler = scene.mechanism.structure, scene.orientation == "euler"
-    angle = ("cos_half", "sin_half") if euler else ("theta",)
-    rate = ("cos_rate", "sin_rate") if euler else ("omega",)
-    names = [
-        f"{name}_{body}"
-        for own in (("x", "z", *angle), ("vx", "vz", *rate))
-        for body in structure.bodies
-        for name in own
-    ]
-    return state_type_of((*names, *(structure.bristles if scene.has_bristles else ())))
-
-
 @kept_alone
 def redundant_state(scene: RedundantScene, state: MinimalState) -> BodiesState:
     """The consistent state of a redundant scene that is equivalent to a minimal state.
@@ -143,7 +129,7 @@ def redundant_state(scene: RedundantScene, state: MinimalState) -> BodiesState:
         own |= {"cos_rate": -0.5 * rate * s, "sin_rate": 0.5 * rate * c}
         fields |= {f"{name}_{body.name}": value for name, value in own.items()}
     fields |= {name: getattr(state, name) for name in structure.bristles if name in state._fields}
-    kind = state_type(scene)
+    kind = scene.state_type
     return kind(**{name: fields[name] for name in kind._fields})
 
 

@@ -27,7 +27,6 @@ from jaxbiped.dynamics._mode_changes import (
 )
 from jaxbiped.dynamics._stance import Stance, of_stance
 from jaxbiped.dynamics._stance_motion import Impulse, plastic_impact, rolling
-from jaxbiped.dynamics._state import state_type
 from jaxbiped.dynamics._surfaces import clearance
 from jaxbiped.dynamics._tree import Loads, rehung
 from jaxbiped.dynamics._tree_inertia import composites, eliminate
@@ -201,7 +200,7 @@ def rigid_checks(scene: RigidScene, states: Any) -> RigidChecks:
         ArgumentError: an argument has the wrong type.
     """
     scene = check_scene(scene, RigidScene)
-    check_type("states", states, state_type(scene))
+    check_type("states", states, scene.state_type)
     states = jtu.tree_map(lambda leaf: np.ravel(np.asarray(leaf)), states)
     known = np.isfinite(states[1])
     last = np.max(np.flatnonzero(known), initial=0)

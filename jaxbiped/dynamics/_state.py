@@ -1,10 +1,8 @@
 """States of scenes: their types, their checks, the seed's start, and what each coordinate is.
 
-A formulation registers its kind of scene here, by `state_type`. A coordinate whose
-name is not known has no size, and is refused where errors are measured in sizes.
+A coordinate whose name is not known has no size, and is refused where errors are measured in sizes.
 """
 
-import functools
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
@@ -17,17 +15,11 @@ from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar, as_float, by_numpy
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
-from jaxbiped.scene._state_types import SomeState, State, is_redundant, state_type_of
+from jaxbiped.scene._scene import AbstractWalkerScene
+from jaxbiped.scene._state_types import SomeState, State, is_redundant
 
 Periods: TypeAlias = tuple[float | None, ...]
 """Period of each of some coordinates, None for one that has none; () if none of them has one."""
-
-
-@functools.singledispatch
-def state_type(scene: object) -> type[PyTree]:
-    """The type of a scene's states, a NamedTuple of scalar leaves."""
-    raise ArgumentError(f"scene is a {type(scene).__name__}, which is not allowed: give a scene.")
 
 
 def seed_state() -> State:
@@ -146,11 +138,6 @@ def check_leaves(state: SomeState, name: str) -> SomeState:
     return state._replace(**leaves)
 
 
-@state_type.register
-def _(scene: Scene) -> type[Any]:
-    return state_type_of(scene.state_names)
-
-
 def state_for(scene: AbstractWalkerScene, state: PyTree, name: str = "state") -> PyTree:
     """A checked start of the type that a scene needs. Default of bristles: straight.
 
@@ -158,7 +145,7 @@ def state_for(scene: AbstractWalkerScene, state: PyTree, name: str = "state") ->
         ArgumentError: this is not a state, it has bristles but the scene has none, an entry is not
             finite, or leaves have different shapes.
     """
-    kind: Any = state_type(scene)
+    kind: Any = scene.state_type
     given = getattr(state, "_fields", ())
     structure = scene.mechanism.structure
     if given and (*given, *structure.bristles) == kind._fields:
@@ -171,11 +158,6 @@ def state_for(scene: AbstractWalkerScene, state: PyTree, name: str = "state") ->
             f"{name} has bristles, but friction = {law} has none: give a {kind.__name__}."
         )
     return without_whole_turns(scene, check_state(state, kind, name))
-
-
-@state_type.register
-def _(scene: RigidScene) -> type[Any]:
-    return state_type_of(scene.state_names)
 
 
 _OF_ROOT = {

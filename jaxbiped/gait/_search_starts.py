@@ -16,7 +16,7 @@ from jaxbiped.dynamics._constrained_motion import consistent_state
 from jaxbiped.dynamics._contacts import legs_in
 from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._joint_loads import motion_of
-from jaxbiped.dynamics._state import seed_state, state_for, state_type
+from jaxbiped.dynamics._state import seed_state, state_for
 from jaxbiped.dynamics._surfaces import rate_unit
 from jaxbiped.dynamics._tree import pose_of
 from jaxbiped.gait._gait import Gait
@@ -115,7 +115,7 @@ def _lines(scene: AbstractWalkerScene, seed: State, own: Scene) -> Lines:
 
 def _posed(scene: AbstractWalkerScene, lines: Lines) -> WalkerState:
     """Legs that turn as a whole about a root point at 0; all other bodies at rest."""
-    mechanism, kind = scene.mechanism, state_type(scene)
+    mechanism, kind = scene.mechanism, scene.state_type
     structure, limits = mechanism.structure, _limits(mechanism)
     zero = jnp.zeros_like(lines.swing)
     angles: dict[int, Scalar] = {}
@@ -261,7 +261,7 @@ def scattered_start_count(scene: Scene | RigidScene) -> int:
 
 def _alone(scene: AbstractWalkerScene) -> list[str]:
     """Names of the bodies of a state that are no part of a leg."""
-    structure, fields = scene.mechanism.structure, state_type(scene)._fields
+    structure, fields = scene.mechanism.structure, scene.state_type._fields
     return [
         name
         for j, name in enumerate(structure.bodies)

@@ -19,7 +19,7 @@ from jaxbiped._parameter_declaration import check_parameters
 from jaxbiped._types import Scalar, Time, any_of, as_float, by_numpy, in_64_bits, is_traced, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
-from jaxbiped.dynamics._state import check_state, periods_of, state_type, turned_difference
+from jaxbiped.dynamics._state import check_state, periods_of, turned_difference
 from jaxbiped.hybrid._guards import Guard, Switch
 from jaxbiped.hybrid._sections import AbstractSection, Section, section_of
 from jaxbiped.hybrid._system import AbstractSystem
@@ -131,11 +131,6 @@ def _turn(name: str, period: float) -> Guard:
     return Guard(
         name, lambda y: getattr(y, name) - period, direction=1, reset=begin_again, scale=period
     )
-
-
-@state_type.register
-def _(scene: HybridSystem) -> type[Any]:
-    return scene.state_type
 
 
 class At(AbstractSection):

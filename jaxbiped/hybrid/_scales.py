@@ -14,7 +14,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Numbers, RealScalarLike, Scalar, is_traced
-from jaxbiped.dynamics._state import dimensions_of, recurring_leaves, state_type
+from jaxbiped.dynamics._state import dimensions_of, recurring_leaves
 from jaxbiped.scene._scene import (
     AbstractScene,
     AbstractWalkerScene,
@@ -142,7 +142,7 @@ def recurring_inverse_units(args: PyTree, count: int) -> Scalar:
     """`Units.inverse` of a minimal state without hip_x, shape (count,)."""
     if is_rigid(args) or not isinstance(args, AbstractScene):
         return jnp.ones(count)
-    kind = state_type(args.minimal)
+    kind = args.minimal.state_type
     inverse = recurring_leaves(units_of(args, kind(*[0.0] * len(kind._fields))).inverse)
     return jnp.stack(inverse) if len(inverse) == count else jnp.ones(count)
 

@@ -17,7 +17,7 @@ from jaxbiped._checks import (
     warn,
 )
 from jaxbiped._progress import Stage, stage
-from jaxbiped.dynamics._state import cyclic_names, recurring_names, state_type
+from jaxbiped.dynamics._state import cyclic_names, recurring_names
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
 from jaxbiped.gait._search_starts import state_of_guess
@@ -171,7 +171,7 @@ def _check_measured(scene: AnyScene, measured: MeasuredGait, bounds: Mapping[str
             raise ArgumentError(f"{name} is both known (conditions) and to be fitted (vary).")
     with_parameters(scene, measured.conditions)
     arrivals_of(scene, measured.footsteps)
-    kind = state_type(scene)
+    kind = scene.state_type
     lacks = () if is_walker(scene) else ("peak_normal", "angles")
     if not is_walker(scene) and not cyclic_names(kind):
         lacks = ("step_length", "speed", *lacks)
@@ -182,7 +182,7 @@ def _check_measured(scene: AnyScene, measured: MeasuredGait, bounds: Mapping[str
         if name.startswith(OF_STATE):
             check_choice("measures", name, [OF_STATE + each for each in recurring_names(kind)])
     for name in () if measured.angles is None else measured.angles.known:
-        angles = [each for each in state_type(scene)._fields if each.startswith("theta_")]
+        angles = [each for each in scene.state_type._fields if each.startswith("theta_")]
         check_choice("an angle", name, angles)
 
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_increasing, check_type
 from jaxbiped.compiler import count_operations
-from jaxbiped.dynamics._state import state_type
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.measure._energy_ledger import ledger_and_motors, rigid_ledger
 from jaxbiped.measure._footsteps import heel_strikes, root_place
@@ -83,7 +82,7 @@ def cost_of_transport(
         gravity, motors = books.gravity_work, books.motor_work
     else:
         check_type("walk", walk, Trajectory)
-        check_type("walk.state", walk.state, state_type(scene))
+        check_type("walk.state", walk.state, scene.state_type)
         check_scene_of(walk, scene, "walk")
         if times is not None:
             check_increasing("times", times, 2)
@@ -109,6 +108,6 @@ def operation_counts(scene: Scene | RigidScene) -> dict[str, int]:
     Returns:
         The number of times that each operation occurs, by name.
     """
-    kind, field = state_type(scene), system_of(scene).vector_field
+    field, kind = system_of(scene).vector_field, scene.state_type
     state = kind(*[0.0] * len(kind._fields))
     return count_operations(lambda y, args: field(0.0, y, args), state, scene)

@@ -14,7 +14,7 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import AT_ONCE, Scalar, as_array, as_float, in_parts, rows_of
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._stance import of_stance
-from jaxbiped.dynamics._state import check_state, state_type
+from jaxbiped.dynamics._state import check_state
 from jaxbiped.dynamics._surfaces import standing_place
 from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState, SomeState, State
@@ -201,7 +201,7 @@ def kept_strikes(scene: RigidScene, walk: Trajectory[Any]) -> tuple[np.ndarray, 
     """Times [s] and states of the heel strikes that a walk kept, leaves of shape (n + 1,)."""
     check_type("scene", scene, RigidScene)
     check_type("walk", walk, Trajectory)
-    check_type("walk.state", walk.state, state_type(scene))
+    check_type("walk.state", walk.state, scene.state_type)
     check_scene_of(walk, scene, "walk")
     assert walk.arrivals is not None
     times = np.asarray(walk.arrivals.t)
@@ -216,7 +216,7 @@ def kept_strikes(scene: RigidScene, walk: Trajectory[Any]) -> tuple[np.ndarray, 
 
 def from_start(scene: RigidScene, walk: Trajectory[Any], start: Any) -> Trajectory[Any]:
     """A rigid walk whose start is kept as a heel strike is, at time 0."""
-    first, kept = check_state(start, state_type(scene), "start"), walk.arrivals
+    first, kept = check_state(start, scene.state_type, "start"), walk.arrivals
     total, t = 1, np.zeros(1)
     state = jtu.tree_map(lambda leaf: np.reshape(np.asarray(leaf), (1,)), first)
     if kept is not None:

@@ -12,7 +12,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_within
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._state import state_of_recurring, state_type
+from jaxbiped.dynamics._state import state_of_recurring
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -54,7 +54,7 @@ class GaitSettings(NamedTuple):
         return self.find(scene, self.state_of(scene, point))
 
     def state_of(self, scene: Scene | RigidScene, point: np.ndarray) -> WalkerState:
-        return jtu.tree_map(np.float64, state_of_recurring(state_type(scene), point))
+        return jtu.tree_map(np.float64, state_of_recurring(scene.state_type, point))
 
 
 def are_walks(gaits: Gait) -> np.ndarray:
@@ -83,7 +83,7 @@ def gaits_near(
     count = len(points)
     scenes = with_parameters(scene, {name: jnp.asarray(each) for name, each in values.items()})
     scenes = jtu.tree_map(lambda leaf: jnp.broadcast_to(jnp.asarray(leaf), (count,)), scenes)
-    starts = state_of_recurring(state_type(scene), map(jnp.asarray, points.T), jnp.zeros(count))
+    starts = state_of_recurring(scene.state_type, map(jnp.asarray, points.T), jnp.zeros(count))
     return scenes, *jax.device_get(_find_each(scenes, starts, wanted, settings))
 
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._energy import is_driven
-from jaxbiped.dynamics._state import cyclic_names, state_type
+from jaxbiped.dynamics._state import cyclic_names
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene, is_walker
@@ -136,7 +136,7 @@ OBJECTIVES = {
 def _of_walkers(name: str, scene: AbstractScene) -> str | None:
     if is_walker(scene) or OBJECTIVES[name].measured is not None:
         return None
-    advances = bool(cyclic_names(state_type(scene)))
+    advances = bool(cyclic_names(scene.state_type))
     own = ("period", "spectral_radius", *(("speed", "step_length") if advances else ()))
     return None if name in own else f"a {type(scene).__name__} has {', '.join(own)}"
 

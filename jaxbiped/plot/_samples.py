@@ -14,7 +14,6 @@ from jaxbiped._types import as_array, in_parts, rows_of
 from jaxbiped.dynamics._energy import powers
 from jaxbiped.dynamics._equivalent_states import whole_state
 from jaxbiped.dynamics._impact import push_off_work
-from jaxbiped.dynamics._state import state_type
 from jaxbiped.measure._footsteps import HeelStrikes, heel_strikes
 from jaxbiped.measure._samples import (
     NODES,
@@ -214,7 +213,7 @@ def rigid_motion(scene: RigidScene, walk: Trajectory[Any]) -> RigidMotion:
     What comes after the last heel strike that the walk kept (`max_arrivals`) is left out where
     there were more. Raises `ArgumentError` for a walk without heel strikes.
     """
-    check_type("trajectory.state", walk.state, state_type(scene))
+    check_type("trajectory.state", walk.state, scene.state_type)
     if walk.dense is not None:
         walk = from_start(scene, walk, rows_of(walk.state, 0))
     times, states, end = np.zeros(0), walk.state, float(np.asarray(walk.t)[-1])

@@ -51,6 +51,7 @@ class AbstractScene(eqx.Module):
     """What is modelled, and how it is written down; a frozen pytree of its parameters.
 
     Attributes:
+        state_type: the type of its states, a NamedTuple of scalar leaves.
         time_unit: size of the times in which its motion changes [s]. A property of the class.
         endings: names of the endings of a hybrid system; None for a walker. A property of the
             class.
@@ -70,6 +71,13 @@ class AbstractScene(eqx.Module):
 
     __repr__ = in_short
     _repr_html_ = notebook_html
+
+    if TYPE_CHECKING:
+        # A property of some scenes, of the class of others.
+        @property
+        def state_type(self) -> type[Any]: ...
+    else:
+        state_type: AbstractVar[type[Any]]
 
     @property
     @abc.abstractmethod
@@ -121,6 +129,16 @@ class AbstractWalkerScene(AbstractScene):
         Compliant feet strike by name: those of unlike legs arrive once a stride.
         """
         return self.cycle_footsteps if self.compliant else 1
+
+    @property
+    @abc.abstractmethod
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the scalars of a state."""
+
+    @property
+    def state_type(self) -> type[Any]:
+        """The type of its states."""
+        return state_type_of(self.state_names)
 
     @property
     def has_bristles(self) -> bool:
@@ -229,7 +247,7 @@ class Scene(AbstractMinimalScene):
         """
         names = self.state_names
         placed = placement(self.mechanism, self.ground.slope, values, standing, names)
-        return state_type_of(names)(**placed)
+        return self.state_type(**placed)
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -308,10 +326,10 @@ class RigidScene(AbstractMinimalScene):
         modes, names = rigid_modes(mechanism), self.state_names
         if not modes.any:
             limits_named(modes, held or ())
-            return state_type_of(names)(**placement(mechanism, slope, values, standing, names))
+            return self.state_type(**placement(mechanism, slope, values, standing, names))
         placed = placement(mechanism, slope, values, standing, names[:-1])
         mode = starting_mode(mechanism, modes, slope, placed, feet, held)
-        return state_type_of(names)(**placed, mode=mode)
+        return self.state_type(**placed, mode=mode)
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -381,6 +399,20 @@ class RedundantScene(AbstractWalkerScene):
     def linkage(self) -> Linkage:
         """The bodies, hinges and couplings as a linkage."""
         return walker_linkage(self.walker, self.orientation, self.ground.slope)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the scalars of a state: place and orientation of each body, then their rates."""
+        structure, euler = self.mechanism.structure, self.orientation == "euler"
+        angle = ("cos_half", "sin_half") if euler else ("theta",)
+        rate = ("cos_rate", "sin_rate") if euler else ("omega",)
+        names = [
+            f"{name}_{body}"
+            for own in (("x", "z", *angle), ("vx", "vz", *rate))
+            for body in structure.bodies
+            for name in own
+        ]
+        return (*names, *(structure.bristles if self.has_bristles else ()))
 
 
 CompliantScene: TypeAlias = Scene | RedundantScene

@@ -22,7 +22,7 @@ from jaxbiped._checks import (
 )
 from jaxbiped._types import Scalar, as_float, by_numpy, is_traced
 from jaxbiped.compiler import BY_NAME, Request
-from jaxbiped.dynamics._state import check_state, state_type, without_whole_turns
+from jaxbiped.dynamics._state import check_state, without_whole_turns
 from jaxbiped.hybrid._mode_history import history_of
 from jaxbiped.hybrid._sections import AbstractSection, HeelStrike, check_section_body
 from jaxbiped.scene._ground import check_pulls
@@ -113,7 +113,7 @@ class RigidSimulation(eqx.Module):
         check_limits(duration, footsteps, asked.max_solver_steps)
         with traced_rules() as rules:
             scene = check_scene(scene, RigidScene)
-            state = check_state(in_own_precision(state), state_type(scene))
+            state = check_state(in_own_precision(state), scene.state_type)
             state = in_one_precision(without_whole_turns(scene, state))
             check_single_scene(scene)
             check_section_body(scene, section)

@@ -17,7 +17,7 @@ from jaxbiped._types import as_float
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import BY_NAME, DEVICES, Program, Request
 from jaxbiped.dynamics._mode_changes import SLACK
-from jaxbiped.dynamics._state import recurring_names, state_type
+from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait._return_map_spec import patience_of
 from jaxbiped.hybrid._endings import WATCHES
 from jaxbiped.hybrid._hybrid_system import GuardedMotion, HybridSystem
@@ -232,7 +232,7 @@ def passes_a_stop(scene: Any, values: Mapping[str, Any], *, by: float = SLACK) -
     Those of a hybrid system, beyond a guard that is armed and resets the state, in its scale.
     """
     if not is_walker(scene):
-        states = state_type(scene)(**values)
+        states = scene.state_type(**values)
         return np.asarray(jax.vmap(lambda y: scene.lies_beyond(y, by))(states))
     angle = scene.mechanism.structure.coordinates[2]
     passed = np.zeros(np.shape(values[angle]), dtype=bool)

@@ -18,7 +18,7 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import Doubt, Label, Witness
-from jaxbiped.dynamics._state import state_type, without_whole_turns
+from jaxbiped.dynamics._state import without_whole_turns
 from jaxbiped.hybrid._hybrid_system import HybridSystem, within_periods
 from jaxbiped.hybrid._scales import resolve_slip_speed
 from jaxbiped.scene._parameter_access import scene_identity, with_parameters
@@ -212,7 +212,7 @@ def _kind_of(scene: Scene | RigidScene | HybridSystem) -> str:
 
 
 def _check_states(scene: Scene | RigidScene | HybridSystem, states: PyTree) -> PyTree:
-    kind = state_type(scene)
+    kind = scene.state_type
     bristles = scene.mechanism.structure.bristles if is_walker(scene) else ()
     if (*getattr(states, "_fields", ()), *bristles) == kind._fields:
         straight = np.zeros_like(np.asarray(states[0]))

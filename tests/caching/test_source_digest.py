@@ -32,7 +32,11 @@ CODE = {
     "sign of a law": (COULOMB, "return -self.mu", "return self.mu"),
     "constant": ("hybrid/_endings.py", "_LOST_RATE = 0.1", "_LOST_RATE = 0.2"),
     "string": ("gait/_find_gait.py", '"newton"', '"newtons"'),
-    "registered for a class": ("dynamics/_equivalent_states.py", '"euler"', '"other"'),
+    "registered for a class": (
+        "hybrid/_walker_systems.py",
+        "return RedundantWalking()",
+        "return Walking()",
+    ),
     "compiler": ("compiler/ir/_liveness.py", "value.op in", "value.op not in"),
     "how programs are kept": ("caching/_cached_jit.py", '_KIND = "xla"', '_KIND = "lax"'),
     "what laws there are": ("scene/laws/__init__.py", "Tsuji as Tsuji", "Tsuji as Fuji"),
@@ -139,7 +143,7 @@ def test_who_reaches_a_table_of_functions_reaches_those_that_are_put_there():
                     module = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
                     registered.append(module)
                     assert module in digests.reached(homes.get(each.split(".")[0], module))
-    assert "jaxbiped.dynamics._equivalent_states" in registered
+    assert "jaxbiped.hybrid._hybrid_system" in registered
 
 
 def _package(folder, **modules):

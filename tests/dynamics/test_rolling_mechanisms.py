@@ -71,14 +71,16 @@ def a_state(draw, scene):
 
 def whole(scene, state):
     """Place of the root point, angles and rates of all bodies; a coupled torso bisects its legs."""
-    found, bodies = (
-        jb.dynamics.whole_state(scene, state)._asdict(),
-        scene.mechanism.structure.bodies,
-    )
+    structure = scene.mechanism.structure
+    found = jb.dynamics.whole_state(scene, state)._asdict()
+
+    def of_body(kind, body):
+        """The state's own, or the mean of the thighs', which a coupled torso bisects."""
+        bodies = [body] if f"{kind}_{body}" in found else ["a1", "a2"]
+        return np.mean([found[f"{kind}_{name}"] for name in bodies])
 
     def of_bodies(kind):
-        legs = [found[f"{kind}_a{i}"] for i in (1, 2)]
-        return tuple(np.asarray(found.get(f"{kind}_{name}", np.mean(legs))) for name in bodies)
+        return tuple(of_body(kind, body) for body in structure.bodies)
 
     x, z = list(found.values())[:2]
     vx, vz = (found[name] for name in found if name.endswith(("_vx", "_vz")))

@@ -13,7 +13,6 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped import Mechanism, Stop
-from jaxbiped.dynamics._state import state_type
 from jaxbiped.hybrid._walker_systems import BodiesField, WalkerField, system_of
 from jaxbiped.scene._scene import AbstractScene, is_compliant, is_rigid
 from jaxbiped.scene._state_types import state_type_of
@@ -91,8 +90,8 @@ RIGID = jb.RigidScene(SEED.walker, SEED.ground)
 def test_every_scene_says_of_what_kind_it_is(scene, compliant, redundant, state, field):
     assert (scene.compliant, scene.redundant) == (compliant, redundant)
     assert (is_compliant(scene), is_rigid(scene)) == (compliant, not compliant)
-    assert (state_type(scene), system_of(scene).vector_field) == (state, field)
-    assert scene.has_bristles == (state_type(scene.minimal) is jb.dynamics.BristleState)
+    assert (scene.state_type, system_of(scene).vector_field) == (state, field)
+    assert scene.has_bristles == (scene.minimal.state_type is jb.dynamics.BristleState)
     assert scene.minimal.minimal is scene.minimal
     assert not scene.minimal.redundant
 
@@ -110,8 +109,6 @@ def test_what_is_no_scene_is_of_no_kind():
     assert not is_compliant(3.0)
     assert not is_rigid(None)
     with pytest.raises(jb.ArgumentError, match="scene is a float"):
-        state_type(3.0)
-    with pytest.raises(jb.ArgumentError, match="scene is a float"):
         system_of(3.0)
 
 
@@ -120,6 +117,7 @@ class Wheel(AbstractScene):
 
     compliant: ClassVar[bool] = False
     redundant: ClassVar[bool] = False
+    state_type: ClassVar[type[tuple]] = tuple
     spokes: float = jb.laws.parameter("spokes", "$n$", positive=True)
 
     @property
@@ -130,13 +128,8 @@ class Wheel(AbstractScene):
         return minimal
 
 
-def test_a_kind_of_ones_own_registers_its_formulation_and_needs_no_walker():
-    @state_type.register
-    def _(scene: Wheel):
-        return tuple
-
+def test_a_kind_of_ones_own_needs_no_walker():
     wheel = Wheel(8.0)
-    assert state_type(wheel) is tuple
     assert not is_rigid(wheel)
     assert jb.parameter_names(wheel) == ("spokes",)
     assert jb.parameter_quantities(wheel)["spokes"].words == "spokes"

@@ -17,7 +17,6 @@ from jaxbiped._types import JsonObject, Scalar
 from jaxbiped.compiler import LANES, Program, Request, web_module
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._energy import Energies, energies, is_driven, powers
-from jaxbiped.dynamics._state import state_type
 from jaxbiped.plot import style
 from jaxbiped.plot._skeleton import body_motion, motion_names, names_by_foot, skeleton_of
 from jaxbiped.plot.viewer._view import AbstractPage
@@ -189,7 +188,7 @@ def playground(scene: Scene, state: Any, *, footsteps: int = 5) -> Playground:
         b'\\x00asm'
     """
     scene = check_scene(scene, Scene)
-    kind = state_type(scene)
+    kind = scene.state_type
     check_type("state", state, kind)
     check_count("footsteps", footsteps)
     request = played_request(scene, state, footsteps)

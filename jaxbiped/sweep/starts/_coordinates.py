@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
 from jaxbiped._quantity import Quantity
-from jaxbiped.dynamics._state import recurring_names, state_quantity, state_type
+from jaxbiped.dynamics._state import recurring_names, state_quantity
 from jaxbiped.hybrid._hybrid_system import HybridSystem
 from jaxbiped.scene._modes import AT_LIMIT, limit_motions, rigid_modes
 from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, with_parameters
@@ -38,7 +38,7 @@ def state_coordinates(scene: AbstractScene) -> dict[str, str]:
     Where the bodies "1" and "2" are legs, `theta_stance`, `theta_swing` and their rates are other
     names of theirs.
     """
-    names = recurring_names(state_type(scene))
+    names = recurring_names(scene.state_type)
     found: dict[str, str] = {}
     if not is_walker(scene):
         return found | {name: name for name in names}
@@ -86,7 +86,7 @@ def coordinate_quantities(scene: Scene | RigidScene | HybridSystem) -> dict[str,
             for name in state_coordinates(scene)
         }
     else:
-        units = getattr(state_type(scene), "own_units", {})
+        units = getattr(scene.state_type, "own_units", {})
         own = {name: Quantity(name, unit=units.get(name, "")) for name in state_coordinates(scene)}
     return {name: each for name, each in own.items() if each} | parameter_quantities(scene)
 
