@@ -115,7 +115,7 @@ def _select(w: HostWriter, op: Operation) -> list[Value]:
     which, *cases = op.inputs
     if len(cases) == 1:
         return cases
-    if len(cases) > 2 or which.dtype.kind != "b":
+    if len(cases) > 2:
         raise UnwrittenError("a choice among several")
     if which.constant is not None and which.held == ():
         return [cases[int(which.constant)]]

@@ -39,6 +39,17 @@ def test_one_branch_runs(which):
     check_against_xla(lambda k, x: jax.lax.switch(k, branches, x), np.asarray(which), X)
 
 
+def test_a_branch_for_each_row_is_a_choice():
+    """A batched conditional chooses by a whole number, which NumPy has to take for a truth."""
+
+    def one(x):
+        return jax.lax.cond(x[0] > 0.0, lambda: x + 1.0, lambda: -x)
+
+    rows = np.array([[1.0, 2.0], [-1.0, 2.0], [0.0, 3.0]])
+    check_against_xla(jax.vmap(one), rows)
+    check_against_xla(one, rows[1])
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_what_a_branch_shares_with_what_follows_is_known_there(sign):
     """A part of an array that a branch is the first to need, and equal operations of both sides."""
