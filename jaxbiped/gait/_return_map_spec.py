@@ -12,6 +12,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_count, check_type
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.caching._cached_jit import note_code
+from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.compiler import LANES, XLA, AbstractEngine
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.hybrid._system import AbstractSystem
@@ -130,19 +131,11 @@ class ReturnMapSpec(eqx.Module):
         )
 
 
+@known_by_shape
 def has_switches(system: AbstractSystem, args: PyTree, y: PyTree, kind: str = "value") -> bool:
-    """Whether a system has switches, all or those of a kind (`resets`, `first_only`).
-
-    Known before anything runs.
-    """
-    found: list[bool] = []
-
-    def look(args: PyTree, y: PyTree) -> None:
-        each = system.switches(args, y)
-        found.extend(kind == "value" or getattr(switch, kind) for switch in each)
-
-    eqx.filter_eval_shape(look, args, y)
-    return any(found)
+    """Whether a system has switches, all or those of a kind (`resets`, `first_only`)."""
+    switches = system.switches(args, y)
+    return any(kind == "value" or getattr(switch, kind) for switch in switches)
 
 
 def runs_by_lanes(spec: ReturnMapSpec, *_: object, **__: object) -> bool:

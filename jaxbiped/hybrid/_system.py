@@ -13,6 +13,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, select
+from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._sections import AbstractSection
 
@@ -94,9 +95,10 @@ class AbstractSystem(eqx.Module):
     def load(self, args: PyTree, y: PyTree) -> Scalar | None:
         """The quantity whose largest value along the orbit is reported, or None."""
 
+    @known_by_shape
     def load_exists(self, args: PyTree, y: PyTree) -> bool:
-        """Whether there is a load, known before anything runs."""
-        return eqx.filter_eval_shape(self.load, args, y) is not None
+        """Whether there is a load."""
+        return self.load(args, y) is not None
 
     def gaps(self, args: PyTree, y: PyTree) -> tuple[Gap, ...]:
         """The gaps whose closing no step may miss. Default: there are none."""

@@ -1,0 +1,62 @@
+"""What is known of arguments by their shapes, before anything runs; asked once for each shape."""
+
+import functools
+from collections.abc import Callable, Hashable
+from typing import Any, ParamSpec, TypeVar
+
+import equinox as eqx
+import jax
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
+from jaxbiped.caching._fingerprint import Leaf
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+def known_by_shape(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Decorator: a function whose result follows from the shapes of the numbers in its arguments.
+
+    It is evaluated with numbers that only have a shape, and once for all arguments that differ in
+    nothing else: a trace of equations of motion takes milliseconds, which a warm call would spend
+    each time.
+
+    Args:
+        function: a function of trees whose result holds no arrays.
+
+    Returns:
+        The same function, for positional arguments.
+    """
+
+    def evaluate(args: Any) -> _T:
+        results: list[_T] = []
+        eqx.filter_eval_shape(lambda given: results.append(function(*given)), args)
+        return results[0]
+
+    @bounded_cache(PROGRAMS)
+    @functools.wraps(function)
+    def of_shapes(structure: jtu.PyTreeDef, *leaves: Hashable) -> _T:
+        return evaluate(structure.unflatten([_with_shape(leaf) for leaf in leaves]))
+
+    @functools.wraps(function)
+    def called(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        leaves, structure = jtu.tree_flatten(args)
+        try:
+            return of_shapes(structure, *map(_without_value, leaves))
+        except TypeError:  # what cannot be hashed is not kept
+            return evaluate(args)
+
+    return called
+
+
+def _without_value(leaf: Any) -> Any:
+    """The shape of an array or of a number with digits; all else decides by its value."""
+    if not isinstance(leaf, jax.Array | np.ndarray | np.generic | float):
+        return leaf
+    return Leaf(np.shape(leaf), jax.dtypes.result_type(leaf), False)
+
+
+def _with_shape(leaf: Hashable) -> Any:
+    return jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) if isinstance(leaf, Leaf) else leaf
