@@ -86,7 +86,8 @@ class Progress(NamedTuple):
         trial: the m recurring components to follow next.
         base: the last accepted; `base_residual` the largest change over its cycle `base_return`,
             `slope` the derivatives of its changes with respect to the components (m, m), `step`
-            Newton's correction of it.
+            Newton's correction of it; `is_smallest` whether that is the smallest of those that
+            leave nothing of the change.
         damping: share of the step that `trial` took.
         coarse: the witness, once there is one.
         optimiser: its state.
@@ -99,6 +100,7 @@ class Progress(NamedTuple):
     base_residual: Scalar
     slope: Scalar
     step: Scalar
+    is_smallest: Scalar
     base_return: LinearisedReturn
     damping: Scalar
     coarse: LinearisedReturn
@@ -124,6 +126,7 @@ def initial_progress(
         base_residual=jnp.asarray(jnp.inf),
         slope=jnp.eye(len(first)),
         step=jnp.zeros_like(first),
+        is_smallest=jnp.asarray(False),
         base_return=no_return,
         damping=jnp.asarray(1.0),
         coarse=no_return,
@@ -146,7 +149,7 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
         forward = jnp.asarray(True)
         simplified = jnp.zeros_like(change)
     else:
-        simplified = -_correction(now.slope, change)
+        simplified = -_of_kind(now.is_smallest, now.slope, change)
         sizes = (_size(method.measured(each)) for each in (simplified, now.step))
         forward = jnp.isinf(now.base_residual) | operator.lt(*sizes)
     better = returned & ~approaching & ~witness & forward
@@ -167,9 +170,11 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
     nowhere = ~returned & ~jnp.isfinite(base_residual) & (now.stage < Stage.COARSE)
     if method.optimiser is not None:
         step, optimiser = _descent_step(now, base, change, slope, better, method.optimiser)
-        damping = jnp.asarray(1.0)
+        damping, is_smallest = jnp.asarray(1.0), now.is_smallest
     else:
-        step = jnp.where(better, -_correction(slope, change), now.step)
+        correction, kind = _correction(slope, change)
+        step = jnp.where(better, -correction, now.step)
+        is_smallest = jnp.where(better, kind, now.is_smallest)
         last, next_, plain = map(method.measured, (now.step, step, simplified))
         damping = _damping_factor(now, last, next_, plain, returned, better)
         optimiser = now.optimiser
@@ -182,8 +187,8 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
     stage = jnp.where(fine_done, int(Stage.WITNESS), stage)
     stage = jnp.where(nowhere, int(Stage.NO_RETURN), stage)
     stage = jnp.where(witness, int(Stage.FOUND), stage)
-    correction = step if method.optimiser is None else jnp.zeros_like(step)
-    ahead = jnp.where(fine_done, correction, damping * step)
+    beyond = step if method.optimiser is None else jnp.zeros_like(step)
+    ahead = jnp.where(fine_done, beyond, damping * step)
     return Progress(
         stage=stage,
         trial=jnp.where(approaching, base, base + ahead),
@@ -192,6 +197,7 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
         base_residual=jnp.where(refined, jnp.inf, base_residual),
         slope=slope,
         step=step,
+        is_smallest=is_smallest,
         base_return=base_return,
         damping=damping,
         coarse=choose(witness & returned, latest, now.coarse),
@@ -221,25 +227,37 @@ def _damping_factor(
     return jnp.where(better, ahead, back)
 
 
-def _correction(slope: Scalar, change: Scalar) -> Scalar:
-    """What Newton's step is the negative of: the smallest, where the orbits are a family.
+def _correction(slope: Scalar, change: Scalar) -> tuple[Scalar, Scalar]:
+    """What Newton's step is the negative of, and whether it is the smallest one.
 
-    Those of a conservative system are, by their energy: their slope is singular, and the other
-    directions alone are corrected. Where that leaves a part of the change, as behind a fold, there
-    is no orbit to come to, and the plain step tells so.
+    It is where the orbits are a family, as those of a conservative system are by their energy:
+    their slope is singular, and the other directions alone are corrected. Where that leaves a part
+    of the change, as behind a fold, there is no orbit to come to, and the plain step tells so.
     """
-    step = solution(slope, change)
-    scale = jnp.max(jnp.abs(slope))
-    is_far = ~(_size(step) * scale * _SINGULAR <= _size(change))
+    plain = solution(slope, change)
+    is_far = ~(_size(plain) * jnp.max(jnp.abs(slope)) * _SINGULAR <= _size(change))
 
-    def smallest() -> Scalar:
-        damped = slope @ slope.T + (_SINGULAR * scale) ** 2 * jnp.eye(len(change))
-        other = slope.T @ solution(damped, change)
-        solves = _size(slope @ other - change) <= _LEFT_OVER * _size(change)
-        return jnp.where(solves, other, step)
+    def of_family() -> tuple[Scalar, Scalar]:
+        smallest = _smallest_solution(slope, change)
+        solves = _size(slope @ smallest - change) <= _LEFT_OVER * _size(change)
+        return jnp.where(solves, smallest, plain), solves
 
-    corrected: Scalar = jax.lax.cond(is_far, smallest, lambda: step)
-    return corrected
+    found: tuple[Scalar, Scalar] = jax.lax.cond(
+        is_far, of_family, lambda: (plain, jnp.asarray(False))
+    )
+    return found
+
+
+def _of_kind(is_smallest: Scalar, slope: Scalar, change: Scalar) -> Scalar:
+    """A change's correction of the kind that a step was: only those are compared."""
+    found: Scalar = jax.lax.cond(is_smallest, _smallest_solution, solution, slope, change)
+    return found
+
+
+def _smallest_solution(slope: Scalar, change: Scalar) -> Scalar:
+    damping = (_SINGULAR * jnp.max(jnp.abs(slope))) ** 2 * jnp.eye(len(change))
+    found: Scalar = slope.T @ solution(slope @ slope.T + damping, change)
+    return found
 
 
 def _size(step: Scalar) -> Scalar:

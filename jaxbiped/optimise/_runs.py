@@ -10,6 +10,7 @@ import numpy as np
 from jaxbiped._progress import Stage
 from jaxbiped.continuation._critical_values import allows, range_of
 from jaxbiped.dynamics._state import recurring_leaves
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.optimise._design_functions import Functions
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
@@ -137,14 +138,24 @@ def _message(problem: DesignProblem, best: Design, ended: RunEnding, doubt: str)
     return " ".join(filter(None, [ended.message, doubt, *worst, *none]))
 
 
+def doubt_of_gait(search: Search, critical: Bifurcation) -> str:
+    """Why an optimum's own gait leaves it uncertain; empty where it does not."""
+    if search is not Search.FOUND:
+        return f"Its gait, searched again from where it was, ends as {search!s}."
+    if critical is Bifurcation.FOLD:
+        return "Its gait is at a fold, where derivatives have no bound."
+    return ""
+
+
 def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     """The best of the designs that runs came to."""
     best = runs.best
     found, scene = problem.objective(best.known), problem.scene_at(best.u)
     gait, outcome = problem.settings.find_near(scene, best.known.state), runs.outcome()
     doubt = doubt_of(problem, best) if outcome is Outcome.CORNER else ""
-    if outcome in (Outcome.CONVERGED, Outcome.FLAT) and gait.critical is Bifurcation.FOLD:
-        outcome, doubt = Outcome.CORNER, "Its gait is at a fold, where derivatives have no bound."
+    if outcome in (Outcome.CONVERGED, Outcome.FLAT):
+        doubt = doubt_of_gait(gait.outcome, gait.critical)
+        outcome = Outcome.CORNER if doubt else outcome
     return Optimum(
         outcome=outcome,
         message=_message(problem, best, runs.ended, doubt),

@@ -113,7 +113,7 @@ def slopes_of(
     at = TangentsAtTimes(there, jnp.zeros((len(t), 0, len(there))))
     time = jnp.zeros((len(t), 0))
     if places or active:
-        how, engine = motion_solve(_watch_of(system), solver, rtol), CUDA if device else None
+        how, engine = motion_solve(_watch_of(system, scene), solver, rtol), CUDA if device else None
         start, seeded = seeded_directions(scene, state, places, active)
         early = _EARLY * rtol * units_of(scene, state).time
         at = tangents_at_times(how, start, seeded, jnp.where(by_clock, t, t - early), engine)
@@ -140,15 +140,14 @@ def slopes_of(
     )
 
 
-def _watch_of(system: AbstractSystem) -> Watch:
+def _watch_of(system: AbstractSystem, scene: PyTree) -> Watch:
     """What derivatives are followed with, up to the times at which the plain solve saved."""
-    if not system.resets:
-        return Watch(system.vector_field, system.switches, time_unit=system.time_unit)
     return Watch(
         system.vector_field,
         system.switches,
-        reset=system.reset_at_switch,
-        repeats=system.repeats,
+        reset=system.reset_at_switch if system.resets else None,
+        repeats=system.repeats if system.resets else None,
+        project=system.project if system.projects(scene) else None,
         time_unit=system.time_unit,
     )
 
@@ -188,7 +187,8 @@ def _at_events(
         assert section is not None
 
         def surface(a: PyTree, y: PyTree) -> Scalar:
-            return section.value(a, system.in_nearest_names(section, a, here.state, y))
+            near, y = (system.section_state(a, each) for each in (here.state, y))
+            return section.value(a, system.in_nearest_names(section, a, near, y))
 
         moves = follow(surface, here)
         if not section.behind_reset:

@@ -252,10 +252,6 @@ def _check_derivatives(run: Simulation) -> None:
     refused = {
         'save = "steps"': (run.save_steps, 'ask for save="end", an array of times or a section'),
         "extremes": (run.extremes is not None, "only times and states have derivatives"),
-        "scene = RedundantScene(…)": (
-            run.scene.redundant,
-            "simulate scene.minimal, or choose an adjoint of diffrax's",
-        ),
     }
     for argument, (is_so, instead) in refused.items():
         if is_so:
@@ -267,7 +263,6 @@ def _slopes(
 ) -> Slopes:
     # The columns take the walk's own method of steps, where that is one for them.
     solver = run.solver if isinstance(run.solver, AbstractRosenbrock) else Rodas4P()
-    assert isinstance(run.scene, Scene | HybridSystem)
     return slopes_of(
         run.scene,
         run.state,

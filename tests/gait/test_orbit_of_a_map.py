@@ -350,6 +350,27 @@ def test_steps_are_damped_as_the_natural_level_function_says():
     assert float(three.base[0]) == pytest.approx(0.0, abs=1e-9)
 
 
+def test_near_a_fold_corrections_of_one_kind_are_compared():
+    """x → x − 50 x, y → y + y/1000 + y²: a first step leaves y as it is, the next has to go far."""
+    nothing = linearised(TURN, np.zeros(3), P)._replace(code=np.asarray(0))
+
+    def at(place):
+        x, y = map(float, place)
+        change = np.array([-50.0 * x, 1e-3 * y + y * y])
+        slope = np.diag([-49.0, 1.001 + 2.0 * y])
+        return nothing._replace(recurring=np.array([x, y]) + change, jacobian=slope)
+
+    method = Method(None, 40, 1e-10)
+    iteration = jax.jit(lambda now, latest: newton_iteration(now, latest, method))
+    begin = jnp.array([1e-8, 1e-6])
+    now = initial_progress(begin, jnp.asarray(0.0), method, at(begin))
+    while int(now.stage) < Stage.FOUND and int(now.evaluations) < 40:
+        now = iteration(now, at(now.trial))
+    assert int(now.stage) == Stage.FOUND
+    assert int(now.evaluations) <= 6
+    np.testing.assert_allclose(now.base, 0.0, atol=1e-9)
+
+
 def gait_of(values, multipliers=(0.5, 0.1), found=jb.gait.Search.FOUND):
     """As much of a gait as its judge looks at; all its errors are 0.01."""
     state = jb.State(*[0.0] * 8)

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.gait import Bifurcation, Search
 from jaxbiped.optimise import Outcome
 from jaxbiped.optimise._design_problem import variables_of
 from jaxbiped.optimise._optimality import OPTIMAL, _balance, doubt_of, optimality_of
+from jaxbiped.optimise._runs import doubt_of_gait
 from tests.optimise.drawn_designs import (
     BOTH,
     FASTEST,
@@ -208,6 +210,13 @@ def test_true_optima_are_certified(name):
     if "dome" in name or "saddle" in name:  # left for a bound
         last = runs.best.u[-1]
         assert min(abs(last), abs(1.0 - last)) < 1e-12  # within rounding: SciPy's solver decides
+
+
+def test_a_gait_at_a_fold_or_not_found_again_leaves_doubt():
+    assert doubt_of_gait(Search.FOUND, Bifurcation.NONE) == ""
+    assert doubt_of_gait(Search.FOUND, Bifurcation.PERIOD_DOUBLING) == ""
+    assert "fold" in doubt_of_gait(Search.FOUND, Bifurcation.FOLD)
+    assert "not converged" in doubt_of_gait(Search.NOT_CONVERGED, Bifurcation.NONE)
 
 
 @pytest.mark.nightly
