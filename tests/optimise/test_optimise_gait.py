@@ -11,7 +11,6 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.optimise import Evaluation
 from jaxbiped.optimise._design_gaits import GaitSettings
-from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._objective_values import Evaluations
 from jaxbiped.optimise._optimise_gait import _problem_settings
 from tests.cli.commands import interrupt_after
@@ -93,22 +92,30 @@ def test_an_equality_is_kept():
     assert best.known.values["step_length"] == pytest.approx(0.19, rel=1e-6)
 
 
-def test_a_lost_gait_turns_the_search_back(monkeypatch):
-    """As if no gait existed beyond d = 0.09: the best one with a gait is found."""
-    plain = DesignProblem.at
+@pytest.mark.parametrize("optimiser", ["trust-region", "slsqp"])
+def test_a_lost_gait_turns_the_search_back(optimiser):
+    """On the steepest of these slopes no search finds a gait, on gentler ones the best lies."""
+    steep = {"vary": {"slope": (0.01, 1.4)}, "maximise": "peak_normal"}
+    best = best_of(optimiser=optimiser, **steep)
+    assert best.lost > 0
+    assert best.outcome is jb.optimise.Outcome.CONVERGED
+    assert best.objective > best.history[0].objective
+    for share in (0.998, 1.002):
+        beside = jb.with_parameters(RIGID, {"slope": share * best.variables["slope"]})
+        how = dict(parameters=(), radius_sensitivities=False)
+        other = jb.find_gait(beside, best.gait.measures.state, **how)
+        assert other.outcome is jb.gait.Search.FOUND
+        assert float(other.measures.peak_normal) < best.objective
 
-    def at(problem, u):
-        if problem.variables.by_name(np.clip(u, 0.0, 1.0))["d"] < 0.09:
-            problem.lost += 1
-            return None
-        return plain(problem, u)
 
-    monkeypatch.setattr(DesignProblem, "at", at)
-    for name in ("trust-region", "slsqp"):
-        best = best_of(vary={"d": (0.08, 0.12)}, optimiser=name)
-        assert best.lost > 0, name
-        assert best.variables["d"] >= 0.09
-        assert best.objective >= best.history[0].objective
+def test_where_no_gait_exists_the_last_one_before_is_the_best():
+    """Level ground gives a passive walker no energy: the slowest gait is on the least slope."""
+    slow = {"vary": {"slope": (-0.01, 0.03)}, "maximise": None, "minimise": "speed"}
+    best = best_of(iterations=20, **slow)
+    assert best.lost > 0
+    assert 0.0 < best.variables["slope"] < 1e-3
+    assert best.gait.outcome is jb.gait.Search.FOUND
+    assert best.objective == pytest.approx(float(best.gait.measures.speed), rel=1e-6)
 
 
 def test_a_gait_without_a_fold_is_no_lost_gait(tmp_path):
