@@ -117,14 +117,27 @@ def stages_at_once(monkeypatch):
     monkeypatch.setattr("jaxbiped._progress._PATIENCE", 0.0)
 
 
+@pytest.fixture(scope="session")
+def _reported():
+    """What JAX reports, while the session lasts."""
+    events = []
+    jax.monitoring.register_event_duration_secs_listener(
+        lambda name, seconds, **_: events.append(name)
+    )
+    return events
+
+
 @pytest.fixture
-def xla_refuses(monkeypatch):
-    """From when it is called, nothing new is compiled by XLA."""
+def made_by_xla(_reported):
+    """Asked for, what JAX has lowered and what XLA has compiled since this was last asked."""
 
-    def refuse(*_):
-        raise AssertionError("compiled again")
+    def asked():
+        names = [name.rpartition("/")[2] for name in _reported]
+        _reported.clear()
+        return [name for name in names if name.startswith(("jaxpr_to_mlir", "backend_compile"))]
 
-    return lambda: monkeypatch.setattr("jaxbiped.caching._cached_jit.trace_call", refuse)
+    _reported.clear()
+    return asked
 
 
 def pytest_collection_finish():

@@ -7,10 +7,8 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics import FootMotion, touches
-from jaxbiped.dynamics._footfalls import landings, standing_leg
+from jaxbiped.hybrid import Walking
 from tests.mechanisms import scene_of
-
-LEGS = jb.seed_scene().mechanism.structure
 
 
 def test_foot_at_the_seed_start():
@@ -79,14 +77,27 @@ def test_a_foot_touches_that_is_indented_and_admitted(penetration, admitted, exp
 
 
 def test_a_heel_strike_is_of_the_foot_ahead():
-    up, down = -1e-3, 1e-3
-    for ahead in (0, 1):
-        places = (0.2, 0.1) if ahead == 0 else (0.1, 0.2)
-        before = tuple(_foot(x, up, None) for x in places)
-        both = tuple(_foot(x, down, None) for x in places)
-        assert list(map(bool, landings(LEGS, before, both))) == [ahead == 0, ahead == 1]
-        assert not any(map(bool, landings(LEGS, both, both)))
-        assert not any(map(bool, landings(LEGS, both, before)))
-        one = tuple(_foot(x, down if k == ahead else up, None) for k, x in enumerate(places))
-        assert int(standing_leg(LEGS, one)) == ahead + 1
-        assert int(standing_leg(LEGS, both)) == int(standing_leg(LEGS, before)) == 0
+    """Of two legs astride whose feet come down at once; then of one that alone stands."""
+    walking, seed = Walking(), jb.seed_scene()
+    scene = jb.Scene(
+        seed.walker, seed.ground, seed.normal, seed.friction, clearance=jb.laws.AlwaysTouching()
+    )
+
+    def astride(first, depth, lower=0.0):
+        """Leg 1 at this angle, leg 2 at the opposite one but for what makes its foot lower."""
+        height = 0.08 + 0.32 * np.cos(first) - depth
+        second = -first * (1.0 - lower)
+        return jb.State(0.0, height, first, second, *[0.0] * 4)
+
+    for ahead, angle in ((0, 0.2), (1, -0.2)):
+        before, both = astride(angle, -1e-3), astride(angle, 1e-3)
+        lands = lambda one, two: list(map(bool, walking.landings(scene, one, two)))
+        assert lands(before, both) == [ahead == 0, ahead == 1]
+        assert not any(lands(both, both))
+        assert not any(lands(both, before))
+        alone = astride(angle, -1e-3, lower=0.1)
+        assert int(walking.standing_leg(scene, alone)) == 2
+        swapped = jb.dynamics.exchange_legs(scene, alone)
+        assert int(walking.standing_leg(scene, swapped)) == 1
+        for state in (both, before):
+            assert int(walking.standing_leg(scene, state)) == 0

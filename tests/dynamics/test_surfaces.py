@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._surfaces import straight_legs
 from jaxbiped.hybrid import Rolling, switches
 from jaxbiped.scene.laws import normal_law_like
 from tests.mechanisms import FEET, LEGS, PAIR, scene_of, start_of
@@ -106,17 +105,39 @@ def test_a_rigid_walker_arrives_where_the_foot_ahead_comes_down(stands):
 
 
 def test_legs_are_straight_where_each_is_one_body_on_the_hip_with_its_foot_along_it():
-    """Such a walker has fallen for good once it leans: its uprightness is then a leg's angle."""
-    assert straight_legs(SEED.mechanism) == (0, 1)
+    """The opening at a heel strike is then both angles; else how low the foot is, by the height."""
+    swings, stands = -0.1, 0.3
+
+    def strikes_at(mechanism):
+        scene = jb.RigidScene(mechanism, SEED.ground)
+        names = [name for name in scene.state_type._fields if name.startswith("theta")]
+        angles = {name: swings if name.endswith("1") else stands for name in names}
+        value, _ = Rolling().arrival(jb.HeelStrike(), scene, scene.state(**angles))
+        return float(value)
+
+    def lower(length, *sides):
+        """How much lower the swing foot is, by points at this distance, so far ahead."""
+        depths = [
+            max(length * np.cos(angle) - side * np.sin(angle) for side in sides)
+            for angle in (swings, stands)
+        ]
+        return (depths[0] - depths[1]) / 0.4
+
     ahead = tuple(jb.Foot(f"leg_{i}", centre=(0.32, 0.01), radius=0.08) for i in (1, 2))
     flat = tuple(
         jb.Foot(f"leg_{i}", name=name, centre=(0.4, side), radius=0.0)
         for i in (1, 2)
         for name, side in (("heel", -0.02), ("toe", 0.05))
     )
-    for feet, legs in ((FEET, (0, 1)), (ahead, None), (flat, None)):
-        assert straight_legs(jb.Mechanism(bodies=LEGS, feet=feet, mirror=PAIR)) == legs
-    assert straight_legs(scene_of("kneed").mechanism) is None
+    for feet, value in (
+        (FEET, -(swings + stands)),
+        (ahead, lower(0.32, 0.01)),
+        (flat, lower(0.4, -0.02, 0.05)),
+    ):
+        mechanism = jb.Mechanism(bodies=LEGS, feet=feet, mirror=PAIR)
+        assert strikes_at(mechanism) == pytest.approx(value, rel=1e-12)
+    assert strikes_at(SEED.mechanism) == pytest.approx(-(swings + stands), rel=1e-12)
+    assert strikes_at(scene_of("kneed").mechanism) == pytest.approx(lower(0.32, 0.0), rel=1e-12)
 
 
 @pytest.mark.parametrize(("other", "own"), [(-0.2, 0.15), (0.15, -0.2)])

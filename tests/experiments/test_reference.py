@@ -37,6 +37,7 @@ def test_the_seeds_numbers_are_those_of_its_scene():
     np.testing.assert_array_equal(check_numbers(SCENE), numbers())
 
 
+@pytest.mark.nightly
 def test_the_seeds_walk_by_lsoda_is_that_by_radau():
     times, states = reference_states()
     found = checked(START, check_numbers(SCENE), float(times[10]))

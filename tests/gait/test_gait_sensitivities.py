@@ -41,6 +41,8 @@ STEPS = {
 # Powers of the parameters that scale one unit alone, and how the measures follow.
 HELD_BY_SCALINGS = ("xi", "m", "J", "l", "r", "g", "v0")
 """Three laws bind these sensitivities; one by one they are compared at night."""
+LIKE_OTHERS = ("d", "hip_mass", "c")
+"""So are these: a length with its law, a mass and a constant of the normal law as others are."""
 SCALINGS = {
     "time": (dict(g=-2, K=-2, c=-1, v0=-1, xi=1), (1, 0, -1, -2, 0)),
     "mass": (dict(m=1, J=1, K=1, c=1), (0, 0, 0, 1, 0)),
@@ -144,7 +146,9 @@ def test_multipliers_agree_with_an_independent_solve(accuracy, tolerance, multip
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=[pytest.mark.nightly] if name in HELD_BY_SCALINGS else [])
+        pytest.param(
+            name, marks=[pytest.mark.nightly] if name in HELD_BY_SCALINGS + LIKE_OTHERS else []
+        )
         for name in STEPS
     ],
 )

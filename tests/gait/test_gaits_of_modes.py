@@ -31,13 +31,8 @@ def test_multipliers_are_as_many_whatever_is_held(gait):
     np.testing.assert_allclose(gait.multipliers[3:], 0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "derivative",
-    [
-        pytest.param(jax.grad, marks=pytest.mark.nightly),
-        pytest.param(jax.jacfwd, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("derivative", [jax.grad, jax.jacfwd])
 def test_derivatives_go_through_the_modes(gait, derivative):
     """dt/dω of two footsteps by differences."""
     scene, state = hsu_chen(), gait.measures.state

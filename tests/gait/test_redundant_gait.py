@@ -6,27 +6,18 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait import _gait_measures as measuring
 
 pytestmark = pytest.mark.slow
 
 HOW = dict(parameters=("K", "c"), radius_sensitivities=False, accuracy="tight")
-"""All tests here ask for the same, so that one compiled search serves them."""
-
-FIND_GAIT = jb.find_gait
-
-
-def find_alike(*arguments, **options):
-    """`find_gait` with fewer sensitivities, whatever was asked for."""
-    return FIND_GAIT(*arguments, **options | HOW)
 
 
 @pytest.fixture(scope="module")
 def gaits():
     """The seed's gait in minimal coordinates, and in redundant ones."""
     scene = jb.seed_scene()
-    minimal = find_alike(scene)
-    redundant = find_alike(jb.RedundantScene(scene), minimal.measures.state)
+    minimal = jb.find_gait(scene, **HOW)
+    redundant = jb.find_gait(jb.RedundantScene(scene), minimal.measures.state, **HOW)
     return minimal, redundant
 
 
@@ -54,11 +45,10 @@ def test_gait_multipliers_and_sensitivities_agree(gaits):
 
 
 @pytest.mark.nightly
-def test_measures_differentiate_in_both_modes(gaits, monkeypatch):
+def test_measures_differentiate_in_both_modes(gaits):
     """By the leaves of what is modelled; the method's own have no part in the gait."""
     minimal, redundant = gaits
     scene, start = jb.RedundantScene(jb.seed_scene()), redundant.measures.state
-    monkeypatch.setattr(measuring, "find_gait", find_alike)
 
     def period(scene):
         return jb.gait_measures(scene, start, accuracy="tight").period

@@ -1,12 +1,13 @@
 """Endings, against states made by hand on both sides of each threshold."""
 
+import inspect
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.hybrid._endings import WATCHES, ending_code, ending_events
 from tests.compliant_walkers import held_walker
 
 SEED = jb.seed_scene()
@@ -14,6 +15,7 @@ ALWAYS = held_walker()
 REACH, RADIUS = 0.32, 0.08
 SPEED, RATE = np.sqrt(9.8 * 0.4), np.sqrt(9.8 / 0.4)
 Ending = jb.Ending
+WATCHES = inspect.signature(jb.simulate).parameters["watch"].default
 
 
 def happens(state):
@@ -30,7 +32,7 @@ def _happens(state):
     """Every ending at a state: on ground that always holds, and under the paper's rule."""
     told = {}
     for rule, scene in (("always", ALWAYS), ("paper", SEED)):
-        events = ending_events(WATCHES).items()
+        events = jb.hybrid.Walking().failures(WATCHES).items()
         told[rule] = {str(name): test(0.0, state, scene) for name, test in events}
     return told
 
@@ -129,15 +131,3 @@ def test_a_leg_barred_ahead_came_too_late_and_one_behind_too_early(exchange):
         assert not bool(happens(exchange(faster))["paper"][ending])
         higher = deep._replace(hip_z=deep.hip_z + 6e-3)
         assert not bool(happens(exchange(higher))["paper"][ending])
-
-
-def test_codes_put_failures_before_what_only_ran_out():
-    no, yes = jnp.asarray(False), jnp.asarray(True)
-    code = lambda events, **flags: int(
-        ending_code(events, **dict(done=no, out_of_steps=no, timed_out=no) | flags)
-    )
-    assert code({}) == Ending.SOLVER_FAILED
-    assert code({}, done=yes) == Ending.WALKING
-    assert code({}, out_of_steps=yes) == Ending.OUT_OF_STEPS
-    assert code({}, timed_out=yes, out_of_steps=yes) == Ending.TIMED_OUT
-    assert code({Ending.STUMBLED: yes, Ending.STOPPED: no}, done=yes) == Ending.STUMBLED

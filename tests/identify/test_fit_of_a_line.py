@@ -1,14 +1,12 @@
 """Fits of linear models, against their estimates and errors in closed form."""
 
 import dataclasses
-from types import SimpleNamespace
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.identify import _fit_gait, _predicted_gait
+from jaxbiped.identify import _fit_gait
 from jaxbiped.identify._interval_end import interval_end
 from jaxbiped.identify._predicted_gait import Prediction, predict
 from tests.mechanisms import scene_of
@@ -303,45 +301,33 @@ def test_without_a_gait_nothing_is_fitted(predicts):
     assert fit.evaluations == 9  # the start, and others about it
 
 
-def found_gait(scene):
-    """A gait whose period is 3 slope + J, and what else is asked of it."""
-    slope, inertia = (float(jb.parameter_values(scene)[name]) for name in ("slope", "J"))
-    measures = SimpleNamespace(
-        period=3.0 * slope + inertia, step_length=slope**2, state=(jnp.asarray(slope),)
-    )
-    slopes = SimpleNamespace(
-        period=np.array([1.0, 3.0]), step_length=np.array([0.0, 2.0 * slope]),
-        state=(np.array([0.0, 1.0]),),
-    )  # fmt: skip
-    errors = SimpleNamespace(period=np.array([0.1, 0.3]), step_length=np.array([0.0, 0.2]))
-    return SimpleNamespace(
-        measures=measures, sensitivities=slopes, sensitivity_errors=errors,
-        outcome=jb.gait.Search.FOUND, sound=True,
-    )  # fmt: skip
-
-
-def test_a_prediction_is_of_the_conditions_in_units_of_the_parameters(monkeypatch):
-    asked = []
-
-    def find(scene, guess, **how):
-        asked.append((guess, how))
-        return found_gait(scene)
-
-    monkeypatch.setattr(_predicted_gait, "find_gait", find)
+def test_a_prediction_is_of_the_conditions_in_units_of_the_parameters():
+    """Those of a gait that is searched under them, to the last bit."""
     seen = jb.identify.MeasuredGait(
         {"step_length": (0.1, 0.01), "period": (0.5, 0.01)}, conditions={"slope": 0.05}, footsteps=2
     )
     values, sizes = {"J": 0.02, "d": 0.1}, np.array([0.02, 10.0])
     found = predict(SCENE, seen, values, sizes, None, accuracy="tight", engine="lanes")
-    np.testing.assert_allclose(found.values, [0.05**2, 3.0 * 0.05 + 0.02])
-    np.testing.assert_allclose(found.slopes, [[0.0, 1.0], [0.02, 30.0]])
-    np.testing.assert_allclose(found.slope_errors, [[0.0, 2.0], [0.002, 3.0]])
-    moved = found.state_at(np.array([0.5, 0.25]))
-    assert float(moved[0]) == pytest.approx(0.05 + 0.25 * 10.0)
-    ((guess, how),) = asked
-    assert guess is None
-    assert (how["footsteps"], how["accuracy"], how["engine"]) == (2, "tight", "lanes")
-    assert how["parameters"] == ("J", "d")
+    gait = jb.find_gait(
+        jb.with_parameters(SCENE, {**values, "slope": 0.05}),
+        footsteps=2,
+        parameters=("J", "d"),
+        accuracy="tight",
+        radius_sensitivities=False,
+        engine="lanes",
+    )
+    assert found.found
+    np.testing.assert_array_equal(found.values, [gait.measures.step_length, gait.measures.period])
+    for ours, slopes in (
+        (found.slopes, gait.sensitivities),
+        (found.slope_errors, gait.sensitivity_errors),
+    ):
+        np.testing.assert_array_equal(ours, np.stack([slopes.step_length, slopes.period]) * sizes)
+    moved, along = found.state_at(np.array([0.5, 0.25])), np.array([0.5 * 0.02, 0.25 * 10.0])
+    for ours, state, slope in zip(
+        moved, gait.measures.state, gait.sensitivities.state, strict=True
+    ):
+        assert float(ours) == pytest.approx(float(state) + float(slope @ along), rel=1e-12)
 
 
 def test_weights_are_those_of_every_number():

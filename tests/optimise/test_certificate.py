@@ -1,10 +1,11 @@
 """Certificate of an optimum: each of its parts against what it stands for."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.optimise import _certificate
 
 pytestmark = pytest.mark.slow
 RIGID = jb.ladder()["rigid"]
@@ -17,24 +18,11 @@ def best():
     )
 
 
-def test_a_stable_gait_is_certified(best, capsys, monkeypatch, stages_at_once):
-    named, stage = [], _certificate.stage
-
-    def noting(doing, **how):
-        named.append(doing)
-        return stage(doing, **how)
-
-    monkeypatch.setattr(_certificate, "stage", noting)
+def test_a_stable_gait_is_certified(best, capsys, stages_at_once):
     found = jb.optimise.certify(
         best, starts=256, footsteps=50, bifurcations_along=(), progress=True
     )
-    assert named == [
-        "certifying the optimum",
-        "gait sensitivity norm",
-        "gaits that starts may come to",
-        "basin of 256 starts",
-        "walk of 50 footsteps",
-    ]
+    assert found.failed == {}
     assert "certifying the optimum: 4 of 4 parts" in capsys.readouterr().err
     own = jb.find_gait(RIGID, parameters=(), radius_sensitivities=False)
     assert found.stable is True
@@ -63,6 +51,24 @@ def test_the_fatal_push_is_that_of_labels(best):
     assert ends[0] is jb.basins.Label.WALKING
     assert ends[1] is not jb.basins.Label.WALKING
     assert found.basin is None
+
+
+def test_parts_fail_by_themselves_and_under_their_names(best):
+    """Another walker's state fits none of them; so many starts fit no memory."""
+    measures = best.gait.measures._replace(state=jb.seed_state())
+    other = dataclasses.replace(best, gait=dataclasses.replace(best.gait, measures=measures))
+    found = jb.optimise.certify(other, starts=256, footsteps=50)
+    assert list(found.failed) == [
+        "gait sensitivity norm",
+        "gaits that starts may come to",
+        "walk of 50 footsteps",
+        "nearest bifurcation along slope",
+    ]
+    assert found.stable is True
+    assert found.failed["walk of 50 footsteps"].startswith("ArgumentError: state = a State is not")
+    found = jb.optimise.certify(best, starts=10**15, footsteps=0, bifurcations_along=())
+    assert list(found.failed) == ["basin of 1000000000000000 starts"]
+    assert np.isfinite(found.sensitivity_norm[0])
 
 
 def test_an_unstable_gait_does_not_return():

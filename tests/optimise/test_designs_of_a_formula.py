@@ -1,5 +1,6 @@
 """Designs whose measures are formulas, against optima, costs and norms in closed form."""
 
+import json
 from types import SimpleNamespace
 
 import jax
@@ -27,7 +28,7 @@ from jaxbiped.optimise._design_gaits import (
 from jaxbiped.optimise._design_problem import scale_of
 from jaxbiped.optimise._jacobian_functionals import entry_weights, leading_multipliers
 from jaxbiped.optimise._local_model import Local
-from jaxbiped.optimise._objective_values import _cost_of_transport, _root_of_squares
+from jaxbiped.optimise._objective_values import Evaluations, _cost_of_transport, _root_of_squares
 from jaxbiped.optimise._optimality import optimality_of
 from jaxbiped.optimise._optimisers import _damped_update
 from tests.optimise.drawn_designs import (
@@ -422,3 +423,16 @@ def test_a_part_of_a_certificate_fails_by_itself():
 def test_a_bound_of_either_sign_has_a_size(bound, size):
     """Else what exceeds a bound below zero would be told to keep it."""
     assert scale_of(bound) == size
+
+
+def test_what_is_not_finite_comes_back_from_a_store(tmp_path):
+    some = Evaluation(
+        {"speed": 1.0}, {"speed": np.inf}, {"speed": np.array([np.nan, 1.0])},
+        {"speed": np.array([-np.inf, 1.0])}, np.array([0.5]), np.array([[np.nan]]),
+    )  # fmt: skip
+    for _ in range(2):  # as two runs that begin it together
+        Evaluations(tmp_path / "a", {"of": 1}).add(np.array([0.25]), some)
+    for line in (tmp_path / "a").read_text().splitlines():
+        json.loads(line, parse_constant=pytest.fail)
+    kept = Evaluations(tmp_path / "a", {"of": 1}).get(np.array([0.25]))
+    jax.tree.map(np.testing.assert_array_equal, kept, some)

@@ -1,7 +1,6 @@
 """Optimisation of a gait: against a grid, through lost gaits, resumed, interrupted; bad inputs."""
 
 import dataclasses
-import json
 
 import jax.tree_util as jtu
 import numpy as np
@@ -9,11 +8,6 @@ import optax
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.optimise import Evaluation
-from jaxbiped.optimise._design_gaits import GaitSettings
-from jaxbiped.optimise._design_problem import DesignProblem
-from jaxbiped.optimise._objective_values import Evaluations
-from jaxbiped.optimise._optimise_gait import _problem_settings
 from tests.cli.commands import interrupt_after
 
 pytestmark = pytest.mark.slow
@@ -93,22 +87,30 @@ def test_an_equality_is_kept():
     assert best.known.values["step_length"] == pytest.approx(0.19, rel=1e-6)
 
 
-def test_a_lost_gait_turns_the_search_back(monkeypatch):
-    """As if no gait existed beyond d = 0.09: the best one with a gait is found."""
-    plain = DesignProblem.at
+@pytest.mark.parametrize("optimiser", ["trust-region", "slsqp"])
+def test_a_lost_gait_turns_the_search_back(optimiser):
+    """On the steepest of these slopes no search finds a gait, on gentler ones the best lies."""
+    steep = {"vary": {"slope": (0.01, 1.4)}, "maximise": "peak_normal"}
+    best = best_of(optimiser=optimiser, **steep)
+    assert best.lost > 0
+    assert best.outcome is jb.optimise.Outcome.CONVERGED
+    assert best.objective > best.history[0].objective
+    for share in (0.998, 1.002):
+        beside = jb.with_parameters(RIGID, {"slope": share * best.variables["slope"]})
+        how = dict(parameters=(), radius_sensitivities=False)
+        other = jb.find_gait(beside, best.gait.measures.state, **how)
+        assert other.outcome is jb.gait.Search.FOUND
+        assert float(other.measures.peak_normal) < best.objective
 
-    def at(problem, u):
-        if problem.variables.by_name(np.clip(u, 0.0, 1.0))["d"] < 0.09:
-            problem.lost += 1
-            return None
-        return plain(problem, u)
 
-    monkeypatch.setattr(DesignProblem, "at", at)
-    for name in ("trust-region", "slsqp"):
-        best = best_of(vary={"d": (0.08, 0.12)}, optimiser=name)
-        assert best.lost > 0, name
-        assert best.variables["d"] >= 0.09
-        assert best.objective >= best.history[0].objective
+def test_where_no_gait_exists_the_last_one_before_is_the_best():
+    """Level ground gives a passive walker no energy: the slowest gait is on the least slope."""
+    slow = {"vary": {"slope": (-0.01, 0.03)}, "maximise": None, "minimise": "speed"}
+    best = best_of(iterations=20, **slow)
+    assert best.lost > 0
+    assert 0.0 < best.variables["slope"] < 1e-3
+    assert best.gait.outcome is jb.gait.Search.FOUND
+    assert best.objective == pytest.approx(float(best.gait.measures.speed), rel=1e-6)
 
 
 def test_a_gait_without_a_fold_is_no_lost_gait(tmp_path):
@@ -119,13 +121,16 @@ def test_a_gait_without_a_fold_is_no_lost_gait(tmp_path):
     assert bound.known.beyond_range == ("fold_distance",)
     assert bound.objective > bound.history[0].objective
     assert all(each.beyond_range == ("fold_distance",) for each in bound.history)
-    path = tmp_path / "runs.jsonl"
+    path, runs = tmp_path / "runs.jsonl", []
     for _ in range(2):  # the second time as kept in the store
         best = best_of(maximise="fold_distance", store=path, **options)
+        runs.append(best)
         assert best.outcome is jb.optimise.Outcome.BEYOND_RANGE
         assert str(best.outcome) == "beyond range"
         assert best.message.endswith("fold_distance: none from 0.0025 to 0.16 rad.")
         assert best.known.beyond_range == ("fold_distance",)
+    first, again = (best.known for best in runs)
+    jtu.tree_map(np.testing.assert_array_equal, again, first)
 
 
 def test_restarts_are_searched_as_one_batch():
@@ -173,32 +178,18 @@ def test_a_store_is_of_the_laws_and_rules_of_its_scene(tmp_path):
         jb.with_parameters(seed, {"mu_static": 0.51}),
     )
 
-    def settings(scene):
-        return _problem_settings(scene, {"d": (0.08, 0.12)}, {"speed"}, GaitSettings(), None)
+    def begin(scene):
+        path, vary = tmp_path / "a", {"d": (0.08, 0.12)}
+        return jb.optimise_gait(scene, vary=vary, maximise="speed", iterations=1, store=path)
 
-    Evaluations(tmp_path / "a", settings(seed))
-    # What is varied takes other values in every design.
-    Evaluations(tmp_path / "a", settings(jb.with_parameters(seed, {"d": 0.11})))
+    begin(seed)
     for other in others:
         with pytest.raises(jb.ArgumentError, match="another problem"):
-            Evaluations(tmp_path / "a", settings(other))
-
-
-def test_what_is_not_finite_comes_back_from_a_store(tmp_path):
-    some = Evaluation(
-        {"speed": 1.0}, {"speed": np.inf}, {"speed": np.array([np.nan, 1.0])},
-        {"speed": np.array([-np.inf, 1.0])}, np.array([0.5]), np.array([[np.nan]]),
-    )  # fmt: skip
-    for _ in range(2):  # as two runs that begin it together
-        Evaluations(tmp_path / "a", {"of": 1}).add(np.array([0.25]), some)
-
-    def refuse(word):
-        raise AssertionError(word)
-
-    for line in (tmp_path / "a").read_text().splitlines():
-        json.loads(line, parse_constant=refuse)
-    kept = Evaluations(tmp_path / "a", {"of": 1}).get(np.array([0.25]))
-    jtu.tree_map(np.testing.assert_array_equal, kept, some)
+            begin(other)
+    # What is varied takes other values in every design.
+    known = len((tmp_path / "a").read_text().splitlines())
+    begin(jb.with_parameters(seed, {"d": 0.11}))
+    assert len((tmp_path / "a").read_text().splitlines()) > known
 
 
 @pytest.mark.nightly

@@ -170,7 +170,11 @@ def test_derivatives_of_a_rigid_walk(how):
 
 
 @pytest.mark.parametrize(
-    ("name", "draft"), [("kelvin-voigt", (5e-4, 3e-3)), ("tsuji", (2e-4, 3e-4))]
+    ("name", "draft"),
+    [
+        pytest.param("kelvin-voigt", (5e-4, 3e-3), marks=pytest.mark.nightly),
+        ("tsuji", (2e-4, 3e-4)),
+    ],
 )
 def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name, draft):
     """Medians and largest errors over starts, for single ones vary tenfold with where steps fall.

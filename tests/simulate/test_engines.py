@@ -192,10 +192,11 @@ def test_lanes_compute_in_64_bits():
 
 def test_auto_leaves_to_xla_what_lanes_cannot_express():
     scene = eqx.tree_at(lambda s: s.friction, SEED, ErrorFunction(mu=0.5))
-    walk = _end(START, "auto", scene, duration=1e-3, save="steps")
+    how = dict(duration=1e-5, save="steps", solver="euler", dt=1e-6)
+    walk = _end(START, "auto", scene, **how)
     assert (walk.engine, walk.outcome) == ("xla", jb.Ending.WALKING)
     with pytest.raises(jb.ArgumentError, match="'erf'"):
-        _end(START, "lanes", scene, duration=1e-3)
+        _end(START, "lanes", scene, **how)
 
 
 def test_memory_is_asked_for_by_the_steps_taken():

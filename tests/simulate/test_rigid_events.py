@@ -23,7 +23,7 @@ WALKERS = {
     "spring": (SEED, 0.02, SPRING, {"torques": lambda y: 3.0 * (y[[1, 0]] - y[:2])}),
     "push-off": (SEED, 0.0, PUSH, {"push_off": 0.15}),
 }  # fmt: skip
-FOOTSTEPS = 3
+FOOTSTEPS, NIGHTLY = 3, [pytest.mark.nightly]
 
 
 def _scene(name):
@@ -54,7 +54,13 @@ def _walker_of(scene, duration):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", WALKERS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[] if name in ("seed", "point feet", "push-off") else NIGHTLY)
+        for name in WALKERS
+    ],
+)
 def test_strikes_and_falls_are_those_of_small_steps(name):
     scene = _scene(name)
     unit = float(np.sqrt(scene.walker.l / scene.ground.g))

@@ -128,7 +128,7 @@ def test_both_engines_arrive_alike():
 
 
 @pytest.mark.parametrize(
-    ("engine", "most"), [("lanes", 1e-9), pytest.param("xla", 1e-6, marks=pytest.mark.slow)]
+    ("engine", "most"), [("lanes", 1e-9), pytest.param("xla", 1e-6, marks=pytest.mark.nightly)]
 )
 def test_steps_are_saved_under_jit_and_vmap_as_without(engine, most):
     scene, state, duration = SCENES["round feet"]

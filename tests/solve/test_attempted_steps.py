@@ -7,6 +7,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from jaxbiped import Ending
+from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._stance_motion import rolling_rates
 from jaxbiped.solve import _rigid_steps
 from jaxbiped.solve._rigid_steps import (
@@ -21,11 +22,22 @@ from jaxbiped.solve._rigid_steps import (
     initial_progress,
     with_next_step,
 )
-from jaxbiped.solve._rolling_step import DOPRI8, ModeEvents, StepOnto, SurfaceCourse
+from jaxbiped.solve._rolling_step import (
+    DOPRI8,
+    ModeEvents,
+    StepOnto,
+    SurfaceCourse,
+    course_of,
+    root_place,
+)
+from tests.dynamics.test_mode_changes import mode_of
+from tests.dynamics.test_modes import HEEL_TOE, in_mode, loads_of_feet
+from tests.dynamics.test_rolling_mechanisms import rigid
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.solve.test_step_events import AHEAD, FALLS, STEP, TIPS, ends_of, of_controls
 
 RTOL, DURATION = 1e-6, 2.5
+TOLERANT = 1e-3
 YES, NO = True, False
 STANDS = [0.3] * 6
 DIPS = [0.2, 0.1, -1e-3, 0.1, 0.1, 0.2]
@@ -330,38 +342,66 @@ def test_the_next_strike_is_due_where_two_footsteps_lasted_alike(before, closing
     np.testing.assert_array_equal(told.state, other)
 
 
+FLAT = rigid(HEEL_TOE)
+BOTH = FLAT.state(theta_leg_1=-0.3)
+"""A flat foot that stands."""
+UNLOADED = "heel all but unloaded"
+COMES = "toe all but down"
+
+
+@pytest.fixture(scope="module")
+def beside():
+    """A heel whose load is 5e-7 of the weight, and a toe that falls from 6e-4 of the height."""
+    least = 0.5e-3 * TOLERANT * float(FLAT.mechanism.total_mass * FLAT.ground.g)
+
+    def turning(rate):
+        return in_mode(FLAT, BOTH._replace(omega_leg_2=rate), (), (True, True))
+
+    heavy, light = -2.0, -5.0
+    while light < (middle := 0.5 * (heavy + light)) < heavy:
+        load = float(loads_of_feet(FLAT, turning(middle))[0])
+        heavy, light = (middle, light) if load > least else (heavy, middle)
+    tipped = BOTH._replace(theta_foot_2=2e-3, omega_foot_2=-1.0)
+    return {UNLOADED: turning(heavy), COMES: in_mode(FLAT, tipped, (), (True, False))}
+
+
+after_change, surfaces_of = host_jit()(_rigid_steps._after_change), host_jit()(course_of)
+
+
 @pytest.mark.parametrize(("struck", "changed", "event"), [(NO, NO, 0), (YES, NO, 1), (NO, YES, 3)])
+@pytest.mark.parametrize(("name", "stands"), [(UNLOADED, (NO, YES)), (COMES, (YES, YES))])
 def test_a_change_of_mode_is_noted_with_its_time_and_its_first_step(
-    monkeypatch, struck, changed, event
+    beside, name, stands, struck, changed, event
 ):
-    """Of the second surface. The place moves with that of the foot that stands then."""
-
-    def in_the_mode(scene, state, slack, load_slack):
-        tolerances = state.omega_1 + slack / RTOL, state.omega_2 + load_slack / (1e-3 * RTOL)
-        leg = state.theta_1 + 0.5
-        return state._replace(theta_1=leg, omega_1=tolerances[0], omega_2=tolerances[1])
-
-    seen = course()._replace(values=jnp.array([3.0, 4.0]))
-    monkeypatch.setattr(_rigid_steps, "change_mode", in_the_mode)
-    monkeypatch.setattr(_rigid_steps, "course_of", lambda scene, state: seen)
-    monkeypatch.setattr(_rigid_steps, "root_place", lambda walk, state: state.theta_1)
-    state = simplest_state(*STABLE)
-    there = onto_of(jax.tree.map(lambda leaf: leaf + 0.25, state), rest=1e-3)
-    modes = modes_of(2, behind=1)._replace(changed=changed)
-    trial = progress(state, (), modes, landing=4, struck=struck, pace=0.7)
-    told = _rigid_steps._after_change(walk_for(), trial, there, course())
+    """Of the second surface; where the other end of the foot stands the hip stays in its place."""
+    at = jax.tree.map(jnp.asarray, beside[name])
+    surfaces = jax.tree.map(jnp.zeros_like, surfaces_of(FLAT, at))
+    modes = ModeProgress(
+        surfaces, 2, changed, 1, jnp.array([1.7, 1.9, 0.0, 0.0]), 0.1 * jnp.arange(1.0, 6.0), 1
+    )
+    elsewhere = at._replace(hip_x=at.hip_x + 0.25)
+    trial = progress(elsewhere, (), modes, landing=4, struck=struck, pace=0.7)
+    how = 2.5, 4.0, TOLERANT, 100.0
+    walk, there = RigidWalk(FLAT, at, *map(jnp.asarray, how)), onto_of(at, rest=1e-3)
+    told = after_change(walk, trial, there, surfaces)
     assert float(told.t) == pytest.approx(2.001 if changed else 2.0)
-    moved = np.add(there.state, [-0.5, 0.5, 0.0, 1.0, 1.0])
-    np.testing.assert_allclose(told.state, moved if changed else state, atol=1e-15)
+    if changed:
+        assert tuple(mode_of(FLAT, told.state)[0]) == stands
+        places = [float(each[0] + root_place(FLAT, each)) for each in (told.state, at)]
+        assert places[0] == pytest.approx(places[1], abs=1e-15)
+    else:
+        np.testing.assert_array_equal(told.state, elsewhere)
     assert int(told.landing) == (0 if changed else 4)
-    assert float(told.pace) == ([0.7, 0.1, 0.2, 0.3][event])
+    assert float(told.pace) == pytest.approx([0.7, 0.1, 0.2, 0.3][event])
     after = told.modes
     assert int(after.changing) == (0 if changed else 2)
     assert int(after.behind) == (event or 1)
-    np.testing.assert_allclose(after.met, [1.7, 2.001 if changed else 1.9])
-    np.testing.assert_array_equal(after.course.values, seen.values if event else [0.0, 0.0])
-    unknown = trial._replace(modes=trial.modes._replace(paces=jnp.zeros(3)))
-    told = _rigid_steps._after_change(walk_for(), unknown, there, course())
+    np.testing.assert_allclose(after.met, [1.7, 2.001 if changed else 1.9, 0.0, 0.0])
+    seen = surfaces_of(FLAT, told.state) if event else surfaces
+    np.testing.assert_allclose(after.course.values, seen.values, rtol=1e-12)
+    np.testing.assert_allclose(after.course.rates, seen.rates, rtol=1e-12)
+    unknown = trial._replace(modes=trial.modes._replace(paces=jnp.zeros(5)))
+    told = after_change(walk, unknown, there, surfaces)
     assert float(told.pace) == 0.7
 
 

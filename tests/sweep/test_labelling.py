@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.compiler import XLA
+from jaxbiped.compiler import BY_NAME, XLA
 from tests.rigid_walkers import FIRST_DOUBLING, STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, rows, same, simplest_grid, stacked
 
@@ -147,9 +147,17 @@ def test_a_lone_start_is_labelled_as_in_any_batch(seed, simplest, monkeypatch):
         monkeypatch.delenv("JAXBIPED_THREADS")
 
 
-def test_both_engines_give_the_same_labels(simplest, monkeypatch, no_disk_cache):
-    monkeypatch.setattr(XLA, "slots", 24)
-    effort = simplest.effort._replace(engine="xla")
+@pytest.fixture
+def few_slots():
+    """The name of an engine like XLA's that follows 24 simulations at once."""
+    name = "xla with few slots"
+    BY_NAME[name] = type(XLA)(slots=24)
+    yield name
+    del BY_NAME[name]
+
+
+def test_both_engines_give_the_same_labels(simplest, few_slots):
+    effort = simplest.effort._replace(engine=few_slots)
     # More starts than slots, so that slots are filled anew.
     states = simplest_grid(simplest.scene, 7).batch(simplest, 0, 49).states
     states = states._replace(theta_2=np.where(np.arange(49) == 11, np.nan, states.theta_2))

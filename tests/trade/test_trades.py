@@ -90,9 +90,10 @@ def test_errors_of_a_rigid_gait_shrink_with_the_tolerance():
 
 
 def test_no_gait_no_truth():
-    scene = jb.seed_scene(slope=-0.2)
-    assert GaitTrade(scene).parameters == ("K", "c", "xi")
-    assert GaitTrade(scene).truth() is None
+    """Uphill nothing walks; on rigid feet the search is over soonest."""
+    assert GaitTrade(jb.seed_scene(slope=-0.2)).parameters == ("K", "c", "xi")
+    uphill = jb.with_parameters(jb.ladder()["rigid"], {"slope": -0.2})
+    assert GaitTrade(uphill).truth() is None
 
 
 @pytest.mark.nightly

@@ -12,6 +12,7 @@ import jaxbiped as jb
 from jaxbiped import Ending
 from jaxbiped.dynamics import vector_field
 from jaxbiped.hybrid import switches
+from jaxbiped.hybrid._endings import ending_code
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.solvers import Rodas4, Rodas5P
 from jaxbiped.variational._solve_to_section import (
@@ -286,3 +287,14 @@ def test_columns_that_a_graze_left_undetermined_cost_no_steps():
     assert np.isnan(lost.columns[0]).all()
     np.testing.assert_allclose(lost.columns[1], plain.columns[1], rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(lost.state, plain.state, atol=1e-6)
+
+
+def test_codes_put_failures_before_what_only_ran_out():
+    code = lambda events, **flags: int(
+        ending_code(events, **dict(done=NO, out_of_steps=NO, timed_out=NO) | flags)
+    )
+    assert code({}) == Ending.SOLVER_FAILED
+    assert code({}, done=YES) == Ending.WALKING
+    assert code({}, out_of_steps=YES) == Ending.OUT_OF_STEPS
+    assert code({}, timed_out=YES, out_of_steps=YES) == Ending.TIMED_OUT
+    assert code({Ending.STUMBLED: YES, Ending.STOPPED: NO}, done=YES) == Ending.STUMBLED

@@ -73,7 +73,12 @@ def value_and_derivatives(function, depths, transform=jax.jacfwd):
 
 @pytest.mark.parametrize(
     ("engine", "mode"),
-    [("lanes", "forward"), ("xla", "forward"), ("lanes", "reverse"), ("xla", "reverse")],
+    [
+        ("lanes", "forward"),
+        ("lanes", "reverse"),
+        pytest.param("xla", "forward", marks=pytest.mark.nightly),
+        pytest.param("xla", "reverse", marks=pytest.mark.nightly),
+    ],
 )
 def test_contacts_between_two_steps_are_felt_or_told(engine, mode):
     gradient = jb.gait.Forward() if mode == "forward" else jb.gait.Reverse()

@@ -47,7 +47,9 @@ def test_sensitivities_equal_differences(gait, name):
     assert ours == pytest.approx(expected, rel=1e-4)
 
 
-@pytest.mark.parametrize("law", ["kelvin-voigt", "tsuji", "kuwabara-kono"])
+@pytest.mark.parametrize(
+    "law", ["kelvin-voigt", "kuwabara-kono", pytest.param("tsuji", marks=pytest.mark.nightly)]
+)
 def test_sensitivities_of_the_radius_are_differences_of_gaits(law):
     """Also where the force is infinitely steep at touchdown."""
     normal = jb.laws.normal_law_like(law, K=1e6, c=1e7, n=1.5, mass=2.0)

@@ -1,5 +1,7 @@
 """Host compilation, against XLA: what NumPy runs, what is left, what another process finds."""
 
+import os
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,7 +9,6 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.compiler import host_jit
-from jaxbiped.compiler.host_code import _host_jit
 
 
 @host_jit()
@@ -22,6 +23,11 @@ def _doubled(x, on_host):
 
 
 @host_jit()
+def _doubled_for_users(x):
+    return 2.0 * x
+
+
+@host_jit()
 def _error_function(x):
     return jax.lax.erf(x)
 
@@ -30,20 +36,12 @@ def _rigid_gait():
     return jb.find_gait(jb.ladder()["rigid"], parameters=(), radius_sensitivities=False)
 
 
-def _refuse(*_):
-    raise AssertionError("compiled, or written again")
-
-
-@pytest.fixture
-def converted(monkeypatch):
-    """Results become arrays of JAX without the one program that all functions share for it."""
-    monkeypatch.setattr(_host_jit, "_of_jax", lambda arrays: list(map(jnp.asarray, arrays)))
-
-
-@pytest.mark.usefixtures("converted")
-def test_numpy_runs_it(monkeypatch):
-    monkeypatch.setattr(type(_root._jitted), "__call__", _refuse)
+def test_numpy_runs_it(made_by_xla):
+    """XLA makes the one program by which all functions convert a result of that shape."""
+    assert isinstance(_doubled_for_users(np.ones(2)), jax.Array)
+    made_by_xla()
     found = _root(np.array([4.0, 2.0]))
+    assert made_by_xla() == []
     assert isinstance(found, jax.Array)
     np.testing.assert_allclose(found, [2.0, np.sqrt(2.0)], rtol=1e-15)
 
@@ -56,10 +54,11 @@ def test_traced_it_is_xlas():
     assert "scan" in str(jax.make_jaxpr(_root)(jnp.asarray(4.0)))
 
 
-def test_only_where_it_pays(monkeypatch):
+def test_only_where_it_pays(made_by_xla):
     assert isinstance(_doubled(np.ones(2), False), jax.Array)
-    monkeypatch.setattr(type(_doubled._jitted), "__call__", _refuse)
+    made_by_xla()
     assert isinstance(_doubled(np.ones(2), True), np.ndarray)
+    assert made_by_xla() == []
 
 
 def test_what_numpy_lacks_is_compiled():
@@ -71,20 +70,23 @@ def test_shapes_are_known_before_it_runs():
     assert _error_function.begin(np.ones(3)).result.shape == (3,)
 
 
-@pytest.mark.usefixtures("converted")
-def test_kept_for_the_next_process(monkeypatch, tmp_path, xla_refuses):
-    """A gait search, whose host programs hold programs of lanes; XLA compiles none of it."""
-    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path))
-    xla_refuses()
-
+def test_kept_for_the_next_process(monkeypatch, tmp_path, made_by_xla):
+    """A gait search, whose host programs hold programs of lanes; XLA converts their results."""
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path / "cache"))
     jb.clear_caches()
     first = _rigid_gait()
     # The start, the search and what is told of the gait.
-    assert len(list((tmp_path / "host").iterdir())) == 3
+    written = list((tmp_path / "cache" / "host").iterdir())
+    assert len(written) == 3
+    assert made_by_xla().count("backend_compile_duration") <= 3
+    for path in written:
+        os.link(path, tmp_path / path.name)
     jb.clear_caches()
 
-    monkeypatch.setattr(_host_jit, "write_host_program", _refuse)
     second = _rigid_gait()
+    assert made_by_xla() == []
+    # What is written again is a new file.
+    assert all(path.samefile(tmp_path / path.name) for path in written)
     for a, b in zip(jax.tree.leaves(first), jax.tree.leaves(second), strict=True):
         np.testing.assert_array_equal(a, b)
     jb.clear_caches()

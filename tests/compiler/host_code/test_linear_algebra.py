@@ -4,9 +4,24 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.custom_batching import sequential_vmap
 
-from jaxbiped.linalg._small_matrices import eigenpairs, eigensystem, solve
 from tests.compiler.host_code.host_runs import check_against_xla
+
+solve = sequential_vmap(jnp.linalg.solve)
+
+
+@sequential_vmap
+def eigensystem(matrix):
+    """Eigenvalues, right vectors (columns) and left ones (rows), wᵀ v = 1 in pairs."""
+    values, left, right = jax.lax.linalg.eig(matrix)
+    left = jnp.conj(left)
+    return values, right, (left / jnp.sum(left * right, axis=0)).T
+
+
+def eigenpairs(matrix):
+    return jax.lax.linalg.eig(matrix, compute_left_eigenvectors=False)
+
 
 GENERATOR = np.random.default_rng(3)
 A, B, C = (GENERATOR.normal(size=shape) for shape in ((5, 5), (5, 3), (4, 5, 5)))

@@ -1,6 +1,7 @@
 """Compiled code on disk, against compiling it again; damage is `test_disk_cache.py`'s."""
 
-import weakref
+import gc
+import os
 
 import jax.numpy as jnp
 import numpy as np
@@ -15,23 +16,26 @@ POINTS = np.linspace(-1.0, 1.0, 5)
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path))
-    monkeypatch.setattr(_machine_code, "_LOADED", weakref.WeakValueDictionary())
-    return tmp_path / "lanes"
+    monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "lanes"
 
 
 def _run(scale=3.0):
-    _machine_code._LOADED.clear()
+    gc.collect()  # code goes with its program
     program = compiled(lambda x: jnp.exp(x) * scale, ())
     np.testing.assert_allclose(program.run([POINTS]).outputs, np.exp(POINTS) * scale)
 
 
-def test_compiled_code_is_stored_once_and_read_again(cache, monkeypatch):
+def test_compiled_code_is_stored_once_and_read_again(cache, tmp_path):
+    """What is compiled is written into a new file, and what is read is younger than it was."""
     _run()
     (stored,) = cache.iterdir()
-    monkeypatch.setattr(_machine_code, "_module", None)  # compiling would fail now
+    os.link(stored, tmp_path / "first")
+    os.utime(stored, (0.0, 0.0))
     _run()
     assert list(cache.iterdir()) == [stored]
+    assert stored.samefile(tmp_path / "first")
+    assert stored.stat().st_mtime > 0.0
 
 
 def test_other_programs_have_code_of_their_own(cache):

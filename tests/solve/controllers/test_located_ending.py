@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface, fall_height
+from jaxbiped.hybrid._endings import (
+    WATCHES,
+    ending_events,
+    ending_surface,
+    fall_height,
+)
 from jaxbiped.hybrid._scales import units_of
 from jaxbiped.solve.controllers._event_steps import LocatedEnding
 from jaxbiped.solve.controllers._step_size import ErrorControl
