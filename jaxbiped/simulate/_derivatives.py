@@ -26,7 +26,6 @@ from jaxbiped.compiler import CUDA, host_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._stance_motion import rolling_field
 from jaxbiped.dynamics._surfaces import opening, uprightness
-from jaxbiped.hybrid._rigid_guards import mode_switches
 from jaxbiped.hybrid._scales import units_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
@@ -51,8 +50,6 @@ from jaxbiped.variational._variational_solve import (
 _EARLY, _LEFT = 3.0, 1e-2
 """How long before an event the motion is first followed, in tolerances times the unit of time, and
 the share of that which is left in the end: behind a touchdown derivatives change in nanoseconds."""
-_ROLLING = Watch(field=rolling_field, switches=mode_switches)
-_IN_MODES = Watch(field=rolling_field, switches=mode_switches, reset=Rolling().reset_at_switch)
 _Run = TypeVar("_Run")
 _STILL = object()
 """Tangent of what is known."""
@@ -113,7 +110,8 @@ def slopes_of(
     at = TangentsAtTimes(there, jnp.zeros((len(t), 0, len(there))))
     time = jnp.zeros((len(t), 0))
     if places or active:
-        how, engine = motion_solve(_watch_of(system), solver, rtol), CUDA if device else None
+        watch = Watch.of(system, resets=system.resets)
+        how, engine = motion_solve(watch, solver, rtol), CUDA if device else None
         start, seeded = seeded_directions(scene, state, places, active)
         early = _EARLY * rtol * units_of(scene, state).time
         at = tangents_at_times(how, start, seeded, jnp.where(by_clock, t, t - early), engine)
@@ -137,19 +135,6 @@ def slopes_of(
         state=jnp.where(reached[..., None], columns, 0.0),
         clock=by_clock.astype(t.dtype),
         rates=jnp.where(reached, rates, 0.0),
-    )
-
-
-def _watch_of(system: AbstractSystem) -> Watch:
-    """What derivatives are followed with, up to the times at which the plain solve saved."""
-    if not system.resets:
-        return Watch(system.vector_field, system.switches, time_unit=system.time_unit)
-    return Watch(
-        system.vector_field,
-        system.switches,
-        reset=system.reset_at_switch,
-        repeats=system.repeats,
-        time_unit=system.time_unit,
     )
 
 
@@ -249,7 +234,7 @@ def rigid_slopes_of(
     """
     scene, state = in_64_bits((walk.scene, walk.state))
     start, seeded = seeded_directions(scene, state, places, active)
-    watch = _IN_MODES if hasattr(state, "mode") else _ROLLING
+    watch = Watch.of(Rolling(), resets=hasattr(state, "mode"))
     how = motion_solve(watch, Rodas5P(), walk.rtol)
     unit = jnp.sqrt(scene.mechanism.height / scene.ground.g)
     n = len(places) + len(active)

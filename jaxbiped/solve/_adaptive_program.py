@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import diffrax
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
@@ -23,9 +22,9 @@ from jaxbiped.compiler import Program, without_barriers
 from jaxbiped.hybrid._endings import ending_code
 from jaxbiped.hybrid._scales import Units
 from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.solve._gathering import Gathering
 from jaxbiped.solve._recorders import AbstractRecorder, LastStep, Moment, Step
 from jaxbiped.solve._stepper import Stepper, Tolerance
+from jaxbiped.solve._switch_resets import Gathering, reset_at_switch
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._event_steps import (
     FootstepLimit,
@@ -181,7 +180,10 @@ class AdaptiveSolve:
         state, resets = select(keep, y1, now.state), now.resets
         ends = [state]  # and behind a reset
         if resets is not None:
-            t, state, resets = self._reset(solve, keep, control, t, state, resets)
+            passed = self._landed(control), keep
+            t, state, _, resets = reset_at_switch(
+                self._switches, solve.scene, *passed, t, state, (), resets
+            )
             dense, ends = (*dense, y1), [*ends, state]
         counted = jnp.asarray(result != diffrax.RESULTS.successful)
         memory = now.memory
@@ -235,33 +237,15 @@ class AdaptiveSolve:
             return solved
         return self.recorder.finish(solve, now.memory, solved, count)
 
+    @property
+    def _switches(self) -> Watch:
+        """What steps end on; for a system that lands."""
+        return Watch.of(self.system, resets=self.system.resets)
+
     def _landed(self, control: PyTree) -> SwitchLocatorState:
         """What the switch locator knows; for a system that lands."""
         landed: SwitchLocatorState = control[0] if self.counting else control
         return landed
-
-    def _reset(
-        self,
-        solve: Solve,
-        keep: Scalar,
-        control: PyTree,
-        t: Scalar,
-        state: PyTree,
-        before: Gathering,
-    ) -> tuple[Scalar, PyTree, Gathering]:
-        """Time and state behind a step, on the switch and reset there if it ends just past one."""
-        landed = self._landed(control)
-        met = keep & (landed.crossed_field > 0)
-
-        def behind() -> tuple[Scalar, PyTree, Scalar]:
-            # The little time past the switch is taken back.
-            rates = self.system.vector_field(t, state, solve.scene)
-            on = jtu.tree_map(lambda leaf, rate: leaf - landed.past * rate, state, rates)
-            after = self.system.reset_at_switch(solve.scene, on, landed.crossed_field)
-            return t - landed.past, after, self.system.repeats(solve.scene, after)
-
-        t, state, repeats = jax.lax.cond(met, behind, lambda: (t, state, jnp.asarray(False)))
-        return t, state, before.after(met, t, repeats, self.system.time_unit)
 
     def _happened(self, scene: PyTree, now: _Now) -> dict[Ending, Scalar]:
         """The failure that ends a solve here, the first of them."""
@@ -338,10 +322,7 @@ class AdaptiveSolve:
         else:
             control = MissedContacts(EqualSteps(solve.steps.total, solve.duration), self.system)
         if self.system.lands:
-            watch = Watch(
-                self.system.vector_field, self.system.switches, time_unit=self.system.time_unit
-            )
-            control = SwitchLocator(control, watch)
+            control = SwitchLocator(control, self._switches)
         if self.counting:
             control = FootstepLimit(control, solve.footsteps, self.system)
         return LocatedEnding(control, self.system, self.watch, probe) if self.located else control
