@@ -4,7 +4,7 @@ import abc
 import dataclasses
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -24,7 +24,7 @@ from jaxbiped.hybrid._guards import Guard, Switch
 from jaxbiped.hybrid._sections import AbstractSection, Section, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractMinimalScene
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
@@ -40,7 +40,7 @@ _ASKED_AGAIN = 7
 """Times that guards are asked again behind a reset: it may bring the state to another one."""
 
 
-class HybridSystem(AbstractScene):
+class HybridSystem(AbstractMinimalScene):
     """A system of one's own: its parameters are the fields, its motion a field with guards.
 
     The state is a NamedTuple of scalars. Its class may have, as plain attributes: `cyclic`, names
@@ -59,9 +59,7 @@ class HybridSystem(AbstractScene):
     """
 
     compliant: ClassVar[bool] = False
-    redundant: ClassVar[bool] = False
     state_type: AbstractClassVar[type[Any]]
-    time_unit: ClassVar[float] = 1.0
 
     def __check_init__(self) -> None:
         check_parameters(self)
@@ -80,14 +78,6 @@ class HybridSystem(AbstractScene):
         Default: the state itself, which closes without any.
         """
         return state
-
-    @property
-    def minimal(self) -> Self:
-        """The system itself."""
-        return self
-
-    def with_minimal(self, minimal: Self) -> Self:
-        return minimal
 
     @property
     def every_guard(self) -> tuple[Guard, ...]:
