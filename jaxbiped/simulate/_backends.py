@@ -19,6 +19,7 @@ from jaxbiped.compiler import BY_NAME, LaneEngine, Request
 from jaxbiped.hybrid._endings import ending_code
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.simulate._start import Options
+from jaxbiped.simulate._trajectory import Trajectory, arrivals_among, single_time
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adaptive_program
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
 from jaxbiped.solve._recorders import (
@@ -31,7 +32,6 @@ from jaxbiped.solve._recorders import (
 from jaxbiped.solve._runge_kutta import stepper_of
 from jaxbiped.solve._solvers import with_projection, with_root_tolerances
 from jaxbiped.solve._stepper import Stepper
-from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 from jaxbiped.solve.controllers._event_steps import (
     PATIENCE,
     FootstepLimit,

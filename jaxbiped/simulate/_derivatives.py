@@ -31,8 +31,8 @@ from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import Rolling, system_of
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.simulate._trajectory import Trajectory
 from jaxbiped.solve._rigid_steps import RigidWalk
-from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock

@@ -28,6 +28,7 @@ from jaxbiped.hybrid._scales import Units
 from jaxbiped.scene._linkages import LinkageScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.simulate._start import Options, check_steps
+from jaxbiped.simulate._trajectory import Trajectory, arrivals_among
 from jaxbiped.solve._accuracy import rms_norm, tolerances
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
@@ -39,7 +40,6 @@ from jaxbiped.solve._solvers import (
     with_projection,
     with_root_tolerances,
 )
-from jaxbiped.solve._trajectory import Trajectory, arrivals_among
 from jaxbiped.solve.controllers._step_size import step_control
 from jaxbiped.solve.controllers._wrapped_control import (
     StepControl,

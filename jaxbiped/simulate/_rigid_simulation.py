@@ -40,6 +40,7 @@ from jaxbiped.simulate._start import (
     in_own_precision,
     watched_by,
 )
+from jaxbiped.simulate._trajectory import Trajectory, arrivals_among, scene_key, single_time
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._explicit_methods import EXPLICIT_METHODS, ExplicitMethod
@@ -53,7 +54,6 @@ from jaxbiped.solve._recorders import (
 from jaxbiped.solve._rigid_program import RigidSolve, RigidSolved, rigid_program
 from jaxbiped.solve._rigid_record import rigid_record
 from jaxbiped.solve._rigid_steps import FallWatch, RigidWalk
-from jaxbiped.solve._trajectory import Trajectory, arrivals_among, scene_key, single_time
 
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""

@@ -49,10 +49,10 @@ from jaxbiped.simulate._start import (
     start_for,
     watched_by,
 )
+from jaxbiped.simulate._trajectory import Trajectory, scene_key
 from jaxbiped.solve._accuracy import tolerances
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import check_adjoint, solver_named
-from jaxbiped.solve._trajectory import Trajectory, scene_key
 from jaxbiped.solve.controllers._event_steps import PATIENCE
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas4P, Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
