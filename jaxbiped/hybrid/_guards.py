@@ -25,12 +25,12 @@ class Switch(NamedTuple):
         corner: whether a force acts on both sides and only its slope jumps, as at the peak of
             friction: touching the surface changes no derivative. Static.
         resets: whether the state itself jumps, and only when the value falls through zero. Static.
-        rises: whether a motion may begin below a surface that resets it and first rise through it,
-            as a runner lifts off lower than it touches down. Else what begins there rests on the
-            surface, as a knee on its stop, and only rounding has it below. Static.
         first_only: whether only first derivatives of motions across the surface are computed,
             because the force jumps there or is infinitely steep; second derivatives are finite
             differences. Static, like all fields marked so: known before anything runs.
+        rises: whether a motion may begin below a surface that resets it and first rise through it,
+            as a runner lifts off lower than it touches down. Else what begins there rests on the
+            surface, as a knee on its stop, and only rounding has it below. Static.
     """
 
     value: Scalar
@@ -38,8 +38,8 @@ class Switch(NamedTuple):
     force_jumps: bool = False
     corner: bool = False
     resets: bool = False
-    rises: bool = False
     first_only: bool = False
+    rises: bool = False
 
 
 class Gap(NamedTuple):
@@ -128,6 +128,6 @@ class Guard:
             force_jumps=jumps,
             corner=self.corner,
             resets=resets,
-            rises=resets,
             first_only=jumps,
+            rises=resets,
         )

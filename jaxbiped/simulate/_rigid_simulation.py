@@ -50,10 +50,12 @@ from jaxbiped.solve._recorders import (
     StepRecorder,
     StrikeRecorder,
     TimeRecorder,
+    program_of,
 )
-from jaxbiped.solve._rigid_program import RigidSolve, RigidSolved, rigid_program
-from jaxbiped.solve._rigid_record import rigid_record
+from jaxbiped.solve._rigid_program import RigidSolve
 from jaxbiped.solve._rigid_steps import FallWatch, RigidWalk
+from jaxbiped.solve._solved import Solved
+from jaxbiped.solve._step_records import rigid_record
 
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""
@@ -266,17 +268,11 @@ class RigidSimulation(eqx.Module):
         return Trajectory(
             t=t,
             state=told,
-            ending=solved.ending,
-            accepted=solved.accepted,
-            rejected=solved.rejected,
             dense=dense,
             arrivals=arrivals,
-            lowest=solved.lowest,
-            highest=solved.highest,
-            grazes=solved.grazes,
-            pulls=solved.pulls,
             mode_history=history,
             engine=self.engine,
+            **solved.outcome,
         )
 
     @property
@@ -292,13 +288,19 @@ class RigidSimulation(eqx.Module):
             return ArrivalRecorder(self.section)
         return StrikeRecorder(strikes=self.room > 0) if moded or self.section else None
 
-    def _run(self, recorder: AbstractRecorder | None, room: int) -> tuple[RigidSolved, Any, Any]:
+    def _run(self, recorder: AbstractRecorder | None, room: int) -> tuple[Solved, Any, Any]:
         """What is solved, the rows that are recorded, and how many there were."""
         falls = FallWatch.LOCATED if "fall" in self.watch else FallWatch.IGNORED
-        steps = RigidSolve(recorder, self.extremes, self.waits, self.method, falls)
+        steps = RigidSolve(
+            recorder=recorder,
+            extremes=self.extremes,
+            waits=self.waits,
+            method=self.method,
+            falls=falls,
+        )
         scheduled = recorder is not None and recorder.scheduled
         request = Request(
-            rigid_program(steps),
+            program_of(steps),
             self.walk,
             room=0 if scheduled else room,
             times=self.times if scheduled else None,
