@@ -14,12 +14,13 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._ending import FIRST_OF_A_SYSTEM, Ending
+from jaxbiped._ending import FIRST_OF_A_SYSTEM
 from jaxbiped._parameter_declaration import check_parameters
 from jaxbiped._types import Scalar, Time, any_of, as_float, by_numpy, in_64_bits, is_traced, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped.dynamics._state import check_state, periods_of, turned_difference
+from jaxbiped.hybrid._endings import ending_events
 from jaxbiped.hybrid._guards import Guard, Switch
 from jaxbiped.hybrid._sections import AbstractSection, Section, section_of
 from jaxbiped.hybrid._system import AbstractSystem
@@ -373,7 +374,7 @@ class GuardedMotion(AbstractSystem):
     def failures(self, watch: tuple[str, ...]) -> dict[Any, Callable[..., Scalar]]:
         ends = enumerate(self.watched, FIRST_OF_A_SYSTEM)
         passed = {code: _passed(k) for code, (k, name) in ends if name in watch}
-        return {Ending.SOLVER_FAILED: _failed} | passed
+        return ending_events(()) | passed
 
     def ending_surface(self, code: Scalar, args: HybridSystem, past: PyTree, y: PyTree) -> Scalar:
         value = jnp.full(jnp.shape(code), jnp.nan)
@@ -386,10 +387,6 @@ def _reset(guard: Guard, y: PyTree) -> PyTree:
     assert guard.reset is not None
     behind = guard.reset(y)
     return type(y)(*(jnp.asarray(leaf, y[0].dtype) for leaf in behind))
-
-
-def _failed(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
-    return ~jnp.isfinite(sum(jtu.tree_leaves(y)))
 
 
 @bounded_cache(PROGRAMS)  # the same function each time: caches know by it what is compiled

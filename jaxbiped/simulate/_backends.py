@@ -50,6 +50,7 @@ from jaxbiped.solve.controllers._wrapped_control import (
 )
 
 if TYPE_CHECKING:
+    from jaxbiped.simulate._rigid_simulation import RigidSimulation
     from jaxbiped.simulate._simulation import Simulation
 
 _QUICK = 100_000
@@ -235,7 +236,7 @@ def lane_request(run: "Simulation") -> Request:
         stepper=_stepper(run),
         watch=run.watch,
         counting=run.footsteps is not None,
-        recorder=_recorder(run),
+        recorder=recorder_for(run),
         extremes=run.extremes,
         located=run.dt is None,
         fenced=run.engine == "xla",
@@ -250,7 +251,8 @@ def _stepper(run: "Simulation") -> Stepper:
     return stepper
 
 
-def _recorder(run: "Simulation") -> AbstractRecorder | None:
+def recorder_for(run: "Simulation | RigidSimulation") -> AbstractRecorder | None:
+    """What saves as a request asks; None: the end alone is saved."""
     if run.section is not None:
         return ArrivalRecorder(run.section)
     if run.save_steps:

@@ -325,7 +325,6 @@ def with_derivatives(
     *,
     moving: Callable[[_Run], tuple[PyTree, PyTree, PyTree]],
     slopes: Callable[[_Run, Trajectory[Any], tuple[int, ...], tuple[int, ...]], Slopes],
-    check: Callable[[_Run], None] = lambda run: None,
 ) -> Trajectory[Any]:
     """`compute(run)`, with derivatives of the times and states that are saved.
 
@@ -335,7 +334,9 @@ def with_derivatives(
         moving: what of it may be differentiated: the start, the scene, and the times at which a
             clock ends or saves it.
         slopes: derivatives of what was found with respect to some leaves of start and scene.
-        check: raises `ArgumentError` for what has none, before anything is simulated.
+
+    Raises:
+        ArgumentError: what is asked has no derivatives; before anything is simulated.
     """
     arrays, rest = eqx.partition(run, eqx.is_array)
     leaves, structure = jtu.tree_flatten(arrays)
@@ -367,7 +368,7 @@ def with_derivatives(
         known = not is_traced(primals)
         with untraced() if known else contextlib.nullcontext():
             once = whole(primals if known else first_derivatives_only(primals, "a simulation"))
-            check(once)
+            check_derivatives(once)
             found = compute(whole(primals)) if known else function(*primals)
             at = slopes(once, found, tuple(state_dots), tuple(scene_dots))
         along = [*state_dots.values(), *scene_dots.values()]
@@ -375,6 +376,21 @@ def with_derivatives(
 
     function.defjvp(rule, symbolic_zeros=True)
     return function(*(leaves[i] for i in traced))
+
+
+def check_derivatives(run: Any) -> None:
+    """Raises `ArgumentError` for a request whose results have no derivatives."""
+    refused = {
+        'save = "steps"': (run.save_steps, 'ask for save="end", an array of times or a section'),
+        "extremes": (run.extremes is not None, "only times and states have derivatives"),
+        "scene = RedundantScene(…)": (
+            run.scene.redundant,
+            "simulate scene.minimal, or choose an adjoint of diffrax's",
+        ),
+    }
+    for argument, (is_so, instead) in refused.items():
+        if is_so:
+            raise ArgumentError(f"{argument} is not allowed under derivatives: {instead}.")
 
 
 def first_derivatives_only(leaves: PyTree, function: str) -> PyTree:
