@@ -71,7 +71,7 @@ from jaxbiped.simulate._simulate import swing as swing
 from jaxbiped.solve._accuracy import ACCURACIES as ACCURACIES
 from jaxbiped._ending import Ending as Ending
 from jaxbiped.solve._engine_names import ENGINES as ENGINES
-from jaxbiped.solve._trajectory import Trajectory as Trajectory
+from jaxbiped.simulate._trajectory import Trajectory as Trajectory
 
 # Measures of a walk.
 from jaxbiped.measure._footsteps import footsteps as footsteps

@@ -33,7 +33,6 @@ KNOW_A_WALKER = {
     "solve/_rigid_program.py",  # the rigid loop: its steps, its events, and where it saves
     "solve/_rigid_steps.py",
     "solve/_rolling_step.py",
-    "solve/_trajectory.py",  # kinds of scenes and of states, in its types
 }
 
 

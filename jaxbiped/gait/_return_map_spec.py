@@ -117,16 +117,13 @@ class ReturnMapSpec(eqx.Module):
         """What the solves end on: a section is looked at after the arrival's reset."""
         system = self.system if of is None else of
         loaded = system.load_exists(args, y)
-        return Watch(
-            field=system.vector_field,
-            switches=system.switches,
+        return Watch.of(
+            system,
+            resets=has_switches(system, args, y, "resets"),
             section=_Arrival(system, self.section),
             asked_before=self.section.behind_reset,
             ending=system.ending,
             peak=system.load if peak and loaded else None,
-            reset=system.reset_at_switch if has_switches(system, args, y, "resets") else None,
-            repeats=system.repeats if system.resets else None,
-            time_unit=system.time_unit,
             project=system.project if system.projects(args) else None,
         )
 

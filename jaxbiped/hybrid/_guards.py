@@ -28,6 +28,9 @@ class Switch(NamedTuple):
         first_only: whether only first derivatives of motions across the surface are computed,
             because the force jumps there or is infinitely steep; second derivatives are finite
             differences. Static, like all fields marked so: known before anything runs.
+        rises: whether a motion may begin below a surface that resets it and first rise through it,
+            as a runner lifts off lower than it touches down. Else what begins there rests on the
+            surface, as a knee on its stop, and only rounding has it below. Static.
     """
 
     value: Scalar
@@ -36,6 +39,7 @@ class Switch(NamedTuple):
     corner: bool = False
     resets: bool = False
     first_only: bool = False
+    rises: bool = False
 
 
 class Gap(NamedTuple):
@@ -125,4 +129,5 @@ class Guard:
             corner=self.corner,
             resets=resets,
             first_only=jumps,
+            rises=resets,
         )

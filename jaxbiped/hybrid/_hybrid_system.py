@@ -4,7 +4,7 @@ import abc
 import dataclasses
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -14,17 +14,18 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._ending import FIRST_OF_A_SYSTEM, Ending
+from jaxbiped._ending import FIRST_OF_A_SYSTEM
 from jaxbiped._parameter_declaration import check_parameters
 from jaxbiped._types import Scalar, Time, any_of, as_float, by_numpy, in_64_bits, is_traced, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped.dynamics._state import check_state, periods_of, turned_difference
+from jaxbiped.hybrid._endings import ending_events
 from jaxbiped.hybrid._guards import Guard, Switch
 from jaxbiped.hybrid._sections import AbstractSection, Section, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractMinimalScene
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
@@ -40,7 +41,7 @@ _ASKED_AGAIN = 7
 """Times that guards are asked again behind a reset: it may bring the state to another one."""
 
 
-class HybridSystem(AbstractScene):
+class HybridSystem(AbstractMinimalScene):
     """A system of one's own: its parameters are the fields, its motion a field with guards.
 
     The state is a NamedTuple of scalars. Its class may have, as plain attributes: `cyclic`, names
@@ -59,9 +60,7 @@ class HybridSystem(AbstractScene):
     """
 
     compliant: ClassVar[bool] = False
-    redundant: ClassVar[bool] = False
     state_type: AbstractClassVar[type[Any]]
-    time_unit: ClassVar[float] = 1.0
 
     def __check_init__(self) -> None:
         check_parameters(self)
@@ -80,14 +79,6 @@ class HybridSystem(AbstractScene):
         Default: the state itself, which closes without any.
         """
         return state
-
-    @property
-    def minimal(self) -> Self:
-        """The system itself."""
-        return self
-
-    def with_minimal(self, minimal: Self) -> Self:
-        return minimal
 
     @property
     def every_guard(self) -> tuple[Guard, ...]:
@@ -383,7 +374,7 @@ class GuardedMotion(AbstractSystem):
     def failures(self, watch: tuple[str, ...]) -> dict[Any, Callable[..., Scalar]]:
         ends = enumerate(self.watched, FIRST_OF_A_SYSTEM)
         passed = {code: _passed(k) for code, (k, name) in ends if name in watch}
-        return {Ending.SOLVER_FAILED: _failed} | passed
+        return ending_events(()) | passed
 
     def ending_surface(self, code: Scalar, args: HybridSystem, past: PyTree, y: PyTree) -> Scalar:
         value = jnp.full(jnp.shape(code), jnp.nan)
@@ -396,10 +387,6 @@ def _reset(guard: Guard, y: PyTree) -> PyTree:
     assert guard.reset is not None
     behind = guard.reset(y)
     return type(y)(*(jnp.asarray(leaf, y[0].dtype) for leaf in behind))
-
-
-def _failed(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
-    return ~jnp.isfinite(sum(jtu.tree_leaves(y)))
 
 
 @bounded_cache(PROGRAMS)  # the same function each time: caches know by it what is compiled

@@ -7,36 +7,20 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import Scalar, Time
+from jaxbiped._types import Scalar
 from jaxbiped.constraints._constraint_methods import AbstractProjectingMethod, correct_step
 from jaxbiped.dynamics._constrained_motion import LinkageState, linkage_field
 from jaxbiped.hybrid._endings import ending_events
 from jaxbiped.hybrid._guards import Switch
-from jaxbiped.hybrid._implicit_field import AbstractImplicitField, Residual
+from jaxbiped.hybrid._implicit_field import ImplicitField, with_unit_mass
 from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.linalg._sparse_lu import SparseMatrix
 from jaxbiped.scene._linkages import LinkageScene
-
-
-class LinkageField(AbstractImplicitField):
-    """`linkage_field`, whose implicit form is its own."""
-
-    def __call__(self, t: Time, y: LinkageState, args: LinkageScene) -> LinkageState:
-        return linkage_field(t, y, args)
-
-    def mass_matrix(self, y: LinkageState, args: LinkageScene) -> SparseMatrix:
-        return {}
-
-    def residual(self, y: LinkageState, rates: LinkageState, args: LinkageScene) -> Residual:
-        here = linkage_field(jnp.zeros(()), y, args)
-        pairs = zip((*here.q, *here.v), (*rates.q, *rates.v), strict=True)
-        return {i: a - b for i, (a, b) in enumerate(pairs)}
 
 
 class Swinging(AbstractSystem):
     """A linkage in gravity."""
 
-    vector_field: ClassVar[LinkageField] = LinkageField()
+    vector_field: ClassVar[ImplicitField] = with_unit_mass(linkage_field)
 
     def switches(self, args: LinkageScene, y: LinkageState) -> tuple[Switch, ...]:
         return ()

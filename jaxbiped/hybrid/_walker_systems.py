@@ -25,11 +25,10 @@ from jaxbiped.dynamics._surfaces import lead, opening
 from jaxbiped.hybrid._compliant_guards import contact_changes, gaps, switches
 from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface, rigid_ending
 from jaxbiped.hybrid._guards import Gap, Switch
-from jaxbiped.hybrid._implicit_field import AbstractImplicitField, Residual
+from jaxbiped.hybrid._implicit_field import ImplicitField, with_unit_mass
 from jaxbiped.hybrid._rigid_guards import mode_switches
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.linalg._sparse_lu import SparseMatrix
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
 
@@ -38,33 +37,6 @@ from jaxbiped.scene._state_types import State
 def system_of(scene: object) -> AbstractSystem:
     """The system that a scene describes; each kind of scene registers its own."""
     raise ArgumentError(f"scene is a {type(scene).__name__}, which is not allowed: give a scene.")
-
-
-class WalkerField(AbstractImplicitField):
-    """`vector_field` with the tree's implicit form, in which bristles stand alone."""
-
-    def __call__(self, t: Time, y: PyTree, args: Scene) -> PyTree:
-        return vector_field(t, y, args)
-
-    def mass_matrix(self, y: PyTree, args: Scene) -> SparseMatrix:
-        return mass_matrix(args, y)
-
-    def residual(self, y: PyTree, rates: PyTree, args: Scene) -> Residual:
-        return force_residual(args, y, rates)
-
-
-class BodiesField(AbstractImplicitField):
-    """`redundant_field`, whose implicit form is its own: forces of constraints reach every body."""
-
-    def __call__(self, t: Time, y: PyTree, args: RedundantScene) -> PyTree:
-        return redundant_field(t, y, args)
-
-    def mass_matrix(self, y: PyTree, args: RedundantScene) -> SparseMatrix:
-        return {}
-
-    def residual(self, y: PyTree, rates: PyTree, args: RedundantScene) -> Residual:
-        here = redundant_field(jnp.zeros(()), y, args)
-        return {i: a - b for i, (a, b) in enumerate(zip(here, rates, strict=True))}
 
 
 class AbstractWalking(AbstractSystem):
@@ -122,7 +94,8 @@ class Walking(AbstractWalking):
         map(State._fields.index, cyclic_names(State))
     )
 
-    vector_field: ClassVar[WalkerField] = WalkerField()
+    # Bristles stand alone in the implicit form.
+    vector_field: ClassVar[ImplicitField] = ImplicitField(vector_field, mass_matrix, force_residual)
 
 
 class RedundantWalking(AbstractWalking):
@@ -131,7 +104,7 @@ class RedundantWalking(AbstractWalking):
     `find_gait` tells its returns in minimal coordinates; by itself it is for `return_map`.
     """
 
-    vector_field: ClassVar[BodiesField] = BodiesField()
+    vector_field: ClassVar[ImplicitField] = with_unit_mass(redundant_field)
 
     def project(self, args: RedundantScene, y: PyTree) -> PyTree:
         return project(args, y)

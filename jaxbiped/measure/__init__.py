@@ -14,4 +14,4 @@ from jaxbiped.measure._energy_ledger import rigid_ledger as rigid_ledger
 from jaxbiped.measure._footsteps import Footsteps as Footsteps
 from jaxbiped.measure._footsteps import HeelStrikes as HeelStrikes
 from jaxbiped.measure._footsteps import heel_strikes as heel_strikes
-from jaxbiped.solve._trajectory import Arrivals as Arrivals
+from jaxbiped.simulate._trajectory import Arrivals as Arrivals

@@ -11,7 +11,7 @@ from jaxbiped.measure._energy_ledger import ledger_and_motors, rigid_ledger
 from jaxbiped.measure._footsteps import heel_strikes, root_place
 from jaxbiped.measure._samples import evaluate_at, kept_strikes, places_of_standing
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.solve._trajectory import Trajectory, check_scene_of
+from jaxbiped.simulate._trajectory import Trajectory, check_scene_of
 
 
 class CostOfTransport(NamedTuple):

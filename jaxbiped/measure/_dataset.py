@@ -18,7 +18,7 @@ from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._state import state_quantity
 from jaxbiped.scene._parameter_access import parameter_quantities, parameter_values
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.solve._trajectory import Trajectory, check_scene_of
+from jaxbiped.simulate._trajectory import Trajectory, check_scene_of
 
 if TYPE_CHECKING:
     import xarray

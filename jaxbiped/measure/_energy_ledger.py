@@ -24,7 +24,7 @@ from jaxbiped.measure._samples import (
     states_after,
 )
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.solve._trajectory import Trajectory, check_scene_of
+from jaxbiped.simulate._trajectory import Trajectory, check_scene_of
 
 _PANELS, _PARTS, _SPLITS = 48, 4, 10
 """Parts of a footstep, each with its Gauss points; into how many one is split, and how often."""

@@ -23,7 +23,7 @@ from jaxbiped.measure._samples import (
 )
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene._structure import Structure
-from jaxbiped.solve._trajectory import Trajectory, check_scene_of
+from jaxbiped.simulate._trajectory import Trajectory, check_scene_of
 
 if TYPE_CHECKING:
     import xarray

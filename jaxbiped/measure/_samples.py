@@ -19,7 +19,7 @@ from jaxbiped.dynamics._surfaces import standing_place
 from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState, SomeState, State
 from jaxbiped.simulate._simulate import rigid_walk
-from jaxbiped.solve._trajectory import Arrivals, Trajectory, check_scene_of
+from jaxbiped.simulate._trajectory import Arrivals, Trajectory, check_scene_of
 
 SomeScene = TypeVar("SomeScene", bound=AbstractWalkerScene)
 _Taken = TypeVar("_Taken")

@@ -32,8 +32,8 @@ from jaxbiped.scene._parameter_access import parameter_names
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.simulate._simulate import simulate
+from jaxbiped.simulate._trajectory import Trajectory
 from jaxbiped.solve._engine_names import ENGINES
-from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure

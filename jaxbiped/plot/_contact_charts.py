@@ -15,7 +15,7 @@ from jaxbiped.plot._samples import Channels, Tolerances, adaptive_knots, sample,
 from jaxbiped.plot._skeleton import Sole, skeleton_of
 from jaxbiped.plot._symbols import NORMAL_FORCE, PENETRATION, TANGENTIAL_FORCE, TIME
 from jaxbiped.scene._scene import RedundantScene, Scene
-from jaxbiped.solve._trajectory import Trajectory, check_scene_of
+from jaxbiped.simulate._trajectory import Trajectory, check_scene_of
 
 _KINDS = ("normal", "tangential")
 _EXACT = 1e-5

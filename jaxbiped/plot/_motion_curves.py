@@ -24,7 +24,7 @@ from jaxbiped.plot._skeleton import Part, Skeleton, skeleton_of
 from jaxbiped.plot._symbols import TIME, angle_of, rate_of
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._simulate import rigid_walk
-from jaxbiped.solve._trajectory import Trajectory, check_scene_of
+from jaxbiped.simulate._trajectory import Trajectory, check_scene_of
 
 _MOST_STRIKES = 4096
 _PLACES = (0.12, 0.37, 0.62, 0.87)

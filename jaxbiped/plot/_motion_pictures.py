@@ -20,7 +20,7 @@ from jaxbiped.plot import style
 from jaxbiped.plot._samples import AnyScene, DrawnMotion
 from jaxbiped.plot._skeleton import Pose, Skeleton, poses, skeleton_of, upright
 from jaxbiped.plot._symbols import HEIGHT, HORIZONTAL
-from jaxbiped.solve._trajectory import Trajectory, check_scene_of
+from jaxbiped.simulate._trajectory import Trajectory, check_scene_of
 
 _SHOWN = 1.8
 """Default duration of the motion that is shown [s]."""

@@ -27,7 +27,7 @@ from jaxbiped.scene._modes import rigid_modes, standing_legs
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.scene._structure import Structure
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.simulate._trajectory import Trajectory
 
 AnyScene: TypeAlias = Scene | RedundantScene | RigidScene
 _EVEN = 2048

@@ -89,6 +89,21 @@ class AbstractScene(eqx.Module):
         """The scene of another model, held together as this one is."""
 
 
+class AbstractMinimalScene(AbstractScene):
+    """What is modelled in minimal coordinates."""
+
+    redundant: ClassVar[bool] = False
+
+    @property
+    def minimal(self) -> Self:
+        """The scene itself."""
+        return self
+
+    def with_minimal(self, minimal: Self) -> Self:
+        """The other model itself."""
+        return minimal
+
+
 class AbstractWalkerScene(AbstractScene):
     """A walker on a slope, and how it is modelled.
 
@@ -146,22 +161,7 @@ class AbstractWalkerScene(AbstractScene):
         return isinstance(getattr(self.minimal, "friction", None), AbstractBristleLaw)
 
 
-class AbstractMinimalScene(AbstractWalkerScene):
-    """A walker in minimal coordinates."""
-
-    redundant: ClassVar[bool] = False
-
-    @property
-    def minimal(self) -> Self:
-        """The scene itself."""
-        return self
-
-    def with_minimal(self, minimal: Self) -> Self:
-        """The other model itself."""
-        return minimal
-
-
-class Scene(AbstractMinimalScene):
+class Scene(AbstractMinimalScene, AbstractWalkerScene):
     """A walker on a slope, with its laws of contact.
 
     A frozen pytree whose numeric leaves are the parameters: differentiate or `vmap` with respect
@@ -257,7 +257,7 @@ class Scene(AbstractMinimalScene):
         return (*structure.coordinates, *structure.rates, *bristles)
 
 
-class RigidScene(AbstractMinimalScene):
+class RigidScene(AbstractMinimalScene, AbstractWalkerScene):
     """A walker whose feet are rigid: they roll without slip and strike without rebound.
 
     Single support is a smooth motion. A footstep ends with a plastic impact, at which the feet

@@ -21,9 +21,9 @@ from jaxbiped._types import is_traced
 from jaxbiped.hybrid._scales import relative_to_scene, sizes_of
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._simulation import Simulation
+from jaxbiped.simulate._trajectory import Trajectory
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name
 from jaxbiped.solve._error_estimate import LOOSER, Judged, check_untraced, check_wanted, refine
-from jaxbiped.solve._trajectory import Trajectory
 
 _SHARE = 0.05
 """Least bar of one number over the largest bar of the same moment, in the scene's units.

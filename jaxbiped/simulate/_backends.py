@@ -19,19 +19,21 @@ from jaxbiped.compiler import BY_NAME, LaneEngine, Request
 from jaxbiped.hybrid._endings import ending_code
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.simulate._start import Options
-from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adaptive_program
+from jaxbiped.simulate._trajectory import Trajectory, arrivals_among, single_time
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
 from jaxbiped.solve._recorders import (
     AbstractRecorder,
     ArrivalRecorder,
     StepRecorder,
     TimeRecorder,
-    recorded_steps,
+    program_of,
 )
 from jaxbiped.solve._runge_kutta import stepper_of
+from jaxbiped.solve._solved import Solved
 from jaxbiped.solve._solvers import with_projection, with_root_tolerances
+from jaxbiped.solve._step_records import recorded_steps
 from jaxbiped.solve._stepper import Stepper
-from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 from jaxbiped.solve.controllers._event_steps import (
     PATIENCE,
     FootstepLimit,
@@ -48,6 +50,7 @@ from jaxbiped.solve.controllers._wrapped_control import (
 )
 
 if TYPE_CHECKING:
+    from jaxbiped.simulate._rigid_simulation import RigidSimulation
     from jaxbiped.simulate._simulation import Simulation
 
 _QUICK = 100_000
@@ -203,17 +206,12 @@ def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
     return Trajectory(
         t=t,
         state=state,
-        ending=ended.ending,
-        accepted=ended.accepted,
-        rejected=ended.rejected,
         dense=dense,
         arrivals=arrivals,
-        lowest=ended.lowest,
-        highest=ended.highest,
         correction=run.correction,
-        missed_contacts=ended.missed,
         engine=run.engine,
         endings=run.scene.endings,
+        **ended.outcome,
     )
 
 
@@ -234,16 +232,16 @@ def lane_request(run: "Simulation") -> Request:
         steps=None if run.dt is None else StepsOfOneSize.of(run.dt, run.duration),
     )
     steps = AdaptiveSolve(
-        system_of(run.scene),
-        _stepper(run),
-        run.watch,
-        run.footsteps is not None,
-        _recorder(run),
-        run.extremes,
+        system=system_of(run.scene),
+        stepper=_stepper(run),
+        watch=run.watch,
+        counting=run.footsteps is not None,
+        recorder=recorder_for(run),
+        extremes=run.extremes,
         located=run.dt is None,
         fenced=run.engine == "xla",
     )
-    return Request(adaptive_program(steps), solve, quick=run.max_solver_steps <= _QUICK)
+    return Request(program_of(steps), solve, quick=run.max_solver_steps <= _QUICK)
 
 
 def _stepper(run: "Simulation") -> Stepper:
@@ -253,7 +251,8 @@ def _stepper(run: "Simulation") -> Stepper:
     return stepper
 
 
-def _recorder(run: "Simulation") -> AbstractRecorder | None:
+def recorder_for(run: "Simulation | RigidSimulation") -> AbstractRecorder | None:
+    """What saves as a request asks; None: the end alone is saved."""
     if run.section is not None:
         return ArrivalRecorder(run.section)
     if run.save_steps:

@@ -26,14 +26,13 @@ from jaxbiped.compiler import CUDA, host_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._stance_motion import rolling_field
 from jaxbiped.dynamics._surfaces import opening, uprightness
-from jaxbiped.hybrid._rigid_guards import mode_switches
 from jaxbiped.hybrid._scales import units_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import Rolling, system_of
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.simulate._trajectory import Trajectory
 from jaxbiped.solve._rigid_steps import RigidWalk
-from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -51,8 +50,6 @@ from jaxbiped.variational._variational_solve import (
 _EARLY, _LEFT = 3.0, 1e-2
 """How long before an event the motion is first followed, in tolerances times the unit of time, and
 the share of that which is left in the end: behind a touchdown derivatives change in nanoseconds."""
-_ROLLING = Watch(field=rolling_field, switches=mode_switches)
-_IN_MODES = Watch(field=rolling_field, switches=mode_switches, reset=Rolling().reset_at_switch)
 _Run = TypeVar("_Run")
 _STILL = object()
 """Tangent of what is known."""
@@ -113,7 +110,9 @@ def slopes_of(
     at = TangentsAtTimes(there, jnp.zeros((len(t), 0, len(there))))
     time = jnp.zeros((len(t), 0))
     if places or active:
-        how, engine = motion_solve(_watch_of(system, scene), solver, rtol), CUDA if device else None
+        project = system.project if system.projects(scene) else None
+        watch = Watch.of(system, resets=system.resets, project=project)
+        how, engine = motion_solve(watch, solver, rtol), CUDA if device else None
         start, seeded = seeded_directions(scene, state, places, active)
         early = _EARLY * rtol * units_of(scene, state).time
         at = tangents_at_times(how, start, seeded, jnp.where(by_clock, t, t - early), engine)
@@ -137,18 +136,6 @@ def slopes_of(
         state=jnp.where(reached[..., None], columns, 0.0),
         clock=by_clock.astype(t.dtype),
         rates=jnp.where(reached, rates, 0.0),
-    )
-
-
-def _watch_of(system: AbstractSystem, scene: PyTree) -> Watch:
-    """What derivatives are followed with, up to the times at which the plain solve saved."""
-    return Watch(
-        system.vector_field,
-        system.switches,
-        reset=system.reset_at_switch if system.resets else None,
-        repeats=system.repeats if system.resets else None,
-        project=system.project if system.projects(scene) else None,
-        time_unit=system.time_unit,
     )
 
 
@@ -249,7 +236,7 @@ def rigid_slopes_of(
     """
     scene, state = in_64_bits((walk.scene, walk.state))
     start, seeded = seeded_directions(scene, state, places, active)
-    watch = _IN_MODES if hasattr(state, "mode") else _ROLLING
+    watch = Watch.of(Rolling(), resets=hasattr(state, "mode"))
     how = motion_solve(watch, Rodas5P(), walk.rtol)
     unit = jnp.sqrt(scene.mechanism.height / scene.ground.g)
     n = len(places) + len(active)
@@ -340,7 +327,6 @@ def with_derivatives(
     *,
     moving: Callable[[_Run], tuple[PyTree, PyTree, PyTree]],
     slopes: Callable[[_Run, Trajectory[Any], tuple[int, ...], tuple[int, ...]], Slopes],
-    check: Callable[[_Run], None] = lambda run: None,
 ) -> Trajectory[Any]:
     """`compute(run)`, with derivatives of the times and states that are saved.
 
@@ -350,7 +336,9 @@ def with_derivatives(
         moving: what of it may be differentiated: the start, the scene, and the times at which a
             clock ends or saves it.
         slopes: derivatives of what was found with respect to some leaves of start and scene.
-        check: raises `ArgumentError` for what has none, before anything is simulated.
+
+    Raises:
+        ArgumentError: what is asked has no derivatives; before anything is simulated.
     """
     arrays, rest = eqx.partition(run, eqx.is_array)
     leaves, structure = jtu.tree_flatten(arrays)
@@ -382,7 +370,7 @@ def with_derivatives(
         known = not is_traced(primals)
         with untraced() if known else contextlib.nullcontext():
             once = whole(primals if known else first_derivatives_only(primals, "a simulation"))
-            check(once)
+            check_derivatives(once)
             found = compute(whole(primals)) if known else function(*primals)
             at = slopes(once, found, tuple(state_dots), tuple(scene_dots))
         along = [*state_dots.values(), *scene_dots.values()]
@@ -390,6 +378,17 @@ def with_derivatives(
 
     function.defjvp(rule, symbolic_zeros=True)
     return function(*(leaves[i] for i in traced))
+
+
+def check_derivatives(run: Any) -> None:
+    """Raises `ArgumentError` for a request whose results have no derivatives."""
+    refused = {
+        'save = "steps"': (run.save_steps, 'ask for save="end", an array of times or a section'),
+        "extremes": (run.extremes is not None, "only times and states have derivatives"),
+    }
+    for argument, (is_so, instead) in refused.items():
+        if is_so:
+            raise ArgumentError(f"{argument} is not allowed under derivatives: {instead}.")
 
 
 def first_derivatives_only(leaves: PyTree, function: str) -> PyTree:

@@ -28,10 +28,11 @@ from jaxbiped.hybrid._scales import Units
 from jaxbiped.scene._linkages import LinkageScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.simulate._start import Options, check_steps
+from jaxbiped.simulate._trajectory import Trajectory, arrivals_among
 from jaxbiped.solve._accuracy import rms_norm, tolerances
-from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
-from jaxbiped.solve._recorders import TimeRecorder
+from jaxbiped.solve._recorders import TimeRecorder, program_of
 from jaxbiped.solve._runge_kutta import stepper_of
 from jaxbiped.solve._solvers import (
     check_adjoint,
@@ -39,7 +40,6 @@ from jaxbiped.solve._solvers import (
     with_projection,
     with_root_tolerances,
 )
-from jaxbiped.solve._trajectory import Trajectory, arrivals_among
 from jaxbiped.solve.controllers._step_size import step_control
 from jaxbiped.solve.controllers._wrapped_control import (
     StepControl,
@@ -226,8 +226,10 @@ def _lane_request(
         max_attempts=as_float(asked.max_solver_steps),
         steps=None if dt is None else StepsOfOneSize.of(dt, until),
     )
-    steps = AdaptiveSolve(Swinging(), stepper, (), counting=False, recorder=TimeRecorder())
-    request = Request(adaptive_program(steps), solve, times=np.asarray(times))
+    steps = AdaptiveSolve(
+        system=Swinging(), stepper=stepper, watch=(), counting=False, recorder=TimeRecorder()
+    )
+    request = Request(program_of(steps), solve, times=np.asarray(times))
     return None if LANES.can(request) else request
 
 
@@ -251,12 +253,10 @@ def _by_lanes(
     return Trajectory(
         t=saved.t,
         state=saved.state,
-        ending=code,
-        accepted=solved.accepted,
-        rejected=solved.rejected,
         correction=off,
         violation=_violation(scene, saved.state),
         engine="lanes",
+        **solved._replace(ending=code).outcome,
     )
 
 

@@ -29,6 +29,7 @@ from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._modes import check_mode, rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
+from jaxbiped.simulate._backends import recorder_for
 from jaxbiped.simulate._derivatives import Slopes, rigid_slopes_of, with_derivatives
 from jaxbiped.simulate._start import (
     Options,
@@ -40,20 +41,20 @@ from jaxbiped.simulate._start import (
     in_own_precision,
     watched_by,
 )
+from jaxbiped.simulate._trajectory import Trajectory, arrivals_among, scene_key, single_time
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._explicit_methods import EXPLICIT_METHODS, ExplicitMethod
 from jaxbiped.solve._recorders import (
     AbstractRecorder,
     ArrivalRecorder,
-    StepRecorder,
     StrikeRecorder,
-    TimeRecorder,
+    program_of,
 )
-from jaxbiped.solve._rigid_program import RigidSolve, RigidSolved, rigid_program
-from jaxbiped.solve._rigid_record import rigid_record
+from jaxbiped.solve._rigid_program import RigidSolve
 from jaxbiped.solve._rigid_steps import FallWatch, RigidWalk
-from jaxbiped.solve._trajectory import Trajectory, arrivals_among, scene_key, single_time
+from jaxbiped.solve._solved import Solved
+from jaxbiped.solve._step_records import rigid_record
 
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""
@@ -229,9 +230,7 @@ class RigidSimulation(eqx.Module):
 
     def __call__(self) -> Trajectory[Any]:
         """Solves it, differentiably."""
-        walk = with_derivatives(
-            self, RigidSimulation.solved, moving=_moving, slopes=_slopes, check=_check_derivatives
-        )
+        walk = with_derivatives(self, RigidSimulation.solved, moving=_moving, slopes=_slopes)
         return dataclasses.replace(walk, scene_key=scene_key(self.walk.scene))
 
     def solved(self) -> Trajectory[Any]:
@@ -266,17 +265,11 @@ class RigidSimulation(eqx.Module):
         return Trajectory(
             t=t,
             state=told,
-            ending=solved.ending,
-            accepted=solved.accepted,
-            rejected=solved.rejected,
             dense=dense,
             arrivals=arrivals,
-            lowest=solved.lowest,
-            highest=solved.highest,
-            grazes=solved.grazes,
-            pulls=solved.pulls,
             mode_history=history,
             engine=self.engine,
+            **solved.outcome,
         )
 
     @property
@@ -284,21 +277,25 @@ class RigidSimulation(eqx.Module):
         return np.zeros((0, 1 + len(self.walk.state)), self.rtol.dtype)
 
     def _recorder(self, moded: bool) -> AbstractRecorder | None:
-        if self.times is not None:
-            return TimeRecorder()
-        if self.save_steps:
-            return StepRecorder()
-        if self.section is not None and not isinstance(self.section, HeelStrike):
-            return ArrivalRecorder(self.section)
-        return StrikeRecorder(strikes=self.room > 0) if moded or self.section else None
+        at_strikes = isinstance(self.section, HeelStrike)
+        recorder = None if at_strikes else recorder_for(self)
+        if recorder is None and (moded or at_strikes):
+            return StrikeRecorder(strikes=self.room > 0)
+        return recorder
 
-    def _run(self, recorder: AbstractRecorder | None, room: int) -> tuple[RigidSolved, Any, Any]:
+    def _run(self, recorder: AbstractRecorder | None, room: int) -> tuple[Solved, Any, Any]:
         """What is solved, the rows that are recorded, and how many there were."""
         falls = FallWatch.LOCATED if "fall" in self.watch else FallWatch.IGNORED
-        steps = RigidSolve(recorder, self.extremes, self.waits, self.method, falls)
+        steps = RigidSolve(
+            recorder=recorder,
+            extremes=self.extremes,
+            waits=self.waits,
+            method=self.method,
+            falls=falls,
+        )
         scheduled = recorder is not None and recorder.scheduled
         request = Request(
-            rigid_program(steps),
+            program_of(steps),
             self.walk,
             room=0 if scheduled else room,
             times=self.times if scheduled else None,
@@ -411,15 +408,3 @@ def _slopes(
         return slopes
     # Of the strikes only those that are kept, then the end.
     return Slopes(*(jnp.concatenate([leaf[:kept], leaf[-1:]]) for leaf in slopes))
-
-
-def _check_derivatives(run: RigidSimulation) -> None:
-    if run.save_steps:
-        raise ArgumentError(
-            'save = "steps" is not allowed under derivatives: ask for save="end", an array of '
-            "times or a section."
-        )
-    if run.extremes is not None:
-        raise ArgumentError(
-            "extremes is not allowed under derivatives: only times and states have derivatives."
-        )

@@ -26,7 +26,7 @@ from jaxbiped.simulate._linkage_simulation import simulate_linkage
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.simulate._start import Options
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.simulate._trajectory import Trajectory
 
 
 @without_switches

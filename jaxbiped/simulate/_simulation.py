@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, PyTree
 
 from jaxbiped._checks import (
-    ArgumentError,
     check_choice,
     check_positive,
     check_room,
@@ -49,10 +48,10 @@ from jaxbiped.simulate._start import (
     start_for,
     watched_by,
 )
+from jaxbiped.simulate._trajectory import Trajectory, scene_key
 from jaxbiped.solve._accuracy import tolerances
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import check_adjoint, solver_named
-from jaxbiped.solve._trajectory import Trajectory, scene_key
 from jaxbiped.solve.controllers._event_steps import PATIENCE
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas4P, Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -195,9 +194,7 @@ class Simulation(eqx.Module):
                 warn(_OF_STEPS)
             walk = _run(self)
         else:
-            walk = with_derivatives(
-                self, _run, moving=_moving, slopes=_slopes, check=_check_derivatives
-            )
+            walk = with_derivatives(self, _run, moving=_moving, slopes=_slopes)
         return dataclasses.replace(walk, scene_key=scene_key(self.scene))
 
     def at_tolerance(self, rtol: float) -> "Simulation":
@@ -246,16 +243,6 @@ def _run(run: Simulation) -> Trajectory:
 
 def _moving(run: Simulation) -> tuple[PyTree, PyTree, PyTree]:
     return run.state, run.scene, run.duration if run.times is None else run.times
-
-
-def _check_derivatives(run: Simulation) -> None:
-    refused = {
-        'save = "steps"': (run.save_steps, 'ask for save="end", an array of times or a section'),
-        "extremes": (run.extremes is not None, "only times and states have derivatives"),
-    }
-    for argument, (is_so, instead) in refused.items():
-        if is_so:
-            raise ArgumentError(f"{argument} is not allowed under derivatives: {instead}.")
 
 
 def _slopes(

@@ -7,25 +7,22 @@ import contextlib
 import dataclasses
 import functools
 import operator
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import diffrax
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Numbers, Scalar, select
-from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import Program, without_barriers
+from jaxbiped.compiler import without_barriers
 from jaxbiped.hybrid._endings import ending_code
 from jaxbiped.hybrid._scales import Units
-from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.solve._gathering import Gathering
-from jaxbiped.solve._recorders import AbstractRecorder, LastStep, Moment, Step
+from jaxbiped.solve._recorders import AbstractSolve, LastStep, Moment, Step
+from jaxbiped.solve._solved import Solved
 from jaxbiped.solve._stepper import Stepper, Tolerance
+from jaxbiped.solve._switch_resets import Gathering, reset_at_switch
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._event_steps import (
     FootstepLimit,
@@ -40,7 +37,6 @@ from jaxbiped.solve.controllers._wrapped_control import (
     StepsOfOneSize,
     clip_step,
     first_step,
-    widened_extremes,
 )
 
 
@@ -74,23 +70,6 @@ class Solve(NamedTuple):
     steps: StepsOfOneSize | None = None
 
 
-class Solved(NamedTuple):
-    """One simulation's outputs: the last state and time, how it ended, and its steps.
-
-    `lowest` and `highest` are the extremes of what was asked for, None where nothing was; `missed`
-    counts the contacts between steps of one size, None for others.
-    """
-
-    t: Scalar
-    state: PyTree
-    ending: Scalar
-    accepted: Scalar
-    rejected: Scalar
-    lowest: PyTree = None
-    highest: PyTree = None
-    missed: Scalar | None = None
-
-
 class _Now(NamedTuple):
     """What is carried from attempt to attempt; as diffrax's loop has it."""
 
@@ -106,28 +85,22 @@ class _Now(NamedTuple):
     resets: Gathering | None = None
 
 
-@dataclasses.dataclass(frozen=True)
-class AdaptiveSolve:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class AdaptiveSolve(AbstractSolve):
     """The functions of a `Program` that solves a `Solve`. Hashable.
 
     Attributes:
-        system: what moves.
         stepper: its steps.
         watch: failures that end it.
         counting: whether footsteps are counted.
-        recorder: what is saved; None: the end alone.
-        extremes: a function of (scene, state) whose extremes over the steps' ends are wanted, or
-            None.
         located: whether the last step ends at the event that ends the solve.
         fenced: whether XLA is to compile it, and not lanes (see `fenced`).
     """
 
-    system: AbstractSystem
+    resets: ClassVar[bool] = False
     stepper: Stepper
     watch: tuple[str, ...]
     counting: bool
-    recorder: AbstractRecorder | None = None
-    extremes: Callable[[PyTree, PyTree], PyTree] | None = None
     located: bool = False
     fenced: bool = False
 
@@ -145,15 +118,9 @@ class AdaptiveSolve:
             self.stepper.error_order(term),
         )
         count = jnp.zeros((), dtype=jnp.int64)
-        memory = None if self.recorder is None else self.recorder.begin(self, solve)
-        extremes = None
-        if self.extremes is not None:
-            values = _numbers(self.extremes(solve.scene, solve.state))
-            extremes = (values, values)
+        observed = self.observed_start(solve)
         resets = Gathering.none(zero) if self.system.resets else None
-        return _Now(
-            zero, next_t, solve.state, control, count, count, none, memory, extremes, resets
-        )
+        return _Now(zero, next_t, solve.state, control, count, count, none, *observed, resets)
 
     def attempt(self, solve: Solve, now: _Now) -> tuple[_Now, Scalar]:
         term, tolerance = self._term(), Tolerance(solve.rtol, solve.atol, solve.units)
@@ -181,7 +148,10 @@ class AdaptiveSolve:
         state, resets = select(keep, y1, now.state), now.resets
         ends = [state]  # and behind a reset
         if resets is not None:
-            t, state, resets = self._reset(solve, keep, control, t, state, resets)
+            passed = self._landed(control), keep
+            t, state, _, resets = reset_at_switch(
+                self._switches, solve.scene, *passed, t, state, (), resets
+            )
             dense, ends = (*dense, y1), [*ends, state]
         counted = jnp.asarray(result != diffrax.RESULTS.successful)
         memory = now.memory
@@ -200,7 +170,7 @@ class AdaptiveSolve:
             rejected=now.rejected + jnp.where(keep | ended, 0, 1),
             counted=counted,
             memory=memory,
-            extremes=self._extremes_after(solve.scene, now, keep, ends),
+            extremes=self.widened(solve, now, lambda: (keep, ends)),
             resets=resets,
         )
         attempts = (after.accepted + after.rejected).astype(solve.max_attempts.dtype)
@@ -210,8 +180,7 @@ class AdaptiveSolve:
         decided = None if self.recorder is None else self.recorder.decides(memory)
         return after, over if decided is None else over | decided
 
-    def finish(self, solve: Solve, now: _Now) -> PyTree:
-        """What is `Solved`, or what the recorder makes of it."""
+    def solved(self, solve: Solve, now: _Now) -> tuple[Solved, Scalar | None]:
         done = (now.t >= solve.duration) | now.counted
         timed_out, count = jnp.asarray(False), None
         control = now.control
@@ -229,39 +198,19 @@ class AdaptiveSolve:
         if now.resets is not None:
             code = jnp.where(now.resets.chatters, int(Ending.CHATTERS), code)
         low, high = (None, None) if now.extremes is None else now.extremes
-        missed = None if solve.steps is None else control[1]
-        solved = Solved(now.t, now.state, code, now.accepted, now.rejected, low, high, missed)
-        if self.recorder is None:
-            return solved
-        return self.recorder.finish(solve, now.memory, solved, count)
+        steps = (now.accepted, now.rejected)
+        solved = Solved(now.t, now.state, code, None, *steps, lowest=low, highest=high)
+        return solved if solve.steps is None else solved._replace(missed_contacts=control[1]), count
+
+    @property
+    def _switches(self) -> Watch:
+        """What steps end on; for a system that lands."""
+        return Watch.of(self.system, resets=self.system.resets)
 
     def _landed(self, control: PyTree) -> SwitchLocatorState:
         """What the switch locator knows; for a system that lands."""
         landed: SwitchLocatorState = control[0] if self.counting else control
         return landed
-
-    def _reset(
-        self,
-        solve: Solve,
-        keep: Scalar,
-        control: PyTree,
-        t: Scalar,
-        state: PyTree,
-        before: Gathering,
-    ) -> tuple[Scalar, PyTree, Gathering]:
-        """Time and state behind a step, on the switch and reset there if it ends just past one."""
-        landed = self._landed(control)
-        met = keep & (landed.crossed_field > 0)
-
-        def behind() -> tuple[Scalar, PyTree, Scalar]:
-            # The little time past the switch is taken back.
-            rates = self.system.vector_field(t, state, solve.scene)
-            on = jtu.tree_map(lambda leaf, rate: leaf - landed.past * rate, state, rates)
-            after = self.system.reset_at_switch(solve.scene, on, landed.crossed_field)
-            return t - landed.past, after, self.system.repeats(solve.scene, after)
-
-        t, state, repeats = jax.lax.cond(met, behind, lambda: (t, state, jnp.asarray(False)))
-        return t, state, before.after(met, t, repeats, self.system.time_unit)
 
     def _happened(self, scene: PyTree, now: _Now) -> dict[Ending, Scalar]:
         """The failure that ends a solve here, the first of them."""
@@ -272,24 +221,16 @@ class AdaptiveSolve:
             none = none & ~happened[name]
         return happened
 
-    def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-        assert self.recorder is not None
-        return self.recorder.record(self, solve, now.memory, Moment(now.t, now.state), time)
-
-    @property
-    def resets(self) -> bool:
-        """Whether steps may end in a reset of the state."""
-        return False
+    def moment(self, solve: Solve, now: _Now) -> Moment:
+        return Moment(now.t, now.state)
 
     def no_coefficients(self, solve: Solve, course: bool) -> tuple[PyTree, ...]:
-        """The coefficients of a `Step` before the first one: zeros."""
         nothing = jtu.tree_map(jnp.zeros_like, solve.state)
         return (nothing,) * (self.stepper.dense_count + self.system.resets)
 
     def course(
         self, solve: Solve, last: LastStep, t: Scalar, state: PyTree
     ) -> diffrax.AbstractLocalInterpolation:
-        """The continuous solution of a step that ended at this time in this state."""
         coefficients = last.coefficients
         if self.system.resets:  # behind which the state is another one than at the step's end
             *inner, state = coefficients
@@ -298,7 +239,6 @@ class AdaptiveSolve:
         return self.stepper.interpolation_cls(**ends, coefficients=coefficients)
 
     def state_at(self, solve: Solve, last: LastStep, now: Moment, time: Scalar) -> PyTree:
-        """The state at a time within the last step."""
         return self.course(solve, last, now.t, now.state).evaluate(time)
 
     def arrival_near(
@@ -306,17 +246,6 @@ class AdaptiveSolve:
     ) -> tuple[Scalar, PyTree]:
         """The zero of the course itself, and the state there."""
         return time, self.state_at(solve, last, now, time)
-
-    def _extremes_after(
-        self, scene: PyTree, now: _Now, keep: Scalar, states: list[PyTree]
-    ) -> tuple[PyTree, PyTree] | None:
-        """The extremes, with states at the step's end where it is kept."""
-        if now.extremes is None or self.extremes is None:
-            return None
-        wider = now.extremes
-        for state in states:
-            wider = widened_extremes(keep, wider, _numbers(self.extremes(scene, state)))
-        return wider
 
     def _first_step(self, solve: Solve) -> Scalar:
         if solve.steps is None:
@@ -338,10 +267,7 @@ class AdaptiveSolve:
         else:
             control = MissedContacts(EqualSteps(solve.steps.total, solve.duration), self.system)
         if self.system.lands:
-            watch = Watch(
-                self.system.vector_field, self.system.switches, time_unit=self.system.time_unit
-            )
-            control = SwitchLocator(control, watch)
+            control = SwitchLocator(control, self._switches)
         if self.counting:
             control = FootstepLimit(control, solve.footsteps, self.system)
         return LocatedEnding(control, self.system, self.watch, probe) if self.located else control
@@ -350,19 +276,6 @@ class AdaptiveSolve:
         return diffrax.ODETerm(self.system.vector_field)
 
 
-@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def adaptive_program(steps: AdaptiveSolve) -> Program:
-    recorder = steps.recorder
-    records = recorder is not None and recorder.records
-    scheduled = recorder is not None and recorder.scheduled
-    record = steps.record if records else None
-    return Program(steps.start, steps.attempt, steps.finish, record=record, scheduled=scheduled)
-
-
 def _has_begun(now: _Now) -> Scalar:
     """Whether anything was attempted: a solve may begin in what would end it."""
     return now.accepted + now.rejected > 0
-
-
-def _numbers(values: PyTree) -> PyTree:
-    return jtu.tree_map(lambda x: jnp.asarray(x, dtype=jnp.float64), values)

@@ -1,22 +1,23 @@
-"""Recorders: what a solve in the lanes engine saves of its steps, and whether that ends it."""
+"""Recorders: what a program saves of a solve's steps, and whether that ends it."""
 
 import abc
 import dataclasses
-from collections.abc import Callable
-from typing import ClassVar, NamedTuple, Protocol
+from collections.abc import Callable, Iterable
+from typing import Any, ClassVar, NamedTuple
 
 import diffrax
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-import numpy as np
-from jaxtyping import Array, PyTree
+from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
+from jaxbiped.compiler import Program
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.solve._step_polynomials import StepCubic
-from jaxbiped.solve._stepper import Stepper
+from jaxbiped.solve.controllers._wrapped_control import widened_extremes
 
 NO_RESET, STRIKE, CHANGE = 0.0, 1.0, 2.0
 """What resets the state behind a recorded step: nothing, a heel strike, a change of mode."""
@@ -101,31 +102,60 @@ class LastStep(NamedTuple):
     end: PyTree = None
 
 
-class Motion(Protocol):
-    """What a recorder asks of a solve's functions."""
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class AbstractSolve(abc.ABC):
+    """The functions of a `Program` that solves a motion. Hashable.
 
-    @property
-    def system(self) -> AbstractSystem:
-        """What moves."""
+    Its inputs have a scene and a state to start from; what it carries from attempt to attempt has a
+    recorder's memory and the extremes so far.
 
-    @property
-    def resets(self) -> bool:
-        """Whether steps may end in a reset of the state."""
+    Attributes:
+        system: what moves.
+        recorder: what is saved; None: the end alone.
+        extremes: a function of (scene, state) whose extremes over the steps' ends are wanted, on
+            both sides of a reset, or None.
+        resets: whether recorders ask which steps end in a reset. A property of the class.
+    """
 
-    def no_coefficients(self, solve: PyTree, course: bool) -> tuple[PyTree, ...]:
+    resets: ClassVar[bool]
+    system: AbstractSystem
+    recorder: "AbstractRecorder | None" = None
+    extremes: Callable[[PyTree, PyTree], PyTree] | None = None
+
+    @abc.abstractmethod
+    def start(self, solve: Any) -> Any:
+        """What is carried into the first attempt."""
+
+    @abc.abstractmethod
+    def attempt(self, solve: Any, now: Any) -> tuple[Any, Scalar]:
+        """What is carried behind an attempt, and whether the solve is over."""
+
+    @abc.abstractmethod
+    def solved(self, solve: Any, now: Any) -> tuple[PyTree, Scalar | None]:
+        """The outputs, and how many footsteps there were, if any are counted."""
+
+    @abc.abstractmethod
+    def moment(self, solve: Any, now: Any) -> Moment:
+        """Where the solve is, as it is told."""
+
+    @abc.abstractmethod
+    def no_coefficients(self, solve: Any, course: bool) -> tuple[PyTree, ...]:
         """The coefficients of a `Step` before the first one: zeros."""
 
+    @abc.abstractmethod
     def course(
-        self, solve: PyTree, last: LastStep, t: Scalar, state: PyTree
+        self, solve: Any, last: LastStep, t: Scalar, state: PyTree
     ) -> diffrax.AbstractLocalInterpolation:
         """The continuous solution of a step that ended at this time in this state."""
 
-    def state_at(self, solve: PyTree, last: LastStep, now: Moment, time: Scalar) -> PyTree:
+    @abc.abstractmethod
+    def state_at(self, solve: Any, last: LastStep, now: Moment, time: Scalar) -> PyTree:
         """The state at a time within the last step, as accurate as the step's end."""
 
+    @abc.abstractmethod
     def arrival_near(
         self,
-        solve: PyTree,
+        solve: Any,
         last: LastStep,
         now: Moment,
         time: Scalar,
@@ -133,8 +163,54 @@ class Motion(Protocol):
     ) -> tuple[Scalar, PyTree]:
         """Where a value of the state is zero, and that state, from a zero of the course."""
 
+    def finish(self, solve: Any, now: Any) -> PyTree:
+        """What is `solved`, or what the recorder makes of it."""
+        solved, footsteps = self.solved(solve, now)
+        if self.recorder is None:
+            return solved
+        return self.recorder.finish(solve, now.memory, solved, footsteps)
 
-def no_step(how: Motion, solve: PyTree, *, course: bool) -> LastStep:
+    def record(self, solve: Any, now: Any, time: Scalar) -> tuple[Scalar, list[Scalar]]:
+        """Whether there is a row, and its numbers."""
+        assert self.recorder is not None
+        return self.recorder.record(self, solve, now.memory, self.moment(solve, now), time)
+
+    def observed_start(self, solve: Any) -> tuple[PyTree, tuple[PyTree, PyTree] | None]:
+        """The recorder's memory and the extremes before the first attempt."""
+        memory = None if self.recorder is None else self.recorder.begin(self, solve)
+        if self.extremes is None:
+            return memory, None
+        values = _numbers(self.extremes(solve.scene, solve.state))
+        return memory, (values, values)
+
+    def widened(
+        self, solve: Any, now: Any, ends: Callable[[], tuple[Scalar, Iterable[PyTree]]]
+    ) -> tuple[PyTree, PyTree] | None:
+        """The extremes behind a step; `ends` gives whether it is kept, and states at its end."""
+        wider: tuple[PyTree, PyTree] | None = now.extremes
+        if self.extremes is None or wider is None:
+            return None
+        keep, states = ends()
+        for state in states:
+            wider = widened_extremes(keep, wider, _numbers(self.extremes(solve.scene, state)))
+        return wider
+
+
+def _numbers(values: PyTree) -> PyTree:
+    return jtu.tree_map(lambda x: jnp.asarray(x, dtype=jnp.float64), values)
+
+
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def program_of(steps: AbstractSolve) -> Program:
+    """The program of a solve."""
+    recorder = steps.recorder
+    records = recorder is not None and recorder.records
+    scheduled = recorder is not None and recorder.scheduled
+    record = steps.record if records else None
+    return Program(steps.start, steps.attempt, steps.finish, record=record, scheduled=scheduled)
+
+
+def no_step(how: AbstractSolve, solve: PyTree, *, course: bool) -> LastStep:
     """The last step before the first attempt. `course`: whether its continuous solution is kept."""
     none, nothing = jnp.asarray(False), jtu.tree_map(jnp.zeros_like, solve.state)
     coefficients = how.no_coefficients(solve, course)
@@ -163,11 +239,11 @@ class AbstractRecorder(abc.ABC):
     """Whether rows are made at the times of a schedule."""
 
     @abc.abstractmethod
-    def begin(self, how: Motion, solve: PyTree) -> PyTree:
+    def begin(self, how: AbstractSolve, solve: PyTree) -> PyTree:
         """The memory before the first attempt."""
 
     @abc.abstractmethod
-    def follow(self, how: Motion, solve: PyTree, memory: PyTree, step: Step) -> PyTree:
+    def follow(self, how: AbstractSolve, solve: PyTree, memory: PyTree, step: Step) -> PyTree:
         """The memory after an attempt."""
 
     def decides(self, memory: PyTree) -> Scalar | None:
@@ -182,7 +258,7 @@ class AbstractRecorder(abc.ABC):
 
     def record(
         self,
-        how: Motion,
+        how: AbstractSolve,
         solve: PyTree,
         memory: PyTree,
         now: Moment,
@@ -200,17 +276,17 @@ class StepRecorder(AbstractRecorder):
     the state before the reset comes before that behind it.
     """
 
-    def begin(self, how: Motion, solve: PyTree) -> LastStep:
+    def begin(self, how: AbstractSolve, solve: PyTree) -> LastStep:
         last = no_step(how, solve, course=False)
         return last._replace(end=last.state) if how.resets else last
 
-    def follow(self, how: Motion, solve: PyTree, memory: LastStep, step: Step) -> LastStep:
+    def follow(self, how: AbstractSolve, solve: PyTree, memory: LastStep, step: Step) -> LastStep:
         here = last_step(step, memory, course=False)
         return here if step.end is None else here._replace(end=step.end())
 
     def record(
         self,
-        how: Motion,
+        how: AbstractSolve,
         solve: PyTree,
         memory: LastStep,
         now: Moment,
@@ -228,15 +304,15 @@ class TimeRecorder(AbstractRecorder):
 
     scheduled: ClassVar[bool] = True
 
-    def begin(self, how: Motion, solve: PyTree) -> LastStep:
+    def begin(self, how: AbstractSolve, solve: PyTree) -> LastStep:
         return no_step(how, solve, course=False)
 
-    def follow(self, how: Motion, solve: PyTree, memory: LastStep, step: Step) -> LastStep:
+    def follow(self, how: AbstractSolve, solve: PyTree, memory: LastStep, step: Step) -> LastStep:
         return last_step(step, memory, course=False)
 
     def record(
         self,
-        how: Motion,
+        how: AbstractSolve,
         solve: PyTree,
         memory: LastStep,
         now: Moment,
@@ -256,13 +332,13 @@ class ArrivalRecorder(AbstractRecorder):
 
     section: AbstractSection
 
-    def begin(self, how: Motion, solve: PyTree) -> LastStep:
+    def begin(self, how: AbstractSolve, solve: PyTree) -> LastStep:
         last = no_step(how, solve, course=True)
         stands = jnp.asarray(how.system.standing_leg(solve.scene, solve.state))
         rise = Rise(last.noted, last.t, last.t)
         return last._replace(leg=stands, rise=rise)
 
-    def follow(self, how: Motion, solve: PyTree, memory: LastStep, step: Step) -> LastStep:
+    def follow(self, how: AbstractSolve, solve: PyTree, memory: LastStep, step: Step) -> LastStep:
         scene, here = solve.scene, last_step(step, memory, course=True)
         assert memory.leg is not None
         course = how.course(solve, here, step.t1, step.y1)
@@ -285,7 +361,7 @@ class ArrivalRecorder(AbstractRecorder):
 
     def record(
         self,
-        how: Motion,
+        how: AbstractSolve,
         solve: PyTree,
         memory: LastStep,
         now: Moment,
@@ -296,7 +372,9 @@ class ArrivalRecorder(AbstractRecorder):
             memory.noted, lambda: self._arrival(how, solve, memory, now), lambda: nothing
         )
 
-    def _arrival(self, how: Motion, solve: PyTree, last: LastStep, now: Moment) -> list[Scalar]:
+    def _arrival(
+        self, how: AbstractSolve, solve: PyTree, last: LastStep, now: Moment
+    ) -> list[Scalar]:
         if self.section.behind_reset:
             return [now.t, *now.state]
         assert last.rise is not None
@@ -330,14 +408,14 @@ class StrikeRecorder(AbstractRecorder):
 
     strikes: bool = True
 
-    def begin(self, how: Motion, solve: PyTree) -> None:
+    def begin(self, how: AbstractSolve, solve: PyTree) -> None:
         return None
 
-    def follow(self, how: Motion, solve: PyTree, memory: None, step: Step) -> None:
+    def follow(self, how: AbstractSolve, solve: PyTree, memory: None, step: Step) -> None:
         return None
 
     def record(
-        self, how: Motion, solve: PyTree, memory: None, now: Moment, due: Scalar
+        self, how: AbstractSolve, solve: PyTree, memory: None, now: Moment, due: Scalar
     ) -> tuple[Scalar, list[Scalar]]:
         assert now.strikes is not None
         happens = now.strikes if now.changes is None else now.strikes | now.changes
@@ -410,51 +488,3 @@ def arrival_time(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -
 
     start = (low, high, value(low), value(high), jnp.zeros_like(low), high)
     return jax.lax.fori_loop(0, _SECANTS, secant, start)[-1]
-
-
-def recorded_steps(
-    start: PyTree, rows: np.ndarray, stepper: Stepper, *, resets: bool
-) -> tuple[Array, PyTree, diffrax.DenseInterpolation]:
-    """The times [s] of a start and of n steps' ends, (n + 1,), the states there, and the rest.
-
-    From the rows of `StepRecorder`, shape (n, numbers), as diffrax would have them. With `resets`,
-    each row ends with the state before the reset; where there is one, its time comes twice.
-    """
-    kind, size = type(start), len(start)
-    first = np.array([0.0, *(float(leaf) for leaf in start)])
-    begins = np.vstack([first[1:], rows[:, 1 : 1 + size]])[:-1]
-    if resets:
-        rows, begins = _with_both_sides(rows, begins)
-    ends = np.vstack([first, rows[:, : 1 + size]]).T.copy()
-    # One step more than there are: where there are none, diffrax looks into one all the same.
-    times = np.append(ends[0], np.inf)
-    infos = np.vstack([begins.T, rows[:, 1:].T])
-    infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
-    groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
-    # One transfer for all of them: each costs as much as several steps.
-    counts = len(rows) + 1, 1  # of a weak type, as a number in diffrax's own would be
-    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0), counts
-    times, groups, t, states, zero, (count, one) = jax.device_put(parts)
-    dense = diffrax.DenseInterpolation(
-        ts=times,
-        ts_size=count,
-        infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
-        interpolation_cls=stepper.interpolation_cls,
-        direction=one,
-        t0_if_trivial=zero,
-        y0_if_trivial=start,
-    )
-    return t, states, dense
-
-
-def _with_both_sides(rows: np.ndarray, begins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of steps to the states before resets, each followed by one of no length behind it."""
-    size = begins.shape[1]
-    behind, before = rows[:, 1 : 1 + size], rows[:, -size:]
-    to_reset, in_reset = rows[:, :-size].copy(), rows[:, :-size].copy()
-    to_reset[:, 1 : 1 + size] = before
-    in_reset[:, 1 + size :] = 0.0
-    kept = np.stack([np.ones(len(rows), bool), np.any(before != behind, axis=1)], axis=1)
-    both = (np.stack([to_reset, in_reset], axis=1), np.stack([begins, behind], axis=1))
-    steps, starts = (each[kept] for each in both)
-    return steps, starts

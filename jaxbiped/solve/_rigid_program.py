@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import diffrax
 import jax
@@ -12,15 +12,14 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar
-from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import Program
 from jaxbiped.dynamics._stance_motion import rolling_rates
 from jaxbiped.dynamics._surfaces import straight_legs
+from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import Rolling
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._explicit_methods import ExplicitMethod
-from jaxbiped.solve._recorders import AbstractRecorder, LastStep, Moment, Step
+from jaxbiped.solve._recorders import AbstractSolve, LastStep, Moment, Step
 from jaxbiped.solve._rigid_steps import (
     Attempted,
     FallWatch,
@@ -32,26 +31,9 @@ from jaxbiped.solve._rigid_steps import (
     is_pulled,
 )
 from jaxbiped.solve._rolling_step import DOPRI8, state_after, told_state, within_step
-from jaxbiped.solve.controllers._wrapped_control import widened_extremes
+from jaxbiped.solve._solved import Solved
 
-
-class RigidSolved(NamedTuple):
-    """One walk's outputs: see `RigidProgress`.
-
-    `lowest` and `highest` are the extremes of what was asked for, None where nothing was.
-    """
-
-    t: Scalar
-    state: Any
-    ending: Scalar
-    footsteps: Scalar
-    accepted: Scalar
-    rejected: Scalar
-    grazes: Scalar
-    pulls: Scalar
-    begin: Scalar | None
-    lowest: PyTree = None
-    highest: PyTree = None
+ROLLING = Rolling()
 
 
 class _Now(NamedTuple):
@@ -86,39 +68,27 @@ class RollingCourse(diffrax.AbstractLocalInterpolation):
         return told_state(self.scene, within_step(self.step, place, self.before, self.after))
 
 
-@dataclasses.dataclass(frozen=True)
-class RigidSolve:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RigidSolve(AbstractSolve):
     """The functions of a `Program` that solves a `RigidWalk`. Hashable.
 
     Attributes:
-        recorder: what is saved; None: the end alone.
-        extremes: a function of (scene, state) whose extremes over the steps' ends are wanted, on
-            both sides of an impact, or None.
         waits: whether the duration only bounds the wait for footsteps.
         method: its steps.
         falls: what becomes of falls.
         counts_pulls: whether steps behind which the walker is pulled are counted.
     """
 
-    recorder: AbstractRecorder | None = None
-    extremes: Callable[[PyTree, PyTree], PyTree] | None = None
+    resets: ClassVar[bool] = True
+    system: AbstractSystem = ROLLING
     waits: bool = False
     method: ExplicitMethod = DOPRI8
     falls: FallWatch = FallWatch.LOCATED
     counts_pulls: bool = True
 
-    @property
-    def system(self) -> Rolling:
-        """What moves."""
-        return Rolling()
-
     def start(self, walk: RigidWalk) -> _Now:
-        memory = None if self.recorder is None else self.recorder.begin(self, walk)
-        extremes = None
-        if self.extremes is not None:
-            values = self.extremes(walk.scene, walk.state)
-            extremes = (values, values)
-        return _Now(initial_progress(walk), memory, extremes)
+        observed = self.observed_start(walk)
+        return _Now(initial_progress(walk), *observed)
 
     def attempt(self, walk: RigidWalk, now: _Now) -> tuple[_Now, Scalar]:
         before = now.progress
@@ -136,15 +106,14 @@ class RigidSolve:
             memory = self.recorder.follow(self, walk, memory, self._step(walk, before, tried))
             if (decided := self.recorder.decides(memory)) is not None:
                 over = over | decided
-        extremes = now.extremes
-        if self.extremes is not None and extremes is not None:
-            for state in (tried.end(), after.state):
-                values = self.extremes(walk.scene, told_state(walk.scene, state))
-                extremes = widened_extremes(_ends(tried), extremes, values)
-        return _Now(after, memory, extremes), over
 
-    def finish(self, walk: RigidWalk, now: _Now) -> PyTree:
-        """What is `RigidSolved`, or what the recorder makes of it."""
+        def ends() -> tuple[Scalar, list[Any]]:
+            states = [told_state(walk.scene, state) for state in (tried.end(), after.state)]
+            return _ends(tried), states
+
+        return _Now(after, memory, self.widened(walk, now, ends)), over
+
+    def solved(self, walk: RigidWalk, now: _Now) -> tuple[Solved, Scalar]:
         done = now.progress
         code = ending_of(walk, done, jnp.asarray(self.waits))
         counts = (done.footsteps, done.accepted, done.rejected, done.grazes, done.pulls)
@@ -152,26 +121,15 @@ class RigidSolve:
         begin = begin if done.modes is None else done.modes.begin
         low, high = (None, None) if now.extremes is None else now.extremes
         state = told_state(walk.scene, done.state)
-        solved = RigidSolved(done.t, state, code, *counts, begin, low, high)
-        if self.recorder is None:
-            return solved
-        return self.recorder.finish(walk, now.memory, solved, done.footsteps)
+        return Solved(done.t, state, code, *counts, begin, low, high), done.footsteps
 
-    def record(self, walk: RigidWalk, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-        assert self.recorder is not None
+    def moment(self, walk: RigidWalk, now: _Now) -> Moment:
         here, changes = now.progress, None
         if rigid_modes(walk.scene.mechanism).any:
             changes = jnp.asarray(False) if here.modes is None else here.modes.changed
-        moment = Moment(here.t, told_state(walk.scene, here.state), here.struck, changes)
-        return self.recorder.record(self, walk, now.memory, moment, time)
-
-    @property
-    def resets(self) -> bool:
-        """Whether steps may end in a reset of the state."""
-        return True
+        return Moment(here.t, told_state(walk.scene, here.state), here.struck, changes)
 
     def no_coefficients(self, walk: RigidWalk, course: bool) -> tuple[PyTree, ...]:
-        """The coefficients of a `Step` before the first one: zeros."""
         zero = jnp.zeros_like(walk.state[0])
         accelerations = (zero,) * len(walk.scene.mechanism.structure.free)
         if not course:
@@ -180,7 +138,6 @@ class RigidSolve:
         return (accelerations, zero, nothing, accelerations)
 
     def course(self, walk: RigidWalk, last: LastStep, t: Scalar, state: PyTree) -> RollingCourse:
-        """The continuous solution of a step, up to a time [s]."""
         accelerations, length, end, then = last.coefficients
         before = last.state, accelerations
         return RollingCourse(last.t, t, walk.scene, before, (end, then), length)
@@ -237,13 +194,3 @@ def _ends(tried: Attempted) -> Scalar:
     code = tried.after.code
     fell = (code == int(Ending.FELL_FORWARD)) | (code == int(Ending.FELL_BACK))
     return tried.accepted & ((tried.after.landing == 0) | fell)
-
-
-@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def rigid_program(steps: RigidSolve) -> Program:
-    """The program of a `RigidWalk`."""
-    recorder = steps.recorder
-    records = recorder is not None and recorder.records
-    scheduled = recorder is not None and recorder.scheduled
-    record = steps.record if records else None
-    return Program(steps.start, steps.attempt, steps.finish, record=record, scheduled=scheduled)

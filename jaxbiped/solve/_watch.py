@@ -1,12 +1,14 @@
 """Watch: what the steps of a solve end on, and what ends the solve."""
 
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, VectorField
 from jaxbiped.hybrid._guards import Switch
+from jaxbiped.hybrid._system import AbstractSystem
 
 
 class Watch(eqx.Module):
@@ -43,6 +45,21 @@ class Watch(eqx.Module):
     told: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
     repeats: Callable[[PyTree, PyTree], Scalar] | None = eqx.field(static=True, default=None)
     time_unit: float = eqx.field(static=True, default=1.0)
+
+    @classmethod
+    def of(cls, system: AbstractSystem, *, resets: bool, **ends: Any) -> "Watch":
+        """The switches of a system, and whatever else `ends` steps or the solve, by attribute.
+
+        `resets`: whether a switch of these solves may reset the state.
+        """
+        return cls(
+            field=system.vector_field,
+            switches=system.switches,
+            reset=system.reset_at_switch if resets else None,
+            repeats=system.repeats if system.resets else None,
+            time_unit=system.time_unit,
+            **ends,
+        )
 
     def node(self, args: PyTree, y: PyTree) -> PyTree:
         """A state as nodes have it."""

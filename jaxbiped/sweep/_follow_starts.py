@@ -4,6 +4,7 @@ All engines run these same functions, so that labels do not depend on the engine
 beyond a stop are recognised here, too.
 """
 
+import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -27,9 +28,10 @@ from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import Rolling, system_of
 from jaxbiped.scene._modes import limit_motions, rigid_modes
 from jaxbiped.scene._scene import RigidScene, Scene, is_rigid, is_walker
-from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
 from jaxbiped.solve._explicit_methods import ExplicitMethod
-from jaxbiped.solve._rigid_program import RigidSolve, rigid_program
+from jaxbiped.solve._recorders import program_of
+from jaxbiped.solve._rigid_program import RigidSolve
 from jaxbiped.solve._rigid_steps import FallWatch, RigidWalk
 from jaxbiped.solve.controllers._wrapped_control import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -180,22 +182,22 @@ def _program(
     grazes: bool,
 ) -> Program:
     if isinstance(system, Rolling):
-        return rigid_program(
+        return program_of(
             RigidSolve(
-                StrikeLabelRecorder(cycles, grazes),
+                recorder=StrikeLabelRecorder(cycles, grazes),
                 method=ExplicitMethod(embedded=embedded),
                 falls=FallWatch.TOLD,
                 counts_pulls=False,
             )
         )
+    solve = functools.partial(AdaptiveSolve, system=system, stepper=solver, fenced=fenced)
     if isinstance(system, GuardedMotion):
         assert section is not None
         arrivals = ArrivalLabelRecorder(section, cycles, grazes)
         watch = tuple(name for _, name in system.watched)
-        steps = AdaptiveSolve(system, solver, watch, False, arrivals, located=True, fenced=fenced)
-        return adaptive_program(steps)
+        return program_of(solve(watch=watch, counting=False, recorder=arrivals, located=True))
     recorder = LabelRecorder(cycles, grazes)
-    return adaptive_program(AdaptiveSolve(system, solver, WATCHES, True, recorder, fenced=fenced))
+    return program_of(solve(watch=WATCHES, counting=True, recorder=recorder))
 
 
 def _longest_wait(scene: Any) -> np.ndarray:

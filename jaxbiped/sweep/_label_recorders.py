@@ -20,19 +20,19 @@ from jaxbiped.dynamics._state import (
     recurring_periods,
 )
 from jaxbiped.hybrid._sections import AbstractSection, MidStance
-from jaxbiped.solve._adaptive_program import Solve, Solved
+from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._recorders import (
     AbstractRecorder,
+    AbstractSolve,
     LastStep,
-    Motion,
     Step,
     arrival_time,
     last_step,
     no_step,
     rise_within,
 )
-from jaxbiped.solve._rigid_program import RigidSolved
 from jaxbiped.solve._rigid_steps import RigidWalk
+from jaxbiped.solve._solved import Solved
 from jaxbiped.solve.controllers._grazing import grazes
 from jaxbiped.sweep._convergence_test import (
     DEPTH,
@@ -144,14 +144,16 @@ class LabelRecorder(AbstractRecorder):
     cycles: tuple[int, ...]
     grazes: bool = False
 
-    def begin(self, how: Motion, solve: Solve) -> LabelMemory:
+    def begin(self, how: AbstractSolve, solve: Solve) -> LabelMemory:
         zero = jnp.zeros_like(solve.duration)
         trace = empty_history(zero, len(recurring_names(solve.state)), self.cycles)
         landed = contact_places(solve.scene, solve.state)
         count = jnp.zeros((), dtype=jnp.int64) if self.grazes else None
         return LabelMemory(no_step(how, solve, course=True), trace, zero, landed, count)
 
-    def follow(self, how: Motion, solve: Solve, memory: LabelMemory, step: Step) -> LabelMemory:
+    def follow(
+        self, how: AbstractSolve, solve: Solve, memory: LabelMemory, step: Step
+    ) -> LabelMemory:
         last = last_step(step, memory.last, course=True)
         strike = jnp.where(jnp.asarray(step.strikes), step.t1, memory.strike)
         trace = self._traced(how, solve, memory.trace, last, step)
@@ -183,7 +185,7 @@ class LabelRecorder(AbstractRecorder):
         )
 
     def _traced(
-        self, how: Motion, solve: Solve, trace: ArrivalHistory, last: LastStep, step: Step
+        self, how: AbstractSolve, solve: Solve, trace: ArrivalHistory, last: LastStep, step: Step
     ) -> ArrivalHistory:
         """After the last step, within which it may have arrived at mid-stance."""
         scene, system, section = solve.scene, how.system, MidStance()
@@ -245,14 +247,16 @@ class ArrivalLabelRecorder(AbstractRecorder):
     cycles: tuple[int, ...]
     grazes: bool = False
 
-    def begin(self, how: Motion, solve: Solve) -> ArrivalMemory:
+    def begin(self, how: AbstractSolve, solve: Solve) -> ArrivalMemory:
         zero, none = jnp.zeros_like(solve.duration), jnp.zeros((), dtype=jnp.int64)
         trace = empty_history(zero, len(recurring_names(solve.state)), self.cycles)
         count = none if self.grazes else None
         times = (zero, *[jnp.full_like(zero, jnp.nan)] * (2 * DEPTH - 1))
         return ArrivalMemory(no_step(how, solve, course=True), trace, times, none, count)
 
-    def follow(self, how: Motion, solve: Solve, memory: ArrivalMemory, step: Step) -> ArrivalMemory:
+    def follow(
+        self, how: AbstractSolve, solve: Solve, memory: ArrivalMemory, step: Step
+    ) -> ArrivalMemory:
         last = last_step(step, memory.last, course=True)
         course = how.course(solve, last, step.t1, step.y1)
         rise = rise_within(self.section, how.system, solve.scene, course)
@@ -335,13 +339,13 @@ class StrikeLabelRecorder(AbstractRecorder):
     cycles: tuple[int, ...]
     grazes: bool = False
 
-    def begin(self, how: Motion, walk: RigidWalk) -> StrikeMemory:
+    def begin(self, how: AbstractSolve, walk: RigidWalk) -> StrikeMemory:
         zero = jnp.zeros_like(walk.duration)
         size = len(recurring_names(walk.state))
         return StrikeMemory(empty_history(zero, size, self.cycles), zero)
 
     def follow(
-        self, how: Motion, walk: RigidWalk, memory: StrikeMemory, step: Step
+        self, how: AbstractSolve, walk: RigidWalk, memory: StrikeMemory, step: Step
     ) -> StrikeMemory:
         strikes = jnp.asarray(step.strikes)
         trace = _after_arrival(walk, memory.trace, strikes, lambda: step.y1, self.cycles)
@@ -354,7 +358,7 @@ class StrikeLabelRecorder(AbstractRecorder):
         return memory.trace.verdict != UNDECIDED
 
     def finish(
-        self, walk: RigidWalk, memory: StrikeMemory, solved: RigidSolved, footsteps: Scalar | None
+        self, walk: RigidWalk, memory: StrikeMemory, solved: Solved, footsteps: Scalar | None
     ) -> Labelled:
         return _outcome(
             memory.trace,
@@ -367,7 +371,7 @@ class StrikeLabelRecorder(AbstractRecorder):
         )
 
 
-def _advance(solve: Solve | RigidWalk, solved: Solved | RigidSolved) -> Scalar:
+def _advance(solve: Solve | RigidWalk, solved: Solved) -> Scalar:
     """Change of the first cyclic coordinate; NaN without one."""
     for name in cyclic_names(solve.state):
         advance: Scalar = getattr(solved.state, name) - getattr(solve.state, name)

@@ -23,8 +23,8 @@ from jaxbiped.scene._parameter_access import parameter_names
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import MinimalState, WalkerState
 from jaxbiped.simulate._simulation import CompiledSimulation, Simulation
+from jaxbiped.simulate._trajectory import Trajectory
 from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve._trajectory import Trajectory
 
 Values = Mapping[str, np.ndarray]
 """What a solve gave, by the name of the error axis."""

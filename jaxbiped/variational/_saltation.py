@@ -163,51 +163,36 @@ def saltation_at(watch: Watch, state: PyTree, args: Seeded, happens: Scalar) -> 
 
 
 def behind_reset(
-    watch: Watch,
-    met: Scalar,
-    which: Scalar,
-    past: Scalar,
-    state: PyTree,
-    columns: list[Scalar],
-    args: Seeded,
-    sizes: Scalar,
+    watch: Watch, args: Seeded, sizes: Scalar, state: PyTree, columns: list[Scalar], which: Scalar
 ) -> tuple[PyTree, list[Scalar]]:
     """The state behind a switch that resets it, and its columns there.
 
-    It is that on the switch: the little time past it is taken back. Columns are those where all
-    motions meet the switch, so that the reset's own derivative is all that changes them.
+    Columns are those where all motions meet the switch, so that the reset's own derivative is all
+    that changes them.
 
     Args:
-        watch: the field, and its reset.
-        met: whether the switch was met (boolean); else nothing changes.
-        which: the switch's number, from 1 on.
-        past: how long before [s]; so short that the state moves along its rates.
-        state: just past the switch.
-        columns: of the directions of the state, then of those of parameters, shapes (n, c).
+        watch: has the reset.
         args: the arguments and their active leaves.
         sizes: by how much each of the last columns moves its parameter.
+        state: on the switch.
+        columns: of the directions of the state, then of those of parameters, shapes (n, c).
+        which: the switch's number, from 1 on.
     """
-    reset, structure, q = watch.reset, jtu.tree_structure(state), active_leaves(args)
+    reset, q = watch.reset, active_leaves(args)
+    leaves, structure = jtu.tree_flatten(state)
     assert reset is not None
 
     def behind(leaves: list[Scalar], q: list[Scalar]) -> list[Scalar]:
         before = jtu.tree_unflatten(structure, leaves)
         return jtu.tree_leaves(reset(with_active(args, q), before, which))
 
-    def after() -> tuple[PyTree, list[Scalar]]:
-        rates = watch.field(jnp.zeros_like(past), state, args.args)
-        leaves = jtu.tree_leaves(jtu.tree_map(lambda leaf, rate: leaf - past * rate, state, rates))
+    def along(each: tuple[Scalar, Scalar]) -> Scalar:
+        return jnp.stack(jax.jvp(behind, (leaves, q), tuple(map(list, each)))[1])
 
-        def along(each: tuple[Scalar, Scalar]) -> Scalar:
-            return jnp.stack(jax.jvp(behind, (leaves, q), tuple(map(list, each)))[1])
-
-        seeds = jnp.zeros((len(columns[0]), len(q))), jnp.diag(sizes)
-        pairs = zip(columns, seeds, strict=True)
-        moved = [jax.lax.map(along, pair) if len(pair[0]) else pair[0] for pair in pairs]
-        return jtu.tree_unflatten(structure, behind(leaves, q)), moved
-
-    found: tuple[PyTree, list[Scalar]] = jax.lax.cond(met, after, lambda: (state, columns))
-    return found
+    seeds = jnp.zeros((len(columns[0]), len(q))), jnp.diag(sizes)
+    pairs = zip(columns, seeds, strict=True)
+    moved = [jax.lax.map(along, pair) if len(pair[0]) else pair[0] for pair in pairs]
+    return jtu.tree_unflatten(structure, behind(leaves, q)), moved
 
 
 def behind_arrival(watch: Watch, y: Tangents, args: Seeded) -> Tangents:

@@ -12,9 +12,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, VectorField
-from jaxbiped.hybrid._implicit_field import AbstractImplicitField, Residual
+from jaxbiped.hybrid._implicit_field import ImplicitField
 from jaxbiped.hybrid._scales import Units
-from jaxbiped.linalg._sparse_lu import SparseMatrix
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._watch import Watch
 
@@ -119,25 +118,12 @@ def plain_args(args: PyTree) -> PyTree:
     return args.args if isinstance(args, Seeded) else args
 
 
-class _TracedOnce(AbstractImplicitField):
-    rates: Callable[..., PyTree] = eqx.field(static=True)
-    masses: Callable[..., SparseMatrix] = eqx.field(static=True)
-    balance: Callable[..., Residual] = eqx.field(static=True)
-
-    def __call__(self, t: Time, y: PyTree, args: PyTree) -> PyTree:
-        return self.rates(t, y, args)
-
-    def mass_matrix(self, y: PyTree, args: PyTree) -> SparseMatrix:
-        return self.masses(y, args)
-
-    def residual(self, y: PyTree, rates: PyTree, args: PyTree) -> Residual:
-        return self.balance(y, rates, args)
-
-
 def traced_once(field: VectorField) -> VectorField:
     """The same field, compiled by itself: traced once, not at each of its many uses."""
-    if isinstance(field, AbstractImplicitField):
-        return _TracedOnce(jax.jit(field), jax.jit(field.mass_matrix), jax.jit(field.residual))
+    if isinstance(field, ImplicitField):
+        return ImplicitField(
+            jax.jit(field.field), jax.jit(field.mass_matrix), jax.jit(field.residual)
+        )
     return jax.jit(field)
 
 

@@ -1,6 +1,7 @@
 """Variational solve for lanes: the twin of what `_solve_to_section` does through diffrax."""
 
 import dataclasses
+import functools
 from typing import Any, NamedTuple
 
 import diffrax
@@ -13,7 +14,7 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.solve._accuracy import rms_norm
-from jaxbiped.solve._gathering import Gathering
+from jaxbiped.solve._switch_resets import Gathering, reset_at_switch
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._step_size import step_control
 from jaxbiped.solve.controllers._switch_locator import (
@@ -159,15 +160,11 @@ class AdaptiveColumns:
         resets = now.resets
         new_columns, shifts = self._met(given, now, landed, new_columns, step)
         if self.watch.reset is not None:
-            seeded, past = self._seeded(given), landed.past
-            met = keep & (landed.crossed_field > 0)
-            behind = behind_reset(
-                self.watch, met, landed.crossed_field, past, state, new_columns, seeded, given.sizes
+            reset = functools.partial(behind_reset, self.watch, self._seeded(given), given.sizes)
+            end = t, state, new_columns, resets
+            t, state, new_columns, resets = reset_at_switch(
+                self.watch, given.args, landed, keep, *end, reset
             )
-            (state, new_columns), t = behind, jnp.where(met, t - past, t)
-            if resets is not None and self.watch.repeats is not None:
-                repeats = self.watch.repeats(given.args, state)
-                resets = resets.after(met, t, repeats, self.watch.time_unit)
         if self.watch.peak is None:
             pairs = zip(new_columns, columns, strict=True)
             columns = tuple(jax.lax.map(lambda each: jnp.where(keep, *each), p) for p in pairs)

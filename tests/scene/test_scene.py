@@ -13,7 +13,8 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped import Mechanism, Stop
-from jaxbiped.hybrid._walker_systems import BodiesField, WalkerField, system_of
+from jaxbiped.hybrid import RedundantWalking, Walking
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractScene, is_compliant, is_rigid
 from jaxbiped.scene._state_types import state_type_of
 from tests.mechanisms import FEET, LEGS, WALKERS, scene_of
@@ -68,22 +69,22 @@ RIGID = jb.RigidScene(SEED.walker, SEED.ground)
 @pytest.mark.parametrize(
     ("scene", "compliant", "redundant", "state", "field"),
     [
-        (SEED, True, False, jb.State, WalkerField()),
-        (BRISTLES, True, False, jb.dynamics.BristleState, WalkerField()),
+        (SEED, True, False, jb.State, Walking.vector_field),
+        (BRISTLES, True, False, jb.dynamics.BristleState, Walking.vector_field),
         (RIGID, False, False, jb.dynamics.RigidState, jb.hybrid.Rolling().vector_field),
         (
             jb.RedundantScene(SEED),
             True,
             True,
             jb.dynamics.RedundantState,
-            BodiesField(),
+            RedundantWalking.vector_field,
         ),
         (
             jb.RedundantScene(BRISTLES, "penalty", "euler"),
             True,
             True,
             state_type_of((*jb.dynamics.EulerState._fields, "bristle_1", "bristle_2")),
-            BodiesField(),
+            RedundantWalking.vector_field,
         ),
     ],
 )

@@ -1,10 +1,14 @@
 """Columns through a switch that resets the state, against a ball that bounces, known exactly."""
 
+import functools
+import types
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.hybrid import Switch
+from jaxbiped.solve._switch_resets import reset_at_switch
 from jaxbiped.solve._watch import Watch
 from jaxbiped.variational._saltation import at_fixed_time, behind_reset, meet, meeting_at
 from jaxbiped.variational._tangents import Seeded
@@ -44,9 +48,10 @@ def through_the_bounce(state, by_state, met, past=0.0):
     columns, shifts = (by_state, jnp.zeros((2, 2))), (jnp.zeros(2), jnp.zeros(2))
     meeting = meeting_at(WATCH, state, args, jnp.asarray(1))
     columns, shifts = meet(meeting, columns, shifts, jnp.asarray(SIZES))
-    after, columns = behind_reset(
-        WATCH, met, jnp.asarray(1), jnp.asarray(past), state, columns, args, jnp.asarray(SIZES)
-    )
+    passed = types.SimpleNamespace(crossed_field=jnp.asarray(1), past=jnp.asarray(past))
+    reset = functools.partial(behind_reset, WATCH, args, jnp.asarray(SIZES))
+    end = jnp.zeros(()), state, columns, None
+    _, after, columns, _ = reset_at_switch(WATCH, args.args, passed, met, *end, reset)
     return after, at_fixed_time(field(0.0, after, args.args), columns, shifts)
 
 

@@ -28,7 +28,7 @@ from jaxbiped.plot._samples import (
 )
 from jaxbiped.plot._skeleton import Skeleton, body_motion, motion_names, names_by_foot, skeleton_of
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.simulate._trajectory import Trajectory
 
 _FORCES = ("normal", "tangential")
 _ENERGIES = ("kinetic", "elastic", "supplied", "driven", "lost")

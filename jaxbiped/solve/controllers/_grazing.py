@@ -40,15 +40,11 @@ class Turns(NamedTuple):
 
 
 def _may_turn(old: Switch, new: Switch) -> Scalar:
-    """Whether it matters how a switch turns; one that resets the state may have begun on it.
-
-    Where the field jumps as well, the state may begin below the surface, as that of a runner who
-    lifts off lower than it touches down, and rise and fall through it within a step.
-    """
+    """Whether it matters how a switch turns; one that resets the state may have begun on it."""
     if not old.resets:
         return jnp.asarray(old.live & new.live)
     begins_off = old.value > ROUNDING
-    if old.force_jumps:
+    if old.rises:
         begins_off = begins_off | (old.value <= 0.0)
     return jnp.asarray(old.live & begins_off)
 

@@ -21,7 +21,7 @@ from jaxtyping import PyTree
 from jaxbiped._jax_versions import ClosedJaxpr, called_program
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import partial_derivatives
-from jaxbiped.hybrid._implicit_field import AbstractImplicitField, Residual
+from jaxbiped.hybrid._implicit_field import ImplicitField, Residual
 from jaxbiped.linalg._small_matrices import Matrix, inverse
 from jaxbiped.linalg._sparse_lu import (
     Entry,
@@ -265,7 +265,7 @@ def split(y: PyTree, field: object = None) -> tuple[Components, Callable[[Compon
     """The components of `y` and the map back; scalars if `field` has an implicit form."""
     leaves, structure = jtu.tree_flatten(y)
     few = sum(jnp.size(leaf) for leaf in leaves) <= _MOST_SCALARS
-    if not few and not isinstance(field, AbstractImplicitField):
+    if not few and not isinstance(field, ImplicitField):
         vector, unravel = jax.flatten_util.ravel_pytree(y)
         return [vector], lambda components: unravel(components[0])
     shapes = [jnp.shape(leaf) for leaf in leaves]
@@ -299,14 +299,14 @@ class ImplicitForm(NamedTuple):
 
     @property
     def exists(self) -> bool:
-        """Whether the field has one; see `AbstractImplicitField`."""
-        return isinstance(self.field, AbstractImplicitField)
+        """Whether the field has one; see `ImplicitField`."""
+        return isinstance(self.field, ImplicitField)
 
     def mass_matrix(self, y: Components) -> SparseMatrix:
-        return self.field.mass_matrix(self.join(y), self.args)
+        return self.field.mass_matrix(self.args, self.join(y))
 
     def residual(self, y: Components, rates: Components) -> Residual:
-        return self.field.residual(self.join(y), self.join(rates), self.args)
+        return self.field.residual(self.args, self.join(y), self.join(rates))
 
 
 class ImplicitJacobian(NamedTuple):

@@ -1,8 +1,9 @@
-"""Steps of a rigid walk as they are saved: its states on both sides of each reset, and between."""
+"""Steps as they are saved: states on both sides of each reset, and the motion between."""
 
 from typing import Any, NamedTuple
 
 import diffrax
+import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
@@ -11,6 +12,7 @@ from jaxtyping import Array, PyTree
 from jaxbiped._types import Numbers, Scalar, by_numpy, is_traced
 from jaxbiped.solve._recorders import NO_RESET, STRIKE
 from jaxbiped.solve._rolling_step import root_place, shifted, state_after
+from jaxbiped.solve._stepper import Stepper
 
 
 class RollingStep(diffrax.AbstractLocalInterpolation):
@@ -114,3 +116,51 @@ def _repeated(leaf: Numbers, times: int) -> Array:
         lambda numpy, leaf: numpy.broadcast_to(leaf, (times, *leaf.shape)), jnp.asarray(leaf)
     )
     return repeated
+
+
+def recorded_steps(
+    start: PyTree, rows: np.ndarray, stepper: Stepper, *, resets: bool
+) -> tuple[Array, PyTree, diffrax.DenseInterpolation]:
+    """The times [s] of a start and of n steps' ends, (n + 1,), the states there, and the rest.
+
+    From the rows of `StepRecorder`, shape (n, numbers), as diffrax would have them. With `resets`,
+    each row ends with the state before the reset; where there is one, its time comes twice.
+    """
+    kind, size = type(start), len(start)
+    first = np.array([0.0, *(float(leaf) for leaf in start)])
+    begins = np.vstack([first[1:], rows[:, 1 : 1 + size]])[:-1]
+    if resets:
+        rows, begins = _with_both_sides(rows, begins)
+    ends = np.vstack([first, rows[:, : 1 + size]]).T.copy()
+    # One step more than there are: where there are none, diffrax looks into one all the same.
+    times = np.append(ends[0], np.inf)
+    infos = np.vstack([begins.T, rows[:, 1:].T])
+    infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
+    groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
+    # One transfer for all of them: each costs as much as several steps.
+    counts = len(rows) + 1, 1  # of a weak type, as a number in diffrax's own would be
+    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0), counts
+    times, groups, t, states, zero, (count, one) = jax.device_put(parts)
+    dense = diffrax.DenseInterpolation(
+        ts=times,
+        ts_size=count,
+        infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
+        interpolation_cls=stepper.interpolation_cls,
+        direction=one,
+        t0_if_trivial=zero,
+        y0_if_trivial=start,
+    )
+    return t, states, dense
+
+
+def _with_both_sides(rows: np.ndarray, begins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of steps to the states before resets, each followed by one of no length behind it."""
+    size = begins.shape[1]
+    behind, before = rows[:, 1 : 1 + size], rows[:, -size:]
+    to_reset, in_reset = rows[:, :-size].copy(), rows[:, :-size].copy()
+    to_reset[:, 1 : 1 + size] = before
+    in_reset[:, 1 + size :] = 0.0
+    kept = np.stack([np.ones(len(rows), bool), np.any(before != behind, axis=1)], axis=1)
+    both = (np.stack([to_reset, in_reset], axis=1), np.stack([begins, behind], axis=1))
+    steps, starts = (each[kept] for each in both)
+    return steps, starts
