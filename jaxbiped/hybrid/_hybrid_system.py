@@ -21,7 +21,7 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped.dynamics._state import check_state, periods_of, turned_difference
 from jaxbiped.hybrid._guards import Guard, Switch
-from jaxbiped.hybrid._sections import AbstractSection, Section, section_of
+from jaxbiped.hybrid._sections import AbstractSection, Section, chosen_section, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractScene
@@ -152,6 +152,7 @@ class At(AbstractSection):
         return jnp.asarray(args.guard(self.guard).is_armed(y))
 
 
+@chosen_section.register
 @section_of.register
 def section_of_system(system: HybridSystem, section: Any) -> AbstractSection:
     """A section of a system's motions, checked. Default: at its first guard that resets the state.
@@ -281,6 +282,11 @@ class GuardedMotion(AbstractSystem):
     at: str | None = eqx.field(static=True, default=None)
     lands: ClassVar[bool] = True
 
+    @property
+    def watches(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the guards that end it."""
+        return tuple(name for _, name in self.watched)
+
     def observed_at(self, section: AbstractSection) -> "GuardedMotion":
         if not isinstance(section, At):
             return self
@@ -358,12 +364,6 @@ class GuardedMotion(AbstractSystem):
         modes = getattr(type(y), "modes", ())
         held = {name: jnp.round(getattr(y, name)) for name in modes}
         return within_periods(y._replace(**held))
-
-    def ending(self, args: HybridSystem, y: PyTree) -> Scalar:
-        code = jnp.asarray(0)
-        for name, happens in self.failures(tuple(name for _, name in self.watched)).items():
-            code = jnp.where(happens(0.0, y, args), int(name), code)
-        return code
 
     def reset_map(self, args: HybridSystem, y: PyTree) -> PyTree:
         if self.at is not None and (guard := args.guard(self.at)).reset is not None:

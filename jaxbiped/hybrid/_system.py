@@ -32,12 +32,14 @@ class AbstractSystem(eqx.Module):
         lands: whether every solve ends a step on each switch; else only those with derivatives do,
             and others weigh the errors of steps across. A property of the class.
         resets: whether a plain solve resets the state at switches. A property of the class.
+        watches: names of the failures that may be watched for. A property of the class.
     """
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = ()
     time_unit: ClassVar[float] = 1.0
     lands: ClassVar[bool] = False
     resets: ClassVar[bool] = False
+    watches: ClassVar[tuple[str, ...]] = ()
 
     @abc.abstractmethod
     def vector_field(self, t: Time, y: PyTree, args: PyTree) -> PyTree:
@@ -73,9 +75,15 @@ class AbstractSystem(eqx.Module):
         """
         return y
 
-    @abc.abstractmethod
     def ending(self, args: PyTree, y: PyTree) -> Scalar:
-        """Code of the `Ending` that has occurred; 0 if the motion goes on."""
+        """Code of the `Ending` that has occurred; 0 if the motion goes on.
+
+        Default: the last of the failures that `watches` names.
+        """
+        code = jnp.asarray(0)
+        for name, happens in self.failures(self.watches).items():
+            code = jnp.where(happens(0.0, y, args), int(name), code)
+        return code
 
     @abc.abstractmethod
     def reset_map(self, args: PyTree, y: PyTree) -> PyTree:

@@ -70,6 +70,8 @@ class BodiesField(AbstractImplicitField):
 class AbstractWalking(AbstractSystem):
     """A walker on compliant ground: legs exchanged at each footstep."""
 
+    watches: ClassVar[tuple[str, ...]] = WATCHES
+
     def switches(self, args: CompliantScene, y: PyTree) -> tuple[Switch, ...]:
         return switches(args, y)
 
@@ -78,12 +80,6 @@ class AbstractWalking(AbstractSystem):
 
     def contact_changes(self, args: CompliantScene, before: PyTree, after: PyTree) -> Scalar:
         return contact_changes(args, before, after)
-
-    def ending(self, args: PyTree, y: PyTree) -> Scalar:
-        code = jnp.asarray(0)
-        for name, happens in ending_events(WATCHES).items():
-            code = jnp.where(happens(0.0, y, args), int(name), code)
-        return code
 
     def failures(self, watch: tuple[str, ...]) -> dict[Ending, Callable[..., Scalar]]:
         return ending_events(watch)

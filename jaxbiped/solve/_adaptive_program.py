@@ -14,14 +14,15 @@ import diffrax
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import Numbers, Scalar, select
+from jaxbiped._types import Numbers, Scalar, as_float, select
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import Program, without_barriers
 from jaxbiped.hybrid._endings import ending_code
-from jaxbiped.hybrid._scales import Units
+from jaxbiped.hybrid._scales import Units, units_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.solve._gathering import Gathering
 from jaxbiped.solve._recorders import AbstractRecorder, LastStep, Moment, Step
@@ -40,6 +41,7 @@ from jaxbiped.solve.controllers._wrapped_control import (
     StepsOfOneSize,
     clip_step,
     first_step,
+    just_before_end,
     widened_extremes,
 )
 
@@ -130,6 +132,18 @@ class AdaptiveSolve:
     extremes: Callable[[PyTree, PyTree], PyTree] | None = None
     located: bool = False
     fenced: bool = False
+
+    def inputs(self, scene: PyTree, state: PyTree, **limits: Numbers) -> Solve:
+        """The inputs of a solve that only waits for its recorder, from its `limits` by name."""
+        return Solve(
+            scene,
+            state,
+            almost=just_before_end(as_float(limits["duration"])),
+            atol=1e-2 * limits["rtol"],
+            units=units_of(scene, state),
+            patience=np.inf,
+            **limits,
+        )
 
     def start(self, solve: Solve) -> _Now:
         zero, none = jnp.zeros_like(solve.duration), jnp.asarray(False)
@@ -351,7 +365,8 @@ class AdaptiveSolve:
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def adaptive_program(steps: AdaptiveSolve) -> Program:
+def solve_program(steps: Any) -> Program:
+    """The program of an `AdaptiveSolve`, or of other functions of this form."""
     recorder = steps.recorder
     records = recorder is not None and recorder.records
     scheduled = recorder is not None and recorder.scheduled

@@ -11,9 +11,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import Scalar
-from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import Program
+from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._stance_motion import rolling_rates
 from jaxbiped.dynamics._surfaces import straight_legs
 from jaxbiped.hybrid._walker_systems import Rolling
@@ -111,6 +109,10 @@ class RigidSolve:
     def system(self) -> Rolling:
         """What moves."""
         return Rolling()
+
+    def inputs(self, scene: RigidScene, state: Any, **limits: Numbers) -> RigidWalk:
+        """The inputs of a solve that only waits for its recorder, from its `limits` by name."""
+        return RigidWalk(scene, state, **limits)
 
     def start(self, walk: RigidWalk) -> _Now:
         memory = None if self.recorder is None else self.recorder.begin(self, walk)
@@ -237,13 +239,3 @@ def _ends(tried: Attempted) -> Scalar:
     code = tried.after.code
     fell = (code == int(Ending.FELL_FORWARD)) | (code == int(Ending.FELL_BACK))
     return tried.accepted & ((tried.after.landing == 0) | fell)
-
-
-@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def rigid_program(steps: RigidSolve) -> Program:
-    """The program of a `RigidWalk`."""
-    recorder = steps.recorder
-    records = recorder is not None and recorder.records
-    scheduled = recorder is not None and recorder.scheduled
-    record = steps.record if records else None
-    return Program(steps.start, steps.attempt, steps.finish, record=record, scheduled=scheduled)

@@ -194,7 +194,7 @@ class Labelling(eqx.Module):
         if effort["wanted"] is None:
             del effort["wanted"]
         models = {"scene": own["model"], "solver": identity(self.effort.solver)}
-        if section is not None:
+        if not section.names_legs:  # which a walker leaves no choice of
             models["section"] = identity(section)
         return {
             "model": _kind_of(self.scene),

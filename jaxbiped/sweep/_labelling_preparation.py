@@ -16,7 +16,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
 from jaxbiped.hybrid._hybrid_system import HybridSystem
 from jaxbiped.hybrid._scales import resolve_slip_speed
-from jaxbiped.hybrid._sections import AbstractSection, section_of
+from jaxbiped.hybrid._sections import AbstractSection, chosen_section
 from jaxbiped.scene._scene import RigidScene, Scene, is_rigid, is_walker
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
@@ -156,22 +156,8 @@ def effort_of(
         engine=engine_for(engine, obstacle=None, by_device=True, by_any=True),
         may_move=engine == "auto",
         wanted=wanted,
-        section=_section_for(scene, section),
+        section=chosen_section(scene, section),
     )
-
-
-def _section_for(
-    scene: Scene | RigidScene | HybridSystem, section: AbstractSection | None
-) -> AbstractSection | None:
-    """The section of a hybrid system, checked; None for a walker, which has one alone."""
-    if not is_walker(scene):
-        return section_of(scene, section)
-    if section is not None:
-        raise ArgumentError(
-            f"section = {section!r} is not allowed for a {type(scene).__name__}: walkers are "
-            "compared at their own section; leave it out."
-        )
-    return None
 
 
 def _share_wanted(accuracy: str | float, rtol: float | None) -> float | None:
