@@ -19,12 +19,19 @@ from jaxbiped._parameter_declaration import check_parameters
 from jaxbiped._types import Scalar, Time, any_of, as_float, by_numpy, in_64_bits, is_traced, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
-from jaxbiped.dynamics._state import check_state, periods_of, turned_difference
+from jaxbiped.dynamics._mode_changes import SLACK
+from jaxbiped.dynamics._state import (
+    check_state,
+    periods_of,
+    state_for,
+    turned_difference,
+    without_whole_turns,
+)
 from jaxbiped.hybrid._guards import Guard, Switch
 from jaxbiped.hybrid._sections import AbstractSection, Section, chosen_section, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene, RedundantScene, RigidScene, Scene
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
@@ -110,16 +117,11 @@ class HybridSystem(AbstractScene):
         check_choice("guard", name, guards)
         return guards[name]
 
-    def lies_beyond(self, state: Any, by: float) -> Scalar:
-        """Whether a state is so far beyond a guard that is armed and resets it (boolean).
 
-        Args:
-            state: a state.
-            by: how far at least, in the guard's scale.
-        """
-        resetting = [guard for guard in self.guards() if guard.reset is not None]
-        beyond = [(guard.value(state) < -by) & guard.is_armed(state) for guard in resetting]
-        return any_of([jnp.asarray(False), *map(jnp.asarray, beyond)])
+SCENES = (Scene, RigidScene, RedundantScene, HybridSystem)
+"""Kinds of scenes."""
+MINIMAL_SCENES = (Scene, RigidScene, HybridSystem)
+"""Those in minimal coordinates."""
 
 
 def _turn(name: str, period: float) -> Guard:
@@ -187,6 +189,7 @@ def any_state(system: HybridSystem) -> Any:
     return kind(*(as_float(0.0) for _ in kind._fields))
 
 
+@state_for.register
 def start_of_system(system: HybridSystem, state: Any, name: str = "state") -> Any:
     """A start with all numbers in 64 bits, each periodic coordinate within its period.
 
@@ -204,6 +207,11 @@ def start_of_system(system: HybridSystem, state: Any, name: str = "state") -> An
                         f"{name} is not allowed: the rate of {coordinate} is {float(rate):g} there."
                     )
     return state
+
+
+@without_whole_turns.register
+def _(system: HybridSystem, state: Any) -> Any:
+    return within_periods(state)
 
 
 def within_periods(state: Any) -> Any:
@@ -355,6 +363,19 @@ class GuardedMotion(AbstractSystem):
             for old in (getattr(before, name),)
         }
         return after._replace(**counted)
+
+    def lies_beyond(self, args: HybridSystem, states: PyTree, by: float = SLACK) -> np.ndarray:
+        """Whether states are beyond a guard that is armed and resets them, by so much in its scale.
+
+        Leaves have the shape (n,).
+        """
+
+        def one(y: PyTree) -> Scalar:
+            resetting = [guard for guard in args.guards() if guard.reset is not None]
+            beyond = [(guard.value(y) < -by) & guard.is_armed(y) for guard in resetting]
+            return any_of([jnp.asarray(False), *map(jnp.asarray, beyond)])
+
+        return np.asarray(jax.vmap(one)(states))
 
     def repeats(self, args: HybridSystem, y: PyTree) -> Scalar:
         resetting = [guard for guard in self._located(args) if guard.reset is not None]

@@ -1,10 +1,11 @@
 """Walkers as hybrid systems: with laws of contact in either coordinates, and on rigid feet."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
@@ -13,11 +14,11 @@ from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._constrained_motion import project
 from jaxbiped.dynamics._contacts import feet, foot_force
 from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
-from jaxbiped.dynamics._footfalls import landings, standing_leg
+from jaxbiped.dynamics._footfalls import landings, leg_depth, standing_leg
 from jaxbiped.dynamics._holds import on_held
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import force_residual, mass_matrix, vector_field
-from jaxbiped.dynamics._mode_changes import change_mode_on_surface
+from jaxbiped.dynamics._mode_changes import SLACK, change_mode_on_surface
 from jaxbiped.dynamics._redundant_motion import redundant_field
 from jaxbiped.dynamics._stance_motion import rolling, rolling_field
 from jaxbiped.dynamics._state import cyclic_names
@@ -28,10 +29,14 @@ from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._implicit_field import AbstractImplicitField, Residual
 from jaxbiped.hybrid._rigid_guards import mode_switches
 from jaxbiped.hybrid._sections import AbstractSection
+from jaxbiped.hybrid._start_placement import held_like, passes_a_stop, standing_like
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.linalg._sparse_lu import SparseMatrix
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
+
+_SHALLOW = 1e-9
+"""Depth of a foot in units of length up to which it just touches."""
 
 
 @functools.singledispatch
@@ -71,6 +76,7 @@ class AbstractWalking(AbstractSystem):
     """A walker on compliant ground: legs exchanged at each footstep."""
 
     watches: ClassVar[tuple[str, ...]] = WATCHES
+    footsteps_end_on_section: ClassVar[bool] = False
 
     def switches(self, args: CompliantScene, y: PyTree) -> tuple[Switch, ...]:
         return switches(args, y)
@@ -120,6 +126,20 @@ class Walking(AbstractWalking):
 
     vector_field: ClassVar[WalkerField] = WalkerField()
 
+    def placed_like(
+        self, args: Scene, base: PyTree, states: PyTree, named: Collection[str]
+    ) -> PyTree:
+        return standing_like(args, base, states, named)
+
+    def sizes(self, args: Scene, y: PyTree) -> PyTree:
+        """The root point's height is measured in the depth of the stance leg's deepest foot."""
+        structure = args.mechanism.structure
+        found = leg_depth(structure, feet(args, y), structure.stance_leg)
+        depth, length = abs(float(found)), float(args.mechanism.height)
+        # A start whose foot just touches tells no depth.
+        height = depth if depth > _SHALLOW * length else length
+        return super().sizes(args, y)._replace(**{structure.coordinates[1]: height})
+
 
 class RedundantWalking(AbstractWalking):
     """The walker in coordinates of each leg. Its constraints leave fewer directions than leaves.
@@ -143,6 +163,7 @@ class Rolling(AbstractSystem):
     """The rigid walker: it rolls on one foot, and exchanges support at each heel strike."""
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (0,)
+    watches: ClassVar[tuple[str, ...]] = WATCHES
 
     def vector_field(self, t: Time, y: Any, args: RigidScene) -> Any:
         return rolling_field(t, y, args)
@@ -152,6 +173,12 @@ class Rolling(AbstractSystem):
 
     def reset_at_switch(self, args: RigidScene, y: Any, which: Scalar) -> Any:
         return change_mode_on_surface(args, y)
+
+    def lies_beyond(self, args: RigidScene, states: Any, by: float = SLACK) -> np.ndarray:
+        return passes_a_stop(args, states._asdict(), by=by)
+
+    def placed_like(self, args: RigidScene, base: Any, states: Any, named: Collection[str]) -> Any:
+        return held_like(args, base, states, named)
 
     def on_held(self, args: RigidScene, y: Any) -> Any:
         return on_held(args, y)

@@ -133,7 +133,7 @@ class AdaptiveSolve:
     located: bool = False
     fenced: bool = False
 
-    def inputs(self, scene: PyTree, state: PyTree, **limits: Numbers) -> Solve:
+    def inputs(self, scene: PyTree, state: PyTree, **limits: Any) -> Solve:
         """The inputs of a solve that only waits for its recorder, from its `limits` by name."""
         return Solve(
             scene,
@@ -141,7 +141,7 @@ class AdaptiveSolve:
             almost=just_before_end(as_float(limits["duration"])),
             atol=1e-2 * limits["rtol"],
             units=units_of(scene, state),
-            patience=np.inf,
+            patience=np.asarray(np.inf),
             **limits,
         )
 

@@ -11,7 +11,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import Numbers, Scalar
+from jaxbiped._types import Scalar
 from jaxbiped.dynamics._stance_motion import rolling_rates
 from jaxbiped.dynamics._surfaces import straight_legs
 from jaxbiped.hybrid._walker_systems import Rolling
@@ -110,7 +110,7 @@ class RigidSolve:
         """What moves."""
         return Rolling()
 
-    def inputs(self, scene: RigidScene, state: Any, **limits: Numbers) -> RigidWalk:
+    def inputs(self, scene: Any, state: Any, **limits: Any) -> RigidWalk:
         """The inputs of a solve that only waits for its recorder, from its `limits` by name."""
         return RigidWalk(scene, state, **limits)
 

@@ -1,29 +1,23 @@
 """Following of starts until the label of each is certain: how far and accurately, by any engine.
 
-All engines run these same functions, so that labels do not depend on the engine. Starts that lie
-beyond a stop are recognised here, too.
+All engines run these same functions, so that labels do not depend on the engine.
 """
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import jax
 import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped.compiler import BY_NAME, DEVICES, Request
-from jaxbiped.dynamics._mode_changes import SLACK
 from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait._return_map_spec import patience_of
-from jaxbiped.hybrid._hybrid_system import HybridSystem
 from jaxbiped.hybrid._scales import is_smooth
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._modes import limit_motions, rigid_modes
-from jaxbiped.scene._scene import RigidScene, Scene, is_rigid, is_walker
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, solve_program
 from jaxbiped.solve._explicit_methods import ExplicitMethod
 from jaxbiped.solve._rigid_program import RigidSolve
@@ -98,7 +92,7 @@ class Effort(NamedTuple):
 
 
 def follow_starts(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     states: PyTree,
     goals: Goals,
     cycles: tuple[int, ...],
@@ -190,20 +184,3 @@ def broadcast_leaves(tree: PyTree, count: int) -> PyTree:
         return np.broadcast_to(array, (count, *array.shape))
 
     return jtu.tree_map(repeat, tree)
-
-
-def passes_a_stop(scene: Any, values: Mapping[str, Any], *, by: float = SLACK) -> np.ndarray:
-    """Whether states by name, arrays of shape (n,), lie beyond a stop by so much [rad].
-
-    Those of a hybrid system, beyond a guard that is armed and resets the state, in its scale.
-    """
-    if not is_walker(scene):
-        states = scene.state_type(**values)
-        return np.asarray(jax.vmap(lambda y: scene.lies_beyond(y, by))(states))
-    angle = scene.mechanism.structure.coordinates[2]
-    passed = np.zeros(np.shape(values[angle]), dtype=bool)
-    if is_rigid(scene):
-        mechanism, slope = scene.mechanism, scene.ground.slope
-        for gap, _ in limit_motions(mechanism, rigid_modes(mechanism), slope, values):
-            passed = passed | (np.asarray(gap) < -by)
-    return passed

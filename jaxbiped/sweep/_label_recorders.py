@@ -218,6 +218,7 @@ class LabelRecorder(AbstractLabelRecorder):
         )
 
     def follow(self, how: Motion, solve: Solve, memory: LabelMemory, step: Step) -> LabelMemory:
+        assert memory.last is not None
         last = last_step(step, memory.last, course=True)
         strike = jnp.where(jnp.asarray(step.strikes), step.t1, memory.times[0])
         trace = self._traced(how, solve, memory.trace, last, step)
@@ -273,6 +274,8 @@ class ArrivalLabelRecorder(AbstractLabelRecorder):
         )
 
     def follow(self, how: Motion, solve: Solve, memory: LabelMemory, step: Step) -> LabelMemory:
+        assert memory.last is not None
+        assert memory.arrivals is not None
         last = last_step(step, memory.last, course=True)
         course = how.course(solve, last, step.t1, step.y1)
         rise = rise_within(self.section, how.system, solve.scene, course)
@@ -289,14 +292,15 @@ class ArrivalLabelRecorder(AbstractLabelRecorder):
             return course.evaluate(arrival_time(value, rise.since, rise.until))
 
         lasting = _lasting(step.t1, memory.times)
+        arrivals = memory.arrivals + jnp.where(arrives, 1, 0)
         after = LabelMemory(
             last,
             self._after_arrival(solve, memory.trace, arrives, on_section, lasting),
             select(arrives, (step.t1, *memory.times[:-1]), memory.times),
-            arrivals=memory.arrivals + jnp.where(arrives, 1, 0),
+            arrivals=arrivals,
             grazes=step.grazes if self.grazes else None,
         )
-        walked = after.arrivals.astype(solve.footsteps.dtype) >= solve.footsteps
+        walked = arrivals.astype(solve.footsteps.dtype) >= solve.footsteps
         open_ = after.trace.verdict == UNDECIDED
         return _time_out(solve, after.with_verdict(Label.UNRESOLVED, open_ & walked), step.t1)
 
