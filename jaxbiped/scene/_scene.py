@@ -66,6 +66,8 @@ class AbstractScene(eqx.Module):
         coordinate_aliases: coordinates by other names that they have.
         has_default_guess: whether it is known where a search for its gaits begins. A property of
             the class.
+        has_ground: whether it has feet on a ground, whose forces, losses and clearances are
+            measured along a cycle. A property of the class.
     """
 
     compliant: AbstractClassVar[bool]
@@ -75,6 +77,7 @@ class AbstractScene(eqx.Module):
     posture: ClassVar[tuple[str, ...]] = ()
     coordinate_aliases: ClassVar[Mapping[str, str]] = MappingProxyType({})
     has_default_guess: ClassVar[bool] = False
+    has_ground: ClassVar[bool] = False
     time_unit: ClassVar[float] = 1.0
     endings: ClassVar[tuple[str, ...] | None] = None
     arrival_footsteps: ClassVar[int] = 1
@@ -110,6 +113,7 @@ class AbstractWalkerScene(AbstractScene):
     """
 
     has_default_guess: ClassVar[bool] = True
+    has_ground: ClassVar[bool] = True
     if TYPE_CHECKING:
         # A field of some scenes, a property of others.
         @property

@@ -15,7 +15,6 @@ from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait._return_map_spec import patience_of
 from jaxbiped.hybrid._scales import is_smooth
 from jaxbiped.hybrid._sections import AbstractSection
-from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, solve_program
@@ -105,19 +104,17 @@ def follow_starts(
     """
     count, each = len(states[0]), scene.arrival_footsteps
     arrivals = tuple(max(length // each, 1) for length in cycles)
-    # Labels by a number may doubt what grazes.
-    counted = effort.wanted is not None
     if not count:
         none = np.zeros(0)
         final: Any = (none,) * len(recurring_names(states))
         plain = Labelled(*[*[none] * 9, final])
-        return _as_arrays(plain._replace(grazes=none if counted else None))
+        return _as_arrays(plain._replace(grazes=None if effort.wanted is None else none))
 
     def same(value: npt.ArrayLike) -> np.ndarray:
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
 
     waits = np.asarray(patience_of(scene))
-    steps = _steps(system_of(scene), effort, arrivals, smooth=is_smooth(scene), grazes=counted)
+    steps = _steps(scene, effort, arrivals)
     start = steps.inputs(
         scene,
         states,
@@ -137,16 +134,11 @@ def follow_starts(
 
 
 def _steps(
-    system: AbstractSystem,
-    effort: Effort,
-    cycles: tuple[int, ...],
-    *,
-    smooth: bool,
-    grazes: bool,
+    scene: AbstractScene, effort: Effort, cycles: tuple[int, ...]
 ) -> RigidSolve | AdaptiveSolve:
-    """The functions of the program that labels starts."""
-    section = effort.section
-    if smooth:
+    """The functions of the program that labels starts. Labels by a number may doubt what grazes."""
+    system, section, grazes = system_of(scene), effort.section, effort.wanted is not None
+    if is_smooth(scene):
         return RigidSolve(
             StrikeLabelRecorder(section, cycles, grazes),
             method=ExplicitMethod(embedded=effort.embedded),
