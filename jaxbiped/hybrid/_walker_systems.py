@@ -28,6 +28,7 @@ from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface, rig
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._implicit_field import AbstractImplicitField, Residual
 from jaxbiped.hybrid._rigid_guards import mode_switches
+from jaxbiped.hybrid._scales import sizes_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._start_placement import held_like, passes_a_stop, standing_like
 from jaxbiped.hybrid._system import AbstractSystem
@@ -138,7 +139,7 @@ class Walking(AbstractWalking):
         depth, length = abs(float(found)), float(args.mechanism.height)
         # A start whose foot just touches tells no depth.
         height = depth if depth > _SHALLOW * length else length
-        return super().sizes(args, y)._replace(**{structure.coordinates[1]: height})
+        return sizes_of(args, y)[1]._replace(**{structure.coordinates[1]: height})
 
 
 class RedundantWalking(AbstractWalking):
