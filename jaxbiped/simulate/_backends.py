@@ -19,7 +19,7 @@ from jaxbiped.compiler import BY_NAME, LaneEngine, Request
 from jaxbiped.hybrid._endings import ending_code
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.simulate._start import Options
-from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, solve_program
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adaptive_program
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
 from jaxbiped.solve._recorders import (
     AbstractRecorder,
@@ -243,7 +243,7 @@ def lane_request(run: "Simulation") -> Request:
         located=run.dt is None,
         fenced=run.engine == "xla",
     )
-    return Request(solve_program(steps), solve, quick=run.max_solver_steps <= _QUICK)
+    return Request(adaptive_program(steps), solve, quick=run.max_solver_steps <= _QUICK)
 
 
 def _stepper(run: "Simulation") -> Stepper:

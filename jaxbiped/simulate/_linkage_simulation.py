@@ -29,7 +29,7 @@ from jaxbiped.scene._linkages import LinkageScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.simulate._start import Options, check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
-from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, solve_program
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
 from jaxbiped.solve._recorders import TimeRecorder
 from jaxbiped.solve._runge_kutta import stepper_of
@@ -227,7 +227,7 @@ def _lane_request(
         steps=None if dt is None else StepsOfOneSize.of(dt, until),
     )
     steps = AdaptiveSolve(Swinging(), stepper, (), counting=False, recorder=TimeRecorder())
-    request = Request(solve_program(steps), solve, times=np.asarray(times))
+    request = Request(adaptive_program(steps), solve, times=np.asarray(times))
     return None if LANES.can(request) else request
 
 

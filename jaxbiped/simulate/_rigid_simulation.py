@@ -41,7 +41,6 @@ from jaxbiped.simulate._start import (
     watched_by,
 )
 from jaxbiped.solve._accuracy import ACCURACIES
-from jaxbiped.solve._adaptive_program import solve_program
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._explicit_methods import EXPLICIT_METHODS, ExplicitMethod
 from jaxbiped.solve._recorders import (
@@ -51,7 +50,7 @@ from jaxbiped.solve._recorders import (
     StrikeRecorder,
     TimeRecorder,
 )
-from jaxbiped.solve._rigid_program import RigidSolve, RigidSolved
+from jaxbiped.solve._rigid_program import RigidSolve, RigidSolved, rigid_program
 from jaxbiped.solve._rigid_record import rigid_record
 from jaxbiped.solve._rigid_steps import FallWatch, RigidWalk
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, scene_key, single_time
@@ -299,7 +298,7 @@ class RigidSimulation(eqx.Module):
         steps = RigidSolve(recorder, self.extremes, self.waits, self.method, falls)
         scheduled = recorder is not None and recorder.scheduled
         request = Request(
-            solve_program(steps),
+            rigid_program(steps),
             self.walk,
             room=0 if scheduled else room,
             times=self.times if scheduled else None,

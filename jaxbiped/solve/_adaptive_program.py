@@ -365,8 +365,7 @@ class AdaptiveSolve:
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def solve_program(steps: Any) -> Program:
-    """The program of an `AdaptiveSolve`, or of other functions of this form."""
+def adaptive_program(steps: AdaptiveSolve) -> Program:
     recorder = steps.recorder
     records = recorder is not None and recorder.records
     scheduled = recorder is not None and recorder.scheduled

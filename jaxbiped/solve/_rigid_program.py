@@ -12,6 +12,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
+from jaxbiped.compiler import Program
 from jaxbiped.dynamics._stance_motion import rolling_rates
 from jaxbiped.dynamics._surfaces import straight_legs
 from jaxbiped.hybrid._walker_systems import Rolling
@@ -239,3 +241,13 @@ def _ends(tried: Attempted) -> Scalar:
     code = tried.after.code
     fell = (code == int(Ending.FELL_FORWARD)) | (code == int(Ending.FELL_BACK))
     return tried.accepted & ((tried.after.landing == 0) | fell)
+
+
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def rigid_program(steps: RigidSolve) -> Program:
+    """The program of a `RigidWalk`."""
+    recorder = steps.recorder
+    records = recorder is not None and recorder.records
+    scheduled = recorder is not None and recorder.scheduled
+    record = steps.record if records else None
+    return Program(steps.start, steps.attempt, steps.finish, record=record, scheduled=scheduled)

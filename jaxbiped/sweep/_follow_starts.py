@@ -17,9 +17,9 @@ from jaxbiped.hybrid._scales import is_smooth
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractScene
-from jaxbiped.solve._adaptive_program import AdaptiveSolve, solve_program
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, adaptive_program
 from jaxbiped.solve._explicit_methods import ExplicitMethod
-from jaxbiped.solve._rigid_program import RigidSolve
+from jaxbiped.solve._rigid_program import RigidSolve, rigid_program
 from jaxbiped.solve._rigid_steps import FallWatch
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import Goals
@@ -125,8 +125,9 @@ def follow_starts(
     )
     pursuit = Pursuit(goals, same(effort.gap), same(waits))
     given = jtu.tree_map(same, start)._replace(recording=pursuit)
+    program = rigid_program(steps) if isinstance(steps, RigidSolve) else adaptive_program(steps)
     engine = BY_NAME[effort.engine_of(count)]
-    found = _as_arrays(engine.run(Request(solve_program(steps), given, batch=True)).outputs)
+    found = _as_arrays(engine.run(Request(program, given, batch=True)).outputs)
     if each == 1:
         return found
     footsteps = (each * found.cycle_footsteps).astype(found.cycle_footsteps.dtype)
@@ -140,7 +141,7 @@ def _steps(
     system, section, grazes = system_of(scene), effort.section, effort.wanted is not None
     if is_smooth(scene):
         return RigidSolve(
-            StrikeLabelRecorder(section, cycles, grazes),
+            recorder=StrikeLabelRecorder(section, cycles, grazes),
             method=ExplicitMethod(embedded=effort.embedded),
             falls=FallWatch.TOLD,
             counts_pulls=False,
@@ -148,11 +149,11 @@ def _steps(
     counting = section.names_legs
     recorder = LabelRecorder if counting else ArrivalLabelRecorder
     return AdaptiveSolve(
-        system,
-        effort.solver,
-        system.watches,
-        counting,
-        recorder(section, cycles, grazes),
+        system=system,
+        stepper=effort.solver,
+        watch=system.watches,
+        counting=counting,
+        recorder=recorder(section, cycles, grazes),
         located=system.lands,
         fenced=effort.engine == "xla",
     )

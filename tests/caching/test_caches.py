@@ -20,9 +20,8 @@ from jaxbiped.compiler.runtime._machine_code import _LOADED
 from jaxbiped.compiler.runtime._primitive import call
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.hybrid._endings import WATCHES, ending_events
-from jaxbiped.solve._adaptive_program import solve_program
 from jaxbiped.solve._recorders import StrikeRecorder
-from jaxbiped.solve._rigid_program import RigidSolve
+from jaxbiped.solve._rigid_program import RigidSolve, rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk
 from tests.compiler.one_shot import compiled, let_threads_run, stepped
 from tests.sweep.walkers import same
@@ -218,7 +217,7 @@ def test_a_compiled_program_that_somebody_has_is_found_again():
     walk = RigidWalk(rigid, default_guess(rigid), *[jnp.ones(())] * 4)
 
     def program():
-        return LaneEngine().compile(Request(solve_program(RigidSolve(StrikeRecorder())), walk))
+        return LaneEngine().compile(Request(rigid_program(RigidSolve(StrikeRecorder())), walk))
 
     held = program()
     jb.clear_caches()

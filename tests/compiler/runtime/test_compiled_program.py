@@ -19,7 +19,7 @@ from jaxbiped import ArgumentError
 from jaxbiped.compiler import LANES, Request, default_threads, host
 from jaxbiped.compiler.runtime import _machine_code
 from jaxbiped.hybrid._scales import units_of
-from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, solve_program
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
 from jaxbiped.solve.controllers._wrapped_control import just_before_end
 from tests.compiler.one_shot import let_threads_run, stepped
 
@@ -33,7 +33,7 @@ def _program():
         jb.hybrid.Walking(), jb.solvers.Rodas4(), WATCH, counting=False, located=True
     )
     one = jtu.tree_map(lambda leaf: leaf[0], _inputs([SEED]))
-    return LANES.compile(Request(solve_program(steps), one, quick=True))
+    return LANES.compile(Request(adaptive_program(steps), one, quick=True))
 
 
 def _inputs(starts, duration=0.3, most=20000.0, scene=SCENE):
