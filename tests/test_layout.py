@@ -46,6 +46,22 @@ def test_solves_know_systems_and_no_walker():
     assert known == KNOW_A_WALKER
 
 
+KINDS = {
+    "is_compliant", "is_rigid", "is_walker",  # the questions
+    "Scene", "RigidScene", "RedundantScene", "HybridSystem",  # the scenes
+    "Walking", "RedundantWalking", "Rolling", "GuardedMotion",  # and their systems
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "sweep").rglob("*.py")), ids=lambda p: p.name)
+def test_sweeps_ask_no_scene_which_kind_of_motion_it_has(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            assert not KINDS & {each.name for each in node.names}
+        elif isinstance(node, ast.Attribute):
+            assert node.attr not in ("compliant", "redundant")
+
+
 def test_every_package_has_a_layer():
     assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} == set(LAYERS)
 

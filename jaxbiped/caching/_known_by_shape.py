@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Hashable
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, TypeVar, cast
 
 import equinox as eqx
 import jax
@@ -12,11 +12,10 @@ import numpy as np
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.caching._fingerprint import Leaf
 
-_P = ParamSpec("_P")
-_T = TypeVar("_T")
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def known_by_shape(function: Callable[_P, _T]) -> Callable[_P, _T]:
+def known_by_shape(function: _Function) -> _Function:
     """Decorator: a function whose result follows from the shapes of the numbers in its arguments.
 
     It is evaluated with numbers that only have a shape, and once for all arguments that differ in
@@ -30,25 +29,25 @@ def known_by_shape(function: Callable[_P, _T]) -> Callable[_P, _T]:
         The same function, for positional arguments.
     """
 
-    def evaluate(args: Any) -> _T:
-        results: list[_T] = []
+    def evaluate(args: Any) -> Any:
+        results: list[Any] = []
         eqx.filter_eval_shape(lambda given: results.append(function(*given)), args)
         return results[0]
 
     @bounded_cache(PROGRAMS)
     @functools.wraps(function)
-    def of_shapes(structure: jtu.PyTreeDef, *leaves: Hashable) -> _T:
+    def of_shapes(structure: jtu.PyTreeDef, *leaves: Hashable) -> Any:
         return evaluate(structure.unflatten([_with_shape(leaf) for leaf in leaves]))
 
     @functools.wraps(function)
-    def called(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+    def called(*args: Any) -> Any:
         leaves, structure = jtu.tree_flatten(args)
         try:
             return of_shapes(structure, *map(_without_value, leaves))
         except TypeError:  # what cannot be hashed is not kept
             return evaluate(args)
 
-    return called
+    return cast(_Function, called)
 
 
 def _without_value(leaf: Any) -> Any:

@@ -3,6 +3,7 @@
 A coordinate whose name is not known has no size, and is refused where errors are measured in sizes.
 """
 
+import functools
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
@@ -68,8 +69,9 @@ def standing_height(
     return placed[f"{structure.root}_z"] - penetration
 
 
-def without_whole_turns(scene: AbstractWalkerScene, state: SomeState) -> SomeState:
-    """The same start with angles between −π and π.
+@functools.singledispatch
+def without_whole_turns(scene: Any, state: PyTree) -> PyTree:
+    """The same start with angles between −π and π, or what has a period within it.
 
     A body that has turned once winds up what acts at joints: where anything does, angles stay.
     """
@@ -77,10 +79,7 @@ def without_whole_turns(scene: AbstractWalkerScene, state: SomeState) -> SomeSta
     if structure.joints:
         return state
     angles = [name for name in state._fields if name in structure.coordinates[2:]]
-    turned: SomeState = state._replace(
-        **{name: _within_a_turn(getattr(state, name)) for name in angles}
-    )
-    return turned
+    return state._replace(**{name: _within_a_turn(getattr(state, name)) for name in angles})
 
 
 def _within_a_turn(angle: Scalar) -> Scalar:
@@ -138,7 +137,8 @@ def check_leaves(state: SomeState, name: str) -> SomeState:
     return state._replace(**leaves)
 
 
-def state_for(scene: AbstractWalkerScene, state: PyTree, name: str = "state") -> PyTree:
+@functools.singledispatch
+def state_for(scene: Any, state: PyTree, name: str = "state") -> PyTree:
     """A checked start of the type that a scene needs. Default of bristles: straight.
 
     Raises:
@@ -214,6 +214,13 @@ def state_quantity(name: str) -> Quantity | None:
     root, _, kind = name.rpartition("_")
     known = _OF_ROOT.get(kind)
     return Quantity(f"{root} {known.words}", known.symbol, known.unit) if root and known else None
+
+
+def coordinate_quantity(kind: Any, name: str) -> Quantity:
+    """What a coordinate of a kind of state is: of a unit that the class tells, or by its name."""
+    if name in (units := getattr(kind, "own_units", {})):
+        return Quantity(name, unit=units[name])
+    return state_quantity(name) or Quantity(name)
 
 
 def unit_of(name: str) -> str:

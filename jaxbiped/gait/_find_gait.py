@@ -43,7 +43,7 @@ from jaxbiped.hybrid._hybrid_system import HybridSystem
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractScene, RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import RigidState, State, WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
@@ -60,7 +60,7 @@ _SAME = 1e-4
 
 @without_switches
 def find_gait(
-    scene: Scene | RigidScene | RedundantScene | HybridSystem,
+    scene: AbstractScene,
     guess: Gait | WalkerState | BodiesState | PyTree | None = None,
     *,
     footsteps: int | None = None,

@@ -20,14 +20,19 @@ from jaxbiped.dynamics._state import seed_state, state_for
 from jaxbiped.dynamics._surfaces import rate_unit
 from jaxbiped.dynamics._tree import pose_of
 from jaxbiped.gait._gait import Gait
-from jaxbiped.hybrid._hybrid_system import HybridSystem, start_of_system
 from jaxbiped.hybrid._sections import AbstractSection, with_leg_names_of
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode, rigid_modes
 from jaxbiped.scene._placement import root_on_feet
 from jaxbiped.scene._ready_scenes import seed_scene
-from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import (
+    AbstractScene,
+    AbstractWalkerScene,
+    RedundantScene,
+    RigidScene,
+    Scene,
+)
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import State, WalkerState
 from jaxbiped.scene._structure import Angle
@@ -48,29 +53,23 @@ def default_guess(scene: Any) -> WalkerState:
     return _fitted(scene, *jax.tree.map(dtype.type, _seed()))
 
 
-def state_of_guess(
-    scene: AbstractWalkerScene | HybridSystem, guess: Gait | WalkerState | PyTree | None
-) -> Any:
+def state_of_guess(scene: AbstractScene, guess: Gait | WalkerState | PyTree | None) -> Any:
     """The checked state from which a search begins: a gait's, or the one given; None for None.
 
     Raises:
         ArgumentError: no state of this scene.
     """
     near = guess.measures.state if isinstance(guess, Gait) else guess
-    if isinstance(scene, HybridSystem):
-        if near is None:
-            raise ArgumentError(
-                f"guess = None is not allowed for a {type(scene).__name__}: give a state."
-            )
-        return start_of_system(scene, near, "guess")
+    if near is None and not scene.has_default_guess:
+        raise ArgumentError(
+            f"guess = None is not allowed for a {type(scene).__name__}: give a state."
+        )
     return None if near is None else state_for(scene, near, "guess")
 
 
 def start_of_search(scene: Any, section: AbstractSection, guess: PyTree) -> Any:
-    """The checked state from which a walker is searched, the default where there is no guess."""
-    if isinstance(scene, HybridSystem):
-        return state_of_guess(scene, guess)
-    start = default_guess(scene) if guess is None else guess
+    """The checked state from which a gait is searched, the default where there is no guess."""
+    start = default_guess(scene) if guess is None and scene.has_default_guess else guess
     if scene.redundant and not isinstance(guess, Gait):  # whose state is minimal
         start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
     start = in_64_bits(state_of_guess(scene.minimal, start))

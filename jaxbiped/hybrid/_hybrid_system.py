@@ -19,13 +19,20 @@ from jaxbiped._parameter_declaration import check_parameters
 from jaxbiped._types import Scalar, Time, any_of, as_float, by_numpy, in_64_bits, is_traced, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
-from jaxbiped.dynamics._state import check_state, periods_of, turned_difference
+from jaxbiped.dynamics._mode_changes import SLACK
+from jaxbiped.dynamics._state import (
+    check_state,
+    periods_of,
+    state_for,
+    turned_difference,
+    without_whole_turns,
+)
 from jaxbiped.hybrid._endings import ending_events
 from jaxbiped.hybrid._guards import Guard, Switch
-from jaxbiped.hybrid._sections import AbstractSection, Section, section_of
+from jaxbiped.hybrid._sections import AbstractSection, Section, chosen_section, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._scene import AbstractMinimalScene
+from jaxbiped.scene._scene import AbstractMinimalScene, RedundantScene, RigidScene, Scene
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
@@ -101,16 +108,11 @@ class HybridSystem(AbstractMinimalScene):
         check_choice("guard", name, guards)
         return guards[name]
 
-    def lies_beyond(self, state: Any, by: float) -> Scalar:
-        """Whether a state is so far beyond a guard that is armed and resets it (boolean).
 
-        Args:
-            state: a state.
-            by: how far at least, in the guard's scale.
-        """
-        resetting = [guard for guard in self.guards() if guard.reset is not None]
-        beyond = [(guard.value(state) < -by) & guard.is_armed(state) for guard in resetting]
-        return any_of([jnp.asarray(False), *map(jnp.asarray, beyond)])
+SCENES = (Scene, RigidScene, RedundantScene, HybridSystem)
+"""Kinds of scenes."""
+MINIMAL_SCENES = (Scene, RigidScene, HybridSystem)
+"""Those in minimal coordinates."""
 
 
 def _turn(name: str, period: float) -> Guard:
@@ -143,6 +145,7 @@ class At(AbstractSection):
         return jnp.asarray(args.guard(self.guard).is_armed(y))
 
 
+@chosen_section.register
 @section_of.register
 def section_of_system(system: HybridSystem, section: Any) -> AbstractSection:
     """A section of a system's motions, checked. Default: at its first guard that resets the state.
@@ -177,6 +180,7 @@ def any_state(system: HybridSystem) -> Any:
     return kind(*(as_float(0.0) for _ in kind._fields))
 
 
+@state_for.register
 def start_of_system(system: HybridSystem, state: Any, name: str = "state") -> Any:
     """A start with all numbers in 64 bits, each periodic coordinate within its period.
 
@@ -194,6 +198,11 @@ def start_of_system(system: HybridSystem, state: Any, name: str = "state") -> An
                         f"{name} is not allowed: the rate of {coordinate} is {float(rate):g} there."
                     )
     return state
+
+
+@without_whole_turns.register
+def _(system: HybridSystem, state: Any) -> Any:
+    return within_periods(state)
 
 
 def within_periods(state: Any) -> Any:
@@ -272,6 +281,11 @@ class GuardedMotion(AbstractSystem):
     at: str | None = eqx.field(static=True, default=None)
     lands: ClassVar[bool] = True
 
+    @property
+    def watches(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the guards that end it."""
+        return tuple(name for _, name in self.watched)
+
     def observed_at(self, section: AbstractSection) -> "GuardedMotion":
         if not isinstance(section, At):
             return self
@@ -341,6 +355,19 @@ class GuardedMotion(AbstractSystem):
         }
         return after._replace(**counted)
 
+    def lies_beyond(self, args: HybridSystem, states: PyTree, by: float = SLACK) -> np.ndarray:
+        """Whether states are beyond a guard that is armed and resets them, by so much in its scale.
+
+        Leaves have the shape (n,).
+        """
+
+        def one(y: PyTree) -> Scalar:
+            resetting = [guard for guard in args.guards() if guard.reset is not None]
+            beyond = [(guard.value(y) < -by) & guard.is_armed(y) for guard in resetting]
+            return any_of([jnp.asarray(False), *map(jnp.asarray, beyond)])
+
+        return np.asarray(jax.vmap(one)(states))
+
     def repeats(self, args: HybridSystem, y: PyTree) -> Scalar:
         resetting = [guard for guard in self._located(args) if guard.reset is not None]
         return any_of([self._stays_on(guard, args, y) for guard in resetting])
@@ -349,12 +376,6 @@ class GuardedMotion(AbstractSystem):
         modes = getattr(type(y), "modes", ())
         held = {name: jnp.round(getattr(y, name)) for name in modes}
         return within_periods(y._replace(**held))
-
-    def ending(self, args: HybridSystem, y: PyTree) -> Scalar:
-        code = jnp.asarray(0)
-        for name, happens in self.failures(tuple(name for _, name in self.watched)).items():
-            code = jnp.where(happens(0.0, y, args), int(name), code)
-        return code
 
     def reset_map(self, args: HybridSystem, y: PyTree) -> PyTree:
         if self.at is not None and (guard := args.guard(self.at)).reset is not None:

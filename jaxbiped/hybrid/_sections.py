@@ -164,6 +164,21 @@ def section_of(scene: Any, section: AbstractSection | None) -> AbstractSection:
     return HeelStrike()
 
 
+@functools.singledispatch
+def chosen_section(scene: Any, section: AbstractSection | None) -> AbstractSection:
+    """The section that a scene leaves to be chosen, checked; a walker's own, which it does not.
+
+    Raises:
+        ArgumentError: a section is given for a walker, or it is not allowed.
+    """
+    if section is not None:
+        raise ArgumentError(
+            f"section = {section!r} is not allowed for a {type(scene).__name__}: walkers are "
+            "compared at their own section; leave it out."
+        )
+    return section_of(scene, None)
+
+
 def _default_section(scene: Any) -> AbstractSection:
     """Mid-stance; of a single leg, which may hop, its landing."""
     is_walker = isinstance(scene, AbstractWalkerScene)

@@ -4,17 +4,21 @@ A walker is only one of them: solves and searches ask this interface, so a user'
 """
 
 import abc
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, select
 from jaxbiped.caching._known_by_shape import known_by_shape
+from jaxbiped.dynamics._mode_changes import SLACK
 from jaxbiped.hybrid._guards import Gap, Switch
+from jaxbiped.hybrid._scales import sizes_of
 from jaxbiped.hybrid._sections import AbstractSection
 
 
@@ -33,12 +37,17 @@ class AbstractSystem(eqx.Module):
         lands: whether every solve ends a step on each switch; else only those with derivatives do,
             and others weigh the errors of steps across. A property of the class.
         resets: whether a plain solve resets the state at switches. A property of the class.
+        watches: names of the failures that may be watched for. A property of the class.
+        footsteps_end_on_section: whether a footstep ends where a cycle's section is met; else
+            between two arrivals there. A property of the class.
     """
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = ()
     time_unit: ClassVar[float] = 1.0
     lands: ClassVar[bool] = False
     resets: ClassVar[bool] = False
+    watches: ClassVar[tuple[str, ...]] = ()
+    footsteps_end_on_section: ClassVar[bool] = True
 
     @abc.abstractmethod
     def vector_field(self, t: Time, y: PyTree, args: PyTree) -> PyTree:
@@ -74,9 +83,15 @@ class AbstractSystem(eqx.Module):
         """
         return y
 
-    @abc.abstractmethod
     def ending(self, args: PyTree, y: PyTree) -> Scalar:
-        """Code of the `Ending` that has occurred; 0 if the motion goes on."""
+        """Code of the `Ending` that has occurred; 0 if the motion goes on.
+
+        Default: the last of the failures that `watches` names.
+        """
+        code = jnp.asarray(0)
+        for name, happens in self.failures(self.watches).items():
+            code = jnp.where(happens(0.0, y, args), int(name), code)
+        return code
 
     @abc.abstractmethod
     def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
@@ -86,6 +101,26 @@ class AbstractSystem(eqx.Module):
         """The section's value at a state just before it, and whether a crossing there counts."""
         after_reset = self.section_state(args, self.reset_map(args, y))
         return section.value(args, after_reset), section.counts(args, after_reset)
+
+    def lies_beyond(self, args: PyTree, states: PyTree, by: float = SLACK) -> np.ndarray:
+        """Whether states are so far beyond a surface that resets them (booleans).
+
+        Leaves have the shape (n,). Default: there is none.
+        """
+        return np.zeros(np.shape(jtu.tree_leaves(states)[0]), dtype=bool)
+
+    def placed_like(
+        self, args: PyTree, base: PyTree, states: PyTree, named: Collection[str]
+    ) -> PyTree:
+        """States that stand and are held as the base does, what is `named` as it is.
+
+        Leaves have the shape (n,). Default: they are as they are.
+        """
+        return states
+
+    def sizes(self, args: PyTree, y: PyTree) -> PyTree:
+        """Size of each leaf of a state, in which distances from it are measured, SI units."""
+        return sizes_of(args, y)[1]
 
     def section_state(self, args: PyTree, y: PyTree) -> PyTree:
         """The state as sections take it. Default: as it is."""

@@ -1,10 +1,11 @@
 """Walkers as hybrid systems: with laws of contact in either coordinates, and on rigid feet."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
@@ -13,11 +14,11 @@ from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._constrained_motion import project
 from jaxbiped.dynamics._contacts import feet, foot_force
 from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
-from jaxbiped.dynamics._footfalls import landings, standing_leg
+from jaxbiped.dynamics._footfalls import landings, leg_depth, standing_leg
 from jaxbiped.dynamics._holds import on_held
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import force_residual, mass_matrix, vector_field
-from jaxbiped.dynamics._mode_changes import change_mode_on_surface
+from jaxbiped.dynamics._mode_changes import SLACK, change_mode_on_surface
 from jaxbiped.dynamics._redundant_motion import redundant_field
 from jaxbiped.dynamics._stance_motion import rolling, rolling_field
 from jaxbiped.dynamics._state import cyclic_names
@@ -27,10 +28,15 @@ from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface, rig
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._implicit_field import ImplicitField, with_unit_mass
 from jaxbiped.hybrid._rigid_guards import mode_switches
+from jaxbiped.hybrid._scales import sizes_of
 from jaxbiped.hybrid._sections import AbstractSection
+from jaxbiped.hybrid._start_placement import held_like, passes_a_stop, standing_like
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
+
+_SHALLOW = 1e-9
+"""Depth of a foot in units of length up to which it just touches."""
 
 
 @functools.singledispatch
@@ -42,6 +48,9 @@ def system_of(scene: object) -> AbstractSystem:
 class AbstractWalking(AbstractSystem):
     """A walker on compliant ground: legs exchanged at each footstep."""
 
+    watches: ClassVar[tuple[str, ...]] = WATCHES
+    footsteps_end_on_section: ClassVar[bool] = False
+
     def switches(self, args: CompliantScene, y: PyTree) -> tuple[Switch, ...]:
         return switches(args, y)
 
@@ -50,12 +59,6 @@ class AbstractWalking(AbstractSystem):
 
     def contact_changes(self, args: CompliantScene, before: PyTree, after: PyTree) -> Scalar:
         return contact_changes(args, before, after)
-
-    def ending(self, args: PyTree, y: PyTree) -> Scalar:
-        code = jnp.asarray(0)
-        for name, happens in ending_events(WATCHES).items():
-            code = jnp.where(happens(0.0, y, args), int(name), code)
-        return code
 
     def failures(self, watch: tuple[str, ...]) -> dict[Ending, Callable[..., Scalar]]:
         return ending_events(watch)
@@ -97,6 +100,20 @@ class Walking(AbstractWalking):
     # Bristles stand alone in the implicit form.
     vector_field: ClassVar[ImplicitField] = ImplicitField(vector_field, mass_matrix, force_residual)
 
+    def placed_like(
+        self, args: Scene, base: PyTree, states: PyTree, named: Collection[str]
+    ) -> PyTree:
+        return standing_like(args, base, states, named)
+
+    def sizes(self, args: Scene, y: PyTree) -> PyTree:
+        """The root point's height is measured in the depth of the stance leg's deepest foot."""
+        structure = args.mechanism.structure
+        found = leg_depth(structure, feet(args, y), structure.stance_leg)
+        depth, length = abs(float(found)), float(args.mechanism.height)
+        # A start whose foot just touches tells no depth.
+        height = depth if depth > _SHALLOW * length else length
+        return sizes_of(args, y)[1]._replace(**{structure.coordinates[1]: height})
+
 
 class RedundantWalking(AbstractWalking):
     """The walker in coordinates of each leg. Its constraints leave fewer directions than leaves.
@@ -120,6 +137,7 @@ class Rolling(AbstractSystem):
     """The rigid walker: it rolls on one foot, and exchanges support at each heel strike."""
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (0,)
+    watches: ClassVar[tuple[str, ...]] = WATCHES
 
     def vector_field(self, t: Time, y: Any, args: RigidScene) -> Any:
         return rolling_field(t, y, args)
@@ -129,6 +147,12 @@ class Rolling(AbstractSystem):
 
     def reset_at_switch(self, args: RigidScene, y: Any, which: Scalar) -> Any:
         return change_mode_on_surface(args, y)
+
+    def lies_beyond(self, args: RigidScene, states: Any, by: float = SLACK) -> np.ndarray:
+        return passes_a_stop(args, states._asdict(), by=by)
+
+    def placed_like(self, args: RigidScene, base: Any, states: Any, named: Collection[str]) -> Any:
+        return held_like(args, base, states, named)
 
     def on_held(self, args: RigidScene, y: Any) -> Any:
         return on_held(args, y)

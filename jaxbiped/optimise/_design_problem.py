@@ -27,10 +27,15 @@ from jaxbiped.optimise._design_gaits import (
     with_worse_members,
 )
 from jaxbiped.optimise._jacobian_functionals import CLUSTER
-from jaxbiped.optimise._objective_values import Evaluation, Evaluations, evaluate
+from jaxbiped.optimise._objective_values import (
+    Evaluation,
+    Evaluations,
+    evaluate,
+    functional_names,
+)
 from jaxbiped.optimise._objectives import OBJECTIVES, check_objective
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene, is_walker
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 
 _WORDS = re.compile(r"^\s*(\w+)\s*(<=|>=|==|<|>|=)\s*([^<>=]+?)\s*$")
@@ -266,10 +271,9 @@ class DesignProblem:
 
     @property
     def has_cluster(self) -> bool:
-        """Whether multipliers are a walker's, and those of one gait, not means over an ensemble."""
-        if not is_walker(self.scene):
-            return False
-        return self.ensemble is None or self.ensemble.criterion != "mean"
+        """Whether functionals of multipliers are of one gait, not means over an ensemble."""
+        of_one = self.ensemble is None or self.ensemble.criterion != "mean"
+        return of_one and bool(functional_names(self.scene, CLUSTER[:1])[0])
 
     def begin(self, u: np.ndarray, guess: WalkerState | None = None) -> Design:
         """The first design; its gait is found near a guess, or from nothing.

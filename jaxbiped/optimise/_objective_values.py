@@ -42,7 +42,7 @@ from jaxbiped.optimise._jacobian_functionals import (
 )
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.scene._parameter_access import parameter_names, select_parameters
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene, is_walker
+from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
 
 _OF_THE_GAIT = ("speed", "step_length", "period", "peak_normal")
 _DISTANCES = {
@@ -86,7 +86,7 @@ def functionals_of(
     scene: Scene | RigidScene, gait: Gait, wanted: tuple[str, ...], accuracy: str
 ) -> BothFunctionals:
     """What measures need beside the gait itself."""
-    of_jacobian, of_cycle = _names_for(scene, wanted)
+    of_jacobian, of_cycle = functional_names(scene, wanted)
     how: Any = {"arrivals": len(gait.orbit[0]), "accuracy": accuracy, "engine": gait.engine}
     state, first, second = gait.measures.state, None, None
     if of_jacobian:
@@ -96,12 +96,12 @@ def functionals_of(
     return first, second
 
 
-def _names_for(scene: AbstractScene, wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
+def functional_names(scene: AbstractScene, wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
     """Which functionals of the Jacobian these measures need, and whether those of the cycle.
 
-    A hybrid system's measures are all known with its gait.
+    Where there is no ground all measures are known with the gait.
     """
-    if not is_walker(scene):
+    if not scene.has_ground:
         return (), False
     needed = {*wanted, *(_WHOLE if "whole_sensitivity" in wanted else ())}
     of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
@@ -130,14 +130,14 @@ def evaluate(
     """
     wanted = tuple(names)
     both = (gait.measures, gait.measure_errors, gait.sensitivities, gait.sensitivity_errors)
+    of_jacobian, _ = functional_names(scene, wanted)
     of_gait = tuple(name for name in _OF_THE_GAIT if name in gait.measured)
-    if not is_walker(scene) and "spectral_radius" in wanted:
+    if "spectral_radius" in {*wanted} - {*of_jacobian}:
         of_gait = (*of_gait, "spectral_radius")
     rows = {name: _row(*(getattr(each, name) for each in both)) for name in of_gait}
     rows |= {name: Functional(*measured(scene, gait)) for name, measured in _own(wanted).items()}
     if functionals is None:
         functionals = functionals_of(scene, gait, wanted, accuracy)
-    of_jacobian, _ = _names_for(scene, wanted)
     first, second = functionals
     if first is not None:
         # The orbit's own error moves the Jacobian, too, as its multipliers tell.

@@ -12,7 +12,7 @@ from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._state import cyclic_names
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._modes import rigid_modes
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene, is_walker
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
 _SEARCHED = {
@@ -22,22 +22,22 @@ _SEARCHED = {
 """What a gait has that is none of a smooth function's values."""
 
 
-def _of_driven(scene: Scene | RigidScene) -> str | None:
+def _of_driven(scene: Any) -> str | None:
     return None if is_driven(scene) else "it has no actuators"
 
 
-def _of_slip(scene: Scene | RigidScene) -> str | None:
-    return None if isinstance(scene, Scene) else "a rigid walker's feet roll without slip"
+def _of_slip(scene: Any) -> str | None:
+    return None if hasattr(scene, "friction") else "a rigid walker's feet roll without slip"
 
 
-def _of_friction(scene: Scene | RigidScene) -> str | None:
-    if isinstance(scene, Scene) and isinstance(scene.friction, Frictionless):
+def _of_friction(scene: Any) -> str | None:
+    if isinstance(getattr(scene, "friction", None), Frictionless):
         return "its friction is Frictionless"
     return _of_slip(scene)
 
 
-def _of_strike(scene: Scene | RigidScene) -> str | None:
-    if isinstance(scene, Scene):
+def _of_strike(scene: Any) -> str | None:
+    if hasattr(scene, "normal"):
         return "its feet press into the ground for a while instead of striking at once"
     damps = any(getattr(part, "damping", None) is not None for part in scene.mechanism.joints)
     if is_driven(scene) or damps:
@@ -47,23 +47,24 @@ def _of_strike(scene: Scene | RigidScene) -> str | None:
     return None
 
 
-def _of_steps(scene: Scene | RigidScene) -> str | None:
+def _of_steps(scene: Any) -> str | None:
     structure = scene.mechanism.structure
     if structure.swing_leg == structure.stance_leg or structure.cycle_footsteps > 1:
         return "it is known of mirrored walkers alone, whose cycle is a step"
     return None
 
 
-def _of_clearance(scene: Scene | RigidScene) -> str | None:
+def _of_clearance(scene: Any) -> str | None:
     return _of_swing(scene) or _of_steps(scene)
 
 
-def _of_swing(scene: Scene | RigidScene) -> str | None:
-    if isinstance(scene, Scene) and not isinstance(
-        scene.clearance.admits(scene.mechanism.structure.legs[0], jnp.ones(())), jax.Array
+def _of_swing(scene: Any) -> str | None:
+    rule = getattr(scene, "clearance", None)
+    if rule is None or isinstance(
+        rule.admits(scene.mechanism.structure.legs[0], jnp.ones(())), jax.Array
     ):
-        return f"its clearance rule is {type(scene.clearance).__name__}, which lets no foot pass"
-    return None
+        return None
+    return f"its clearance rule is {type(rule).__name__}, which lets no foot pass"
 
 
 class Objective(NamedTuple):
@@ -78,8 +79,8 @@ class Objective(NamedTuple):
     """
 
     quantity: Quantity
-    lacks: Callable[[Scene | RigidScene], str | None] = lambda _: None
-    measured: Callable[[Scene | RigidScene, Gait], tuple[Any, Any, Any, Any]] | None = None
+    lacks: Callable[[Any], str | None] = lambda _: None
+    measured: Callable[[Any, Gait], tuple[Any, Any, Any, Any]] | None = None
 
 
 OBJECTIVES = {
@@ -133,8 +134,8 @@ OBJECTIVES = {
 """
 
 
-def _of_walkers(name: str, scene: AbstractScene) -> str | None:
-    if is_walker(scene) or OBJECTIVES[name].measured is not None:
+def _of_ground(name: str, scene: AbstractScene) -> str | None:
+    if scene.has_ground or OBJECTIVES[name].measured is not None:
         return None
     advances = bool(cyclic_names(scene.state_type))
     own = ("period", "spectral_radius", *(("speed", "step_length") if advances else ()))
@@ -146,6 +147,6 @@ def check_objective(name: str, scene: Any, what: str = "objective") -> None:
     if name in _SEARCHED:
         raise ArgumentError(f"{what} = {name!r} is not allowed: {_SEARCHED[name]}.")
     check_choice(what, name, OBJECTIVES)
-    lacks = _of_walkers(name, scene) or OBJECTIVES[name].lacks(scene)
+    lacks = _of_ground(name, scene) or OBJECTIVES[name].lacks(scene)
     if lacks is not None:
         raise ArgumentError(f"{what} = {name!r} is not allowed for this scene: {lacks}.")

@@ -15,14 +15,14 @@ from jaxbiped._checks import (
     check_type,
 )
 from jaxbiped._files import user_path
-from jaxbiped._identity import DECISIVE, provenance
+from jaxbiped._identity import DECISIVE, identity, provenance
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
 from jaxbiped.gait._search_starts import state_of_guess
-from jaxbiped.hybrid._hybrid_system import HybridSystem
-from jaxbiped.hybrid._sections import AbstractSection, section_of
+from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
+from jaxbiped.hybrid._sections import AbstractSection, chosen_section
 from jaxbiped.optimise._design_gaits import CRITERIA, Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._design_problem import (
     DesignProblem,
@@ -32,13 +32,13 @@ from jaxbiped.optimise._design_problem import (
     start_of,
     variables_of,
 )
-from jaxbiped.optimise._objective_values import Evaluations
+from jaxbiped.optimise._objective_values import Evaluations, functional_names
 from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.optimise._runs import Runs, optimum_of, scattered_designs
 from jaxbiped.scene._parameter_access import scene_identity
-from jaxbiped.scene._scene import RigidScene, Scene, is_walker
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
@@ -53,7 +53,7 @@ Goal: TypeAlias = str | Mapping[str, float] | None
 
 
 def optimise_gait(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     *,
     vary: Mapping[str, tuple[float, float]],
     maximise: Goal = None,
@@ -128,10 +128,8 @@ def optimise_gait(
         >>> str(best.outcome), round(best.variables["d"], 4)
         ('converged', 0.0873)
     """
-    scene = check_scene(scene, Scene, RigidScene, HybridSystem)
-    if section is not None and is_walker(scene):
-        raise ArgumentError(f"section = {section!r} is not allowed for a walker: leave it out.")
-    section = None if is_walker(scene) else section_of(scene, section)
+    scene = check_scene(scene, *MINIMAL_SCENES)
+    section = chosen_section(scene, section)
     variables = variables_of(scene, vary)
     told, sense = _goal(scene, maximise, minimise)
     requirements = requirements_of(scene, subject_to)
@@ -160,7 +158,7 @@ def optimise_gait(
         worse = larger_is_worse(told, sense, requirements) if criterion == "worst" else {}
         ensemble = ensemble_of(scene, scatter, members, criterion, worse, seed)
     measures = {*told, *(each.name for each in requirements)}
-    radius = not is_walker(scene) and "spectral_radius" in measures
+    radius = "spectral_radius" in measures and not functional_names(scene, tuple(measures))[0]
     settings = GaitSettings(footsteps, accuracy, engine, section, radius)
     evaluations = Evaluations()
     if store is not None:
@@ -219,7 +217,8 @@ def _problem_settings(
     ensemble: Ensemble | None,
 ) -> JsonObject:
     """All that evaluations depend on: whatever begins, bounds and optimises may use them."""
-    own = scene_identity(scene)
+    own, section = scene_identity(scene), settings.section
+    chosen = section is not None and not section.names_legs  # of walkers there is no choice
     kept = {name: value for name, value in own["scene"].items() if name not in vary}
     writer = provenance(scene)
     return {
@@ -227,7 +226,7 @@ def _problem_settings(
         "model": own["model"],
         "vary": {name: [float(x) for x in bounds] for name, bounds in vary.items()},
         "measures": sorted(measures),
-        "settings": settings._asdict(),
+        "settings": settings._asdict() | {"section": identity(section) if chosen else None},
         "ensemble": None if ensemble is None else ensemble._asdict(),
         "writer": {name: writer[name] for name in DECISIVE},
     }
@@ -250,7 +249,7 @@ class ParetoFront(NamedTuple):
 
 
 def pareto_front(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     *,
     vary: Mapping[str, tuple[float, float]],
     against: str,

@@ -2,8 +2,9 @@
 
 import abc
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from operator import attrgetter
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias, TypeGuard
 
 import equinox as eqx
@@ -59,10 +60,24 @@ class AbstractScene(eqx.Module):
             roll and strike. A property of the class.
         redundant: whether constraints hold more coordinates together than there are degrees of
             freedom. A property of the class.
+        model: the word for it in the settings of results. A property of the class.
+        bristles: names of the states of friction, which are 0 where a start leaves them out.
+        posture: names of the angles and rates from which the root point's place follows.
+        coordinate_aliases: coordinates by other names that they have.
+        has_default_guess: whether it is known where a search for its gaits begins. A property of
+            the class.
+        has_ground: whether it has feet on a ground, whose forces, losses and clearances are
+            measured along a cycle. A property of the class.
     """
 
     compliant: AbstractClassVar[bool]
     redundant: AbstractClassVar[bool]
+    model: ClassVar[str] = "hybrid system"
+    bristles: ClassVar[tuple[str, ...]] = ()
+    posture: ClassVar[tuple[str, ...]] = ()
+    coordinate_aliases: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    has_default_guess: ClassVar[bool] = False
+    has_ground: ClassVar[bool] = False
     time_unit: ClassVar[float] = 1.0
     endings: ClassVar[tuple[str, ...] | None] = None
     arrival_footsteps: ClassVar[int] = 1
@@ -112,6 +127,8 @@ class AbstractWalkerScene(AbstractScene):
         ground: slope and gravity.
     """
 
+    has_default_guess: ClassVar[bool] = True
+    has_ground: ClassVar[bool] = True
     if TYPE_CHECKING:
         # A field of some scenes, a property of others.
         @property
@@ -156,6 +173,27 @@ class AbstractWalkerScene(AbstractScene):
         return state_type_of(self.state_names)
 
     @property
+    def bristles(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the states of its friction."""
+        return self.mechanism.structure.bristles if self.has_bristles else ()
+
+    @property
+    def posture(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the bodies' angles and rates."""
+        structure = self.mechanism.structure
+        return (*structure.coordinates[2:], *structure.rates[2:])
+
+    @property
+    def coordinate_aliases(self) -> Mapping[str, str]:  # type: ignore[override]
+        """Coordinates of legs "1" and "2" by what the leg does where a cycle begins."""
+        structure = self.mechanism.structure
+        swing, stance = (structure.bodies[j] for j in structure.roles)
+        legs = {"stance": stance, "swing": swing}
+        if {swing, stance} != {"1", "2"}:
+            return {}
+        return {f"{kind}_{at}": f"{kind}_{legs[at]}" for kind in ("theta", "omega") for at in legs}
+
+    @property
     def has_bristles(self) -> bool:
         """Whether the friction has states of its own."""
         return isinstance(getattr(self.minimal, "friction", None), AbstractBristleLaw)
@@ -186,6 +224,7 @@ class Scene(AbstractMinimalScene, AbstractWalkerScene):
     """
 
     compliant: ClassVar[bool] = True
+    model: ClassVar[str] = "compliant"
     walker: Any
     ground: Ground
     normal: AbstractNormalLaw
@@ -253,8 +292,7 @@ class Scene(AbstractMinimalScene, AbstractWalkerScene):
     def state_names(self) -> tuple[str, ...]:
         """Names of the scalars of a state."""
         structure = self.mechanism.structure
-        bristles = structure.bristles if self.has_bristles else ()
-        return (*structure.coordinates, *structure.rates, *bristles)
+        return (*structure.coordinates, *structure.rates, *self.bristles)
 
 
 class RigidScene(AbstractMinimalScene, AbstractWalkerScene):
@@ -282,6 +320,7 @@ class RigidScene(AbstractMinimalScene, AbstractWalkerScene):
     """
 
     compliant: ClassVar[bool] = False
+    model: ClassVar[str] = "rigid"
     walker: Any
     ground: Ground
     actuation: Actuation = eqx.field(converter=actuation_of, default=None)
@@ -372,6 +411,7 @@ class RedundantScene(AbstractWalkerScene):
 
     compliant: ClassVar[bool] = True
     redundant: ClassVar[bool] = True
+    model: ClassVar[str] = "redundant"
     scene: Scene
     method: Any = eqx.field(converter=method_named, default_factory=Index1)
     orientation: str = eqx.field(static=True, default="angle")
@@ -403,16 +443,16 @@ class RedundantScene(AbstractWalkerScene):
     @property
     def state_names(self) -> tuple[str, ...]:
         """Names of the scalars of a state: place and orientation of each body, then their rates."""
-        structure, euler = self.mechanism.structure, self.orientation == "euler"
+        euler = self.orientation == "euler"
         angle = ("cos_half", "sin_half") if euler else ("theta",)
         rate = ("cos_rate", "sin_rate") if euler else ("omega",)
         names = [
             f"{name}_{body}"
             for own in (("x", "z", *angle), ("vx", "vz", *rate))
-            for body in structure.bodies
+            for body in self.mechanism.structure.bodies
             for name in own
         ]
-        return (*names, *(structure.bristles if self.has_bristles else ()))
+        return (*names, *self.bristles)
 
 
 CompliantScene: TypeAlias = Scene | RedundantScene

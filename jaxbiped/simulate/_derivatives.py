@@ -30,7 +30,7 @@ from jaxbiped.hybrid._scales import units_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import Rolling, system_of
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import AbstractScene, RigidScene
 from jaxbiped.simulate._trajectory import Trajectory
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._watch import Watch
@@ -72,7 +72,7 @@ class Slopes(NamedTuple):
 
 @host_jit(lambda *_, device, **__: not device)
 def slopes_of(
-    scene: Scene,
+    scene: AbstractScene,
     state: PyTree,
     found: Trajectory,
     *,
@@ -141,7 +141,7 @@ def slopes_of(
 
 def _at_events(
     system: AbstractSystem,
-    scene: Scene,
+    scene: AbstractScene,
     at: TangentsAtTimes,
     end: PyTree,
     ending: Scalar,

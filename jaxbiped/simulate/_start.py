@@ -31,6 +31,7 @@ from jaxbiped.dynamics._state import state_for
 from jaxbiped.hybrid._endings import WATCHES
 from jaxbiped.hybrid._hybrid_system import HybridSystem, section_of_system, start_of_system
 from jaxbiped.hybrid._sections import AbstractSection, check_section_body
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
 
 _PRECISIONS = (np.float16, np.float32, np.float64)
@@ -184,10 +185,8 @@ def watched_by(scene: Any, watch: Any) -> tuple[str, ...]:
         ArgumentError: a name that is none of a failure.
     """
     check_type("watch", watch, tuple, list)
-    allowed = WATCHES
-    if isinstance(scene, HybridSystem):
-        allowed = tuple(guard.name for guard in scene.guards() if guard.ends)
-        watch = allowed if tuple(watch) == WATCHES else watch
+    allowed = system_of(scene).watches
+    watch = allowed if tuple(watch) == WATCHES else watch
     for name in watch:
         check_choice("watch", name, allowed)
     return tuple(watch)

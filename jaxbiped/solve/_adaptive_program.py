@@ -12,13 +12,14 @@ from typing import Any, ClassVar, NamedTuple
 import diffrax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import Numbers, Scalar, select
+from jaxbiped._types import Numbers, Scalar, as_float, select
 from jaxbiped.compiler import without_barriers
 from jaxbiped.hybrid._endings import ending_code
-from jaxbiped.hybrid._scales import Units
+from jaxbiped.hybrid._scales import Units, units_of
 from jaxbiped.solve._recorders import AbstractSolve, LastStep, Moment, Step
 from jaxbiped.solve._solved import Solved
 from jaxbiped.solve._stepper import Stepper, Tolerance
@@ -37,6 +38,7 @@ from jaxbiped.solve.controllers._wrapped_control import (
     StepsOfOneSize,
     clip_step,
     first_step,
+    just_before_end,
 )
 
 
@@ -103,6 +105,18 @@ class AdaptiveSolve(AbstractSolve):
     counting: bool
     located: bool = False
     fenced: bool = False
+
+    def inputs(self, scene: PyTree, state: PyTree, **limits: Any) -> Solve:
+        """The inputs of a solve that only waits for its recorder, from its `limits` by name."""
+        return Solve(
+            scene,
+            state,
+            almost=just_before_end(as_float(limits["duration"])),
+            atol=1e-2 * limits["rtol"],
+            units=units_of(scene, state),
+            patience=np.asarray(np.inf),
+            **limits,
+        )
 
     def start(self, solve: Solve) -> _Now:
         zero, none = jnp.zeros_like(solve.duration), jnp.asarray(False)

@@ -86,6 +86,10 @@ class RigidSolve(AbstractSolve):
     falls: FallWatch = FallWatch.LOCATED
     counts_pulls: bool = True
 
+    def inputs(self, scene: Any, state: Any, **limits: Any) -> RigidWalk:
+        """The inputs of a solve that only waits for its recorder, from its `limits` by name."""
+        return RigidWalk(scene, state, **limits)
+
     def start(self, walk: RigidWalk) -> _Now:
         observed = self.observed_start(walk)
         return _Now(initial_progress(walk), *observed)

@@ -17,8 +17,6 @@ from jaxbiped._types import JsonObject, as_float
 from jaxbiped.basins._label_oracle import spread_directions
 from jaxbiped.basins._labels import Label
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._contacts import feet
-from jaxbiped.dynamics._footfalls import leg_depth
 from jaxbiped.dynamics._state import (
     recurring_leaves,
     recurring_names,
@@ -29,12 +27,11 @@ from jaxbiped.dynamics._state import (
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.hybrid._admissible_directions import projection_of
-from jaxbiped.hybrid._hybrid_system import HybridSystem
-from jaxbiped.hybrid._scales import sizes_of
 from jaxbiped.hybrid._sections import AbstractSection, section_of
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.sweep._convergence_test import Goals
-from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts, passes_a_stop
+from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
 
 _SHELLS = 1e-5 * 1.5 ** np.arange(30)
 """Distances that are tried."""
@@ -45,8 +42,6 @@ _HALVED, _MOST_CYCLES = 0.5, 16
 _NOISE = 100.0
 """Distance that the solver may make of none in a cycle, in units of its tolerance."""
 _DIRECTIONS = 128
-_SHALLOW = 1e-9
-"""Depth of a foot in units of length up to which it just touches."""
 _SHARE = 0.7
 """Of the largest distance from which every sample came nearer."""
 
@@ -119,7 +114,7 @@ def turned_offsets(state: PyTree, offsets: np.ndarray) -> np.ndarray:
 
 
 def attractor_without_radius(
-    scene: Scene | RigidScene | HybridSystem, gait: Gait, section: AbstractSection | None = None
+    scene: AbstractScene, gait: Gait, section: AbstractSection | None = None
 ) -> Attractor:
     """A gait's metric, from its return map's derivative; its radius is not known yet.
 
@@ -165,7 +160,7 @@ def attractor_without_radius(
 
 
 def section_tangents(
-    scene: Scene | RigidScene | HybridSystem, state: PyTree, section: AbstractSection | None = None
+    scene: AbstractScene, state: PyTree, section: AbstractSection | None = None
 ) -> np.ndarray:
     """Orthonormal directions in which the section extends at a state, shape (m, m − 1)."""
     import scipy.linalg
@@ -180,26 +175,16 @@ def _section_slope(section: AbstractSection, scene: Any, state: PyTree) -> PyTre
     return jax.grad(lambda y: section.value(scene, y))(state)
 
 
-def component_scales(scene: Scene | RigidScene | HybridSystem, state: PyTree) -> np.ndarray:
+def component_scales(scene: AbstractScene, state: PyTree) -> np.ndarray:
     """Size of each component of a state without `ROOT_x`, shape (m,), SI units.
 
     Angles 1, velocities √(g l), rates √(g/l), the root point's height the penetration of the
     deepest foot of the stance leg. Those of a hybrid system are in its state's `scales`.
     """
-    _, sizes = sizes_of(scene, state)
-    if isinstance(scene, Scene):
-        structure = scene.mechanism.structure
-        found = leg_depth(structure, feet(scene, state), structure.stance_leg)
-        depth, length = abs(float(found)), float(scene.mechanism.height)
-        # A start whose foot just touches tells no depth.
-        height = depth if depth > _SHALLOW * length else length
-        sizes = sizes._replace(**{structure.coordinates[1]: height})
-    return np.array(recurring_leaves(sizes))
+    return np.array(recurring_leaves(system_of(scene).sizes(scene, state)))
 
 
-def with_radius(
-    scene: Scene | RigidScene | HybridSystem, attractor: Attractor, effort: Effort
-) -> Attractor:
+def with_radius(scene: AbstractScene, attractor: Attractor, effort: Effort) -> Attractor:
     """The attractor with its radius measured: all starts of one shell after another.
 
     On each shell starts lie in many directions. The radius is a share of the last distance up to
@@ -233,7 +218,7 @@ def _radius_of(draws_in: Callable[[np.ndarray], np.ndarray]) -> float:
 
 
 def _draws_in(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     attractor: Attractor,
     shells: np.ndarray,
     cycles: int,
@@ -264,7 +249,8 @@ def _draws_in(
     aim = attractor._replace(model=nothing, contraction=1.0, radius=-1.0)
     scales = component_scales(scene, attractor.state)
     goals = Goals(*[*(np.stack([each]) for each in aim.goal), scales])
-    strikes = cycles * attractor.cycle_footsteps + (1 if scene.compliant else 0)
+    system = system_of(scene)
+    strikes = cycles * attractor.cycle_footsteps + (0 if system.footsteps_end_on_section else 1)
     found = follow_starts(
         scene,
         starts,
@@ -277,6 +263,6 @@ def _draws_in(
     left = attractor.contraction**cycles
     noise = _NOISE * effort.rtol * (1.0 - left) / (1.0 - attractor.contraction)
     allowed = np.maximum(0.5 * (1.0 + left) * np.repeat(shells, len(directions)), noise)
-    impossible = passes_a_stop(scene, starts._asdict())
+    impossible = system.lies_beyond(scene, starts)
     nearer: np.ndarray = np.asarray(returned & (after <= allowed) | impossible)
     return np.asarray(nearer.reshape(len(shells), -1).all(axis=1))

@@ -1,39 +1,27 @@
 """Following of starts until the label of each is certain: how far and accurately, by any engine.
 
-All engines run these same functions, so that labels do not depend on the engine. Starts that lie
-beyond a stop are recognised here, too.
+All engines run these same functions, so that labels do not depend on the engine.
 """
 
-import functools
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import jax
 import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
 from jaxtyping import PyTree
 
-from jaxbiped._types import as_float
-from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import BY_NAME, DEVICES, Program, Request
-from jaxbiped.dynamics._mode_changes import SLACK
+from jaxbiped.compiler import BY_NAME, DEVICES, Request
 from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait._return_map_spec import patience_of
-from jaxbiped.hybrid._endings import WATCHES
-from jaxbiped.hybrid._hybrid_system import GuardedMotion, HybridSystem
-from jaxbiped.hybrid._scales import units_of
+from jaxbiped.hybrid._scales import is_smooth
 from jaxbiped.hybrid._sections import AbstractSection
-from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.hybrid._walker_systems import Rolling, system_of
-from jaxbiped.scene._modes import limit_motions, rigid_modes
-from jaxbiped.scene._scene import RigidScene, Scene, is_rigid, is_walker
-from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
+from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.solve._adaptive_program import AdaptiveSolve
 from jaxbiped.solve._explicit_methods import ExplicitMethod
 from jaxbiped.solve._recorders import program_of
 from jaxbiped.solve._rigid_program import RigidSolve
-from jaxbiped.solve._rigid_steps import FallWatch, RigidWalk
-from jaxbiped.solve.controllers._wrapped_control import just_before_end
+from jaxbiped.solve._rigid_steps import FallWatch
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import Goals
 from jaxbiped.sweep._label_recorders import (
@@ -47,10 +35,8 @@ from jaxbiped.sweep._label_recorders import (
 _GAP = 1e-4
 """Gap between states that repeat each other, at least; see `after_arrival`."""
 _LONGEST = 1e6
-"""Simulated time [s] that no start takes: its footsteps or its patience end it before. For a
-hybrid system it is in units of its patience."""
-_PATIENCE = 50.0
-"""Longest time between two footsteps, in units of √(l/g)."""
+"""Simulated time that no start takes, in units of its patience: that or its footsteps end it
+before."""
 _WHOLE: dict[str, type] = dict(
     label=np.int8,
     gait=np.int16,
@@ -70,12 +56,12 @@ class Effort(NamedTuple):
         footsteps: after which a start that is not certain is given up; arrivals of a hybrid system.
         max_attempts: cap on the solver's attempted steps.
         gap_share: the gap in units of the tolerance; 0 where recurrences are not looked for.
-        solver: of the compliant walker.
+        solver: where rates may be stiff.
         engine: "lanes", "cuda" or "xla".
+        section: where they arrive.
         may_move: whether large batches go from lanes to a CUDA device where there is one.
         wanted: share of the labels that may be wrong; None where the tolerance decides.
-        embedded: whether the rigid walker steps by the embedded method.
-        section: where a hybrid system arrives; None for a walker's own section.
+        embedded: whether steps are those of the embedded method where rates are smooth.
     """
 
     rtol: float
@@ -84,10 +70,10 @@ class Effort(NamedTuple):
     gap_share: float
     solver: AbstractRosenbrock
     engine: str
+    section: AbstractSection
     wanted: float | None = None
     embedded: bool = False
     may_move: bool = False
-    section: AbstractSection | None = None
 
     @property
     def gap(self) -> float:
@@ -106,7 +92,7 @@ class Effort(NamedTuple):
 
 
 def follow_starts(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     states: PyTree,
     goals: Goals,
     cycles: tuple[int, ...],
@@ -118,52 +104,30 @@ def follow_starts(
     `cycles` are footsteps in the cycles of the goals.
     """
     count, each = len(states[0]), scene.arrival_footsteps
-    longest, waits = _LONGEST, _longest_wait(scene)
-    if not is_walker(scene):
-        longest = _LONGEST * float(waits)
     arrivals = tuple(max(length // each, 1) for length in cycles)
-    # Labels by a number may doubt what grazes.
-    counted = effort.wanted is not None
     if not count:
         none = np.zeros(0)
         final: Any = (none,) * len(recurring_names(states))
         plain = Labelled(*[*[none] * 9, final])
-        return _as_arrays(plain._replace(grazes=none if counted else None))
+        return _as_arrays(plain._replace(grazes=None if effort.wanted is None else none))
 
     def same(value: npt.ArrayLike) -> np.ndarray:
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
 
-    common = dict(
-        scene=jtu.tree_map(same, scene),
-        state=states,
-        duration=same(longest),
-        footsteps=same(effort.footsteps),
-        rtol=same(effort.rtol),
-        max_attempts=same(effort.max_attempts),
+    waits = np.asarray(patience_of(scene))
+    steps = _steps(scene, effort, arrivals)
+    start = steps.inputs(
+        scene,
+        states,
+        duration=_LONGEST * waits,
+        footsteps=effort.footsteps,
+        rtol=effort.rtol,
+        max_attempts=effort.max_attempts,
     )
     pursuit = Pursuit(goals, same(effort.gap), same(waits))
-    starts: Solve | RigidWalk
-    if is_rigid(scene):
-        starts = RigidWalk(**common, recording=pursuit)
-    else:
-        last = same(just_before_end(as_float(longest)))
-        atol = same(1e-2 * effort.rtol)
-        units = jtu.tree_map(same, units_of(scene, states))
-        starts = Solve(
-            **common,
-            almost=last,
-            atol=atol,
-            units=units,
-            patience=same(np.inf),
-            recording=pursuit,
-        )
-    embedded = effort.embedded and is_rigid(scene)
-    fenced = effort.engine == "xla"
-    program = _program(
-        system_of(scene), effort.section, effort.solver, arrivals, fenced, embedded, counted
-    )
+    given = jtu.tree_map(same, start)._replace(recording=pursuit)
+    program = program_of(steps)
     engine = BY_NAME[effort.engine_of(count)]
-    given = jtu.tree_map(np.asarray, starts)
     found = _as_arrays(engine.run(Request(program, given, batch=True)).outputs)
     if each == 1:
         return found
@@ -171,41 +135,29 @@ def follow_starts(
     return found._replace(cycle_footsteps=footsteps, rate=found.rate ** (1.0 / each))
 
 
-@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def _program(
-    system: AbstractSystem,
-    section: AbstractSection | None,
-    solver: AbstractRosenbrock,
-    cycles: tuple[int, ...],
-    fenced: bool,
-    embedded: bool,
-    grazes: bool,
-) -> Program:
-    if isinstance(system, Rolling):
-        return program_of(
-            RigidSolve(
-                recorder=StrikeLabelRecorder(cycles, grazes),
-                method=ExplicitMethod(embedded=embedded),
-                falls=FallWatch.TOLD,
-                counts_pulls=False,
-            )
+def _steps(
+    scene: AbstractScene, effort: Effort, cycles: tuple[int, ...]
+) -> RigidSolve | AdaptiveSolve:
+    """The functions of the program that labels starts. Labels by a number may doubt what grazes."""
+    system, section, grazes = system_of(scene), effort.section, effort.wanted is not None
+    if is_smooth(scene):
+        return RigidSolve(
+            recorder=StrikeLabelRecorder(section, cycles, grazes),
+            method=ExplicitMethod(embedded=effort.embedded),
+            falls=FallWatch.TOLD,
+            counts_pulls=False,
         )
-    solve = functools.partial(AdaptiveSolve, system=system, stepper=solver, fenced=fenced)
-    if isinstance(system, GuardedMotion):
-        assert section is not None
-        arrivals = ArrivalLabelRecorder(section, cycles, grazes)
-        watch = tuple(name for _, name in system.watched)
-        return program_of(solve(watch=watch, counting=False, recorder=arrivals, located=True))
-    recorder = LabelRecorder(cycles, grazes)
-    return program_of(solve(watch=WATCHES, counting=True, recorder=recorder))
-
-
-def _longest_wait(scene: Any) -> np.ndarray:
-    """Longest time between two footsteps, or two arrivals of a hybrid system [s]."""
-    if not is_walker(scene):
-        return np.asarray(patience_of(scene))
-    height, gravity = np.asarray(scene.mechanism.height), np.asarray(scene.ground.g)
-    return np.asarray(_PATIENCE * np.sqrt(height / gravity))
+    counting = section.names_legs
+    recorder = LabelRecorder if counting else ArrivalLabelRecorder
+    return AdaptiveSolve(
+        system=system,
+        stepper=effort.solver,
+        watch=system.watches,
+        counting=counting,
+        recorder=recorder(section, cycles, grazes),
+        located=system.lands,
+        fenced=effort.engine == "xla",
+    )
 
 
 def _as_arrays(found: Labelled) -> Labelled:
@@ -226,20 +178,3 @@ def broadcast_leaves(tree: PyTree, count: int) -> PyTree:
         return np.broadcast_to(array, (count, *array.shape))
 
     return jtu.tree_map(repeat, tree)
-
-
-def passes_a_stop(scene: Any, values: Mapping[str, Any], *, by: float = SLACK) -> np.ndarray:
-    """Whether states by name, arrays of shape (n,), lie beyond a stop by so much [rad].
-
-    Those of a hybrid system, beyond a guard that is armed and resets the state, in its scale.
-    """
-    if not is_walker(scene):
-        states = scene.state_type(**values)
-        return np.asarray(jax.vmap(lambda y: scene.lies_beyond(y, by))(states))
-    angle = scene.mechanism.structure.coordinates[2]
-    passed = np.zeros(np.shape(values[angle]), dtype=bool)
-    if is_rigid(scene):
-        mechanism, slope = scene.mechanism, scene.ground.slope
-        for gap, _ in limit_motions(mechanism, rigid_modes(mechanism), slope, values):
-            passed = passed | (np.asarray(gap) < -by)
-    return passed

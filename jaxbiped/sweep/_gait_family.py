@@ -11,15 +11,12 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject, as_float
-from jaxbiped.dynamics._state import (
-    state_of_recurring,
-)
+from jaxbiped.dynamics._state import state_of_recurring
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
-from jaxbiped.hybrid._hybrid_system import HybridSystem
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.scene._parameter_access import SomeScene, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene, is_walker
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.sweep._attractor import (
     Attractor,
     attractor_without_radius,
@@ -152,7 +149,7 @@ def _places(own: tuple[int, ...], room: tuple[int, ...]) -> list[int]:
 
 
 def find_family(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     effort: Effort,
     *,
     parameters: Mapping[str, Sequence[float] | np.ndarray],
@@ -169,8 +166,7 @@ def find_family(
     scenes = [scene_with(scene, names, values) for values in table]
 
     def seek(k: int, near: PyTree) -> tuple[Attractor, ...]:
-        # A hybrid system is not searched for without a guess.
-        guesses = [near, None] if is_walker(scene) else [near]
+        guesses = [near, None] if scene.has_default_guess else [near]
         found = _stable_gaits(scenes[k], guesses, scene.cycle_footsteps, effort.section)
         return tuple(with_radius(scenes[k], gait, effort) for gait in found)
 
@@ -200,9 +196,7 @@ def _rows_from_neighbours(
     return tuple(rows), tuple(states)
 
 
-def with_gaits(
-    scene: Scene | RigidScene | HybridSystem, family: Family, effort: Effort, guesses: Guesses
-) -> Family:
+def with_gaits(scene: AbstractScene, family: Family, effort: Effort, guesses: Guesses) -> Family:
     """The family that also knows the gaits to which these guesses lead."""
     rows = list(family.rows)
     for k, each in guesses.items():
@@ -234,7 +228,7 @@ def scene_with(scene: SomeScene, names: Sequence[str], values: np.ndarray) -> So
 
 
 def _stable_gaits(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     guesses: Sequence[PyTree],
     length: int,
     section: AbstractSection | None,

@@ -29,7 +29,7 @@ from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
-from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._hybrid_system import SCENES
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import (
     parameter_quantities,
@@ -38,7 +38,7 @@ from jaxbiped.scene._parameter_access import (
     select_parameters,
     with_parameters,
 )
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._gait_grid import (
     LARGE,
@@ -56,7 +56,6 @@ from jaxbiped.sweep.starts._coordinates import parameter_axes
 if TYPE_CHECKING:
     import xarray
 
-AnyScene: TypeAlias = Scene | RigidScene | RedundantScene | HybridSystem
 
 _FEW, _MANY = 16, 256
 """Searches in a batch: every size is a program that XLA compiles."""
@@ -74,7 +73,7 @@ states without `ROOT_x` that are given, shape (n, m)."""
 
 
 def gait_sweep(
-    scene: AnyScene,
+    scene: AbstractScene,
     over: Mapping[str, Sequence[float] | np.ndarray],
     *,
     parameters: tuple[str, ...] | None = None,
@@ -127,7 +126,7 @@ def gait_sweep(
             has other settings or cannot be written.
         ResourceError: the disk is full. The contents of the store are kept.
     """
-    scene = check_scene(scene, Scene, RigidScene, RedundantScene, HybridSystem)
+    scene = check_scene(scene, *SCENES)
     section, near = section_of(scene, section), state_of_guess(scene.minimal, guess)
     if not isinstance(over, Mapping) or not over:
         raise ArgumentError(
@@ -152,7 +151,7 @@ def gait_sweep(
     }
     centre = _nearest(scene, values)
 
-    def scene_at(place: Place) -> AnyScene:
+    def scene_at(place: Place) -> AbstractScene:
         point = {name: values[name][i] for name, i in zip(values, place, strict=True)}
         return with_parameters(scene, point)
 
@@ -200,7 +199,7 @@ def gait_sweep(
 
 
 def find_each(
-    scene: AnyScene,
+    scene: AbstractScene,
     values: Mapping[str, np.ndarray],
     starts: np.ndarray,
     state: type,
@@ -230,7 +229,7 @@ def find_each(
 
 @cached_jit
 def _find_each(
-    scene: AnyScene, values: dict[str, np.ndarray], starts: PyTree, options: dict[str, Any]
+    scene: AbstractScene, values: dict[str, np.ndarray], starts: PyTree, options: dict[str, Any]
 ) -> Gait:
     def one(values: dict[str, np.ndarray], start: PyTree) -> Gait:
         own = jtu.tree_map(jnp.asarray, with_parameters(scene, values))
@@ -241,7 +240,7 @@ def _find_each(
     return jax.vmap(one)(values, starts)
 
 
-def _nearest(scene: AnyScene, values: dict[str, np.ndarray]) -> Place:
+def _nearest(scene: AbstractScene, values: dict[str, np.ndarray]) -> Place:
     """The point of the grid nearest to the scene's own parameters."""
     own = parameter_values(scene)
     return tuple(int(np.argmin(np.abs(v - float(own[name])))) for name, v in values.items())

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple
 
 import equinox.internal as eqxi
 import jax
@@ -19,7 +19,7 @@ from jaxbiped.dynamics._state import (
     recurring_names,
     recurring_periods,
 )
-from jaxbiped.hybrid._sections import AbstractSection, MidStance
+from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._recorders import (
     AbstractRecorder,
@@ -117,78 +117,127 @@ class LabelMemory(NamedTuple):
     """What is carried from attempt to attempt beside the solve.
 
     Attributes:
-        last: the last step, within which it may arrive.
+        last: the last step, within which it may arrive; None where only steps end in arrivals.
         trace: see there.
-        strike: time of the last footstep [s].
-        landed: where each foot came down; see `slip_distances`.
+        times: those of the last footsteps or arrivals, the latest first; that is 0 before any [s].
+        landed: where each foot came down, see `slip_distances`; () where no slip is measured.
+        arrivals: number of arrivals so far; None where footsteps are counted.
         grazes: steps that grazed so far; None where they are not counted.
     """
 
-    last: LastStep
+    last: LastStep | None
     trace: ArrivalHistory
-    strike: Scalar
-    landed: tuple[Scalar, ...]
+    times: tuple[Scalar, ...]
+    landed: tuple[Scalar, ...] = ()
+    arrivals: Scalar | None = None
     grazes: Scalar | None = None
+
+    def with_verdict(self, label: Label, holds: Scalar) -> "LabelMemory":
+        """The same with a label as its verdict if a condition holds."""
+        verdict = jnp.where(holds, int(label), self.trace.verdict)
+        return self._replace(trace=self.trace._replace(verdict=verdict))
 
 
 @dataclasses.dataclass(frozen=True)
-class LabelRecorder(AbstractRecorder):
-    """Labels the compliant walker, which arrives at mid-stance, on whichever leg.
+class AbstractLabelRecorder(AbstractRecorder):
+    """Follows a start until its label is certain.
 
     Attributes:
+        section: where it arrives.
         cycles: arrivals in a cycle of each known gait.
         grazes: whether steps that graze are counted.
     """
 
     records: ClassVar[bool] = False
+    section: AbstractSection
     cycles: tuple[int, ...]
     grazes: bool = False
 
-    def begin(self, how: AbstractSolve, solve: Solve) -> LabelMemory:
+    def begin(self, how: AbstractSolve, solve: Any) -> LabelMemory:
         zero = jnp.zeros_like(solve.duration)
         trace = empty_history(zero, len(recurring_names(solve.state)), self.cycles)
-        landed = contact_places(solve.scene, solve.state)
-        count = jnp.zeros((), dtype=jnp.int64) if self.grazes else None
-        return LabelMemory(no_step(how, solve, course=True), trace, zero, landed, count)
-
-    def follow(
-        self, how: AbstractSolve, solve: Solve, memory: LabelMemory, step: Step
-    ) -> LabelMemory:
-        last = last_step(step, memory.last, course=True)
-        strike = jnp.where(jnp.asarray(step.strikes), step.t1, memory.strike)
-        trace = self._traced(how, solve, memory.trace, last, step)
-        landed, slid = slip_distances(solve.scene, step.y1, memory.landed)
-        late = step.t1 - strike > solve.recording.patience
-        verdict = jnp.where(late, int(Label.TIMED_OUT), trace.verdict)
-        verdict = jnp.where(slid > solve.scene.mechanism.height, int(Label.SLID), verdict)
-        trace = trace._replace(verdict=verdict)
-        count = memory.grazes
-        if count is not None:
-            old, new = (how.system.gaps(solve.scene, y) for y in (step.y0, step.y1))
-            count = count + jnp.where(grazes(old, new, step.t1 - step.t0, solve.rtol), 1, 0)
-        return LabelMemory(last, trace, strike, landed, count)
+        return LabelMemory(None, trace, (zero,))
 
     def decides(self, memory: LabelMemory) -> Scalar:
         return memory.trace.verdict != UNDECIDED
 
     def finish(
-        self, solve: Solve, memory: LabelMemory, solved: Solved, footsteps: Scalar | None
+        self, solve: Any, memory: LabelMemory, solved: Any, footsteps: Scalar | None
     ) -> Labelled:
         return _outcome(
             memory.trace,
             code=solved.ending,
-            footsteps=footsteps,
+            footsteps=memory.arrivals if footsteps is None else footsteps,
             time=solved.t,
             distance=_advance(solve, solved),
             attempted=solved.accepted + solved.rejected,
             grazes=memory.grazes,
         )
 
+    def _after_arrival(
+        self,
+        solve: Any,
+        old: ArrivalHistory,
+        arrives: Scalar,
+        state: Callable[[], PyTree],
+        lasting: tuple[Scalar, ...] | None = None,
+    ) -> ArrivalHistory:
+        """The trace after an arrival, if any start of the batch has one."""
+        pursuit: Pursuit = solve.recording
+
+        def made() -> ArrivalHistory:
+            here, cycles = state(), self.cycles
+            recurring, periods = tuple(recurring_leaves(here)), recurring_periods(here)
+            new = after_arrival(
+                old, recurring, pursuit.goals, cycles, pursuit.gap, solve.rtol, periods, lasting
+            )
+            return select(arrives, new, old)
+
+        trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(arrives), made, lambda: old)
+        return trace
+
+
+def _time_out(solve: Any, memory: LabelMemory, t: Scalar) -> LabelMemory:
+    """The same, with that verdict where the last footstep or arrival lies too far back."""
+    return memory.with_verdict(Label.TIMED_OUT, t - memory.times[0] > solve.recording.patience)
+
+
+@dataclasses.dataclass(frozen=True)
+class LabelRecorder(AbstractLabelRecorder):
+    """Labels the compliant walker, which arrives between heel strikes, on whichever leg."""
+
+    def begin(self, how: AbstractSolve, solve: Solve) -> LabelMemory:
+        return (
+            super()
+            .begin(how, solve)
+            ._replace(
+                last=no_step(how, solve, course=True),
+                landed=contact_places(solve.scene, solve.state),
+                grazes=jnp.zeros((), dtype=jnp.int64) if self.grazes else None,
+            )
+        )
+
+    def follow(
+        self, how: AbstractSolve, solve: Solve, memory: LabelMemory, step: Step
+    ) -> LabelMemory:
+        assert memory.last is not None
+        last = last_step(step, memory.last, course=True)
+        strike = jnp.where(jnp.asarray(step.strikes), step.t1, memory.times[0])
+        trace = self._traced(how, solve, memory.trace, last, step)
+        landed, slid = slip_distances(solve.scene, step.y1, memory.landed)
+        count = memory.grazes
+        if count is not None:
+            old, new = (how.system.gaps(solve.scene, y) for y in (step.y0, step.y1))
+            count = count + jnp.where(grazes(old, new, step.t1 - step.t0, solve.rtol), 1, 0)
+        after = LabelMemory(last, trace, (strike,), landed, grazes=count)
+        timed = _time_out(solve, after, step.t1)
+        return timed.with_verdict(Label.SLID, slid > solve.scene.mechanism.height)
+
     def _traced(
         self, how: AbstractSolve, solve: Solve, trace: ArrivalHistory, last: LastStep, step: Step
     ) -> ArrivalHistory:
-        """After the last step, within which it may have arrived at mid-stance."""
-        scene, system, section = solve.scene, how.system, MidStance()
+        """After the last step, within which it may have arrived at the section."""
+        scene, system, section = solve.scene, how.system, self.section
 
         came = []
         for (_, old), (_, new) in zip(
@@ -209,54 +258,28 @@ class LabelRecorder(AbstractRecorder):
         def on_section() -> PyTree:
             return at(arrival_time(lambda time: section.value(scene, at(time)), last.t, step.t1))
 
-        return _after_arrival(solve, trace, arrives, on_section, self.cycles)
-
-
-class ArrivalMemory(NamedTuple):
-    """What is carried from attempt to attempt of a hybrid system.
-
-    Attributes:
-        last: the last step, within which it may arrive.
-        trace: see there.
-        times: those of the last arrivals, the latest first, of two of the longest cycles; the first
-            one is 0 before any [s].
-        arrivals: number of arrivals so far.
-        grazes: number of steps in which a switch was grazed so far; None where they are not
-            counted.
-    """
-
-    last: LastStep
-    trace: ArrivalHistory
-    times: tuple[Scalar, ...]
-    arrivals: Scalar
-    grazes: Scalar | None = None
+        return self._after_arrival(solve, trace, arrives, on_section)
 
 
 @dataclasses.dataclass(frozen=True)
-class ArrivalLabelRecorder(AbstractRecorder):
-    """Labels a hybrid system, whose arrivals at a section are counted in place of footsteps.
+class ArrivalLabelRecorder(AbstractLabelRecorder):
+    """Labels a hybrid system, whose arrivals at the section are counted in place of footsteps."""
 
-    Attributes:
-        section: where it arrives.
-        cycles: arrivals in a cycle of each known gait.
-        grazes: whether grazed switches are told.
-    """
-
-    records: ClassVar[bool] = False
-    section: AbstractSection
-    cycles: tuple[int, ...]
-    grazes: bool = False
-
-    def begin(self, how: AbstractSolve, solve: Solve) -> ArrivalMemory:
-        zero, none = jnp.zeros_like(solve.duration), jnp.zeros((), dtype=jnp.int64)
-        trace = empty_history(zero, len(recurring_names(solve.state)), self.cycles)
-        count = none if self.grazes else None
-        times = (zero, *[jnp.full_like(zero, jnp.nan)] * (2 * DEPTH - 1))
-        return ArrivalMemory(no_step(how, solve, course=True), trace, times, none, count)
+    def begin(self, how: AbstractSolve, solve: Solve) -> LabelMemory:
+        begun, none = super().begin(how, solve), jnp.zeros((), dtype=jnp.int64)
+        before = (jnp.full_like(solve.duration, jnp.nan),) * (2 * DEPTH - 1)
+        return begun._replace(
+            last=no_step(how, solve, course=True),
+            times=(*begun.times, *before),
+            arrivals=none,
+            grazes=none if self.grazes else None,
+        )
 
     def follow(
-        self, how: AbstractSolve, solve: Solve, memory: ArrivalMemory, step: Step
-    ) -> ArrivalMemory:
+        self, how: AbstractSolve, solve: Solve, memory: LabelMemory, step: Step
+    ) -> LabelMemory:
+        assert memory.last is not None
+        assert memory.arrivals is not None
         last = last_step(step, memory.last, course=True)
         course = how.course(solve, last, step.t1, step.y1)
         rise = rise_within(self.section, how.system, solve.scene, course)
@@ -273,32 +296,17 @@ class ArrivalLabelRecorder(AbstractRecorder):
             return course.evaluate(arrival_time(value, rise.since, rise.until))
 
         lasting = _lasting(step.t1, memory.times)
-        trace = _after_arrival(solve, memory.trace, arrives, on_section, self.cycles, lasting)
-        times = select(arrives, (step.t1, *memory.times[:-1]), memory.times)
         arrivals = memory.arrivals + jnp.where(arrives, 1, 0)
-        verdict = trace.verdict
-        walked = arrivals.astype(solve.footsteps.dtype) >= solve.footsteps
-        verdict = jnp.where((verdict == UNDECIDED) & walked, int(Label.UNRESOLVED), verdict)
-        late = step.t1 - times[0] > solve.recording.patience
-        trace = trace._replace(verdict=jnp.where(late, int(Label.TIMED_OUT), verdict))
-        count = None if memory.grazes is None else step.grazes
-        return ArrivalMemory(last, trace, times, arrivals, count)
-
-    def decides(self, memory: ArrivalMemory) -> Scalar:
-        return memory.trace.verdict != UNDECIDED
-
-    def finish(
-        self, solve: Solve, memory: ArrivalMemory, solved: Solved, footsteps: Scalar | None
-    ) -> Labelled:
-        return _outcome(
-            memory.trace,
-            code=solved.ending,
-            footsteps=memory.arrivals,
-            time=solved.t,
-            distance=_advance(solve, solved),
-            attempted=solved.accepted + solved.rejected,
-            grazes=memory.grazes,
+        after = LabelMemory(
+            last,
+            self._after_arrival(solve, memory.trace, arrives, on_section, lasting),
+            select(arrives, (step.t1, *memory.times[:-1]), memory.times),
+            arrivals=arrivals,
+            grazes=step.grazes if self.grazes else None,
         )
+        walked = arrivals.astype(solve.footsteps.dtype) >= solve.footsteps
+        open_ = after.trace.verdict == UNDECIDED
+        return _time_out(solve, after.with_verdict(Label.UNRESOLVED, open_ & walked), step.t1)
 
 
 def _lasting(t: Scalar, times: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
@@ -314,61 +322,24 @@ def _lasting(t: Scalar, times: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
     return tuple(lasting)
 
 
-class StrikeMemory(NamedTuple):
-    """What is carried from attempt to attempt of a rigid walker.
-
-    Attributes:
-        trace: see there.
-        strike: time of the last footstep [s].
-    """
-
-    trace: ArrivalHistory
-    strike: Scalar
-
-
 @dataclasses.dataclass(frozen=True)
-class StrikeLabelRecorder(AbstractRecorder):
-    """Labels the rigid walker, which arrives just after its impacts.
-
-    Attributes:
-        cycles: arrivals in a cycle of each known gait.
-        grazes: whether heel strikes that graze are told.
-    """
-
-    records: ClassVar[bool] = False
-    cycles: tuple[int, ...]
-    grazes: bool = False
-
-    def begin(self, how: AbstractSolve, walk: RigidWalk) -> StrikeMemory:
-        zero = jnp.zeros_like(walk.duration)
-        size = len(recurring_names(walk.state))
-        return StrikeMemory(empty_history(zero, size, self.cycles), zero)
+class StrikeLabelRecorder(AbstractLabelRecorder):
+    """Labels the rigid walker, which arrives just after its impacts."""
 
     def follow(
-        self, how: AbstractSolve, walk: RigidWalk, memory: StrikeMemory, step: Step
-    ) -> StrikeMemory:
+        self, how: AbstractSolve, walk: RigidWalk, memory: LabelMemory, step: Step
+    ) -> LabelMemory:
         strikes = jnp.asarray(step.strikes)
-        trace = _after_arrival(walk, memory.trace, strikes, lambda: step.y1, self.cycles)
-        strike = jnp.where(strikes, step.t1, memory.strike)
-        late = step.t1 - strike > walk.recording.patience
-        verdict = jnp.where(late, int(Label.TIMED_OUT), trace.verdict)
-        return StrikeMemory(trace._replace(verdict=verdict), strike)
-
-    def decides(self, memory: StrikeMemory) -> Scalar:
-        return memory.trace.verdict != UNDECIDED
+        trace = self._after_arrival(walk, memory.trace, strikes, lambda: step.y1)
+        strike = jnp.where(strikes, step.t1, memory.times[0])
+        return _time_out(walk, LabelMemory(None, trace, (strike,)), step.t1)
 
     def finish(
-        self, walk: RigidWalk, memory: StrikeMemory, solved: Solved, footsteps: Scalar | None
+        self, walk: RigidWalk, memory: LabelMemory, solved: Solved, footsteps: Scalar | None
     ) -> Labelled:
-        return _outcome(
-            memory.trace,
-            code=solved.ending,
-            footsteps=footsteps,
-            time=solved.t,
-            distance=_advance(walk, solved),
-            attempted=solved.accepted + solved.rejected,
-            grazes=solved.grazes if self.grazes else None,
-        )
+        if self.grazes:
+            memory = memory._replace(grazes=solved.grazes)
+        return super().finish(walk, memory, solved, footsteps)
 
 
 def _advance(solve: Solve | RigidWalk, solved: Solved) -> Scalar:
@@ -396,27 +367,3 @@ def _outcome(trace: ArrivalHistory, *, code: Scalar, **walked: Any) -> Labelled:
         final=trace.recent[0],
     )
     return Labelled(**certain, **walked)
-
-
-def _after_arrival(
-    solve: Solve | RigidWalk,
-    old: ArrivalHistory,
-    arrives: Scalar,
-    state: Callable[[], PyTree],
-    cycles: tuple[int, ...],
-    lasting: tuple[Scalar, ...] | None = None,
-) -> ArrivalHistory:
-    """The trace after an arrival, if there is one; made only if any start of the batch has one."""
-    pursuit: Pursuit = solve.recording
-
-    def made() -> ArrivalHistory:
-        here = state()
-        recurring, periods = tuple(recurring_leaves(here)), recurring_periods(here)
-        rtol = cast(Scalar, solve.rtol)
-        new = after_arrival(
-            old, recurring, pursuit.goals, cycles, pursuit.gap, rtol, periods, lasting
-        )
-        return select(arrives, new, old)
-
-    trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(arrives), made, lambda: old)
-    return trace

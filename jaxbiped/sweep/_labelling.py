@@ -19,10 +19,9 @@ from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.dynamics._state import without_whole_turns
-from jaxbiped.hybrid._hybrid_system import HybridSystem, within_periods
-from jaxbiped.hybrid._scales import resolve_slip_speed
+from jaxbiped.hybrid._scales import is_smooth, resolve_slip_speed
 from jaxbiped.scene._parameter_access import scene_identity, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene, is_rigid, is_walker
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named
@@ -34,7 +33,7 @@ from jaxbiped.sweep._label_recorders import Labelled
 _FINER = 10.0
 """From one tolerance to the next."""
 _FINEST = {False: 1e-10, True: 1e-13}
-"""Finest tolerance that is tried, on rigid feet or not."""
+"""Finest tolerance that is tried, by whether rates are smooth."""
 _LEAST = 2.0
 """How many times looser the looser tolerance is at least."""
 _STEPS = 2
@@ -44,9 +43,7 @@ Follow = Callable[[np.ndarray, Effort], Labelled]
 """Labels of the starts with these numbers, by one solve of each."""
 
 
-def relabel_doubtful(
-    follow: Follow, count: int, effort: Effort, scene: Scene | RigidScene | HybridSystem
-) -> Labelled:
+def relabel_doubtful(follow: Follow, count: int, effort: Effort, scene: AbstractScene) -> Labelled:
     """Labels of n starts, solved again where they are in doubt; no start's depends on another's.
 
     In doubt is what a ten times looser tolerance or another method of steps labels otherwise, and
@@ -68,7 +65,7 @@ def relabel_doubtful(
     doubtful = disagreed > 0 if first.grazes is None else (disagreed > 0) | (first.grazes > 0)
     doubt = np.where(doubtful, int(Doubt.REMAINS), int(Doubt.NONE))
     open_ = np.flatnonzero(doubtful)
-    agree, finer, finest = agree[open_], effort, _FINEST[is_rigid(scene)]
+    agree, finer, finest = agree[open_], effort, _FINEST[is_smooth(scene)]
     while len(open_) and finer.rtol > 1.001 * finest:
         finer = finer._replace(rtol=max(finer.rtol / _FINER, finest))
         finer = finer._replace(max_attempts=_STEPS * finer.max_attempts)
@@ -89,7 +86,7 @@ def relabel_doubtful(
 
 
 def _by_other_method(effort: Effort) -> Effort:
-    """Another method of steps: of the rigid walker the embedded one."""
+    """Another method of steps: where rates are smooth, the embedded one."""
     name = "rodas4p" if isinstance(effort.solver, Rodas5P) else "rodas5p"
     solver: Any = solver_named(name)
     return effort._replace(solver=solver, embedded=True)
@@ -110,7 +107,7 @@ class Labelling(eqx.Module):
         effort: how far and how accurately starts are followed.
     """
 
-    scene: Scene | RigidScene | HybridSystem
+    scene: AbstractScene
     family: Family
     effort: Effort = eqx.field(static=True)
 
@@ -161,7 +158,7 @@ class Labelling(eqx.Module):
         """Labels of starts that are checked, by one solve of each."""
         count = len(states[0])
         scene = with_parameters(self.scene, {k: jnp.asarray(v) for k, v in given.items()})
-        scene = check_scene(scene, Scene, RigidScene, HybridSystem)
+        scene = check_scene(scene, AbstractScene)
         goals, cycles = self.family.goals(given, count)
         found = follow_starts(scene, states, goals, cycles, effort)
         if not given or self.family.names:
@@ -194,10 +191,10 @@ class Labelling(eqx.Module):
         if effort["wanted"] is None:
             del effort["wanted"]
         models = {"scene": own["model"], "solver": identity(self.effort.solver)}
-        if section is not None:
+        if not section.names_legs:  # which a walker leaves no choice of
             models["section"] = identity(section)
         return {
-            "model": _kind_of(self.scene),
+            "model": self.scene.model,
             "scene": own["scene"],
             "effort": effort,
             "models": models,
@@ -205,23 +202,15 @@ class Labelling(eqx.Module):
         }
 
 
-def _kind_of(scene: Scene | RigidScene | HybridSystem) -> str:
-    if not is_walker(scene):
-        return "hybrid system"
-    return "rigid" if is_rigid(scene) else "compliant"
-
-
-def _check_states(scene: Scene | RigidScene | HybridSystem, states: PyTree) -> PyTree:
-    kind = scene.state_type
-    bristles = scene.mechanism.structure.bristles if is_walker(scene) else ()
+def _check_states(scene: AbstractScene, states: PyTree) -> PyTree:
+    kind, bristles = scene.state_type, scene.bristles
     if (*getattr(states, "_fields", ()), *bristles) == kind._fields:
         straight = np.zeros_like(np.asarray(states[0]))
         states = kind(*states, *[straight] * len(bristles))
     check_type("states", states, kind)
     whole: PyTree = kind(*[np.asarray(leaf, dtype=np.float64) for leaf in states])
     check_leaves_of_starts(whole)
-    within = without_whole_turns(scene, whole) if is_walker(scene) else within_periods(whole)
-    return jtu.tree_map(np.asarray, within)
+    return jtu.tree_map(np.asarray, without_whole_turns(scene, whole))
 
 
 def check_leaves_of_starts(states: PyTree) -> None:

@@ -14,10 +14,10 @@ from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.basins._labels import Doubt, Label
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
-from jaxbiped.hybrid._hybrid_system import HybridSystem
-from jaxbiped.hybrid._scales import resolve_slip_speed
-from jaxbiped.hybrid._sections import AbstractSection, section_of
-from jaxbiped.scene._scene import RigidScene, Scene, is_rigid, is_walker
+from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
+from jaxbiped.hybrid._scales import is_smooth, resolve_slip_speed
+from jaxbiped.hybrid._sections import AbstractSection, chosen_section
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name
@@ -37,17 +37,18 @@ _ALIKE = 0.05
 _MOST_GUESSES = 8
 """Of one cycle length for one combination of parameters."""
 _GAP_SHARE = {False: 30.0, True: 3.0}
-"""Gap between states that repeat each other in units of the tolerance, on rigid feet or not:
-rolling errs by less, and slow transients past an unstable gait move by as little as a wider gap."""
+"""Gap between states that repeat each other in units of the tolerance, by whether rates are smooth:
+then solves err by less, and slow transients past an unstable gait move by as little as a wider
+gap."""
 _FIRST = 3e-3
 """First tolerance as a share of the accuracy wanted, at most that of "draft": of 100,000 labels of
 the seed's slice 37 were wrong and not in doubt at 1e-5 by Rodas4, and 11 at 1e-6."""
 FINEST_FIRST = {False: 1e-9, True: 1e-11}
-"""Finest tolerance at which every start is labelled, on rigid feet or not."""
+"""Finest tolerance at which every start is labelled, by whether rates are smooth."""
 
 
 def labelling(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     *,
     parameters: Mapping[str, Sequence[float] | np.ndarray] | None = None,
     guess: Gait | WalkerState | PyTree | None = None,
@@ -100,9 +101,8 @@ def labelling(
         engine=engine,
     )
     values = parameter_axes(scene, parameters, "parameters") if parameters else {}
-    if guess is None and is_walker(scene):
-        guess = default_guess(scene)
-    start = state_of_guess(scene, guess)
+    near = state_of_guess(scene, guess)
+    start = default_guess(scene) if near is None else near
     family = find_family(scene, effort, parameters=values, guess=start)
     missing = sum(not row for row in family.rows)
     if missing:
@@ -115,7 +115,7 @@ def labelling(
 
 
 def effort_of(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     *,
     section: AbstractSection | None = None,
     footsteps: int = 30,
@@ -126,7 +126,7 @@ def effort_of(
     engine: str = "auto",
 ) -> Effort:
     """How to follow starts, from the arguments of `labelling`; raises `ArgumentError`."""
-    scene = check_scene(scene, Scene, RigidScene, HybridSystem)
+    scene = check_scene(scene, *MINIMAL_SCENES)
     check_count("footsteps", footsteps)
     check_count("max_solver_steps", max_solver_steps)
     if any(np.ndim(leaf) for leaf in jtu.tree_leaves(scene)):
@@ -136,10 +136,10 @@ def effort_of(
         )
     wanted = _share_wanted(accuracy, rtol)
     named = ACCURACIES["draft" if wanted is not None else str(accuracy)]
-    rigid = is_rigid(scene)
-    own = named.rigid_walk if rigid else named.walk
+    smooth = is_smooth(scene)
+    own = named.rigid_walk if smooth else named.walk
     if wanted is not None:
-        own = min(own, max(_FIRST * wanted, FINEST_FIRST[rigid]))
+        own = min(own, max(_FIRST * wanted, FINEST_FIRST[smooth]))
     tolerance = resolve_slip_speed(own, scene) if rtol is None else rtol
     check_positive("rtol", tolerance, one=True)
     method = solver_named(solver)
@@ -151,27 +151,13 @@ def effort_of(
         rtol=float(tolerance),
         footsteps=int(footsteps),
         max_attempts=int(max_solver_steps),
-        gap_share=_GAP_SHARE[rigid],
+        gap_share=_GAP_SHARE[smooth],
         solver=method,
         engine=engine_for(engine, obstacle=None, by_device=True, by_any=True),
         may_move=engine == "auto",
         wanted=wanted,
-        section=_section_for(scene, section),
+        section=chosen_section(scene, section),
     )
-
-
-def _section_for(
-    scene: Scene | RigidScene | HybridSystem, section: AbstractSection | None
-) -> AbstractSection | None:
-    """The section of a hybrid system, checked; None for a walker, which has one alone."""
-    if not is_walker(scene):
-        return section_of(scene, section)
-    if section is not None:
-        raise ArgumentError(
-            f"section = {section!r} is not allowed for a {type(scene).__name__}: walkers are "
-            "compared at their own section; leave it out."
-        )
-    return None
 
 
 def _share_wanted(accuracy: str | float, rtol: float | None) -> float | None:

@@ -17,11 +17,10 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.hybrid._admissible_directions import admissible_directions
-from jaxbiped.hybrid._hybrid_system import HybridSystem
 from jaxbiped.hybrid._sections import AbstractSection
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.sweep._attractor import Attractor
-from jaxbiped.sweep._follow_starts import passes_a_stop
 from jaxbiped.sweep._gait_family import scene_with
 from jaxbiped.sweep._labelling import Labelling
 
@@ -86,7 +85,7 @@ def nearest_failure(
         }
         found = labelling(states, parameters=parameters)
         failed = found.label != int(Label.WALKING)
-        return (failed & ~passes_a_stop(scene, states._asdict())).astype(int)
+        return (failed & ~system_of(scene).lies_beyond(scene, states)).astype(int)
 
     section = labelling.effort.section
     normal = boundary_normal(scene, attractor, section) if gradients else None
@@ -107,7 +106,7 @@ def nearest_failure(
 
 
 def boundary_normal(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     attractor: Attractor,
     section: AbstractSection | None = None,
 ) -> Normal:
@@ -150,7 +149,7 @@ def _normal_by(arrivals: Callable[[np.ndarray], PyTree], attractor: Attractor) -
 
 @cached_jit
 def _arrivals(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     kind: type,
     section: AbstractSection | None,
     points: Array,

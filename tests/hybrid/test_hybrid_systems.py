@@ -142,10 +142,15 @@ def test_a_sweep_a_fit_and_an_optimum_of_it(bounce, tmp_path):
     fit = jb.fit_gait(BALL, ("gravity",), seen, guess=bounce)
     period = 2.0 * np.pi / float(BALL.frequency)
     np.testing.assert_allclose(fit.estimates["gravity"], 2.0 * 1.65 / period, rtol=1e-9)
-    best = jb.optimise_gait(
-        BALL, vary={"restitution": (0.45, 0.52)}, maximise="spectral_radius", guess=bounce
-    )
-    np.testing.assert_allclose(best.objective, 0.52, rtol=1e-9)
+    for _ in range(2):  # the second time from what the first one kept
+        best = jb.optimise_gait(
+            BALL,
+            vary={"restitution": (0.45, 0.52)},
+            maximise="spectral_radius",
+            guess=bounce,
+            store=tmp_path / "designs",
+        )
+        np.testing.assert_allclose(best.objective, 0.52, rtol=1e-9)
     for result in (bounce, BALL):
         jb.save(tmp_path / "kept", result)
         loaded = jb.load(tmp_path / "kept")

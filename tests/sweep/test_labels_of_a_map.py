@@ -218,7 +218,7 @@ class Straight:
 @pytest.fixture(scope="module")
 def attempt():
     """One step of a labelling, from one given state to another."""
-    recorder = LabelRecorder((1,))
+    recorder = LabelRecorder(jb.MidStance(), (1,))
 
     @jax.jit
     def one(before, after, t, strike, landed, radius):
@@ -235,7 +235,7 @@ def attempt():
         yes, no = jnp.asarray(True), jnp.asarray(False)
         step = Step(t - 0.01, before, t, after, yes, lambda course: (), strikes=no)
         memory = LabelMemory(
-            LastStep(no, t, before, ()), empty_history(strike, 7, (1,)), strike, landed
+            LastStep(no, t, before, ()), empty_history(strike, 7, (1,)), (strike,), landed
         )
         memory = recorder.follow(how, solve, memory, step)
         return memory.trace, recorder.decides(memory)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.hybrid._admissible_directions import admissible_directions, independent_names
-from jaxbiped.sweep._follow_starts import passes_a_stop
 from jaxbiped.sweep.starts._starts import sequence_points
 from tests.dynamics.test_modes import ANGLES, RATES, hsu_chen
 from tests.sweep.walkers import gaitless, same
@@ -111,11 +110,11 @@ def test_given_starts_are_told_apart_by_all_their_numbers():
 def test_states_beyond_a_stop_are_seen_one_by_one():
     """Shanks may be bent back, and stretched as far as their thighs."""
     shank = np.array([-0.3, -0.2, -0.1])
-    values = {name: np.full(3, float(value)) for name, value in HELD._asdict().items()}
-    found = passes_a_stop(KNEED, values | {"theta_shank_1": shank})
+    states = type(HELD)(*[np.full(3, float(value)) for value in HELD])
+    found = jb.hybrid.Rolling().lies_beyond(KNEED, states._replace(theta_shank_1=shank))
     np.testing.assert_array_equal(found, shank > ANGLES["theta_thigh_1"])
-    seed = jb.seed_scene()
-    assert not passes_a_stop(seed, {"theta_1": np.array([3.0])}).any()
+    turned = jb.State(*[np.array([3.0])] * 8)
+    assert not jb.hybrid.Walking().lies_beyond(SCENE, turned).any()
 
 
 def test_a_held_knee_of_a_start_turns_as_the_thigh_that_an_axis_names():

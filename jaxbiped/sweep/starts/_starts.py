@@ -17,9 +17,9 @@ from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.dynamics._state import state_for
-from jaxbiped.hybrid._hybrid_system import HybridSystem, start_of_system
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._parameter_access import with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene, is_walker
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._state_types import State
 from jaxbiped.sweep._follow_starts import broadcast_leaves
 from jaxbiped.sweep._labelling import Labelling, check_leaves_of_starts
@@ -27,7 +27,6 @@ from jaxbiped.sweep.starts._coordinates import (
     axis_values,
     check_coordinates,
     parameters_among,
-    place_states,
     state_at,
 )
 
@@ -111,7 +110,7 @@ class Rest(eqx.Module):
 
 
 def rest_of(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     names: Iterable[str],
     place: bool | None,
     follow: Completion | None,
@@ -119,25 +118,21 @@ def rest_of(
 ) -> Rest:
     """Where starts that name these coordinates have the rest from; raises `ArgumentError`."""
     if base is not None:
-        if isinstance(scene, HybridSystem):
-            base = start_of_system(scene, base, "base")
-        else:
-            base = state_for(scene, base, "base")
+        base = state_for(scene, base, "base")
         if np.ndim(base[0]):
             raise ArgumentError(
                 f"base has leaves of shape {np.shape(base[0])}, which is not allowed: give one "
                 "state."
             )
         base = type(base)(*map(float, base))
-    if place and not is_walker(scene):
+    posture = scene.posture
+    if place and not posture:
         raise ArgumentError(
             f"place = {place!r} is not allowed for a {type(scene).__name__}, which has no leg to "
             "place: leave it out, and complete starts by follow."
         )
-    if place is None and is_walker(scene):
-        structure = scene.mechanism.structure
-        turning = {*structure.coordinates[2:], *structure.rates[2:]}
-        place = not turning.isdisjoint(names)
+    if place is None:
+        place = not set(posture).isdisjoint(names)
     return Rest(bool(place), follow, base)
 
 
@@ -182,7 +177,7 @@ class Grid(AbstractStarts):
 
 
 def grid(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     values: Mapping[str, Sequence[float] | np.ndarray],
     *,
     place: bool | None = None,
@@ -240,17 +235,15 @@ def batch_at(
         base = broadcast_leaves(rest.base, count)
     scene = with_parameters(labelling.scene, parameters)
     states = state_at(scene, base, columns)
-    if rest.place and is_walker(scene):
-        states = place_states(scene, base, states, columns)
+    if rest.place:
+        states = system_of(scene).placed_like(scene, base, states, columns)
     if rest.follow is not None:
         states = rest.follow(scene, states)
     leaves = [np.broadcast_to(np.asarray(leaf, dtype=np.float64), (count,)) for leaf in states]
     return Batch(type(states)(*leaves), parameters, columns)
 
 
-def check_parameters(
-    scene: Scene | RigidScene | HybridSystem, columns: dict[str, np.ndarray]
-) -> None:
+def check_parameters(scene: AbstractScene, columns: dict[str, np.ndarray]) -> None:
     """Raises `ArgumentError` for values that the scene's parameters must not have."""
     for name, column in parameters_among(scene, columns).items():
         with_parameters(scene, {name: column})
@@ -391,7 +384,7 @@ class Sample(AbstractStarts):
 
 
 def sample(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractScene,
     bounds: Mapping[str, tuple[float, float]],
     count: int,
     *,
