@@ -180,9 +180,15 @@ def test_a_bound_holds_at_a_triple_multiplier_to_a_millionth():
 
 @pytest.mark.nightly
 def test_a_walkers_radius_is_least_on_the_ridge_where_its_multipliers_meet():
-    """No design round it is better by what the radius there is known to."""
+    """No design round it is better by what the radius there is known to.
+
+    At balanced, the residual is known to 1.007e-3 of the objective, which is too little.
+    """
     best = jb.optimise_gait(
-        SCENE, vary={"d": (0.05, 0.2), "J": (0.003, 0.02)}, minimise="spectral_radius"
+        SCENE,
+        vary={"d": (0.05, 0.2), "J": (0.003, 0.02)},
+        minimise="spectral_radius",
+        accuracy="tight",
     )
     assert best.outcome is Outcome.CONVERGED
     assert best.objective < 0.180696  # of a grid of 61 by 121 designs about it

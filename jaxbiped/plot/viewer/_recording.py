@@ -121,12 +121,18 @@ def _weight(scene: Any) -> float:
 
 def time_unit(scene: Any) -> float:
     """√(height/g), in which a walker moves [s]."""
-    return math.sqrt(float(scene.mechanism.height) / float(scene.ground.g))
+    return math.sqrt(float(scene.mechanism.height) / _gravity(scene))
+
+
+def _gravity(scene: Any) -> float:
+    """What sizes are measured by [m/s²]: 1 where there is no gravity."""
+    return float(scene.ground.g) or 1.0
 
 
 def tolerances_for(scene: Any, exact: float) -> Tolerances:
     """The errors allowed: `exact` of angles [rad], and of lengths in parts of the height."""
-    weight, structure = _weight(scene), scene.mechanism.structure
+    structure = scene.mechanism.structure
+    weight = float(scene.mechanism.total_mass) * _gravity(scene)
     height = float(scene.mechanism.height)
     names, half = motion_names(structure), 2 + len(structure.bodies)
     allowed = [exact * height] * 2 + [exact] * len(structure.bodies)

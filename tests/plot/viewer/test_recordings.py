@@ -135,6 +135,17 @@ def test_a_walk_is_shown_as_far_as_its_states_are_numbers(name, first, kept):
     assert {len(values) for values in found.channels.values()} == {kept}
 
 
+def test_without_gravity_a_walker_drifts_as_the_walk_says():
+    """Its weight measures no error there."""
+    scene = jb.with_parameters(jb.seed_scene(), {"g": 0.0})
+    walk = jb.simulate(scene, START._replace(hip_vz=np.float64(0.5)), duration=0.5)
+    found = recorded(scene, walk)
+    assert found.weight == 0.0
+    t = np.linspace(0.0, 0.5, 20)
+    for shown, name in zip(played(found, t), ("hip_x", "hip_z", "theta_1", "theta_2"), strict=True):
+        np.testing.assert_allclose(shown, getattr(walk.at(t), name), atol=2e-3)
+
+
 def test_footprints_are_the_heel_strikes(seed_walk):
     scene, walk = seed_walk
     prints = recorded(scene, walk).footprints
