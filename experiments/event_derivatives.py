@@ -78,8 +78,9 @@ class Ball(jb.hybrid.AbstractSystem):
 
 def _moments(found, count=None):
     """Times and states of a walk or of its first arrivals, one behind the other."""
-    at = (found.t, found.state.hip_x, found.state.theta_1, found.state.omega_1)
-    return jnp.concatenate([leaf[:count] for leaf in at])
+    names = ("hip_x", "x_1", "theta_1", "omega_1")  # one of the first two, by its coordinates
+    state = [leaf for name, leaf in found.state._asdict().items() if name in names]
+    return jnp.concatenate([leaf[:count] for leaf in (found.t, *state)])
 
 
 def _walk(scene, start, **how):

@@ -8,7 +8,7 @@ these. Or it is the number of the sentence that refuses it, below the table.
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -41,8 +41,13 @@ class Kind:
     dt: float
 
     @property
+    def reset(self) -> Any:
+        """Where its state is reset: at heel strikes, or where a ball meets the table."""
+        return jb.hybrid.At("table") if isinstance(self.scene, Ball) else jb.HeelStrike()
+
+    @property
     def section(self) -> jb.Section:
-        """Where a standing leg passes the normal of the slope."""
+        """Where a standing leg passes the normal of the slope, or a ball is highest."""
         leg = self.stands
         return jb.Section(lambda scene, state: -getattr(state, leg))
 
@@ -51,6 +56,32 @@ class Kind:
         state = self.state if value is None else self.state._replace(**{self.moved: value})
         limits = {} if "footsteps" in how else {"duration": self.duration}
         return jb.simulate(self.scene, state, **({"save": "end"} | limits | how))
+
+
+class Flight(NamedTuple):
+    """Height [m] and speed [m/s] of a ball."""
+
+    height: float
+    speed: float
+
+
+class Ball(jb.hybrid.HybridSystem):
+    """A ball in air that drags it, on a table."""
+
+    state_type = Flight
+    drag: float = jb.laws.parameter("drag", "$c$", "1/s", default=0.3)
+
+    def rates(self, y: Any) -> Flight:
+        """Free fall with linear drag."""
+        return Flight(y.speed, -9.81 - self.drag * y.speed)
+
+    def bounce(self, y: Any) -> Flight:
+        """The state behind an impact, by a restitution of 0.8."""
+        return y._replace(speed=-0.8 * y.speed)
+
+    def guards(self) -> tuple[jb.hybrid.Guard, ...]:
+        """The table."""
+        return (jb.hybrid.Guard("table", lambda y: y.height, reset=self.bounce),)
 
 
 def published(name: str, gait: str, duration: float) -> Kind:
@@ -70,6 +101,10 @@ def kinds() -> dict[str, Kind]:
         "rigid": published("garcia", "long", 9.0),
         "rigid, pushed": published("kuo", "gait", 9.0),
         "rigid, knees": published("hsu-chen", "gait", 1.3),
+        "redundant": Kind(
+            jb.RedundantScene(scene, "index1"), state, 1.0, "omega_1", "theta_1", "rodas5p", 2e-5
+        ),
+        "own system": Kind(Ball(), Flight(0.3, 0.4), 1.2, "speed", "speed", "tsit5", 1e-3),
     }
 
 
@@ -131,7 +166,7 @@ ROWS: dict[str, tuple[Callable[..., Any], Callable[[Kind], dict[str, Any]], Call
     'save="end"': (_end, lambda kind: {}, _end),
     "save=times": (_times, lambda kind: {}, _times),
     'save="steps", at times': (_steps, lambda kind: {}, _times),
-    "save=HeelStrike()": (_arrivals(lambda kind: jb.HeelStrike()), lambda kind: {}, None),
+    "save=HeelStrike() or At(…)": (_arrivals(lambda kind: kind.reset), lambda kind: {}, None),
     "save=MidStance()": (_arrivals(lambda kind: jb.MidStance()), lambda kind: {}, None),
     "save=Section(…)": (_arrivals(lambda kind: kind.section), lambda kind: {}, None),
     "footsteps=2": (_footsteps, lambda kind: {}, _footsteps),
@@ -146,8 +181,8 @@ ROWS: dict[str, tuple[Callable[..., Any], Callable[[Kind], dict[str, Any]], Call
     "jacrev": (_slope(jax.jacrev), lambda kind: {}, _difference),
     'engine="xla"': (_end, lambda kind: {"engine": "xla"}, _end),
     'engine="xla", times': (_times, lambda kind: {"engine": "xla"}, _times),
-    'engine="xla", HeelStrike()': (
-        _arrivals(lambda kind: jb.HeelStrike()),
+    'engine="xla", HeelStrike() or At(…)': (
+        _arrivals(lambda kind: kind.reset),
         lambda kind: {"engine": "xla"},
         None,
     ),

@@ -68,7 +68,7 @@ def test_lanes_take_the_same_footsteps(method):
     assert 0.0 < float(found.highest.position) < bound
 
 
-def test_lanes_batch_redundant_walks_and_have_no_derivatives():
+def test_lanes_batch_redundant_walks():
     def end(change):
         how = dict(duration=0.1, save="end", engine="lanes")
         scene = jb.with_parameters(jb.seed_scene(), {"c": 1e7 * (1.0 + change)})
@@ -78,5 +78,37 @@ def test_lanes_batch_redundant_walks_and_have_no_derivatives():
     several = jax.vmap(end)(jnp.asarray([0.0, 0.2]))
     np.testing.assert_allclose(several, [end(0.0), end(0.2)], rtol=1e-13)
     assert several[0] != several[1]
-    with pytest.raises(jb.ArgumentError, match=r"RedundantScene.* is not allowed under deriv"):
-        jax.grad(end)(0.0)
+
+
+@pytest.mark.parametrize(
+    ("method", "orientation", "saved"),
+    [
+        ("described", "angle", "end"),
+        pytest.param("described", "euler", "strikes", marks=pytest.mark.nightly),
+        *(
+            pytest.param(name, "angle", "end", marks=pytest.mark.nightly)
+            for name in ("standard", "baumgarte", "penalty", "augmented", "index1", "index1aug")
+        ),
+    ],
+)
+def test_derivatives_are_those_of_the_minimal_walk(method, orientation, saved):
+    """With respect to a rate and the slope, of the state a time or a heel strike later."""
+    seed = jb.seed_scene()
+    how = dict(save="end", duration=0.6)
+    if saved == "strikes":
+        how = dict(save=jb.HeelStrike(), duration=0.5, max_arrivals=1)
+
+    def walked(held, point):
+        scene = jb.with_parameters(seed, {"slope": point[1]})
+        start, scene = jb.seed_state()._replace(omega_1=point[0]), held(scene)
+        walk = jb.simulate(scene, start, **how)
+        found = walk if walk.arrivals is None else walk.arrivals
+        state = jax.tree.map(lambda leaf: leaf[0], found.state)
+        state = jb.dynamics.minimal_state(scene, state) if scene.redundant else state
+        return jnp.stack([found.t[0], *state])
+
+    point = jnp.array([-0.0052, 0.02])
+    redundant = lambda scene: jb.RedundantScene(scene, method, orientation)
+    ours = jax.jacfwd(lambda x: walked(redundant, x))(point)
+    plain = jax.jacfwd(lambda x: walked(lambda scene: scene, x))(point)
+    np.testing.assert_allclose(ours, plain, rtol=1e-4, atol=1e-4 * np.abs(plain).max())
