@@ -29,15 +29,10 @@ def known_by_shape(function: _Function) -> _Function:
         The same function, for positional arguments.
     """
 
-    def evaluate(args: Any) -> Any:
-        results: list[Any] = []
-        eqx.filter_eval_shape(lambda given: results.append(function(*given)), args)
-        return results[0]
-
     @bounded_cache(PROGRAMS)
     @functools.wraps(function)
     def of_shapes(structure: jtu.PyTreeDef, *leaves: Hashable) -> Any:
-        return evaluate(structure.unflatten([_with_shape(leaf) for leaf in leaves]))
+        return eqx.filter_eval_shape(function, *structure.unflatten(map(_with_shape, leaves)))
 
     @functools.wraps(function)
     def called(*args: Any) -> Any:
@@ -45,7 +40,7 @@ def known_by_shape(function: _Function) -> _Function:
         try:
             return of_shapes(structure, *map(_without_value, leaves))
         except TypeError:  # what cannot be hashed is not kept
-            return evaluate(args)
+            return eqx.filter_eval_shape(function, *args)
 
     return cast(_Function, called)
 

@@ -28,6 +28,7 @@ def state_coordinates(scene: AbstractScene) -> dict[str, str]:
     Where the bodies "1" and "2" are legs, `theta_stance`, `theta_swing` and their rates are other
     names of theirs.
     """
+    check_type("scene", scene, AbstractScene)
     names = recurring_names(scene.state_type)
     return {**scene.coordinate_aliases, **{name: name for name in names}}
 
