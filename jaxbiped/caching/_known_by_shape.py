@@ -9,8 +9,9 @@ import jax
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped.caching._cached_jit import Skeleton
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.caching._fingerprint import Leaf
+from jaxbiped.caching._fingerprint import leaf_of
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -32,7 +33,7 @@ def known_by_shape(function: _Function) -> _Function:
     @bounded_cache(PROGRAMS)
     @functools.wraps(function)
     def of_shapes(structure: jtu.PyTreeDef, *leaves: Hashable) -> Any:
-        return eqx.filter_eval_shape(function, *structure.unflatten(map(_with_shape, leaves)))
+        return eqx.filter_eval_shape(function, *Skeleton(list(leaves), structure).shapes())
 
     @functools.wraps(function)
     def called(*args: Any) -> Any:
@@ -47,10 +48,6 @@ def known_by_shape(function: _Function) -> _Function:
 
 def _without_value(leaf: Any) -> Any:
     """The shape of an array or of a number with digits; all else decides by its value."""
-    if not isinstance(leaf, jax.Array | np.ndarray | np.generic | float):
-        return leaf
-    return Leaf(np.shape(leaf), jax.dtypes.result_type(leaf), False)
-
-
-def _with_shape(leaf: Hashable) -> Any:
-    return jax.ShapeDtypeStruct(leaf.shape, leaf.dtype) if isinstance(leaf, Leaf) else leaf
+    if isinstance(leaf, float):
+        leaf = np.asarray(leaf)
+    return leaf_of(leaf) if isinstance(leaf, jax.Array | np.ndarray | np.generic) else leaf

@@ -6,7 +6,6 @@ Problems (2004), algorithm NLEQ-ERR.
 """
 
 import enum
-import operator
 from typing import TYPE_CHECKING, NamedTuple
 
 import equinox as eqx
@@ -55,6 +54,10 @@ class Method(eqx.Module):
     def measured(self, change: Scalar) -> Scalar:
         """A change of the components in what it is measured in."""
         return change if self.sizes is None else change / self.sizes
+
+    def size(self, change: Scalar) -> Scalar:
+        """The Euclidean norm of a change in what its components are measured in."""
+        return _size(self.measured(change))
 
     @property
     def evaluations_allowed(self) -> RealScalarLike:
@@ -149,9 +152,9 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
         forward = jnp.asarray(True)
         simplified = jnp.zeros_like(change)
     else:
-        simplified = -_of_kind(now.is_smallest, now.slope, change)
-        sizes = (_size(method.measured(each)) for each in (simplified, now.step))
-        forward = jnp.isinf(now.base_residual) | operator.lt(*sizes)
+        simplified = -_correction_of_kind(now.is_smallest, now.slope, change)
+        shrinks = method.size(simplified) < method.size(now.step)
+        forward = jnp.isinf(now.base_residual) | shrinks
     better = returned & ~approaching & ~witness & forward
 
     base = jnp.where(better, now.trial, now.base)
@@ -165,7 +168,7 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
     rough_done = (now.stage == Stage.ROUGH) & (base_residual <= _NEAR)
     coarse_done = (now.stage == Stage.COARSE) & (base_residual <= _NEARER)
     refined = rough_done | coarse_done
-    at_floor = returned & ~forward & (_size(method.measured(now.step)) <= _FLOOR * method.residual)
+    at_floor = returned & ~forward & (method.size(now.step) <= _FLOOR * method.residual)
     fine_done = (now.stage == Stage.FINE) & ((base_residual <= method.residual) | at_floor)
     nowhere = ~returned & ~jnp.isfinite(base_residual) & (now.stage < Stage.COARSE)
     if method.optimiser is not None:
@@ -248,13 +251,14 @@ def _correction(slope: Scalar, change: Scalar) -> tuple[Scalar, Scalar]:
     return found
 
 
-def _of_kind(is_smallest: Scalar, slope: Scalar, change: Scalar) -> Scalar:
-    """A change's correction of the kind that a step was: only those are compared."""
+def _correction_of_kind(is_smallest: Scalar, slope: Scalar, change: Scalar) -> Scalar:
+    """The correction of a change, smallest or plain; corrections of unlike kinds do not compare."""
     found: Scalar = jax.lax.cond(is_smallest, _smallest_solution, solution, slope, change)
     return found
 
 
 def _smallest_solution(slope: Scalar, change: Scalar) -> Scalar:
+    """The smallest solution of a linear system, which leaves out its singular directions."""
     damping = (_SINGULAR * jnp.max(jnp.abs(slope))) ** 2 * jnp.eye(len(change))
     found: Scalar = slope.T @ solution(slope @ slope.T + damping, change)
     return found
