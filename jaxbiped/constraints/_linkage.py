@@ -5,6 +5,7 @@ from typing import NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped._parameter_declaration import AbstractPart, check_parameters, parameter
@@ -124,6 +125,13 @@ class Linkage(eqx.Module):
     def coordinates(self) -> int:
         """Coordinates of one body: 3, or 4 with Euler parameters."""
         return 4 if self.orientation == "euler" else 3
+
+    @property
+    def longest_arm(self) -> float:
+        """Longest way from a centre of mass to a joint [m], its numbers known; 0 without joints."""
+        pins = [joint.point_1 for joint in self.joints]
+        pins += [joint.point_2 for joint in self.joints if joint.body_2 is not None]
+        return max((float(np.hypot(*pin)) for pin in pins), default=0.0)
 
 
 class Constraints(NamedTuple):

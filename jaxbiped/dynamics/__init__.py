@@ -2,7 +2,6 @@
 
 from jaxbiped.dynamics._constrained_motion import Consistent as Consistent
 from jaxbiped.dynamics._constrained_motion import LinkageMotion as LinkageMotion
-from jaxbiped.dynamics._constrained_motion import LinkageState as LinkageState
 from jaxbiped.dynamics._constrained_motion import Violation as Violation
 from jaxbiped.dynamics._constrained_motion import consistent_state as consistent_state
 from jaxbiped.dynamics._constrained_motion import linkage_field as linkage_field
@@ -38,7 +37,8 @@ from jaxbiped.dynamics._redundant_motion import redundant_motion as redundant_mo
 from jaxbiped.dynamics._stance_motion import rolling as rolling
 from jaxbiped.dynamics._stance_motion import rolling_field as rolling_field
 from jaxbiped.dynamics._state import standing_height as standing_height
-from jaxbiped.scene._linkages import LinkageScene as LinkageScene
+from jaxbiped.scene._linkage_scene import LinkageScene as LinkageScene
+from jaxbiped.scene._linkage_scene import LinkageState as LinkageState
 from jaxbiped.scene._linkages import walker_linkage as walker_linkage
 from jaxbiped.scene._state_types import Accelerations as Accelerations
 from jaxbiped.scene._state_types import BristleState as BristleState

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_type, holds_somewhere
-from jaxbiped._types import RealScalarLike, Scalar, StateLeaf, Time, by_numpy, in_64_bits
+from jaxbiped._types import RealScalarLike, Scalar, Time, by_numpy, in_64_bits
 from jaxbiped.compiler import kept_alone
 from jaxbiped.constraints._constraint_methods import (
     AbstractConstraintMethod,
@@ -24,23 +24,9 @@ from jaxbiped.constraints._constraint_methods import (
 from jaxbiped.constraints._linkage import Linkage, constraints_of, masses_of
 from jaxbiped.dynamics._equivalent_states import BodiesState, CompliantState, redundant_state
 from jaxbiped.dynamics._state import state_for
-from jaxbiped.scene._linkages import LinkageScene
+from jaxbiped.scene._linkage_scene import LinkageScene, LinkageState
 from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.scene._state_types import is_redundant
-
-
-class LinkageState(NamedTuple):
-    """Coordinates of a linkage and their rates: tuples of n scalar leaves of any batch shape.
-
-    Each body has x, z [m] and θ [rad], or x, z and the Euler parameters cos θ/2, sin θ/2 [–].
-
-    Attributes:
-        q: the n coordinates.
-        v: rates of the coordinates.
-    """
-
-    q: tuple[StateLeaf, ...]
-    v: tuple[StateLeaf, ...]
 
 
 class LinkageMotion(NamedTuple):

@@ -268,17 +268,23 @@ def ending_events(watch: tuple[str, ...]) -> dict[Ending, Callable[..., Scalar]]
 
 
 def ending_code(
-    events: Mapping[Ending, Scalar], *, done: Scalar, out_of_steps: Scalar, timed_out: Scalar
+    events: Mapping[Ending, Scalar],
+    *,
+    done: Scalar,
+    out_of_steps: Scalar,
+    timed_out: Scalar,
+    reached: Ending = Ending.WALKING,
 ) -> Scalar:
     """The code of how a solve ended, from conditions (booleans).
 
     `events` tells for each failure whether it happened, `done` whether the solve came to the end
-    that was asked for, and `timed_out` whether it waited too long for a footstep.
+    that was asked for, which is `reached`, and `timed_out` whether it waited too long for a
+    footstep.
     """
     code = jnp.asarray(int(Ending.SOLVER_FAILED))
     code = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), code)
     code = jnp.where(timed_out, int(Ending.TIMED_OUT), code)
-    code = jnp.where(done, int(Ending.WALKING), code)
+    code = jnp.where(done, int(reached), code)
     for name, happened in events.items():
         code = jnp.where(happened, int(name), code)
     return code

@@ -13,7 +13,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._checks import ArgumentError, check_choice, check_unbatched
 from jaxbiped._ending import FIRST_OF_A_SYSTEM
 from jaxbiped._parameter_declaration import check_parameters
 from jaxbiped._types import Scalar, Time, any_of, as_float, by_numpy, in_64_bits, is_traced, select
@@ -280,11 +280,21 @@ class GuardedMotion(AbstractSystem):
     resets: bool = eqx.field(static=True)  # type: ignore[misc]
     at: str | None = eqx.field(static=True, default=None)
     lands: ClassVar[bool] = True
+    refuses: ClassVar[tuple[str, ...]] = ("footsteps", "adjoint")
 
     @property
     def watches(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of the guards that end it."""
         return tuple(name for _, name in self.watched)
+
+    def start(self, args: HybridSystem, y: PyTree) -> tuple[PyTree, PyTree]:
+        check_unbatched("scene", args, "one system")
+        start = start_of_system(args, y)
+        check_unbatched("state", start, "one start")
+        return start, None
+
+    def check_section(self, args: HybridSystem, section: AbstractSection) -> None:
+        section_of_system(args, section)
 
     def observed_at(self, section: AbstractSection) -> "GuardedMotion":
         if not isinstance(section, At):

@@ -15,6 +15,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Numbers, RealScalarLike, Scalar, is_traced
 from jaxbiped.dynamics._state import dimensions_of, recurring_leaves
+from jaxbiped.scene._linkage_scene import LinkageScene, LinkageState
 from jaxbiped.scene._scene import (
     AbstractScene,
     AbstractWalkerScene,
@@ -117,8 +118,8 @@ def units_of(args: PyTree, state: PyTree) -> Units:
         TypeError: a leaf whose unit is not known.
     """
     if not is_walker(args) and isinstance(args, AbstractScene):
-        inverses = (np.asarray(1.0 / size) for size in own_sizes(type(state)))
-        return Units(type(state)(*inverses), np.asarray(args.time_unit))
+        inverse = jtu.tree_map(lambda size: np.asarray(1.0 / size), _own_sizes(state))
+        return Units(inverse, np.asarray(args.time_unit))
     if not is_compliant(args):
         return Units(jtu.tree_map(jnp.ones_like, state), np.ones(()))
     length, time = _length_and_time(args)
@@ -127,10 +128,14 @@ def units_of(args: PyTree, state: PyTree) -> Units:
     return Units(_by_dimension(state, inverse), time)
 
 
-def own_sizes(kind: Any) -> list[float]:
-    """Sizes of the coordinates of a system's states, as their class tells them; else 1."""
-    scales = getattr(kind, "scales", {})
-    return [float(scales.get(name, 1.0)) for name in kind._fields]
+def _own_sizes(state: PyTree) -> PyTree:
+    """Sizes of the leaves of a system's state, as its class tells them by coordinate; else 1."""
+    scales = getattr(type(state), "scales", {})
+
+    def sizes(name: str, leaves: PyTree) -> PyTree:
+        return jtu.tree_map(lambda _: float(scales.get(name, 1.0)), leaves)
+
+    return type(state)(*(sizes(name, leaves) for name, leaves in state._asdict().items()))
 
 
 def si_units(units: Units) -> Units:
@@ -164,12 +169,23 @@ def sizes_of(args: PyTree, states: PyTree) -> tuple[float, PyTree]:
         args: a scene of a walker, its numbers known.
         states: whose leaves they are for; where it has None there is none.
     """
+    if isinstance(args, LinkageScene):
+        return _linkage_sizes(args)
     if not is_walker(args):
-        return args.time_unit, type(states)(*own_sizes(type(states)))
+        return args.time_unit, _own_sizes(states)
     length, gravity = float(args.mechanism.height), float(args.ground.g)
     time = float(np.sqrt(length / gravity)) if gravity > 0.0 else 1.0
     sizes: _Sizes = {(1, 0): length, (1, -1): length / time, (0, -1): 1.0 / time, (0, 0): 1.0}
     return time, _by_dimension(states, sizes)
+
+
+def _linkage_sizes(scene: LinkageScene) -> tuple[float, LinkageState]:
+    """With the longest arm from a centre of mass to a joint for l; 1 where that is nothing."""
+    length, fall = scene.linkage.longest_arm or 1.0, float(np.hypot(*scene.gravity))
+    time = float(np.sqrt(length / fall)) if fall > 0.0 else 1.0
+    turns = [1.0] * (scene.linkage.coordinates - 2)
+    q = (length, length, *turns) * len(scene.linkage.bodies)
+    return time, LinkageState(q, tuple(size / time for size in q))
 
 
 def recurring_sizes(args: PyTree, state: PyTree) -> np.ndarray:

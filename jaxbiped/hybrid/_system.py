@@ -40,6 +40,8 @@ class AbstractSystem(eqx.Module):
         watches: names of the failures that may be watched for. A property of the class.
         footsteps_end_on_section: whether a footstep ends where a cycle's section is met; else
             between two arrivals there. A property of the class.
+        refuses: names of options of `simulate` that mean nothing for it. A property of the class.
+        reached: how a motion ends that lasts as long as it is asked to. A property of the class.
     """
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = ()
@@ -48,6 +50,31 @@ class AbstractSystem(eqx.Module):
     resets: ClassVar[bool] = False
     watches: ClassVar[tuple[str, ...]] = ()
     footsteps_end_on_section: ClassVar[bool] = True
+    refuses: ClassVar[tuple[str, ...]] = ()
+    reached: ClassVar[Ending] = Ending.WALKING
+
+    def start(self, args: PyTree, y: PyTree) -> tuple[PyTree, PyTree]:
+        """A start that is checked and lies on its constraints, and how it was moved onto them.
+
+        Default: the start as it is, and None.
+        """
+        return y, None
+
+    def check_start(self, args: PyTree, y: PyTree, given: PyTree) -> None:
+        """Raises `ArgumentError` for a start that cannot be simulated well.
+
+        `y` is what `start` makes of the one that was given. Default: any can.
+        """
+
+    def check_section(self, args: PyTree, section: AbstractSection) -> None:
+        """Raises `ArgumentError` for a section that is none of its motions. Default: all are."""
+
+    def violation(self, args: PyTree, states: PyTree) -> Scalar | None:
+        """Distances of states from their constraints [m]; None where these are not told.
+
+        Default: None.
+        """
+        return None
 
     @abc.abstractmethod
     def vector_field(self, t: Time, y: PyTree, args: PyTree) -> PyTree:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection
 from typing import Any, ClassVar
 
 import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
@@ -28,10 +29,11 @@ from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface, rig
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._implicit_field import ImplicitField, with_unit_mass
 from jaxbiped.hybrid._rigid_guards import mode_switches
-from jaxbiped.hybrid._scales import sizes_of
-from jaxbiped.hybrid._sections import AbstractSection
+from jaxbiped.hybrid._scales import check_precision, sizes_of
+from jaxbiped.hybrid._sections import AbstractSection, check_section_body
 from jaxbiped.hybrid._start_placement import held_like, passes_a_stop, standing_like
 from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.hybrid._walker_starts import check_start_height, consistent_start, walking_start
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
 
@@ -50,6 +52,13 @@ class AbstractWalking(AbstractSystem):
 
     watches: ClassVar[tuple[str, ...]] = WATCHES
     footsteps_end_on_section: ClassVar[bool] = False
+
+    def check_start(self, args: CompliantScene, y: PyTree, given: PyTree) -> None:
+        check_precision(args, jnp.result_type(jtu.tree_leaves(y)[0]))
+        check_start_height(args, given)
+
+    def check_section(self, args: CompliantScene, section: AbstractSection) -> None:
+        check_section_body(args.minimal, section)
 
     def switches(self, args: CompliantScene, y: PyTree) -> tuple[Switch, ...]:
         return switches(args, y)
@@ -100,6 +109,9 @@ class Walking(AbstractWalking):
     # Bristles stand alone in the implicit form.
     vector_field: ClassVar[ImplicitField] = ImplicitField(vector_field, mass_matrix, force_residual)
 
+    def start(self, args: Scene, y: PyTree) -> tuple[PyTree, PyTree]:
+        return walking_start(args, y), None
+
     def placed_like(
         self, args: Scene, base: PyTree, states: PyTree, named: Collection[str]
     ) -> PyTree:
@@ -122,6 +134,10 @@ class RedundantWalking(AbstractWalking):
     """
 
     vector_field: ClassVar[ImplicitField] = with_unit_mass(redundant_field)
+
+    def start(self, args: RedundantScene, y: PyTree) -> tuple[PyTree, PyTree]:
+        correction = consistent_start(args, y)
+        return correction.state, correction
 
     def project(self, args: RedundantScene, y: PyTree) -> PyTree:
         return project(args, y)

@@ -1,42 +1,15 @@
-"""Linkages in a scene: one by itself in gravity, and a mechanism as one."""
+"""Mechanisms as linkages."""
 
 from typing import Any
 
-import equinox as eqx
-
-from jaxbiped._checks import ArgumentError, check_type, holds_somewhere
-from jaxbiped._parameter_declaration import check_parameters, parameter, with_fields
+from jaxbiped._checks import ArgumentError, holds_somewhere
+from jaxbiped._parameter_declaration import with_fields
 from jaxbiped._types import Parameter, Scalar, by_numpy
-from jaxbiped.constraints._constraint_methods import AbstractConstraintMethod
 from jaxbiped.constraints._linkage import Linkage, LinkAngle, LinkBody, Pin
 from jaxbiped.scene._bodies import Body, Point
 from jaxbiped.scene._joint_parts import Coupling
 from jaxbiped.scene._mechanism import Mechanism, mechanism_of
 from jaxbiped.scene._structure import Angle
-
-
-class LinkageScene(eqx.Module):
-    """A linkage in gravity, with the method that holds its joints.
-
-    Attributes:
-        linkage: bodies and joints.
-        method: constraint method.
-        gravity: acceleration (x, z) [m/s²].
-
-    Raises:
-        ArgumentError: a part has the wrong type, or gravity is not finite.
-    """
-
-    linkage: Linkage
-    method: AbstractConstraintMethod
-    gravity: tuple[Parameter, Parameter] = parameter(
-        "gravity", "$g$", "m/s^2", several=True, default=(0.0, -9.8)
-    )
-
-    def __check_init__(self) -> None:
-        check_type("linkage", self.linkage, Linkage)
-        check_type("method", self.method, AbstractConstraintMethod)
-        check_parameters(self)
 
 
 def loaded_bodies(mechanism: Mechanism) -> tuple[Body, ...]:

@@ -115,9 +115,11 @@ def _at_least_a_share(scene: PyTree, bars: PyTree) -> PyTree:
     _, sizes = sizes_of(scene, bars)
     largest = np.max(jtu.tree_leaves(jtu.tree_map(np.divide, bars, sizes)), axis=0)
     raised = {
-        name: np.maximum(bar, _SHARE * getattr(sizes, name) * largest)
+        name: jtu.tree_map(
+            lambda bar, size: np.maximum(bar, _SHARE * size * largest), bar, getattr(sizes, name)
+        )
         for name, bar in bars._asdict().items()
-        if bar is not None and not name.startswith("bristle")
+        if not name.startswith("bristle")
     }
     return bars._replace(**raised)
 

@@ -166,8 +166,13 @@ def _ending(
         # Time ran out before the footsteps came, where only footsteps were asked for.
         timed_out = done & (count < run.footsteps) & (run.duration >= PATIENCE * run.footsteps)
         done = (done & ~timed_out) | (solution.result == results.event_occurred)
-    events = dict(zip(names, solution.event_mask or [], strict=True))
-    return ending_code(events, done=done, out_of_steps=out_of_steps, timed_out=timed_out)
+    return ending_code(
+        dict(zip(names, solution.event_mask or [], strict=True)),
+        done=done,
+        out_of_steps=out_of_steps,
+        timed_out=timed_out,
+        reached=system_of(run.scene).reached,
+    )
 
 
 def trim(trajectory: Trajectory) -> Trajectory:

@@ -107,7 +107,7 @@ def slopes_of(
         by_clock = last & (t >= until)
     arrived = len(t) - len(found.t)
     there = jtu.tree_map(lambda leaf: jnp.pad(leaf, (arrived, 0), mode="edge"), saved)
-    at = TangentsAtTimes(there, jnp.zeros((len(t), 0, len(there))))
+    at = TangentsAtTimes(there, jnp.zeros((len(t), 0, len(jtu.tree_leaves(there)))))
     time = jnp.zeros((len(t), 0))
     if places or active:
         project = system.project if system.projects(scene) else None

@@ -25,6 +25,11 @@ from jaxbiped.compiler import BY_NAME, Request
 from jaxbiped.dynamics._state import check_state, without_whole_turns
 from jaxbiped.hybrid._mode_history import history_of
 from jaxbiped.hybrid._sections import AbstractSection, HeelStrike, check_section_body
+from jaxbiped.hybrid._walker_starts import (
+    check_single_scene,
+    in_one_precision,
+    in_own_precision,
+)
 from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._modes import check_mode, rigid_modes
 from jaxbiped.scene._scene import RigidScene
@@ -34,11 +39,8 @@ from jaxbiped.simulate._derivatives import Slopes, rigid_slopes_of, with_derivat
 from jaxbiped.simulate._start import (
     Options,
     check_limits,
-    check_single_scene,
     check_steps,
     check_times,
-    in_one_precision,
-    in_own_precision,
     watched_by,
 )
 from jaxbiped.simulate._trajectory import Trajectory, arrivals_among, scene_key, single_time

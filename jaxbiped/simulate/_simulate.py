@@ -6,14 +6,20 @@ from typing import Any, Literal
 import diffrax
 from jaxtyping import Array, PyTree
 
-from jaxbiped._checks import check_function, check_type, warn
+from jaxbiped._checks import (
+    check_finite,
+    check_function,
+    check_increasing,
+    check_not_negative,
+    check_type,
+    warn,
+)
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Parameter
-from jaxbiped.dynamics._constrained_motion import LinkageState
 from jaxbiped.hybrid._endings import WATCHES
 from jaxbiped.hybrid._scales import unresolved_slip
 from jaxbiped.hybrid._sections import AbstractSection, HeelStrike
-from jaxbiped.scene._linkages import LinkageScene
+from jaxbiped.scene._linkage_scene import LinkageScene, LinkageState
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState
 from jaxbiped.simulate._accurate_walk import (
@@ -22,10 +28,9 @@ from jaxbiped.simulate._accurate_walk import (
     warn_of_long_steps,
     warn_of_missed_contacts,
 )
-from jaxbiped.simulate._linkage_simulation import simulate_linkage
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._simulation import Simulation
-from jaxbiped.simulate._start import Options
+from jaxbiped.simulate._start import Options, last_time
 from jaxbiped.simulate._trajectory import Trajectory
 
 
@@ -63,13 +68,12 @@ def simulate(
 
     Args:
         scene: the scene; a `RedundantScene` for coordinates of each body. For a `RigidScene`,
-            `atol` and `adjoint` do not apply. For a `LinkageScene`, only the options of `swing`
-            apply.
+            `atol` and `adjoint` do not apply; for a `LinkageScene`, `footsteps` and `watch`.
         state: start, a `State`; if friction has bristles, also a `BristleState` (in a `State`, they
             are zero). The precision of the solve is that of the most precise leaf, by default 64
             bits. A redundant scene also accepts a redundant state, which is first moved onto its
-            constraints (see `consistent_state`), and always has 64 bits.
-        duration: simulated time [s].
+            constraints (see `consistent_state`), as a linkage's is, and always has 64 bits.
+        duration: simulated time [s]. None without `footsteps`: the last of the times to save at.
         footsteps: number of footsteps (heel strikes) to simulate. If `duration` is also given, the
             first limit that is reached ends the walk; its outcome is "walking" in both cases.
         solver: a name (see `SOLVERS`) or any diffrax solver. On rigid feet, where motion is smooth
@@ -131,7 +135,7 @@ def simulate(
         check_type("adjoint", adjoint, diffrax.AbstractAdjoint)
     usual = "end" if isinstance(scene, RigidScene) else "steps"
     asked = Options(
-        duration=duration,
+        duration=last_time(save) if duration is None and footsteps is None else duration,
         footsteps=footsteps,
         solver=solver,
         accuracy=accuracy,
@@ -146,8 +150,6 @@ def simulate(
         adjoint=adjoint,
         engine=engine,
     )
-    if isinstance(scene, LinkageScene):
-        return simulate_linkage(scene, state, asked)
     wanted = check_accurate_walk(accuracy, rtol=rtol, atol=atol, dt=dt)
     if wanted is not None:
         asked = asked._replace(accuracy="balanced")
@@ -270,6 +272,9 @@ def swing(
             before anything is compiled.
     """
     check_type("scene", scene, LinkageScene)
+    check_finite("times", times)
+    check_increasing("times", times, 1)
+    check_not_negative("times", times, "s")
     return simulate(
         scene,
         state,

@@ -20,14 +20,13 @@ from jaxbiped._checks import (
     traced_rules,
     warn,
 )
-from jaxbiped._types import Numbers, Scalar, as_array, as_float, is_traced
+from jaxbiped._types import Numbers, Scalar, as_array, is_traced
 from jaxbiped.compiler import BY_NAME, Request
-from jaxbiped.dynamics._constrained_motion import Consistent
-from jaxbiped.hybrid._hybrid_system import HybridSystem
-from jaxbiped.hybrid._scales import Units, check_precision, resolve_slip_speed, si_units, units_of
+from jaxbiped.hybrid._linkage_system import ADAPTIVE_SCENES
+from jaxbiped.hybrid._scales import Units, resolve_slip_speed, si_units, units_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._scene import RedundantScene, Scene, is_walker
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._backends import (
     by_lanes,
@@ -41,11 +40,8 @@ from jaxbiped.simulate._derivatives import Slopes, slopes_of, with_derivatives
 from jaxbiped.simulate._start import (
     Options,
     check_limits,
-    check_start_height,
     check_steps,
     check_times,
-    saved_section,
-    start_for,
     watched_by,
 )
 from jaxbiped.simulate._trajectory import Trajectory, scene_key
@@ -79,7 +75,7 @@ class Simulation(eqx.Module):
         scene, state, duration, rtol, atol, dt, solver, adjoint: as in `simulate`, checked and
             converted to one precision.
         footsteps, watch, max_solver_steps, section, max_arrivals, extremes: as in `simulate`.
-        correction: how a redundant start was moved onto its constraints, or None.
+        correction: how a start was moved onto its constraints, or None.
         times: times at which to save [s], shape (n,), or None.
         save_steps: whether every step is saved.
         units: scale of each leaf of the state, in which `atol` is measured.
@@ -89,9 +85,9 @@ class Simulation(eqx.Module):
     """
 
     finest_tolerance: ClassVar[float] = 1e-12
-    scene: Scene | RedundantScene
+    scene: AbstractScene
     state: PyTree
-    correction: Consistent | None
+    correction: PyTree
     duration: Scalar
     times: Array | None
     rtol: Scalar
@@ -111,29 +107,33 @@ class Simulation(eqx.Module):
     extremes: Callable[..., PyTree] | None = eqx.field(static=True)
 
     @staticmethod
-    def prepare(scene: Scene | RedundantScene, state: PyTree, **options: Any) -> "Simulation":
+    def prepare(scene: AbstractScene, state: PyTree, **options: Any) -> "Simulation":
         """Checks the arguments, which are those of `simulate`; an accuracy must be a name."""
         return Simulation.of(scene, state, Options(**options))
 
     @staticmethod
-    def of(scene: Scene | RedundantScene, state: PyTree, asked: Options) -> "Simulation":
+    def of(scene: AbstractScene, state: PyTree, asked: Options) -> "Simulation":
         """Checks what is asked, and forms it."""
         given, dt, footsteps, times = state, asked.dt, asked.footsteps, asked.times
+        section = asked.section
         check_limits(asked.duration, footsteps, asked.max_solver_steps)
         time = PATIENCE * (footsteps or 0) if asked.duration is None else asked.duration
         for name, value in (("rtol", asked.rtol), ("atol", asked.atol)):
             check_unbatched(name, value)
         with traced_rules() as rules:
-            scene = check_scene(scene, Scene, RedundantScene, HybridSystem)
-            section = saved_section(scene, asked)
+            scene = check_scene(scene, *ADAPTIVE_SCENES)
+            system = system_of(scene)
+            asked.refuse(scene, *system.refuses)
+            if section is not None:
+                system.check_section(scene, section)
             if not scene.redundant:
-                state, correction = start_for(scene, state)
+                state, correction = system.start(scene, state)
             check_positive("duration", time, "s")
             relative, absolute = tolerances(asked.accuracy, asked.rtol, asked.atol, scene)
             method = solver_named(asked.solver)
             check_steps(method, dt, most_steps=asked.max_solver_steps, duration=time)
         if scene.redundant:  # outside: what it compiles makes parts of its own, none of them given
-            state, correction = start_for(scene, state)
+            state, correction = system.start(scene, state)
         # Of a lane that is not allowed nothing is known from the start.
         state, time = where_allowed(rules, state), where_allowed(rules, time, 1.0)
         watch = watched_by(scene, asked.watch)
@@ -143,10 +143,8 @@ class Simulation(eqx.Module):
         if times is not None:
             check_times(times, time)
         dtype = jnp.result_type(jtu.tree_leaves(state)[0])
-        if is_walker(scene):
-            check_precision(scene, dtype)
-            check_start_height(scene, jtu.tree_map(as_float, given))
-        if isinstance(scene, RedundantScene):
+        system.check_start(scene, state, given)
+        if system.projects(scene):
             check_adjoint(scene.method, asked.adjoint)
 
         def cast(leaf: ArrayLike) -> Array:
@@ -195,7 +193,8 @@ class Simulation(eqx.Module):
             walk = _run(self)
         else:
             walk = with_derivatives(self, _run, moving=_moving, slopes=_slopes)
-        return dataclasses.replace(walk, scene_key=scene_key(self.scene))
+        violation = system_of(self.scene).violation(self.scene, walk.state)
+        return dataclasses.replace(walk, scene_key=scene_key(self.scene), violation=violation)
 
     def at_tolerance(self, rtol: float) -> "Simulation":
         """The same at another relative tolerance; the absolute one changes in proportion."""

@@ -5,8 +5,6 @@ from typing import Any, NamedTuple
 
 import diffrax
 import jax
-import jax.numpy as jnp
-import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import ArrayLike, PyTree
 
@@ -18,32 +16,11 @@ from jaxbiped._checks import (
     check_type,
     check_unbatched,
     holds_somewhere,
-    warn,
 )
-from jaxbiped._jax_versions import untraced
-from jaxbiped._types import Scalar, is_traced
-from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.constraints._constraint_methods import check_independent
-from jaxbiped.dynamics._constrained_motion import Consistent, consistent_state, coordinates_of
-from jaxbiped.dynamics._contacts import feet, limits_of
-from jaxbiped.dynamics._footfalls import touches
-from jaxbiped.dynamics._state import state_for
+from jaxbiped._types import Scalar
 from jaxbiped.hybrid._endings import WATCHES
-from jaxbiped.hybrid._hybrid_system import HybridSystem, section_of_system, start_of_system
-from jaxbiped.hybrid._sections import AbstractSection, check_section_body
+from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
-
-_PRECISIONS = (np.float16, np.float32, np.float64)
-"""Of NumPy's, those that JAX has."""
-_DEEPEST = 0.25
-"""Penetration of a foot that touches, in units of l, from which it starts below the ground."""
-_HIGHEST = 100.0
-"""Energy stored in a foot's contact, in units of m g l, from which it does."""
-_TOLD_DEPTH = 0.01
-"""Penetration of a foot that is reported, in units of the walker's height."""
-_TOLD_ANGLE = 0.1
-"""Angle beyond a stop that is reported [rad]."""
 
 
 class Options(NamedTuple):
@@ -97,75 +74,6 @@ class Options(NamedTuple):
                 )
 
 
-def start_for(
-    scene: Scene | RedundantScene | HybridSystem, state: PyTree
-) -> tuple[PyTree, Consistent | None]:
-    """A checked start of the kind that a scene needs, and how it was put on its constraints.
-
-    Raises:
-        ArgumentError: a start that is not allowed, or constraints that the method cannot hold.
-    """
-    if isinstance(scene, HybridSystem):
-        check_unbatched("scene", scene, "one system")
-        start = start_of_system(scene, state)
-        check_unbatched("state", start, "one start")
-        return start, None
-    check_single_scene(scene)
-    if not isinstance(scene, RedundantScene):
-        start = state_for(scene, in_own_precision(state))
-        check_unbatched("state", start, "one start")
-        return in_one_precision(start), None
-    state = in_own_precision(state)
-    check_unbatched("state", state, "one start")
-    correction = consistent_state(scene, state)
-    q, _ = coordinates_of(scene, correction.state)
-    check_independent(scene.linkage, scene.method, q)
-    return correction.state, correction
-
-
-def in_own_precision(state: PyTree) -> PyTree:
-    """A start with NumPy's floating-point leaves as arrays of JAX, which keep their precision."""
-
-    def kept(leaf: object) -> object:
-        own = isinstance(leaf, np.ndarray | np.generic) and leaf.dtype in _PRECISIONS
-        return jnp.asarray(leaf) if own else leaf
-
-    return jtu.tree_map(kept, state)
-
-
-def in_one_precision(state: PyTree) -> PyTree:
-    """A start with all leaves as precise as the most precise one."""
-    kinds = {leaf.dtype for leaf in jtu.tree_leaves(state)}
-    if len(kinds) == 1:
-        return state
-    finest = max(kinds, key=lambda kind: jnp.finfo(kind).bits)
-    return jtu.tree_map(lambda leaf: leaf.astype(finest), state)
-
-
-def check_single_scene(scene: Scene | RigidScene | RedundantScene) -> None:
-    """Raises `ArgumentError` for a batch of scenes.
-
-    Laws of the user's own may hold arrays.
-    """
-    parts = [*vars(scene.minimal).items(), *(("actuation", part) for part in scene.actuation or ())]
-    for name, part in parts:
-        if type(part).__module__.partition(".")[0] == "jaxbiped":
-            check_unbatched(f"scene.{name}", part, "one scene")
-
-
-def saved_section(scene: Any, asked: Options) -> AbstractSection | None:
-    """The section at which to save, checked with all that a hybrid system has not.
-
-    Raises:
-        ArgumentError: a section that is none of the scene's, or an option that it has not.
-    """
-    if not isinstance(scene, HybridSystem):
-        check_section_body(scene.minimal, asked.section)
-        return asked.section
-    asked.refuse(scene, "footsteps", "dt", "adjoint")
-    return None if asked.section is None else section_of_system(scene, asked.section)
-
-
 def check_limits(
     duration: Scalar | float | None, footsteps: int | None, max_solver_steps: int
 ) -> None:
@@ -216,79 +124,6 @@ def check_steps(
         )
 
 
-@untraced()
-def check_start_height(scene: Scene | RedundantScene, state: Any) -> None:
-    """Refuses a start in minimal coordinates below the ground, where all values are known.
-
-    The deepest that is allowed is l/4, and so deep that the contact stores what would throw the
-    walker a hundred legs high, 100 m g l: contact so stiff is to be started near its surface.
-
-    Raises:
-        ArgumentError: a deeper start.
-    """
-    if is_traced((scene, state)):
-        return
-    root = f"{scene.mechanism.structure.root}_z"
-    if not hasattr(state, root):
-        return
-    # Plain numbers: operations of JAX by themselves would be compiled one by one.
-    mechanism = scene.mechanism
-    structure, length = mechanism.structure, float(mechanism.height)
-    lift = float(mechanism.total_mass) * float(scene.ground.g) * length
-    height = float(getattr(state, root))
-    if height <= 0.0:
-        raise ArgumentError(
-            f"state.{root} = {height:g} is not allowed: the walker starts below the ground, its "
-            f"{structure.root} under the surface; start higher."
-        )
-    begun = _contacts_at(scene, state)
-    depths, energies, passed = (list(map(float, each)) for each in begun)
-    names = structure.feet_told
-    stored, depth, foot = max(zip(energies, depths, names, strict=True))
-    if stored > 0.0 and (depth > _DEEPEST * length or stored > _HIGHEST * lift > 0.0):
-        raise ArgumentError(
-            f"state.{root} = {height:g} is not allowed: foot {foot} starts {depth:.3g} m below the "
-            f"ground, where its contact stores {stored:.3g} J (m g l is {lift:.3g} J); it just "
-            f"touches at {root} = {height + depth:.9g}."
-        )
-    if stored > 0.0 and depth > _TOLD_DEPTH * length:
-        warn(
-            f"foot {foot} starts {depth:.3g} m below the ground; it just touches at "
-            f"{root} = {height + depth:.9g}.",
-            UserWarning,
-        )
-    if passed and max(passed) > _TOLD_ANGLE:
-        warn(
-            f"a stop is passed by {max(passed):.3g} rad at the start: begin within its limits.",
-            UserWarning,
-        )
-
-
-class _Begun(NamedTuple):
-    """Contacts at a start, in lists.
-
-    Attributes:
-        depths: of each foot [m].
-        energies: in its contact, 0 where it does not touch [J].
-        passed: how far each limit of a stop is passed [rad].
-    """
-
-    depths: list[Scalar]
-    energies: list[Scalar]
-    passed: list[Scalar]
-
-
-@cached_jit
-def _contacts_at(scene: CompliantScene, state: PyTree) -> _Begun:
-    found = feet(scene, state)
-    energies = [
-        jnp.where(touches(foot), scene.normal.elastic_energy(foot.penetration), 0.0)
-        for foot in found
-    ]
-    passed = [limit.penetration for _, limit in limits_of(scene, state)]
-    return _Begun([foot.penetration for foot in found], energies, passed)
-
-
 def check_times(times: ArrayLike, duration: Scalar | float) -> None:
     """Raises `ArgumentError` unless they increase and lie within the duration [s]."""
     if isinstance(times, jax.core.Tracer) or isinstance(duration, jax.core.Tracer):
@@ -304,3 +139,10 @@ def check_times(times: ArrayLike, duration: Scalar | float) -> None:
         raise ArgumentError(
             f"save = {values} is not allowed: it must be increasing times from 0 to {duration} s."
         )
+
+
+def last_time(save: Any) -> Any:
+    """The last of the times to save at; None where none are given."""
+    if isinstance(save, str | AbstractSection) or save is None or np.ndim(save) != 1:
+        return None
+    return save[-1] if len(save) else None

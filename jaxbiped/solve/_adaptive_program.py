@@ -208,13 +208,17 @@ class AdaptiveSolve(AbstractSolve):
             done=done,
             out_of_steps=jnp.asarray(True),
             timed_out=timed_out,
+            reached=self.system.reached,
         )
         if now.resets is not None:
             code = jnp.where(now.resets.chatters, int(Ending.CHATTERS), code)
         low, high = (None, None) if now.extremes is None else now.extremes
         steps = (now.accepted, now.rejected)
         solved = Solved(now.t, now.state, code, None, *steps, lowest=low, highest=high)
-        return solved if solve.steps is None else solved._replace(missed_contacts=control[1]), count
+        if solve.steps is not None:
+            _, missed = self._landed(now.control).inner if self.system.lands else control
+            solved = solved._replace(missed_contacts=missed)
+        return solved, count
 
     @property
     def _switches(self) -> Watch:

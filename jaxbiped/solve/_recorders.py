@@ -292,7 +292,7 @@ class StepRecorder(AbstractRecorder):
         now: Moment,
         due: Scalar,
     ) -> tuple[Scalar, list[Scalar]]:
-        numbers = [*now.state, *(value for row in memory.coefficients for value in row)]
+        numbers = jtu.tree_leaves((now.state, memory.coefficients))
         if memory.end is not None:
             numbers = [_reset_code(now), *memory.end, *numbers]
         return memory.noted, [now.t, *numbers]
@@ -367,7 +367,7 @@ class ArrivalRecorder(AbstractRecorder):
         now: Moment,
         due: Scalar,
     ) -> tuple[Scalar, list[Scalar]]:
-        nothing = [jnp.zeros_like(now.t)] * (1 + len(now.state))
+        nothing = [jnp.zeros_like(now.t)] * (1 + len(jtu.tree_leaves(now.state)))
         return memory.noted, jax.lax.cond(
             memory.noted, lambda: self._arrival(how, solve, memory, now), lambda: nothing
         )
@@ -376,7 +376,7 @@ class ArrivalRecorder(AbstractRecorder):
         self, how: AbstractSolve, solve: PyTree, last: LastStep, now: Moment
     ) -> list[Scalar]:
         if self.section.behind_reset:
-            return [now.t, *now.state]
+            return [now.t, *jtu.tree_leaves(now.state)]
         assert last.rise is not None
         dense = how.course(solve, last, now.t, now.state)
 
@@ -394,7 +394,7 @@ class ArrivalRecorder(AbstractRecorder):
 
         time = jax.lax.fori_loop(0, _BISECTIONS, halve, last.rise[1:])[1]
         time, state = how.arrival_near(solve, last, now, time, value)
-        return [time, *state]
+        return [time, *jtu.tree_leaves(state)]
 
 
 @dataclasses.dataclass(frozen=True)

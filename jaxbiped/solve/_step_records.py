@@ -126,8 +126,9 @@ def recorded_steps(
     From the rows of `StepRecorder`, shape (n, numbers), as diffrax would have them. With `resets`,
     each row ends with the state before the reset; where there is one, its time comes twice.
     """
-    kind, size = type(start), len(start)
-    first = np.array([0.0, *(float(leaf) for leaf in start)])
+    leaves, kind = jtu.tree_flatten(start)
+    size = len(leaves)
+    first = np.array([0.0, *map(float, leaves)])
     begins = np.vstack([first[1:], rows[:, 1 : 1 + size]])[:-1]
     if resets:
         rows, begins = _with_both_sides(rows, begins)
@@ -136,10 +137,10 @@ def recorded_steps(
     times = np.append(ends[0], np.inf)
     infos = np.vstack([begins.T, rows[:, 1:].T])
     infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
-    groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
+    groups = [kind.unflatten(infos[k : k + size]) for k in range(0, len(infos), size)]
     # One transfer for all of them: each costs as much as several steps.
     counts = len(rows) + 1, 1  # of a weak type, as a number in diffrax's own would be
-    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0), counts
+    parts = times, groups, ends[0], kind.unflatten(ends[1:]), np.float64(0.0), counts
     times, groups, t, states, zero, (count, one) = jax.device_put(parts)
     dense = diffrax.DenseInterpolation(
         ts=times,

@@ -48,6 +48,22 @@ def fallen_ball(ball, state, count):
     return np.array(told).T
 
 
+@pytest.mark.parametrize("solver", ["rodas4p", "dopri8"])
+def test_steps_of_one_size_land_on_guards(solver):
+    """They are as long as asked but where they are cut by an impact, and meet it as exactly."""
+    start, dt = systems.Bounce(0.1, 0.0, 1.0), 0.01
+    times, speeds = fallen_ball(BALL, start, 5)
+    how = dict(solver=solver, dt=dt)
+    walk = moved(BALL, start, 1.2, save=At("impact"), **how)
+    np.testing.assert_allclose(walk.arrivals.t[:5], times, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(walk.arrivals.state.speed[:5], speeds, rtol=0.0, atol=1e-8)
+    assert int(walk.missed_contacts) == 0
+    steps = np.asarray(moved(BALL, start, 1.2, save="steps", **how).t)
+    grid = dt * np.arange(121)
+    np.testing.assert_allclose(steps[np.argmin(np.abs(steps - grid[:, None]), axis=1)], grid)
+    assert np.max(np.diff(steps)) < dt * (1.0 + 1e-12)
+
+
 def test_impacts_come_when_and_as_they_should():
     start = systems.Bounce(0.1, 0.0, 1.0)
     times, speeds = fallen_ball(BALL, start, 5)

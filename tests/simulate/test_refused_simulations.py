@@ -155,7 +155,8 @@ NOSE = jb.MidStance(body="nose")
         (rigid_seed(), ROLLING, dict(save=NOSE, duration=0.1), "section.body = 'nose'"),
         (SCENE, STATE, dict(save=NOSE, duration=0.1), "section.body = 'nose'"),
         (SEVERAL, START, dict(save=[1.0], footsteps=3), "footsteps = 3 is not allowed for a Link"),
-        (SEVERAL, START, dict(), "give increasing times"),
+        (SEVERAL, START, dict(), "duration = None and footsteps = None: give one of them"),
+        (SEVERAL, START, dict(save=jb.MidStance(), duration=1.0), "give a Section"),
     ],
 )
 def test_options_of_other_kinds_of_scene_are_refused(scene, state, how, said):

@@ -204,3 +204,92 @@ def test_an_implicit_solver_takes_steps_of_one_size_also_by_simulate():
     assert float(found.state.q[2][-1]) == pytest.approx(one_leg_angle(3.0), abs=1e-4)
     same = jb.simulate(scene, STILL, save=[3.0], **how)
     assert jax.tree.all(jax.tree.map(np.array_equal, found, same))
+
+
+LEG = jb.dynamics.LinkageScene(one_leg(), jb.constraints.Index1())
+PULL = -9.8 * 0.1 / (0.0096 + 0.1**2)
+
+
+@pytest.fixture(scope="module")
+def pendulum():
+    """One leg's angle, its rate and their derivatives by the first rate, with dense output."""
+
+    def rates(t, y):
+        return [y[1], PULL * np.sin(y[0]), y[3], PULL * np.cos(y[0]) * y[2]]
+
+    def vertical(t, y):
+        return y[0]
+
+    vertical.direction = -1
+    start = [0.5, 1.0, 0.0, 1.0]
+    return solve_ivp(
+        rates, (0.0, 2.0), start, rtol=1e-11, atol=1e-12, dense_output=True, events=vertical
+    )
+
+
+def swung(rate=1.0, **how):
+    return jb.simulate(LEG, hanging(0.5, rates=(rate,)), **{"duration": 2.0, **how})
+
+
+def test_every_step_of_a_linkage_is_kept_with_what_lies_between(pendulum):
+    walk, times = swung(), np.linspace(0.03, 1.97, 11)
+    assert walk.outcome is jb.Ending.FINISHED
+    assert (walk.engine, float(walk.t[-1])) == ("lanes", 2.0)
+    assert len(walk.t) == 1 + int(walk.accepted)
+    assert float(jnp.max(walk.violation)) < 1e-14
+    np.testing.assert_allclose(walk.at(times).q[2], pendulum.sol(times)[0], rtol=0, atol=1e-5)
+    ends = np.asarray(walk.t)
+    np.testing.assert_allclose(walk.state.v[2], pendulum.sol(ends)[1], rtol=0, atol=1e-5)
+
+
+def test_a_linkage_arrives_at_sections_and_tells_its_extremes(pendulum):
+    hangs = jb.Section(lambda scene, state: -state.q[2])
+    walk = swung(save=hangs, extremes=lambda scene, state: state.q[2])
+    (times,) = pendulum.t_events
+    assert int(walk.arrivals.total) == len(times) == 2
+    np.testing.assert_allclose(walk.arrivals.t[:2], times, rtol=0, atol=1e-6)
+    rates = pendulum.y_events[0][:, 1]
+    np.testing.assert_allclose(walk.arrivals.state.v[2][:2], rates, rtol=0, atol=1e-5)
+    highest = np.max(pendulum.sol(np.linspace(0.0, 2.0, 2001))[0])
+    assert float(walk.highest) == pytest.approx(highest, abs=5e-3)  # at the ends of steps
+    xla = swung(save=hangs, engine="xla")
+    np.testing.assert_allclose(xla.arrivals.t[:2], times, rtol=0, atol=1e-6)
+
+
+def test_a_linkage_has_derivatives_of_its_end_its_times_and_its_arrivals(pendulum):
+    hangs, times = jb.Section(lambda scene, state: -state.q[2]), np.array([0.5, 2.0])
+
+    def told(rate):
+        at_times = swung(rate, save=times).state.q[2]
+        return *at_times, *swung(rate, save=hangs).arrivals.t[:2]
+
+    *slopes, first, second = map(float, jax.jacfwd(told)(1.0))
+    np.testing.assert_allclose(slopes, pendulum.sol(times)[2], rtol=1e-4)
+    for slope, (_, rate, by_rate, _) in zip((first, second), pendulum.y_events[0], strict=True):
+        assert slope == pytest.approx(-by_rate / rate, rel=1e-4)
+    backwards = jax.grad(lambda rate: swung(rate, save="end").state.q[2][-1])(1.0)
+    assert float(backwards) == pytest.approx(float(pendulum.sol(2.0)[2]), rel=1e-4)
+
+
+def test_the_bars_of_a_linkage_hold(pendulum):
+    walk = swung(save="end", accuracy=1e-7)
+    off = abs(float(walk.final.q[2]) - pendulum.sol(2.0)[0])
+    assert walk.error.met
+    assert off <= float(walk.error.bars["state"].q[2][-1]) < 1e-6
+
+
+def test_a_batch_and_a_jitted_linkage_swing_like_one_by_itself():
+    rates = jnp.array([0.5, 1.0])
+    end = lambda rate: swung(rate, save="end").final.q[2]
+    alone = [float(end(rate)) for rate in rates]
+    np.testing.assert_allclose(jax.vmap(end)(rates), alone, rtol=0, atol=1e-13)
+    assert float(jax.jit(end)(1.0)) == pytest.approx(alone[1], abs=1e-13)
+
+
+def test_the_last_time_to_save_at_ends_a_simulation_of_any_scene():
+    times = np.array([0.1, 0.2])
+    for scene, state in ((LEG, ONE_LEG_START), (jb.seed_scene(), jb.seed_state())):
+        walk = jb.simulate(scene, state, save=times)
+        np.testing.assert_array_equal(walk.t, times)
+        longer = jb.simulate(scene, state, save=times, duration=0.2)
+        assert jax.tree.all(jax.tree.map(np.array_equal, walk.state, longer.state))

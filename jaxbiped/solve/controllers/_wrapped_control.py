@@ -106,9 +106,9 @@ class AbstractControl(_Control):  # type: ignore[type-arg]
 
 
 class EqualSteps(eqx.Module):
-    """A `StepControl` of steps of one size, of which none is tried again.
+    """A `StepControl` of steps of one size. An attempt is in vain whose error is infinite.
 
-    An attempt is in vain whose error is infinite.
+    Behind a step that another controller made end sooner, the next one ends where that would have.
 
     Its state is the number of steps to the end of the next one. As in diffrax, times are multiples
     of the size, rounded once each, but for the first one.
@@ -128,10 +128,15 @@ class EqualSteps(eqx.Module):
     def adapt_step_size(self, *step: Any) -> Adapted:
         attempt = Attempt(*step)
         keep = jtu.tree_leaves(attempt.error)[0] < jnp.inf
-        steps = attempt.memory + 1.0
-        until = jnp.asarray(self.end * (steps / self.count))
+        is_whole = attempt.t1 >= self._end_of(attempt.memory)
+        steps = attempt.memory + jnp.where(is_whole, 1.0, 0.0)
+        until = self._end_of(steps)
         jump, success = jnp.asarray(False), diffrax.RESULTS.successful
         return Adapted(keep, jnp.asarray(attempt.t1), until, jump, steps, success)
+
+    def _end_of(self, steps: Scalar) -> Scalar:
+        """The end of the step of a number [s]."""
+        return jnp.asarray(self.end * (steps / self.count))
 
 
 def try_again(attempt: Attempt, adapted: Adapted, again: Scalar, target: Scalar) -> Adapted:
