@@ -7,6 +7,7 @@ these. Or it is the number of the sentence that refuses it, below the table.
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -19,43 +20,58 @@ from tqdm import tqdm
 
 import jaxbiped as jb
 
+HEEL_STRIKE = jb.HeelStrike()
+
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
     """A scene with a start, and how its walks are asked for.
 
     Attributes:
+        start: the start by the number that derivatives are with respect to.
+        at: that number.
         duration: of a walk with two heel strikes or more [s].
-        moved: the number of the start that derivatives are with respect to.
-        stands: the angle of the leg that stands.
+        passes: rises through zero where a standing leg or a pendulum passes the normal of the
+            slope, or where a ball is highest.
         solver: another solver that fits.
         dt: size of steps that resolve its motion [s].
+        reset: where its state is reset: at heel strikes, or where a ball meets the table.
     """
 
     scene: Any
-    state: Any
+    start: Callable[[Any], Any]
+    at: float
     duration: float
-    moved: str
-    stands: str
+    passes: Callable[[Any], Any]
     solver: str
     dt: float
-
-    @property
-    def reset(self) -> Any:
-        """Where its state is reset: at heel strikes, or where a ball meets the table."""
-        return jb.hybrid.At("table") if isinstance(self.scene, Ball) else jb.HeelStrike()
+    reset: Any = HEEL_STRIKE
 
     @property
     def section(self) -> jb.Section:
-        """Where a standing leg passes the normal of the slope, or a ball is highest."""
-        leg = self.stands
-        return jb.Section(lambda scene, state: -getattr(state, leg))
+        """The section of the user's own."""
+        return jb.Section(lambda scene, state: self.passes(state))
 
     def walk(self, value: Any = None, **how: Any) -> Any:
         """A walk; `save` is the end unless something else is asked for."""
-        state = self.state if value is None else self.state._replace(**{self.moved: value})
+        state = self.start(self.at if value is None else value)
         limits = {} if "footsteps" in how else {"duration": self.duration}
         return jb.simulate(self.scene, state, **({"save": "end"} | limits | how))
+
+
+def walker(
+    scene: Any, state: Any, duration: float, solver: str, dt: float, *, moved: str, stands: str
+) -> Kind:
+    """A walker with the name of the number that is moved, and of the angle that passes zero."""
+    return Kind(
+        scene,
+        lambda value: state._replace(**{moved: value}),
+        float(getattr(state, moved)),
+        duration,
+        lambda state: -getattr(state, stands),
+        solver,
+        dt,
+    )
 
 
 class Flight(NamedTuple):
@@ -90,26 +106,57 @@ def published(name: str, gait: str, duration: float) -> Kind:
     scene = model.make()
     state = scene.state(**model.starts[gait])
     moved, *_, stands = (field for field in state._fields if field.startswith("theta"))
-    return Kind(scene, state, duration, moved, stands, "tsit5", duration / 400)
+    return walker(scene, state, duration, "tsit5", duration / 400, moved=moved, stands=stands)
+
+
+def pendulum() -> Kind:
+    """A body that swings from a pin, 0.1 m off its centre, by the constraint method "index1"."""
+    body = jb.constraints.LinkBody(1.0, 0.0096)
+    pin = jb.constraints.Pin((0.0, 0.1), (0.0, 0.0), 0)
+    linkage = jb.constraints.Linkage((body,), (pin,))
+    scene = jb.dynamics.LinkageScene(linkage, jb.constraints.Index1())
+
+    def start(rate: Any) -> jb.dynamics.LinkageState:
+        x, z = 0.1 * np.sin(0.5), -0.1 * np.cos(0.5)
+        return jb.dynamics.LinkageState((x, z, 0.5), (-z * rate, x * rate, rate))
+
+    return Kind(scene, start, 1.0, 1.0, lambda state: -state.q[2], "tsit5", 1e-3)
 
 
 def kinds() -> dict[str, Kind]:
     """One of each kind."""
     scene, state = jb.seed_scene(slope=0.02), jb.seed_state()
+    seed = functools.partial(
+        walker, state=state, duration=1.0, solver="rodas5p", dt=2e-5,
+        moved="omega_1", stands="theta_1",
+    )  # fmt: skip
     return {
-        "compliant": Kind(scene, state, 1.0, "omega_1", "theta_1", "rodas5p", 2e-5),
+        "compliant": seed(scene),
         "rigid": published("garcia", "long", 9.0),
         "rigid, pushed": published("kuo", "gait", 9.0),
         "rigid, knees": published("hsu-chen", "gait", 1.3),
-        "redundant": Kind(
-            jb.RedundantScene(scene, "index1"), state, 1.0, "omega_1", "theta_1", "rodas5p", 2e-5
+        "redundant": seed(jb.RedundantScene(scene, "index1")),
+        "linkage": pendulum(),
+        "own system": Kind(
+            Ball(),
+            lambda speed: Flight(0.3, speed),
+            0.4,
+            1.2,
+            lambda state: -state.speed,
+            "tsit5",
+            1e-3,
+            jb.hybrid.At("table"),
         ),
-        "own system": Kind(Ball(), Flight(0.3, 0.4), 1.2, "speed", "speed", "tsit5", 1e-3),
     }
 
 
 def _end(kind: Kind, **how: Any) -> Any:
     return kind.walk(**how).final
+
+
+def _number(walk: Any) -> Any:
+    """The second number of a walk's end."""
+    return jax.tree.leaves(walk.final)[1]
 
 
 def _times(kind: Kind, **how: Any) -> Any:
@@ -134,30 +181,29 @@ def _footsteps(kind: Kind, **how: Any) -> Any:
 
 
 def _extremes(kind: Kind, **how: Any) -> Any:
-    walk = kind.walk(extremes=lambda scene, state: state[0], **how)
+    walk = kind.walk(extremes=lambda scene, state: jax.tree.leaves(state)[0], **how)
     return walk.lowest, walk.highest
 
 
 def _slope(differentiate: Callable[..., Any]) -> Callable[..., Any]:
     def slope(kind: Kind, **how: Any) -> Any:
-        at = getattr(kind.state, kind.moved)
-        return differentiate(lambda value: kind.walk(value, **how).final[1])(jnp.asarray(at))
+        return differentiate(lambda value: _number(kind.walk(value, **how)))(jnp.asarray(kind.at))
 
     return slope
 
 
 def _difference(kind: Kind, **how: Any) -> Any:
-    at, step = getattr(kind.state, kind.moved), 1e-5
-    ends = [kind.walk(at + shift, **how).final[1] for shift in (step, -step)]
+    step = 1e-5
+    ends = [_number(kind.walk(kind.at + shift, **how)) for shift in (step, -step)]
     return (ends[0] - ends[1]) / (2.0 * step)
 
 
 def _jitted(kind: Kind, **how: Any) -> Any:
-    return jax.jit(lambda value: kind.walk(value, **how).final)(getattr(kind.state, kind.moved))
+    return jax.jit(lambda value: kind.walk(value, **how).final)(kind.at)
 
 
 def _batched(kind: Kind, **how: Any) -> Any:
-    values = getattr(kind.state, kind.moved) * jnp.array([1.0, 0.99])
+    values = kind.at * jnp.array([1.0, 0.99])
     ends = jax.vmap(lambda value: kind.walk(value, **how).final)(values)
     return jax.tree.map(lambda leaf: leaf[0], ends)
 

@@ -113,10 +113,10 @@ class AbstractSystem(eqx.Module):
     def ending(self, args: PyTree, y: PyTree) -> Scalar:
         """Code of the `Ending` that has occurred; 0 if the motion goes on.
 
-        Default: the last of the failures that `watches` names.
+        Default: the first that happens of the failures that `watches` names.
         """
         code = jnp.asarray(0)
-        for name, happens in self.failures(self.watches).items():
+        for name, happens in reversed(self.failures(self.watches).items()):
             code = jnp.where(happens(0.0, y, args), int(name), code)
         return code
 

@@ -1,5 +1,8 @@
 """Every ending by its name, against walks that end so."""
 
+import jax
+import jax.numpy as jnp
+import numpy as np
 import pytest
 
 import jaxbiped as jb
@@ -85,6 +88,24 @@ def test_a_scuffing_foot_is_a_stumble():
     assert walk.outcome == Ending.STUMBLED
     unwatched = jb.simulate(scene, jb.seed_state(), duration=0.3, save="end", watch=("fall",))
     assert unwatched.outcome == Ending.WALKING
+
+
+def test_of_failures_that_hold_together_the_first_is_the_ending():
+    """At random motions low above the ground, where often several do."""
+    scene, rng, names = jb.seed_scene(), np.random.default_rng(3), jb.seed_state()._fields
+    system = jb.hybrid.Walking()
+    values = dict(zip(names, rng.normal(0.0, 0.4, (len(names), 200)), strict=True))
+    states = jb.State(**values | {"hip_z": rng.uniform(0.15, 0.35, 200)})
+    failures = system.failures(system.watches)
+
+    def ask(state):
+        holds = [happens(0.0, state, scene) for happens in failures.values()]
+        return system.ending(scene, state), jnp.stack(holds)
+
+    codes, holds = map(np.asarray, jax.jit(jax.vmap(ask))(states))
+    first = np.array([int(name) for name in failures])[np.argmax(holds, axis=1)]
+    np.testing.assert_array_equal(codes, np.where(np.any(holds, axis=1), first, 0))
+    assert np.sum(np.sum(holds, axis=1) > 1) >= 10
 
 
 def test_names_in_words():

@@ -407,6 +407,25 @@ def test_a_bad_guard_gets_a_sentence(effects, words):
         Guard("impact", lambda y: y.height, **effects)
 
 
+class Gates(systems.BouncingBall):
+    """A ball that falls through several gates at once, each of which ends its motion."""
+
+    def guards(self):
+        gates = ("upper", "lower", "last")
+        return (Guard("impact", self.gap, reset=lambda y: y), *(
+            Guard(name, lambda y: y.height - 0.05, ends=True) for name in gates
+        ))  # fmt: skip
+
+
+def test_of_failures_at_one_instant_every_door_names_the_first():
+    system, start = Gates(), systems.Bounce(0.1, 0.0, 1.0)
+    assert str(moved(system, start, 1.0, save="end").outcome) == "upper"
+    returned = jb.return_map(system, start, section=At("impact"))
+    assert int(returned.code) == int(moved(system, start, 1.0, save="end").ending)
+    lost = jb.find_gait(system, start, section=At("impact"), parameters=())
+    assert str(lost.walk_outcome) == "upper"
+
+
 def test_resets_that_gather_end_a_motion():
     """A ball that comes to rest, and a reset that leaves the state on its guard."""
     still = dataclasses.replace(BALL, amplitude=0.0)
