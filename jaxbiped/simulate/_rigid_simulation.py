@@ -24,6 +24,7 @@ from jaxbiped._types import Scalar, as_float, by_numpy, is_traced
 from jaxbiped.compiler import BY_NAME, Request
 from jaxbiped.dynamics._state import check_state, without_whole_turns
 from jaxbiped.hybrid._mode_history import history_of
+from jaxbiped.hybrid._rolling_system import Rolling
 from jaxbiped.hybrid._sections import AbstractSection, HeelStrike, check_section_body
 from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._modes import check_mode, rigid_modes
@@ -45,16 +46,16 @@ from jaxbiped.simulate._trajectory import Trajectory, arrivals_among, scene_key,
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._explicit_methods import EXPLICIT_METHODS, ExplicitMethod
+from jaxbiped.solve._landing_program import LandingSolve
+from jaxbiped.solve._landing_steps import EndingWatch, Landing
 from jaxbiped.solve._recorders import (
     AbstractRecorder,
     ArrivalRecorder,
     StrikeRecorder,
     program_of,
 )
-from jaxbiped.solve._rigid_program import RigidSolve
-from jaxbiped.solve._rigid_steps import FallWatch, RigidWalk
 from jaxbiped.solve._solved import Solved
-from jaxbiped.solve._step_records import rigid_record
+from jaxbiped.solve._step_records import landing_record
 
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""
@@ -92,7 +93,7 @@ class RigidSimulation(eqx.Module):
     """
 
     finest_tolerance: ClassVar[float] = 1e-13
-    walk: RigidWalk
+    walk: Landing
     waits: bool = eqx.field(static=True)
     method: ExplicitMethod = eqx.field(static=True)
     watch: tuple[str, ...] = eqx.field(static=True)
@@ -152,7 +153,7 @@ class RigidSimulation(eqx.Module):
         scene = scene if narrow is None else jtu.tree_map(cast, scene)
         engine = _engine_for(asked, narrow)
         return RigidSimulation(
-            RigidWalk(
+            Landing(
                 scene=scene,
                 state=state,
                 duration=cast(longest),
@@ -245,7 +246,7 @@ class RigidSimulation(eqx.Module):
         (t, told), dense = single_time(solved.t, solved.state), None
         arrivals, changes = arrivals_among(self._no_rows, solved.footsteps, state), (rows, total)
         if self.save_steps:
-            record = rigid_record(scene, state, rows, total)
+            record = landing_record(Rolling(), scene, state, rows, total)
             t, told, dense, changes = record.t, record.state, record.dense, record.resets
             arrivals = arrivals_among(record.strikes, solved.footsteps, state)
         elif self.times is not None:
@@ -285,13 +286,14 @@ class RigidSimulation(eqx.Module):
 
     def _run(self, recorder: AbstractRecorder | None, room: int) -> tuple[Solved, Any, Any]:
         """What is solved, the rows that are recorded, and how many there were."""
-        falls = FallWatch.LOCATED if "fall" in self.watch else FallWatch.IGNORED
-        steps = RigidSolve(
+        endings = EndingWatch.LOCATED if "fall" in self.watch else EndingWatch.IGNORED
+        steps = LandingSolve(
+            system=Rolling(),
             recorder=recorder,
             extremes=self.extremes,
             waits=self.waits,
             method=self.method,
-            falls=falls,
+            endings=endings,
         )
         scheduled = recorder is not None and recorder.scheduled
         request = Request(
