@@ -38,13 +38,15 @@ class AbstractLandingSystem(AbstractSystem):
     """A system whose motion between resets is smooth and never stiff, and of second order.
 
     It is reset where it arrives, which ends a footstep, and where its mode changes; one surface
-    ends it. All surfaces fall through zero there. States are named tuples.
+    ends it. All surfaces fall through zero there. States are named tuples, with a leaf `mode` where
+    several modes can occur.
 
     Attributes:
-        endings: what the motion may come to on the surface that ends it. A property of the class.
+        endings: at least one, what the motion may come to on the surface that ends it. A property
+            of the class.
     """
 
-    endings: ClassVar[tuple[Ending, ...]] = ()
+    endings: ClassVar[tuple[Ending, ...]]
 
     @abc.abstractmethod
     def positions(self, args: PyTree) -> slice:
@@ -71,10 +73,7 @@ class AbstractLandingSystem(AbstractSystem):
 
     @abc.abstractmethod
     def surface_of_ending(self, args: PyTree, near: Any) -> Callable[[Any], Scalar]:
-        """A function of the positions that falls through zero where the motion ends.
-
-        It is the one for endings close to the state `near`.
-        """
+        """A function of the positions that falls through zero at the ending that is `near`."""
 
     @abc.abstractmethod
     def ending_on_surface(self, args: PyTree, y: Any) -> Scalar:
@@ -105,10 +104,6 @@ class AbstractLandingSystem(AbstractSystem):
         `is_reset`: whether there was one (boolean); None: there was. Default: the state as it is.
         """
         return y
-
-    def mode(self, y: Any) -> Scalar | None:
-        """Number of the mode that a state is in. Default: None, for a system of one mode."""
-        return None
 
     def changes_mode(self, args: PyTree) -> bool:
         """Whether the mode may change between arrivals. Default: it does not."""

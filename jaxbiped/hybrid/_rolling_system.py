@@ -97,9 +97,6 @@ class Rolling(AbstractLandingSystem):
         turning = of_all_bodies(args.mechanism.structure, accelerations, accelerations[0])
         return [limit.gap.of(turning) for limit in rigid_modes(args.mechanism).limits]
 
-    def mode(self, y: Any) -> Scalar | None:
-        return getattr(y, "mode", None)
-
     def changes_mode(self, args: RigidScene) -> bool:
         return rigid_modes(args.mechanism).may_change
 

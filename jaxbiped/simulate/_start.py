@@ -21,18 +21,21 @@ from jaxbiped._checks import (
     warn,
 )
 from jaxbiped._jax_versions import untraced
-from jaxbiped._types import Scalar, is_traced
+from jaxbiped._types import Scalar, by_numpy, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._constraint_methods import check_independent
 from jaxbiped.dynamics._constrained_motion import Consistent, consistent_state, coordinates_of
 from jaxbiped.dynamics._contacts import feet, limits_of
 from jaxbiped.dynamics._footfalls import touches
-from jaxbiped.dynamics._state import state_for
+from jaxbiped.dynamics._state import check_state, state_for, without_whole_turns
 from jaxbiped.hybrid._endings import WATCHES
 from jaxbiped.hybrid._hybrid_system import HybridSystem, section_of_system, start_of_system
+from jaxbiped.hybrid._scales import is_smooth, patience_of
 from jaxbiped.hybrid._sections import AbstractSection, check_section_body
 from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.scene._modes import check_mode, rigid_modes
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
+from jaxbiped.solve.controllers._event_steps import PATIENCE
 
 _PRECISIONS = (np.float16, np.float32, np.float64)
 """Of NumPy's, those that JAX has."""
@@ -75,13 +78,6 @@ class Options(NamedTuple):
         return self.save if isinstance(self.save, AbstractSection) else None
 
     @property
-    def room(self) -> int:
-        """How many steps or arrivals to keep."""
-        if self.save_steps:
-            return int(self.max_solver_steps)
-        return 0 if self.section is None else int(self.max_arrivals)
-
-    @property
     def times(self) -> Any:
         """The times to save at, as they are given."""
         return None if isinstance(self.save, str | AbstractSection) else self.save
@@ -98,7 +94,7 @@ class Options(NamedTuple):
 
 
 def start_for(
-    scene: Scene | RedundantScene | HybridSystem, state: PyTree
+    scene: Scene | RedundantScene | RigidScene | HybridSystem, state: PyTree
 ) -> tuple[PyTree, Consistent | None]:
     """A checked start of the kind that a scene needs, and how it was put on its constraints.
 
@@ -111,6 +107,13 @@ def start_for(
         check_unbatched("state", start, "one start")
         return start, None
     check_single_scene(scene)
+    if isinstance(scene, RigidScene):
+        state = check_state(in_own_precision(state), scene.state_type)
+        start = in_one_precision(without_whole_turns(scene, state))
+        check_unbatched("state", start, "one start")
+        if (modes := rigid_modes(scene.mechanism)).any:
+            check_mode(scene.mechanism, modes, scene.ground.slope, start)
+        return start, None
     if not isinstance(scene, RedundantScene):
         start = state_for(scene, in_own_precision(state))
         check_unbatched("state", start, "one start")
@@ -176,6 +179,21 @@ def check_limits(
         check_count("footsteps", footsteps)
     check_unbatched("duration", duration)
     check_count("max_solver_steps", max_solver_steps)
+
+
+def longest_time(scene: Any, asked: Options) -> Scalar | float:
+    """The duration that is asked for, or the time that bounds the wait for footsteps [s].
+
+    Raises:
+        ArgumentError: a duration that is not positive, or ground on which no rigid foot comes down.
+    """
+    if asked.duration is not None:
+        check_positive("duration", asked.duration, "s")
+        return asked.duration
+    if not is_smooth(scene):
+        return PATIENCE * (asked.footsteps or 0)
+    time: Scalar = by_numpy(lambda _, wait: asked.footsteps * wait, patience_of(scene))
+    return time
 
 
 def watched_by(scene: Any, watch: Any) -> tuple[str, ...]:

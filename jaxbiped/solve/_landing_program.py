@@ -113,14 +113,14 @@ class LandingSolve(AbstractSolve):
         done = now.progress
         code = ending_of(solve, done, jnp.asarray(self.waits))
         counts = (done.footsteps, done.accepted, done.rejected, done.grazes, done.pulls)
-        begin = self.system.mode(solve.state) if done.modes is None else done.modes.begin
+        begin = getattr(solve.state, "mode", None) if done.modes is None else done.modes.begin
         low, high = (None, None) if now.extremes is None else now.extremes
         state = self.system.completed(solve.scene, done.state)
         return Solved(done.t, state, code, *counts, begin, low, high), done.footsteps
 
     def moment(self, solve: Landing, now: _Now) -> Moment:
         here, changes = now.progress, None
-        if self.system.mode(solve.state) is not None:
+        if hasattr(solve.state, "mode"):
             changes = jnp.asarray(False) if here.modes is None else here.modes.changed
         state = self.system.completed(solve.scene, here.state)
         return Moment(here.t, state, here.arrived, changes)

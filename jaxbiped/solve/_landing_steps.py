@@ -130,11 +130,10 @@ def initial_progress(system: AbstractLandingSystem, solve: Landing) -> LandingPr
     state, modes = solve.state, None
     if system.changes_mode(solve.scene):
         state = system.change_mode(solve.scene, state)
-        course, begin = system.course(solve.scene, state), system.mode(state)
-        assert begin is not None
+        course = system.course(solve.scene, state)
         paces = jnp.zeros(1 + len(course.values), zero.dtype)
         times = jnp.full_like(paces[1:], -jnp.inf)
-        modes = ModeProgress(course, none, no, begin, times, paces, none)
+        modes = ModeProgress(course, none, no, state.mode, times, paces, none)
         accelerations = course.accelerations
     else:
         accelerations = system.accelerations(solve.scene, state)

@@ -12,8 +12,8 @@ from jaxtyping import PyTree
 
 from jaxbiped.compiler import BY_NAME, DEVICES, Request
 from jaxbiped.dynamics._state import recurring_names
-from jaxbiped.gait._return_map_spec import patience_of
 from jaxbiped.hybrid._landing_system import AbstractLandingSystem
+from jaxbiped.hybrid._scales import patience_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractScene
