@@ -27,6 +27,7 @@ WORDS_OR_SHAPES = {
 }
 """Types of what is the same whatever the numbers are."""
 STATIC_PARTS = {
+    "AbstractSimulation.section",
     "Branch.section",
     "ErrorEstimate.relative",  # floats of Python, which are known before anything runs
     "ErrorEstimate.rtol",
@@ -37,8 +38,6 @@ STATIC_PARTS = {
     "LinkAngle.weights",
     "Method.optimiser",  # of Optax: functions
     "OneFoot.leg",  # a name
-    "RigidSimulation.section",
-    "Simulation.section",
     "Watch.time_unit",
 }
 NOT_TRACED = "sweep/starts"

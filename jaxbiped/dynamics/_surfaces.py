@@ -6,10 +6,8 @@ units of the walker's height.
 
 import functools
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
@@ -153,40 +151,6 @@ def _uprightness(stance: Stance, side: Scalar) -> Scalar:
     if angles is not None:
         return FALL_ANGLE - side * angles[1]
     return (stance.root.z - mechanism.height_over_feet(math.cos(FALL_ANGLE))) / mechanism.height
-
-
-class Surface(NamedTuple):
-    """How far a state is from where something happens, and how fast that changes.
-
-    Attributes:
-        value: above zero before it [rad].
-        rate, curvature: its first two derivatives with respect to time.
-    """
-
-    value: Scalar
-    rate: Scalar
-    curvature: Scalar
-
-
-def surface_along(
-    function: Callable[[Any], Scalar], state: Any, accelerations: tuple[Scalar, ...]
-) -> Surface:
-    """A function of the angles in a motion: its value and its first two derivatives.
-
-    It depends on no other part of the state; `accelerations` are those of the angles [rad/s²].
-    """
-    count = len(accelerations)
-    angles, rates = tuple(state[1 : 1 + count]), tuple(state[1 + count : 1 + 2 * count])
-
-    def of(angles: Any) -> Scalar:
-        return function(type(state)(state[0], *angles, *rates, *state[1 + 2 * count :]))
-
-    def course(angles: Any, rates: Any) -> tuple[Scalar, Scalar]:
-        return jax.jvp(of, (angles,), (rates,))
-
-    along = jax.jvp(course, (angles, rates), (rates, accelerations))
-    (value, rate), (_, curvature) = along
-    return Surface(value, rate, jnp.asarray(curvature))
 
 
 @kept_alone

@@ -10,17 +10,16 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_count, check_type
-from jaxbiped._types import Scalar, Time, by_numpy
+from jaxbiped._types import Scalar, Time
 from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.compiler import LANES, XLA, AbstractEngine
+from jaxbiped.hybrid._scales import patience_of
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._clearance import check_legs_admitted_alike
-from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._scene import (
-    AbstractScene,
     AbstractWalkerScene,
     RedundantScene,
     Scene,
@@ -32,10 +31,6 @@ from jaxbiped.solve._solvers import solver_named, with_projection
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
-_PATIENCE = 50.0
-"""Time allowed to the next arrival, in units of √(l/g)."""
-_PATIENCE_OF_SYSTEMS = 1e6
-"""The same of a hybrid system's, in its unit of time."""
 _MORE_STEPS = 4
 """Factor of the steps that a return may take where it carries columns of parameters: small
 sensitivities are solved as exactly as large ones."""
@@ -230,17 +225,6 @@ def arrivals_of(args: PyTree, footsteps: int | None) -> int:
             f"so give a multiple of {own}."
         )
     return int(footsteps) // each
-
-
-def patience_of(scene: AbstractScene) -> Scalar | float:
-    """Time that the next arrival may take [s]."""
-    if not isinstance(scene, AbstractWalkerScene):
-        return _PATIENCE_OF_SYSTEMS * scene.time_unit
-    check_pulls(scene.ground)
-    found: Scalar = by_numpy(
-        lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.mechanism.height, scene.ground.g
-    )
-    return found
 
 
 def orbit_solver(

@@ -28,9 +28,9 @@ from jaxbiped.dynamics._footfalls import (
     touching_legs,
 )
 from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._surfaces import FALL_ANGLE, lean, rate_unit, uprightness
+from jaxbiped.dynamics._surfaces import FALL_ANGLE, rate_unit
 from jaxbiped.scene._clearance import AbstractClearance, StanceRotation
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._state_types import State
 from jaxbiped.scene._structure import Structure
 
@@ -199,19 +199,6 @@ def has_stumbled(scene: Scene, state: State) -> Scalar:
 
     tripped = [trips(found[i], found[j]) for i, j in foot_pairs(structure)]
     return any_of([jnp.zeros_like(state[0], dtype=bool), *tripped])
-
-
-def rigid_ending(scene: RigidScene, state: Any, *, falls: bool = True) -> Scalar:
-    """Code of the `Ending` that has come to a rigid walker, 0 where it goes on.
-
-    Its root point comes down as a compliant one's does, where `falls` are watched for.
-    """
-    if not falls:
-        return jnp.where(jnp.isfinite(sum(state)), 0, int(Ending.SOLVER_FAILED))
-    side = jnp.sign(lean(scene, state))
-    fallen = jnp.where(side < 0.0, int(Ending.FELL_FORWARD), int(Ending.FELL_BACK))
-    code = jnp.where(uprightness(scene, state, side) < 0.0, fallen, 0)
-    return jnp.where(jnp.isfinite(sum(state)), code, int(Ending.SOLVER_FAILED))
 
 
 def _failed(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:

@@ -13,8 +13,9 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._types import Numbers, RealScalarLike, Scalar, is_traced
+from jaxbiped._types import Numbers, RealScalarLike, Scalar, by_numpy, is_traced
 from jaxbiped.dynamics._state import dimensions_of, recurring_leaves
+from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._linkage_scene import LinkageScene, LinkageState
 from jaxbiped.scene._scene import (
     AbstractScene,
@@ -29,6 +30,10 @@ _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""
 _GRAVITY = 9.8
 """Gravity in the seed paper [m/s²]."""
+_PATIENCE = 50.0
+"""Time allowed to the next arrival, in units of √(l/g)."""
+_PATIENCE_OF_SYSTEMS = 1e6
+"""The same of a hybrid system's, in its unit of time."""
 _Sizes: TypeAlias = dict[tuple[float, float], Any]
 """Numbers by the powers of length and time in a unit."""
 _RESOLVED = 0.5
@@ -94,6 +99,17 @@ def check_precision(scene: CompliantScene, dtype: np.dtype) -> None:
             f"dtype = {np.dtype(dtype).name} is too coarse for this contact: rounding a position "
             f"changes the reaction by {worst:.3g} times the walker's weight; use float64."
         )
+
+
+def patience_of(scene: AbstractScene) -> Scalar | float:
+    """Time that the next arrival may take [s]."""
+    if not isinstance(scene, AbstractWalkerScene):
+        return _PATIENCE_OF_SYSTEMS * scene.time_unit
+    check_pulls(scene.ground)
+    found: Scalar = by_numpy(
+        lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.mechanism.height, scene.ground.g
+    )
+    return found
 
 
 class Units(NamedTuple):

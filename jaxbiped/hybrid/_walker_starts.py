@@ -15,7 +15,8 @@ from jaxbiped.constraints._constraint_methods import check_independent
 from jaxbiped.dynamics._constrained_motion import Consistent, consistent_state, coordinates_of
 from jaxbiped.dynamics._contacts import feet, limits_of
 from jaxbiped.dynamics._footfalls import touches
-from jaxbiped.dynamics._state import state_for
+from jaxbiped.dynamics._state import check_state, state_for, without_whole_turns
+from jaxbiped.scene._modes import check_mode, rigid_modes
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
 
 _PRECISIONS = (np.float16, np.float32, np.float64)
@@ -40,6 +41,21 @@ def walking_start(scene: Scene, state: PyTree) -> PyTree:
     start = state_for(scene, in_own_precision(state))
     check_unbatched("state", start, "one start")
     return in_one_precision(start)
+
+
+def rolling_start(scene: RigidScene, state: PyTree) -> PyTree:
+    """A checked start on rigid feet, in a mode that can occur.
+
+    Raises:
+        ArgumentError: a start that is not allowed.
+    """
+    check_single_scene(scene)
+    state = check_state(in_own_precision(state), scene.state_type)
+    start = in_one_precision(without_whole_turns(scene, state))
+    check_unbatched("state", start, "one start")
+    if (modes := rigid_modes(scene.mechanism)).any:
+        check_mode(scene.mechanism, modes, scene.ground.slope, start)
+    return start
 
 
 def consistent_start(scene: RedundantScene, state: PyTree) -> Consistent:

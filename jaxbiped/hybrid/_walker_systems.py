@@ -1,37 +1,31 @@
-"""Walkers as hybrid systems: with laws of contact in either coordinates, and on rigid feet."""
+"""Walkers with laws of contact as hybrid systems, in either coordinates; the system of a scene."""
 
 import functools
 from collections.abc import Callable, Collection
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
-import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
-from jaxbiped._types import Scalar, Time
+from jaxbiped._types import Scalar
 from jaxbiped.dynamics._constrained_motion import project
 from jaxbiped.dynamics._contacts import feet, foot_force
 from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
 from jaxbiped.dynamics._footfalls import landings, leg_depth, standing_leg
-from jaxbiped.dynamics._holds import on_held
-from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import force_residual, mass_matrix, vector_field
-from jaxbiped.dynamics._mode_changes import SLACK, change_mode_on_surface
 from jaxbiped.dynamics._redundant_motion import redundant_field
-from jaxbiped.dynamics._stance_motion import rolling, rolling_field
 from jaxbiped.dynamics._state import cyclic_names
-from jaxbiped.dynamics._surfaces import lead, opening
 from jaxbiped.hybrid._compliant_guards import contact_changes, gaps, switches
-from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface, rigid_ending
+from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._implicit_field import ImplicitField, with_unit_mass
-from jaxbiped.hybrid._rigid_guards import mode_switches
+from jaxbiped.hybrid._rolling_system import Rolling
 from jaxbiped.hybrid._scales import check_precision, sizes_of
 from jaxbiped.hybrid._sections import AbstractSection, check_section_body
-from jaxbiped.hybrid._start_placement import held_like, passes_a_stop, standing_like
+from jaxbiped.hybrid._start_placement import standing_like
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_starts import check_start_height, consistent_start, walking_start
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
@@ -147,45 +141,6 @@ class RedundantWalking(AbstractWalking):
 
     def projects(self, args: RedundantScene) -> bool:
         return args.method.projects
-
-
-class Rolling(AbstractSystem):
-    """The rigid walker: it rolls on one foot, and exchanges support at each heel strike."""
-
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = (0,)
-    watches: ClassVar[tuple[str, ...]] = WATCHES
-
-    def vector_field(self, t: Time, y: Any, args: RigidScene) -> Any:
-        return rolling_field(t, y, args)
-
-    def switches(self, args: RigidScene, y: Any) -> tuple[Switch, ...]:
-        return mode_switches(args, y)
-
-    def reset_at_switch(self, args: RigidScene, y: Any, which: Scalar) -> Any:
-        return change_mode_on_surface(args, y)
-
-    def lies_beyond(self, args: RigidScene, states: Any, by: float = SLACK) -> np.ndarray:
-        return passes_a_stop(args, states._asdict(), by=by)
-
-    def placed_like(self, args: RigidScene, base: Any, states: Any, named: Collection[str]) -> Any:
-        return held_like(args, base, states, named)
-
-    def on_held(self, args: RigidScene, y: Any) -> Any:
-        return on_held(args, y)
-
-    def ending(self, args: RigidScene, y: Any) -> Scalar:
-        return rigid_ending(args, y)
-
-    def reset_map(self, args: RigidScene, y: Any) -> Any:
-        return impact(args, y).state
-
-    def arrival(self, section: AbstractSection, args: RigidScene, y: Any) -> tuple[Scalar, Scalar]:
-        # The angles before the impact tell, without it.
-        return -opening(args, y), lead(args, y) > 0.0
-
-    def load(self, args: RigidScene, y: Any) -> Scalar:
-        """Normal force on the foot that rolls [N]; an impact has an impulse instead."""
-        return rolling(args, y).force.normal
 
 
 @system_of.register

@@ -27,9 +27,10 @@ from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._surfaces import clearance, clearance_rate, distance_ahead
 from jaxbiped.hybrid._guards import Switch
+from jaxbiped.hybrid._rolling_system import Rolling
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.hybrid._walker_systems import Rolling, Walking
+from jaxbiped.hybrid._walker_systems import Walking
 from jaxbiped.scene._ground import Ground, SteppedGround
 from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene, is_rigid
 from jaxbiped.scene._state_types import WalkerState

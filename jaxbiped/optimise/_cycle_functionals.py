@@ -24,9 +24,9 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import (
     ReturnMapSpec,
     orbit_solver,
-    patience_of,
     runs_by_lanes,
 )
+from jaxbiped.hybrid._scales import patience_of
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.linalg._small_matrices import solve

@@ -7,7 +7,7 @@ as wrong by chance, nothing is seen.
 """
 
 import dataclasses
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,8 +19,7 @@ from jaxbiped._checks import ArgumentError, warn
 from jaxbiped._ending import Ending
 from jaxbiped._types import is_traced
 from jaxbiped.hybrid._scales import relative_to_scene, sizes_of
-from jaxbiped.simulate._rigid_simulation import RigidSimulation
-from jaxbiped.simulate._simulation import Simulation
+from jaxbiped.simulate._abstract_simulation import AbstractSimulation
 from jaxbiped.simulate._trajectory import Trajectory
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name
 from jaxbiped.solve._error_estimate import LOOSER, Judged, check_untraced, check_wanted, refine
@@ -35,7 +34,6 @@ _LONG = 1e-2
 _MANY = 8
 """Steps from which the other ones are longer, and cost less; those of fewer are shorter."""
 _LONGER, _SHORTER = (2.0, 2.0**0.5), (1.0 / 2.0, 1.0 / 3.0)
-AnySimulation: TypeAlias = Simulation | RigidSimulation
 
 
 class Witness(NamedTuple):
@@ -61,7 +59,7 @@ def check_accurate_walk(accuracy: str | float, **replaced: object) -> float | No
     return float(accuracy)
 
 
-def accurate_walk(run: AnySimulation, wanted: float) -> Trajectory[Any]:
+def accurate_walk(run: AbstractSimulation, wanted: float) -> Trajectory[Any]:
     """The walk whose estimated relative error is at most `wanted`, or as small as can be had.
 
     Tolerances are inputs of the compiled programs: no round compiles anything anew.
@@ -168,7 +166,7 @@ def _unknown(walk: Trajectory[Any]) -> dict[str, Any]:
     return jtu.tree_map(lambda leaf: np.full(leaf.shape, np.inf), _outputs(walk))
 
 
-def warn_of_missed_contacts(run: Simulation, walk: Trajectory) -> None:
+def warn_of_missed_contacts(run: AbstractSimulation, walk: Trajectory) -> None:
     """Warns where steps of one size stepped over contacts; nothing is known while tracing."""
     missed = walk.missed_contacts
     if run.dt is None or missed is None or isinstance(missed, jax.core.Tracer) or not int(missed):
@@ -179,7 +177,7 @@ def warn_of_missed_contacts(run: Simulation, walk: Trajectory) -> None:
     )
 
 
-def warn_of_long_steps(run: AnySimulation, walk: Trajectory[Any]) -> None:
+def warn_of_long_steps(run: AbstractSimulation, walk: Trajectory[Any]) -> None:
     """Warns where other steps of one size lead elsewhere; nothing is known while tracing.
 
     Compiles nothing: steps are an input of the program.
@@ -204,7 +202,7 @@ def warn_of_long_steps(run: AnySimulation, walk: Trajectory[Any]) -> None:
     )
 
 
-def _change(run: AnySimulation, walk: Trajectory[Any], other: Trajectory[Any]) -> str:
+def _change(run: AbstractSimulation, walk: Trajectory[Any], other: Trajectory[Any]) -> str:
     """How far another solve leads elsewhere; "" for not far."""
     if int(other.ending) != int(walk.ending):
         return f"it ends as {other.outcome} instead of {walk.outcome}"

@@ -50,7 +50,7 @@ from jaxbiped.solve.controllers._wrapped_control import (
 )
 
 if TYPE_CHECKING:
-    from jaxbiped.simulate._rigid_simulation import RigidSimulation
+    from jaxbiped.simulate._abstract_simulation import AbstractSimulation
     from jaxbiped.simulate._simulation import Simulation
 
 _QUICK = 100_000
@@ -256,7 +256,7 @@ def _stepper(run: "Simulation") -> Stepper:
     return stepper
 
 
-def recorder_for(run: "Simulation | RigidSimulation") -> AbstractRecorder | None:
+def recorder_for(run: "AbstractSimulation") -> AbstractRecorder | None:
     """What saves as a request asks; None: the end alone is saved."""
     if run.section is not None:
         return ArrivalRecorder(run.section)

@@ -26,13 +26,14 @@ from jaxbiped.compiler import CUDA, host_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._stance_motion import rolling_field
 from jaxbiped.dynamics._surfaces import opening, uprightness
+from jaxbiped.hybrid._rolling_system import Rolling
 from jaxbiped.hybrid._scales import units_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.hybrid._walker_systems import Rolling, system_of
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractScene, RigidScene
 from jaxbiped.simulate._trajectory import Trajectory
-from jaxbiped.solve._rigid_steps import RigidWalk
+from jaxbiped.solve._landing_steps import Landing
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -208,7 +209,7 @@ class _Strike(NamedTuple):
 
 @host_jit()
 def rigid_slopes_of(
-    walk: RigidWalk,
+    walk: Landing,
     strikes: Scalar,
     count: Scalar,
     end: Scalar,

@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -10,53 +9,32 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import PyTree
 
-from jaxbiped._checks import (
-    ArgumentError,
-    check_choice,
-    check_positive,
-    check_room,
-    check_unbatched,
-    traced_rules,
-)
-from jaxbiped._types import Scalar, as_float, by_numpy, is_traced
+from jaxbiped._checks import ArgumentError
+from jaxbiped._types import as_float, by_numpy, is_traced
 from jaxbiped.compiler import BY_NAME, Request
-from jaxbiped.dynamics._state import check_state, without_whole_turns
 from jaxbiped.hybrid._mode_history import history_of
-from jaxbiped.hybrid._sections import AbstractSection, HeelStrike, check_section_body
-from jaxbiped.hybrid._walker_starts import (
-    check_single_scene,
-    in_one_precision,
-    in_own_precision,
-)
-from jaxbiped.scene._ground import check_pulls
-from jaxbiped.scene._modes import check_mode, rigid_modes
+from jaxbiped.hybrid._rolling_system import Rolling
+from jaxbiped.hybrid._sections import HeelStrike
+from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene
-from jaxbiped.scene._scene_checks import check_scene, where_allowed
+from jaxbiped.simulate._abstract_simulation import AbstractSimulation
 from jaxbiped.simulate._backends import recorder_for
-from jaxbiped.simulate._derivatives import Slopes, rigid_slopes_of, with_derivatives
-from jaxbiped.simulate._start import (
-    Options,
-    check_limits,
-    check_steps,
-    check_times,
-    watched_by,
-)
-from jaxbiped.simulate._trajectory import Trajectory, arrivals_among, scene_key, single_time
-from jaxbiped.solve._accuracy import ACCURACIES
+from jaxbiped.simulate._derivatives import Slopes, rigid_slopes_of
+from jaxbiped.simulate._start import Options
+from jaxbiped.simulate._trajectory import Trajectory, arrivals_among, single_time
 from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._explicit_methods import EXPLICIT_METHODS, ExplicitMethod
+from jaxbiped.solve._landing_program import LandingSolve
+from jaxbiped.solve._landing_steps import EndingWatch, Landing
 from jaxbiped.solve._recorders import (
     AbstractRecorder,
     ArrivalRecorder,
     StrikeRecorder,
     program_of,
 )
-from jaxbiped.solve._rigid_program import RigidSolve
-from jaxbiped.solve._rigid_steps import FallWatch, RigidWalk
 from jaxbiped.solve._solved import Solved
-from jaxbiped.solve._step_records import rigid_record
+from jaxbiped.solve._step_records import landing_record
 
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""
@@ -71,173 +49,96 @@ _EMBEDDED = 0.3
 tolerance bounds, which the walk's are 10 to 30 times below."""
 _LOOSEST = 1e-3
 """Loosest tolerance to begin with."""
-_PATIENCE = 50.0
-"""Time allowed for each footstep, in units of √(l/g)."""
 
 
-class RigidSimulation(eqx.Module):
-    """A prepared rigid walk. Call it for its trajectory.
+class RigidSimulation(AbstractSimulation):
+    """A checked request for a rigid walk, whose motion between impacts is smooth and never stiff.
 
     Attributes:
-        walk: the program's inputs.
-        waits: whether the duration only bounds the wait for footsteps.
         method: its steps.
-        watch: as in `simulate`.
-        times: times at which to save [s], shape (n,), or None.
-        save_steps: whether every step is saved.
-        section: where arrivals are saved, or None.
-        room: how many of these, or of the steps, to keep.
-        extremes: as in `simulate`.
-        engine: "lanes", "cuda" or "xla".
-        finest_tolerance: finest relative tolerance to which its error is refined: rolling is smooth
-            and never stiff.
+        waits: whether the duration only bounds the wait for footsteps.
     """
 
+    kinds: ClassVar[tuple[type, ...]] = (RigidScene,)
     finest_tolerance: ClassVar[float] = 1e-13
-    walk: RigidWalk
-    waits: bool = eqx.field(static=True)
     method: ExplicitMethod = eqx.field(static=True)
-    watch: tuple[str, ...] = eqx.field(static=True)
-    times: np.ndarray | None
-    save_steps: bool = eqx.field(static=True)
-    section: AbstractSection | None = eqx.field(static=True)
-    extremes: Callable[..., PyTree] | None = eqx.field(static=True)
-    room: int = eqx.field(static=True)
-    engine: str = eqx.field(static=True)
+    waits: bool = eqx.field(static=True)
 
-    @staticmethod
-    def of(scene: RigidScene, state: Any, asked: Options) -> "RigidSimulation":
-        """Checks what is asked, and forms it."""
-        asked.refuse(scene, "atol", "adjoint")
-        method = _method_of(asked)
-        section, duration, footsteps = asked.section, asked.duration, asked.footsteps
-        if isinstance(asked.save, str):
-            check_choice("save", asked.save, ("steps", "end"))
-        check_limits(duration, footsteps, asked.max_solver_steps)
-        with traced_rules() as rules:
-            scene = check_scene(scene, RigidScene)
-            state = check_state(in_own_precision(state), scene.state_type)
-            state = in_one_precision(without_whole_turns(scene, state))
-            check_single_scene(scene)
-            check_section_body(scene, section)
-            check_unbatched("state", state, "one start")
-            if (modes := rigid_modes(scene.mechanism)).any:
-                check_mode(scene.mechanism, modes, scene.ground.slope, state)
-            longest: Any = duration
-            if duration is None:
-                check_pulls(scene.ground)
-                longest = by_numpy(
-                    lambda numpy, l, g: footsteps * (_PATIENCE * numpy.sqrt(l / g)),
-                    scene.mechanism.height,
-                    scene.ground.g,
-                )
-            else:
-                check_positive("duration", duration, "s")
-            usual = ACCURACIES[asked.accuracy].rigid_walk
-            tolerance = usual if asked.rtol is None else asked.rtol
-            check_positive("rtol", tolerance)
-            check_steps(None, asked.dt, most_steps=asked.max_solver_steps, duration=longest)
-        # Of a lane that is not allowed nothing is known from the start.
-        state, longest = where_allowed(rules, state), where_allowed(rules, longest, 1.0)
-        watched_by(scene, asked.watch)
-        check_room("max_arrivals", asked.max_arrivals)
-        dtype = state[0].dtype
-        narrow = "it computes in 64 bits" if dtype != jnp.float64 else None
+    @classmethod
+    def method_of(cls, asked: Options) -> ExplicitMethod:
+        """By default the explicit method of order eight."""
+        solver = asked.solver
+        if isinstance(solver, str) and solver == Options._field_defaults["solver"]:
+            return ExplicitMethod()
+        names = {kind: name for name, kind in EXPLICIT_METHODS.items()}
+        name = solver if isinstance(solver, str) else names.get(type(solver))
+        if name not in EXPLICIT_METHODS:
+            raise ArgumentError(
+                f"solver = {solver!r} is not allowed for a RigidScene, whose motion between "
+                "impacts is smooth and never stiff: choose one of "
+                f"{', '.join(EXPLICIT_METHODS)}."
+            )
+        method = ExplicitMethod(name)
+        if asked.dt is None and not method.estimates:
+            raise ArgumentError(
+                f"dt = None is not allowed for solver = {name}, whose steps have a fixed size: "
+                "give it in seconds."
+            )
+        return method
+
+    @classmethod
+    def completed(
+        cls, fields: dict[str, Any], scene: Any, asked: Options, method: Any
+    ) -> "RigidSimulation":
+        """The engine must be able to save what is asked."""
+        narrow = fields["rtol"].dtype != jnp.float64
+        obstacle = "it computes in 64 bits" if narrow else None
+        engine = engine_for(asked.engine, obstacle=obstacle, by_device=True, by_any=True)
+        obstacle = None
+        if asked.section is not None and jtu.tree_leaves(asked.section):
+            obstacle = f"the section {type(asked.section).__name__} holds numbers of its own"
         if asked.times is not None:
-            check_times(asked.times, longest)
+            if is_traced(asked.times):
+                obstacle = "the times to save at must be known beforehand"
+            else:  # in 64 bits whatever the start is
+                fields |= dict(times=np.asarray(asked.times, dtype=float))
+        if obstacle is not None:
+            raise ArgumentError(f"save = {asked.save!r} is not allowed here: {obstacle}.")
+        return cls(**fields, method=method, engine=engine, waits=asked.duration is None)
 
-        def cast(leaf: Any) -> Scalar:
-            return as_float(leaf).astype(dtype)
-
-        # In the precision of the start, as a compliant walk has it. A scene that is formed anew
-        # makes its mechanism anew.
-        scene = scene if narrow is None else jtu.tree_map(cast, scene)
-        engine = _engine_for(asked, narrow)
-        return RigidSimulation(
-            RigidWalk(
-                scene=scene,
-                state=state,
-                duration=cast(longest),
-                footsteps=cast(footsteps or 0),
-                rtol=cast(tolerance),
-                max_attempts=cast(asked.max_solver_steps),
-                dt=None if asked.dt is None else cast(asked.dt),
-            ),
-            waits=duration is None,
-            method=method,
-            watch=tuple(asked.watch),
-            times=None if asked.times is None else np.asarray(asked.times, dtype=float),
-            save_steps=asked.save_steps,
-            section=section,
-            extremes=asked.extremes,
-            room=asked.room,
-            engine=engine,
+    @property
+    def inputs(self) -> Landing:
+        """The program's inputs."""
+        footsteps, most = (
+            as_float(count).astype(self.rtol.dtype)
+            for count in (self.footsteps or 0, self.max_solver_steps)
         )
+        limits = (self.duration, footsteps, self.rtol, most)
+        return Landing(self.scene, self.state, *limits, dt=self.dt)
 
     @property
-    def scene(self) -> RigidScene:
-        """What walks."""
-        return self.walk.scene
-
-    @property
-    def rtol(self) -> Scalar:
-        """Relative tolerance."""
-        return self.walk.rtol
-
-    @property
-    def duration(self) -> Scalar:
-        """Longest simulated time [s]."""
-        return self.walk.duration
-
-    @property
-    def dt(self) -> Scalar | None:
-        """Size of all steps [s], or None."""
-        return self.walk.dt
-
-    @property
-    def max_solver_steps(self) -> int:
-        """As in `simulate`, where it is known."""
-        return int(self.walk.max_attempts)
-
-    def with_steps(self, dt: Scalar) -> "RigidSimulation":
-        """The same with steps of another fixed size [s]."""
-        return dataclasses.replace(self, walk=self.walk._replace(dt=dt))
-
-    def at_tolerance(self, rtol: float) -> "RigidSimulation":
-        """The same at another relative tolerance."""
-        changed = as_float(rtol).astype(self.rtol.dtype)
-        return dataclasses.replace(self, walk=self.walk._replace(rtol=changed))
+    def room(self) -> int:
+        """How many steps or arrivals to keep."""
+        if self.save_steps:
+            return self.max_solver_steps
+        return 0 if self.section is None else self.max_arrivals
 
     def saving_strikes(self, room: int) -> "RigidSimulation":
         """The same, of which so many heel strikes are saved and nothing else."""
         section = HeelStrike() if room else None
-        return dataclasses.replace(
-            self,
-            times=None,
-            save_steps=False,
-            section=section,
-            extremes=None,
-            room=room,
-        )
+        saved: dict[str, Any] = dict(times=None, save_steps=False, extremes=None)
+        return dataclasses.replace(self, section=section, max_arrivals=room, **saved)
 
     def by_other_method(self) -> tuple["RigidSimulation", float, float]:
-        """The same by another method; its tolerance in units of the walk's, and its weight."""
         if self.method == ExplicitMethod():
             return dataclasses.replace(self, method=ExplicitMethod(embedded=True)), _EMBEDDED, 1.0
         return dataclasses.replace(self, method=ExplicitMethod()), 1.0, 1.0
 
     def first_tolerance(self, wanted: float) -> float:
-        """The relative tolerance to begin with where this relative error is wanted."""
         return min(_FIRST * wanted, _LOOSEST)
 
-    def __call__(self) -> Trajectory[Any]:
-        """Solves it, differentiably."""
-        walk = with_derivatives(self, RigidSimulation.solved, moving=_moving, slopes=_slopes)
-        return dataclasses.replace(walk, scene_key=scene_key(self.walk.scene))
-
     def solved(self) -> Trajectory[Any]:
-        """Solves it."""
-        scene, state = self.scene, self.walk.state
+        scene, state = self.scene, self.state
         moded = rigid_modes(scene.mechanism).any
         recorder = self._recorder(moded)
         strikes = isinstance(recorder, StrikeRecorder)
@@ -247,7 +148,7 @@ class RigidSimulation(eqx.Module):
         (t, told), dense = single_time(solved.t, solved.state), None
         arrivals, changes = arrivals_among(self._no_rows, solved.footsteps, state), (rows, total)
         if self.save_steps:
-            record = rigid_record(scene, state, rows, total)
+            record = landing_record(Rolling(), scene, state, rows, total)
             t, told, dense, changes = record.t, record.state, record.dense, record.resets
             arrivals = arrivals_among(record.strikes, solved.footsteps, state)
         elif self.times is not None:
@@ -274,9 +175,54 @@ class RigidSimulation(eqx.Module):
             **solved.outcome,
         )
 
+    def slopes(
+        self, found: Trajectory[Any], places: tuple[int, ...], active: tuple[int, ...]
+    ) -> Slopes:
+        assert found.arrivals is not None
+        strikes_saved = self.times is None and (
+            self.section is None or isinstance(self.section, HeelStrike)
+        )
+        count, kept, strikes = found.arrivals.total, self.room, found.arrivals.t
+        if not strikes_saved:
+            plain: RigidSimulation = jax.lax.stop_gradient(self.saving_strikes(0))
+            again = plain.solved().arrivals
+            assert again is not None
+            count, kept, strikes = again.total, 0, again.t
+        traced = isinstance(count, jax.core.Tracer)
+        room = int((self.footsteps or 0) if traced else count) or _ROOM
+        if room > kept:
+            walk: RigidSimulation = jax.lax.stop_gradient(self.saving_strikes(room))
+            again = walk.solved().arrivals
+            assert again is not None
+            strikes = again.t
+        moments = None
+        if not strikes_saved:
+            moments = found.t if self.section is None else found.arrivals.t
+        end = found.t[-1], found.ending
+        section = None if strikes_saved else self.section
+        if self.times is not None:
+            end = self.duration, found.ending
+        slopes = rigid_slopes_of(
+            self.inputs,
+            strikes,
+            count,
+            *end,
+            moments,
+            section=section,
+            places=places,
+            active=active,
+        )
+        # Another solve may tell what this one cannot: it then differentiates another walk.
+        grazes = jnp.asarray(found.grazes)
+        slopes = jtu.tree_map(lambda leaf: jnp.where(grazes > 0, jnp.nan, leaf), slopes)
+        if not strikes_saved or len(strikes) == kept:
+            return slopes
+        # Of the strikes only those that are kept, then the end.
+        return Slopes(*(jnp.concatenate([leaf[:kept], leaf[-1:]]) for leaf in slopes))
+
     @property
     def _no_rows(self) -> np.ndarray:
-        return np.zeros((0, 1 + len(self.walk.state)), self.rtol.dtype)
+        return np.zeros((0, 1 + len(self.state)), self.rtol.dtype)
 
     def _recorder(self, moded: bool) -> AbstractRecorder | None:
         at_strikes = isinstance(self.section, HeelStrike)
@@ -287,23 +233,24 @@ class RigidSimulation(eqx.Module):
 
     def _run(self, recorder: AbstractRecorder | None, room: int) -> tuple[Solved, Any, Any]:
         """What is solved, the rows that are recorded, and how many there were."""
-        falls = FallWatch.LOCATED if "fall" in self.watch else FallWatch.IGNORED
-        steps = RigidSolve(
+        endings = EndingWatch.LOCATED if "fall" in self.watch else EndingWatch.IGNORED
+        steps = LandingSolve(
+            system=Rolling(),
             recorder=recorder,
             extremes=self.extremes,
             waits=self.waits,
             method=self.method,
-            falls=falls,
+            endings=endings,
         )
-        scheduled = recorder is not None and recorder.scheduled
+        inputs, scheduled = self.inputs, recorder is not None and recorder.scheduled
         request = Request(
             program_of(steps),
-            self.walk,
+            inputs,
             room=0 if scheduled else room,
             times=self.times if scheduled else None,
             quick=True,
         )
-        if self.save_steps and not is_traced(self.walk):
+        if self.save_steps and not is_traced(inputs):
             request = request._replace(room=min(room, _STEPS))
         solved, recorded, _ = BY_NAME[self.engine].run(request)
         if recorded is None:
@@ -318,95 +265,7 @@ class RigidSimulation(eqx.Module):
         return solved, recorded.values, total
 
 
-def _method_of(asked: Options) -> ExplicitMethod:
-    """The explicit method that is asked for; by default the one of order eight.
-
-    Raises:
-        ArgumentError: another solver, or steps under error control by a method without an estimate.
-    """
-    solver = asked.solver
-    if isinstance(solver, str) and solver == Options._field_defaults["solver"]:
-        return ExplicitMethod()
-    names = {kind: name for name, kind in EXPLICIT_METHODS.items()}
-    name = solver if isinstance(solver, str) else names.get(type(solver))
-    if name not in EXPLICIT_METHODS:
-        raise ArgumentError(
-            f"solver = {solver!r} is not allowed for a RigidScene, whose motion between impacts is "
-            f"smooth and never stiff: choose one of {', '.join(EXPLICIT_METHODS)}."
-        )
-    method = ExplicitMethod(name)
-    if asked.dt is None and not method.estimates:
-        raise ArgumentError(
-            f"dt = None is not allowed for solver = {name}, whose steps have a fixed size: "
-            "give it in seconds."
-        )
-    return method
-
-
-def _engine_for(asked: Options, narrow: str | None) -> str:
-    """The engine, which must be able to save what is asked.
-
-    Raises:
-        ArgumentError: times that are not known beforehand, or a section that holds numbers.
-    """
-    engine = engine_for(asked.engine, obstacle=narrow, by_device=True, by_any=True)
-    obstacle = None
-    if asked.section is not None and jtu.tree_leaves(asked.section):
-        obstacle = f"the section {type(asked.section).__name__} holds numbers of its own"
-    if asked.times is not None and is_traced(asked.times):
-        obstacle = "the times to save at must be known beforehand"
-    if obstacle is not None:
-        raise ArgumentError(f"save = {asked.save!r} is not allowed here: {obstacle}.")
-    return engine
-
-
 def _first_strikes(numpy: Any, rows: Any, count: int) -> Any:
     """So many rows, those of heel strikes first, in their order and without the flag."""
     order = numpy.argsort(rows[:, 1] == 0.0, stable=True)[:count]
     return numpy.concatenate([rows[:, :1], rows[:, 2:]], axis=1)[order]
-
-
-def _moving(run: RigidSimulation) -> tuple[PyTree, PyTree, PyTree]:
-    return run.walk.state, run.walk.scene, run.walk.duration
-
-
-def _slopes(
-    run: RigidSimulation,
-    found: Trajectory[Any],
-    places: tuple[int, ...],
-    active: tuple[int, ...],
-) -> Slopes:
-    assert found.arrivals is not None
-    strikes_saved = run.times is None and (
-        run.section is None or isinstance(run.section, HeelStrike)
-    )
-    count, kept, strikes = found.arrivals.total, run.room, found.arrivals.t
-    if not strikes_saved:
-        plain: RigidSimulation = jax.lax.stop_gradient(run.saving_strikes(0))
-        again = plain.solved().arrivals
-        assert again is not None
-        count, kept, strikes = again.total, 0, again.t
-    known = [each for each in (count, run.walk.footsteps) if not isinstance(each, jax.core.Tracer)]
-    room = int(known[0]) if known and int(known[0]) else _ROOM
-    if room > kept:
-        walk: RigidSimulation = jax.lax.stop_gradient(run.saving_strikes(room))
-        again = walk.solved().arrivals
-        assert again is not None
-        strikes = again.t
-    moments = None
-    if not strikes_saved:
-        moments = found.t if run.section is None else found.arrivals.t
-    end = found.t[-1], found.ending
-    section = None if strikes_saved else run.section
-    if run.times is not None:
-        end = run.walk.duration, found.ending
-    slopes = rigid_slopes_of(
-        run.walk, strikes, count, *end, moments, section=section, places=places, active=active
-    )
-    # Another solve may tell what this one cannot: it then differentiates another walk.
-    grazes = jnp.asarray(found.grazes)
-    slopes = jtu.tree_map(lambda leaf: jnp.where(grazes > 0, jnp.nan, leaf), slopes)
-    if not strikes_saved or len(strikes) == kept:
-        return slopes
-    # Of the strikes only those that are kept, then the end.
-    return Slopes(*(jnp.concatenate([leaf[:kept], leaf[-1:]]) for leaf in slopes))

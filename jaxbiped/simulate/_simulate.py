@@ -17,11 +17,12 @@ from jaxbiped._checks import (
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Parameter
 from jaxbiped.hybrid._endings import WATCHES
-from jaxbiped.hybrid._scales import unresolved_slip
+from jaxbiped.hybrid._scales import is_smooth, unresolved_slip
 from jaxbiped.hybrid._sections import AbstractSection, HeelStrike
 from jaxbiped.scene._linkage_scene import LinkageScene, LinkageState
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import RigidState
+from jaxbiped.simulate._abstract_simulation import AbstractSimulation
 from jaxbiped.simulate._accurate_walk import (
     accurate_walk,
     check_accurate_walk,
@@ -133,7 +134,7 @@ def simulate(
         check_function("extremes", extremes)
     if adjoint is not None:
         check_type("adjoint", adjoint, diffrax.AbstractAdjoint)
-    usual = "end" if isinstance(scene, RigidScene) else "steps"
+    usual = "end" if is_smooth(scene) else "steps"
     asked = Options(
         duration=last_time(save) if duration is None and footsteps is None else duration,
         footsteps=footsteps,
@@ -153,14 +154,8 @@ def simulate(
     wanted = check_accurate_walk(accuracy, rtol=rtol, atol=atol, dt=dt)
     if wanted is not None:
         asked = asked._replace(accuracy="balanced")
-    if isinstance(scene, RigidScene):
-        rolls = RigidSimulation.of(scene, state, asked)
-        if wanted is not None:
-            return accurate_walk(rolls, wanted)
-        rolled = rolls()
-        warn_of_long_steps(rolls, rolled)
-        return rolled
-    run = Simulation.of(scene, state, asked)
+    kind: type[AbstractSimulation] = RigidSimulation if is_smooth(scene) else Simulation
+    run = kind.of(scene, state, asked)
     if wanted is not None:
         return accurate_walk(run, wanted)
     if rtol is not None and dt is None and (said := unresolved_slip(rtol, scene.minimal)):

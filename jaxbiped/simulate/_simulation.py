@@ -1,4 +1,4 @@
-"""Checked request to simulate, which can be compiled and run at other tolerances."""
+"""Checked request to simulate by solvers of stiff motion, which can be compiled."""
 
 import dataclasses
 from collections.abc import Callable
@@ -10,24 +10,15 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array, ArrayLike, PyTree
+from jaxtyping import ArrayLike, PyTree
 
-from jaxbiped._checks import (
-    check_choice,
-    check_positive,
-    check_room,
-    check_unbatched,
-    traced_rules,
-    warn,
-)
-from jaxbiped._types import Numbers, Scalar, as_array, is_traced
+from jaxbiped._types import Numbers
 from jaxbiped.compiler import BY_NAME, Request
 from jaxbiped.hybrid._linkage_system import ADAPTIVE_SCENES
 from jaxbiped.hybrid._scales import Units, resolve_slip_speed, si_units, units_of
-from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractScene
-from jaxbiped.scene._scene_checks import check_scene, where_allowed
+from jaxbiped.simulate._abstract_simulation import AbstractSimulation
 from jaxbiped.simulate._backends import (
     by_lanes,
     by_xla,
@@ -36,19 +27,11 @@ from jaxbiped.simulate._backends import (
     prepare_lanes,
     trim,
 )
-from jaxbiped.simulate._derivatives import Slopes, slopes_of, with_derivatives
-from jaxbiped.simulate._start import (
-    Options,
-    check_limits,
-    check_steps,
-    check_times,
-    watched_by,
-)
+from jaxbiped.simulate._derivatives import Slopes, slopes_of
+from jaxbiped.simulate._start import Options
 from jaxbiped.simulate._trajectory import Trajectory, scene_key
-from jaxbiped.solve._accuracy import tolerances
 from jaxbiped.solve._error_estimate import LOOSER
-from jaxbiped.solve._solvers import check_adjoint, solver_named
-from jaxbiped.solve.controllers._event_steps import PATIENCE
+from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rodas_tableaux import Rodas4P, Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
@@ -62,159 +45,82 @@ _AS_FINE = 2.0
 
 Weight and share were chosen on 1000 random scenes (draw 23 of `experiments/accuracy_coverage.py`):
 without them every number lay within its bar in 95.1 % of the scenes, with them in 99.1 %."""
-_OF_STEPS = (
-    "adjoint = … differentiates the steps that were taken, which were chosen for the state alone: "
-    "through contact such derivatives may be wrong in every digit. Without it they are right."
-)
 
 
-class Simulation(eqx.Module):
+class Simulation(AbstractSimulation):
     """A checked request for a simulation: `prepare` makes it, `compile` compiles it.
 
     Attributes:
-        scene, state, duration, rtol, atol, dt, solver, adjoint: as in `simulate`, checked and
-            converted to one precision.
-        footsteps, watch, max_solver_steps, section, max_arrivals, extremes: as in `simulate`.
-        correction: how a start was moved onto its constraints, or None.
-        times: times at which to save [s], shape (n,), or None.
-        save_steps: whether every step is saved.
         units: scale of each leaf of the state, in which `atol` is measured.
-        finest_tolerance: finest relative tolerance that is tried to meet a requested error.
-        engine: "xla", "lanes" or "cuda".
+        solver: as in `simulate`.
         replaceable: whether XLA may replace the lanes engine.
     """
 
+    kinds: ClassVar[tuple[type, ...]] = ADAPTIVE_SCENES
     finest_tolerance: ClassVar[float] = 1e-12
-    scene: AbstractScene
-    state: PyTree
-    correction: PyTree
-    duration: Scalar
-    times: Array | None
-    rtol: Scalar
-    atol: Scalar
     units: Units
-    dt: Scalar | None
     solver: diffrax.AbstractSolver[PyTree]
-    adjoint: diffrax.AbstractAdjoint | None
-    footsteps: int | None = eqx.field(static=True)
-    save_steps: bool = eqx.field(static=True)
-    watch: tuple[str, ...] = eqx.field(static=True)
-    max_solver_steps: int = eqx.field(static=True)
-    engine: str = eqx.field(static=True)
     replaceable: bool = eqx.field(static=True)
-    section: AbstractSection | None = eqx.field(static=True)
-    max_arrivals: int = eqx.field(static=True)
-    extremes: Callable[..., PyTree] | None = eqx.field(static=True)
 
     @staticmethod
     def prepare(scene: AbstractScene, state: PyTree, **options: Any) -> "Simulation":
         """Checks the arguments, which are those of `simulate`; an accuracy must be a name."""
         return Simulation.of(scene, state, Options(**options))
 
-    @staticmethod
-    def of(scene: AbstractScene, state: PyTree, asked: Options) -> "Simulation":
-        """Checks what is asked, and forms it."""
-        given, dt, footsteps, times = state, asked.dt, asked.footsteps, asked.times
-        section = asked.section
-        check_limits(asked.duration, footsteps, asked.max_solver_steps)
-        time = PATIENCE * (footsteps or 0) if asked.duration is None else asked.duration
-        for name, value in (("rtol", asked.rtol), ("atol", asked.atol)):
-            check_unbatched(name, value)
-        with traced_rules() as rules:
-            scene = check_scene(scene, *ADAPTIVE_SCENES)
-            system = system_of(scene)
-            asked.refuse(scene, *system.refuses)
-            if section is not None:
-                system.check_section(scene, section)
-            if not scene.redundant:
-                state, correction = system.start(scene, state)
-            check_positive("duration", time, "s")
-            relative, absolute = tolerances(asked.accuracy, asked.rtol, asked.atol, scene)
-            method = solver_named(asked.solver)
-            check_steps(method, dt, most_steps=asked.max_solver_steps, duration=time)
-        if scene.redundant:  # outside: what it compiles makes parts of its own, none of them given
-            state, correction = system.start(scene, state)
-        # Of a lane that is not allowed nothing is known from the start.
-        state, time = where_allowed(rules, state), where_allowed(rules, time, 1.0)
-        watch = watched_by(scene, asked.watch)
-        if asked.save is None or isinstance(asked.save, str):
-            check_choice("save", asked.save, ("steps", "end"))
-        check_room("max_arrivals", asked.max_arrivals)
-        if times is not None:
-            check_times(times, time)
-        dtype = jnp.result_type(jtu.tree_leaves(state)[0])
-        system.check_start(scene, state, given)
-        if system.projects(scene):
-            check_adjoint(scene.method, asked.adjoint)
+    @classmethod
+    def method_of(cls, asked: Options) -> diffrax.AbstractSolver[PyTree]:
+        return solver_named(asked.solver)
 
-        def cast(leaf: ArrayLike) -> Array:
-            if isinstance(leaf, jax.Array):
-                return jnp.asarray(leaf, dtype=dtype)
-            return as_array(np.array(leaf, dtype))
+    @classmethod
+    def completed(
+        cls, fields: dict[str, Any], scene: Any, asked: Options, method: Any
+    ) -> "Simulation":
+        state = fields["state"]
+        dtype = jnp.result_type(jtu.tree_leaves(state)[0])
 
         def known(leaf: ArrayLike) -> Numbers:
             # As it is where nothing is traced: each array of JAX's costs 0.1 ms.
-            return cast(leaf) if isinstance(leaf, jax.core.Tracer) else np.asarray(leaf, dtype)
+            traced = isinstance(leaf, jax.core.Tracer)
+            return jnp.asarray(leaf, dtype=dtype) if traced else np.asarray(leaf, dtype)
 
         # A tolerance that is given is one in SI units.
         units = units_of(scene, state)
         units = units if asked.atol is None else si_units(units)
-        scene = scene if dtype == jnp.float64 else jtu.tree_map(cast, scene)
-        longest = cast(time)
-        chosen = choose_engine(asked, method, (scene, state, longest))
-        return Simulation(
-            scene=scene,
-            state=state,
-            correction=correction,
-            duration=longest,
-            times=None if times is None else cast(times),
-            rtol=cast(relative),
-            atol=cast(absolute),
+        return cls(
+            **fields,
             units=jtu.tree_map(known, units),
-            dt=None if dt is None else cast(dt),
             solver=method,
-            adjoint=asked.adjoint,
-            footsteps=None if footsteps is None else int(footsteps),
-            save_steps=asked.save_steps,
-            watch=watch,
-            max_solver_steps=int(asked.max_solver_steps),
-            engine=chosen,
-            replaceable=asked.engine == "auto" and section is None,
-            section=section,
-            max_arrivals=int(asked.max_arrivals),
-            extremes=asked.extremes,
+            engine=choose_engine(asked, method, (fields["scene"], state, fields["duration"])),
+            replaceable=asked.engine == "auto" and asked.section is None,
         )
 
-    def __call__(self) -> Trajectory:
-        """Compiles what is not compiled yet, and runs."""
-        if self.adjoint is not None:
-            if is_traced(self):
-                warn(_OF_STEPS)
-            walk = _run(self)
-        else:
-            walk = with_derivatives(self, _run, moving=_moving, slopes=_slopes)
-        violation = system_of(self.scene).violation(self.scene, walk.state)
-        return dataclasses.replace(walk, scene_key=scene_key(self.scene), violation=violation)
+    def solved(self) -> Trajectory:
+        request = self.lane_request()
+        return trim(by_xla(self)) if request is None else by_lanes(self, request)
 
-    def at_tolerance(self, rtol: float) -> "Simulation":
-        """The same at another relative tolerance; the absolute one changes in proportion."""
-        share = float(self.atol) / float(self.rtol)
-        both = (jnp.asarray(np.asarray(x, self.rtol.dtype)) for x in (rtol, share * rtol))
-        return eqx.tree_at(lambda run: (run.rtol, run.atol), self, tuple(both))
-
-    def with_steps(self, dt: Scalar) -> "Simulation":
-        """The same with steps of another fixed size [s]."""
-        return dataclasses.replace(self, dt=dt)
+    def slopes(self, found: Trajectory, places: tuple[int, ...], active: tuple[int, ...]) -> Slopes:
+        # The columns take the walk's own method of steps, where that is one for them.
+        solver = self.solver if isinstance(self.solver, AbstractRosenbrock) else Rodas4P()
+        return slopes_of(
+            self.scene,
+            self.state,
+            found,
+            until=self.duration if self.times is None else None,
+            solver=solver,
+            section=self.section,
+            rtol=self.rtol,
+            places=places,
+            active=active,
+            device=self.engine == "cuda",
+        )
 
     def by_other_method(self) -> tuple["Simulation", float, float]:
-        """The same by another method; its tolerance in units of the walk's, and its weight."""
         if isinstance(self.solver, Rodas5P):
             # Rodas4P takes about as many steps as Rodas5P at a ten times looser tolerance.
             return dataclasses.replace(self, solver=solver_named("rodas4p")), LOOSER, 1.0
         return dataclasses.replace(self, solver=solver_named("rodas5p")), 1.0, _AS_FINE
 
     def first_tolerance(self, wanted: float) -> float:
-        """The relative tolerance to begin with where this relative error is wanted."""
         # What cannot be met is told with the error that can: not at once by the finest steps.
         # Coarser than what resolves slip both witnesses may chatter alike.
         resolved = float(resolve_slip_speed(1.0, self.scene.minimal))
@@ -233,34 +139,6 @@ class Simulation(eqx.Module):
         if (request := self.lane_request()) is not None:
             return CompiledSimulation(prepare_lanes(self, request), self)
         return CompiledSimulation(by_xla.lower(self).compile(), self)
-
-
-def _run(run: Simulation) -> Trajectory:
-    request = run.lane_request()
-    return trim(by_xla(run)) if request is None else by_lanes(run, request)
-
-
-def _moving(run: Simulation) -> tuple[PyTree, PyTree, PyTree]:
-    return run.state, run.scene, run.duration if run.times is None else run.times
-
-
-def _slopes(
-    run: Simulation, found: Trajectory, places: tuple[int, ...], active: tuple[int, ...]
-) -> Slopes:
-    # The columns take the walk's own method of steps, where that is one for them.
-    solver = run.solver if isinstance(run.solver, AbstractRosenbrock) else Rodas4P()
-    return slopes_of(
-        run.scene,
-        run.state,
-        found,
-        until=run.duration if run.times is None else None,
-        solver=solver,
-        section=run.section,
-        rtol=run.rtol,
-        places=places,
-        active=active,
-        device=run.engine == "cuda",
-    )
 
 
 class CompiledSimulation:

@@ -17,10 +17,12 @@ from jaxbiped._checks import (
     check_unbatched,
     holds_somewhere,
 )
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.hybrid._endings import WATCHES
+from jaxbiped.hybrid._scales import is_smooth, patience_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.solve.controllers._event_steps import PATIENCE
 
 
 class Options(NamedTuple):
@@ -52,13 +54,6 @@ class Options(NamedTuple):
         return self.save if isinstance(self.save, AbstractSection) else None
 
     @property
-    def room(self) -> int:
-        """How many steps or arrivals to keep."""
-        if self.save_steps:
-            return int(self.max_solver_steps)
-        return 0 if self.section is None else int(self.max_arrivals)
-
-    @property
     def times(self) -> Any:
         """The times to save at, as they are given."""
         return None if isinstance(self.save, str | AbstractSection) else self.save
@@ -84,6 +79,21 @@ def check_limits(
         check_count("footsteps", footsteps)
     check_unbatched("duration", duration)
     check_count("max_solver_steps", max_solver_steps)
+
+
+def longest_time(scene: Any, asked: Options) -> Scalar | float:
+    """The duration that is asked for, or the time that bounds the wait for footsteps [s].
+
+    Raises:
+        ArgumentError: a duration that is not positive, or ground on which no rigid foot comes down.
+    """
+    if asked.duration is not None:
+        check_positive("duration", asked.duration, "s")
+        return asked.duration
+    if not is_smooth(scene):
+        return PATIENCE * (asked.footsteps or 0)
+    time: Scalar = by_numpy(lambda _, wait: asked.footsteps * wait, patience_of(scene))
+    return time
 
 
 def watched_by(scene: Any, watch: Any) -> tuple[str, ...]:

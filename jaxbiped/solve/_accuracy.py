@@ -73,7 +73,9 @@ def tolerances(
         ArgumentError: an unknown name, or a tolerance that is not above zero.
     """
     check_choice("accuracy", accuracy, ACCURACIES)
-    relative = resolve_slip_speed(ACCURACIES[accuracy].walk, scene) if rtol is None else rtol
+    named = ACCURACIES[accuracy]
+    usual = named.rigid_walk if is_smooth(scene) else resolve_slip_speed(named.walk, scene)
+    relative = usual if rtol is None else rtol
     check_positive("rtol", relative)
     absolute = 1e-2 * relative if atol is None else atol
     check_positive("atol", absolute)

@@ -13,7 +13,7 @@ class Solved(NamedTuple):
     Attributes:
         t, state: the last time [s], and the state then.
         ending: code of the `Ending`.
-        footsteps: how many there were; see `RigidProgress`, as of `grazes` and `pulls`.
+        footsteps: how many there were; see `LandingProgress`, as of `grazes` and `pulls`.
         accepted, rejected: attempted steps, by what became of them.
         begin: the first mode.
         lowest, highest: extremes of what was asked for.

@@ -10,42 +10,44 @@ import numpy as np
 from jaxtyping import Array, PyTree
 
 from jaxbiped._types import Numbers, Scalar, by_numpy, is_traced
+from jaxbiped.hybrid._landing_system import AbstractLandingSystem
+from jaxbiped.solve._explicit_step import state_after
 from jaxbiped.solve._recorders import NO_RESET, STRIKE
-from jaxbiped.solve._rolling_step import root_place, shifted, state_after
 from jaxbiped.solve._stepper import Stepper
 
 
-class RollingStep(diffrax.AbstractLocalInterpolation):
+class LandingStep(diffrax.AbstractLocalInterpolation):
     """States within a step, each by a step of its own: as accurate as the step's end.
 
     Attributes:
         t0, t1: its ends [s].
-        scene: what walks.
+        system, scene: what moves.
         y0: the state where it began.
-        accelerations: of the angles there [rad/s²].
+        accelerations: of the positions there.
     """
 
     t0: Scalar  # type: ignore[misc]
     t1: Scalar  # type: ignore[misc]
+    system: AbstractLandingSystem
     scene: PyTree
     y0: Any
     accelerations: tuple[Scalar, ...]
 
     def evaluate(self, t0: Any, t1: Any = None, left: bool = True) -> Any:
         del t1, left
-        start = shifted(self.y0, -root_place(self.scene, self.y0))
-        return state_after(self.scene, start, self.accelerations, jnp.asarray(t0 - self.t0))
+        start = self.system.carried(self.scene, self.y0), self.accelerations
+        return state_after(self.system, self.scene, *start, jnp.asarray(t0 - self.t0))
 
 
-class RigidRecord(NamedTuple):
-    """The saved steps of a rigid walk, infinite beyond the last.
+class LandingRecord(NamedTuple):
+    """The saved steps of a landing solve, infinite beyond the last.
 
     Attributes:
         t: their ends [s], shape (n + 1,), those in a reset twice.
         state: the states there, the one before a reset first.
         dense: the continuous solution.
-        strikes: a time and the state behind it of each heel strike, shape (r, 1 + numbers).
-        resets: the same of each heel strike and each change of mode, and how many there were.
+        strikes: a time and the state behind it of each arrival, shape (r, 1 + numbers).
+        resets: the same of each arrival and each change of mode, and how many there were.
     """
 
     t: Array
@@ -55,7 +57,9 @@ class RigidRecord(NamedTuple):
     resets: tuple[Numbers, Scalar]
 
 
-def rigid_record(scene: PyTree, start: Any, rows: Numbers, total: Scalar) -> RigidRecord:
+def landing_record(
+    system: AbstractLandingSystem, scene: PyTree, start: Any, rows: Numbers, total: Scalar
+) -> LandingRecord:
     """The steps that a `StepRecorder` saved as rows, `total` in all, from a start."""
     size, kind = len(start), type(start)
 
@@ -97,17 +101,18 @@ def rigid_record(scene: PyTree, start: Any, rows: Numbers, total: Scalar) -> Rig
         ts=ends,
         ts_size=1 + count.astype(np.int32),  # diffrax's own width
         infos=dict(
+            system=system,
             scene=jtu.tree_map(lambda leaf: _repeated(leaf, len(insides[0])), scene),
             y0=kind(*insides[:size]),
             accelerations=tuple(insides[size:]),
         ),
-        interpolation_cls=RollingStep,
+        interpolation_cls=LandingStep,
         direction=1,
         t0_if_trivial=0.0,
         y0_if_trivial=start,
     )
     state = kind(*(leaf[:-1] for leaf in states))
-    return RigidRecord(ends[:-1], state, dense, strikes, (resets, passed))
+    return LandingRecord(ends[:-1], state, dense, strikes, (resets, passed))
 
 
 def _repeated(leaf: Numbers, times: int) -> Array:

@@ -12,16 +12,16 @@ from jaxtyping import PyTree
 
 from jaxbiped.compiler import BY_NAME, DEVICES, Request
 from jaxbiped.dynamics._state import recurring_names
-from jaxbiped.gait._return_map_spec import patience_of
-from jaxbiped.hybrid._scales import is_smooth
+from jaxbiped.hybrid._landing_system import AbstractLandingSystem
+from jaxbiped.hybrid._scales import patience_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._adaptive_program import AdaptiveSolve
 from jaxbiped.solve._explicit_methods import ExplicitMethod
+from jaxbiped.solve._landing_program import LandingSolve
+from jaxbiped.solve._landing_steps import EndingWatch
 from jaxbiped.solve._recorders import program_of
-from jaxbiped.solve._rigid_program import RigidSolve
-from jaxbiped.solve._rigid_steps import FallWatch
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import Goals
 from jaxbiped.sweep._label_recorders import (
@@ -137,14 +137,15 @@ def follow_starts(
 
 def _steps(
     scene: AbstractScene, effort: Effort, cycles: tuple[int, ...]
-) -> RigidSolve | AdaptiveSolve:
+) -> LandingSolve | AdaptiveSolve:
     """The functions of the program that labels starts. Labels by a number may doubt what grazes."""
     system, section, grazes = system_of(scene), effort.section, effort.wanted is not None
-    if is_smooth(scene):
-        return RigidSolve(
+    if isinstance(system, AbstractLandingSystem):
+        return LandingSolve(
+            system=system,
             recorder=StrikeLabelRecorder(section, cycles, grazes),
             method=ExplicitMethod(embedded=effort.embedded),
-            falls=FallWatch.TOLD,
+            endings=EndingWatch.INTERPOLATED,
             counts_pulls=False,
         )
     counting = section.names_legs

@@ -21,6 +21,7 @@ from jaxbiped.dynamics._state import (
 )
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.solve._adaptive_program import Solve
+from jaxbiped.solve._landing_steps import Landing
 from jaxbiped.solve._recorders import (
     AbstractRecorder,
     AbstractSolve,
@@ -31,7 +32,6 @@ from jaxbiped.solve._recorders import (
     no_step,
     rise_within,
 )
-from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._solved import Solved
 from jaxbiped.solve.controllers._grazing import grazes
 from jaxbiped.sweep._convergence_test import (
@@ -324,25 +324,25 @@ def _lasting(t: Scalar, times: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
 
 @dataclasses.dataclass(frozen=True)
 class StrikeLabelRecorder(AbstractLabelRecorder):
-    """Labels the rigid walker, which arrives just after its impacts."""
+    """Labels a landing system, which arrives just behind its resets."""
 
     def follow(
-        self, how: AbstractSolve, walk: RigidWalk, memory: LabelMemory, step: Step
+        self, how: AbstractSolve, solve: Landing, memory: LabelMemory, step: Step
     ) -> LabelMemory:
         strikes = jnp.asarray(step.strikes)
-        trace = self._after_arrival(walk, memory.trace, strikes, lambda: step.y1)
+        trace = self._after_arrival(solve, memory.trace, strikes, lambda: step.y1)
         strike = jnp.where(strikes, step.t1, memory.times[0])
-        return _time_out(walk, LabelMemory(None, trace, (strike,)), step.t1)
+        return _time_out(solve, LabelMemory(None, trace, (strike,)), step.t1)
 
     def finish(
-        self, walk: RigidWalk, memory: LabelMemory, solved: Solved, footsteps: Scalar | None
+        self, solve: Landing, memory: LabelMemory, solved: Solved, footsteps: Scalar | None
     ) -> Labelled:
         if self.grazes:
             memory = memory._replace(grazes=solved.grazes)
-        return super().finish(walk, memory, solved, footsteps)
+        return super().finish(solve, memory, solved, footsteps)
 
 
-def _advance(solve: Solve | RigidWalk, solved: Solved) -> Scalar:
+def _advance(solve: Solve | Landing, solved: Solved) -> Scalar:
     """Change of the first cyclic coordinate; NaN without one."""
     for name in cyclic_names(solve.state):
         advance: Scalar = getattr(solved.state, name) - getattr(solve.state, name)

@@ -19,10 +19,11 @@ from jaxbiped.compiler.runtime import _lane_call
 from jaxbiped.compiler.runtime._machine_code import _LOADED
 from jaxbiped.compiler.runtime._primitive import call
 from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.hybrid import Rolling
 from jaxbiped.hybrid._endings import WATCHES, ending_events
+from jaxbiped.solve._landing_program import LandingSolve
+from jaxbiped.solve._landing_steps import Landing
 from jaxbiped.solve._recorders import StrikeRecorder, program_of
-from jaxbiped.solve._rigid_program import RigidSolve
-from jaxbiped.solve._rigid_steps import RigidWalk
 from tests.compiler.one_shot import compiled, let_threads_run, stepped
 from tests.sweep.walkers import same
 
@@ -214,11 +215,11 @@ def test_nothing_is_left_when_caches_are_cleared_and_results_stay():
 
 def test_a_compiled_program_that_somebody_has_is_found_again():
     rigid = jb.ladder()["rigid"]
-    walk = RigidWalk(rigid, default_guess(rigid), *[jnp.ones(())] * 4)
+    walk = Landing(rigid, default_guess(rigid), *[jnp.ones(())] * 4)
 
     def program():
         return LaneEngine().compile(
-            Request(program_of(RigidSolve(recorder=StrikeRecorder())), walk)
+            Request(program_of(LandingSolve(system=Rolling(), recorder=StrikeRecorder())), walk)
         )
 
     held = program()

@@ -14,7 +14,7 @@ from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._mode_changes import change_mode, foot_loads
 from jaxbiped.dynamics._stance import stance_on
 from jaxbiped.dynamics._stance_motion import turning_of
-from jaxbiped.hybrid._rigid_guards import mode_switches
+from jaxbiped.hybrid import Rolling
 from jaxbiped.scene._bodies import Point
 from jaxbiped.scene._joint_parts import HOLDS
 from jaxbiped.scene._modes import Mode, _touch_within, rigid_modes
@@ -47,7 +47,7 @@ def loads_of_feet(scene, state):
 
 @host_jit()
 def switches_of(scene, state):
-    return [each.live for each in mode_switches(scene, state)]
+    return [each.live for each in Rolling().switches(scene, state)]
 
 
 @st.composite

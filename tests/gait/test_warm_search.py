@@ -39,7 +39,7 @@ def test_it_traces_no_equation_of_motion(scene, options):
         "dynamics/_tree.py",
         "dynamics/_contacts.py",
         "hybrid/_compliant_guards.py",
-        "hybrid/_rigid_guards.py",
+        "dynamics/_stance_motion.py",
     }
     assert all((PACKAGE / name).exists() for name in equations)
     jb.find_gait(scene, **options)

@@ -1,4 +1,4 @@
-"""Attempted steps of a rigid walk, against what comes first in courses that are given."""
+"""Attempted steps of a landing solve, against what comes first in courses that are given."""
 
 import jax
 import jax.numpy as jnp
@@ -9,33 +9,30 @@ from numpy.polynomial import Polynomial
 from jaxbiped import Ending
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._stance_motion import rolling_rates
-from jaxbiped.solve import _rigid_steps
-from jaxbiped.solve._rigid_steps import (
-    FallWatch,
+from jaxbiped.hybrid import Rolling
+from jaxbiped.hybrid._landing_system import SurfaceCourse
+from jaxbiped.solve._explicit_step import DOPRI8
+from jaxbiped.solve._landing_steps import (
+    EndingWatch,
+    Landing,
+    LandingProgress,
     ModeProgress,
-    RigidProgress,
-    RigidWalk,
+    _after_arrival,
+    _after_change,
     _after_free_step,
-    _after_strike,
     _landing,
     ending_of,
     initial_progress,
     with_next_step,
 )
-from jaxbiped.solve._rolling_step import (
-    DOPRI8,
-    ModeEvents,
-    StepOnto,
-    SurfaceCourse,
-    course_of,
-    root_place,
-)
+from jaxbiped.solve._step_events import ModeEvents, StepOnto
 from tests.dynamics.test_mode_changes import mode_of
 from tests.dynamics.test_modes import HEEL_TOE, in_mode, loads_of_feet
 from tests.dynamics.test_rolling_mechanisms import rigid
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.solve.test_step_events import AHEAD, FALLS, STEP, TIPS, ends_of, of_controls
 
+ROLLING = Rolling()
 RTOL, DURATION = 1e-6, 2.5
 TOLERANT = 1e-3
 YES, NO = True, False
@@ -52,15 +49,17 @@ def numbers(tree):
 def walk_for(duration=DURATION, footsteps=4.0, state=None):
     state = simplest_state(*STABLE) if state is None else state
     how = duration, footsteps, RTOL, 100.0
-    return RigidWalk(simplest_walker(), state, *map(jnp.asarray, how))
+    return Landing(simplest_walker(), state, *map(jnp.asarray, how))
 
 
 def progress(state, turning, modes=None, **more):
     usual = dict(
-        t=2.0, step=STEP, pace=0.11, strike=1.5, period=0.9, due=2.4, landing=0, falling=NO,
-        struck=NO, footsteps=3, grazes=5, pulls=0, accepted=7, rejected=1, code=0,
+        t=2.0, step=STEP, pace=0.11, arrival=1.5, period=0.9, due=2.4, landing=0, ending=NO,
+        arrived=NO, footsteps=3, grazes=5, pulls=0, accepted=7, rejected=1, code=0,
     )  # fmt: skip
-    return RigidProgress(state=state, rates=turning, modes=numbers(modes), **numbers(usual | more))
+    return LandingProgress(
+        state=state, accelerations=turning, modes=numbers(modes), **numbers(usual | more)
+    )
 
 
 def course(count=2):
@@ -68,22 +67,32 @@ def course(count=2):
     return SurfaceCourse(zeros, zeros, zeros > 1.0, jnp.zeros(0), (jnp.zeros(()),) * 2)
 
 
-def modes_of(changing=0, behind=0, met=(1.7, 1.9)):
+def modes_of(changing=0, behind=0, times=(1.7, 1.9)):
     paces = jnp.array([0.1, 0.2, 0.3])
-    return ModeProgress(course(), changing, NO, 1, jnp.array(met), paces, behind)
+    return ModeProgress(course(), changing, NO, 1, jnp.array(times), paces, behind)
 
 
-def onto_of(state, near=NO, rest=1e-5, ahead=YES, closing=-0.5):
-    return StepOnto(*numbers((near, rest)), state, *numbers((closing, ahead)))
+def onto_of(state, near=NO, rest=1e-5, counts=YES, closing=-0.5):
+    return StepOnto(*numbers((near, rest)), state, *numbers((closing, counts)))
 
 
 @jax.jit
 def by_landing_on_falls(walk, now, trial, error, rates, onto, changes):
     return [
         _after_free_step(
-            walk, now, trial, error, DOPRI8.length(error), DOPRI8, rates, onto, falls, changes
+            ROLLING,
+            walk,
+            now,
+            trial,
+            error,
+            DOPRI8.length(error),
+            DOPRI8,
+            rates,
+            onto,
+            endings,
+            changes,
         )
-        for falls in (FallWatch.LOCATED, FallWatch.TOLD)
+        for endings in (EndingWatch.LOCATED, EndingWatch.INTERPOLATED)
     ]
 
 
@@ -100,12 +109,15 @@ def after(opening=STANDS, stance=LEANS, error=1.0, modes=None, changes=None, ont
     for told, kept in found:
         end = trial if kept else state
         np.testing.assert_array_equal(told.state, end)
-        assert (float(told.strike), int(told.footsteps)) == (float(now.strike), int(now.footsteps))
+        assert (float(told.arrival), int(told.footsteps)) == (
+            float(now.arrival),
+            int(now.footsteps),
+        )
     return found
 
 
 def outcome(told):
-    names = "landing", "falling", "struck"
+    names = "landing", "ending", "arrived"
     return {name for name in names if bool(getattr(told, name))}
 
 
@@ -127,11 +139,11 @@ def test_the_next_step_has_four_fifths_of_the_largest_that_the_error_allows(erro
     ("opening", "onto", "expected"),
     [
         (FALLS, {}, {"landing"}),
-        (FALLS, dict(near=YES), {"struck"}),
-        (FALLS, dict(near=YES, ahead=NO), {"landing"}),
+        (FALLS, dict(near=YES), {"arrived"}),
+        (FALLS, dict(near=YES, counts=NO), {"landing"}),
         (FALLS, dict(near=YES, rest=0.11), {"landing"}),
-        (FALLS, dict(near=YES, rest=0.09), {"struck"}),
-        (STANDS, dict(near=YES), {"struck"}),
+        (FALLS, dict(near=YES, rest=0.09), {"arrived"}),
+        (STANDS, dict(near=YES), {"arrived"}),
         (Polynomial([-0.1, 0.05]), dict(near=YES), set()),
         (TOUCHES, dict(near=YES), set()),
     ],
@@ -164,7 +176,7 @@ def test_a_step_that_is_too_long_to_tell_is_tried_again_at_half_its_length():
 )
 def test_only_behind_a_strike_a_step_begins_on_the_section(footsteps, strike, kept):
     rises = Polynomial([1e-9, 0.3, -0.4])
-    for told, keeps in after(rises, error=1e-8, footsteps=footsteps, strike=strike):
+    for told, keeps in after(rises, error=1e-8, footsteps=footsteps, arrival=strike):
         assert bool(keeps) == kept
         assert outcome(told) == ({"landing"} if kept else set())
 
@@ -173,7 +185,7 @@ def test_only_behind_a_strike_a_step_begins_on_the_section(footsteps, strike, ke
 def test_a_fall_is_landed_on_or_its_time_is_interpolated(side, ending):
     (lands, kept), (ends, _) = after([3.0] * 6, side * TIPS, error=1e-8)
     assert bool(kept)
-    assert outcome(lands) == {"landing", "falling"}
+    assert outcome(lands) == {"landing", "ending"}
     assert int(lands.code) == 0
     share = [r.real for r in (of_controls(TIPS) - 1.0).roots() if 0.0 < r.real < 1.0 and not r.imag]
     assert float(lands.step) == pytest.approx(STEP * (share[0] - 1.0), abs=1e-6)
@@ -208,17 +220,17 @@ NOTHING = (NO, 0, 1.0, NO, NO)
         (STANDS, 0, (YES, 0, 0.5, NO, NO), dict(near=YES), {"landing"}, 1),
         (STANDS, 2, NOTHING, {}, set(), 0),
         (STANDS, 2, NOTHING, dict(near=YES), {"changed"}, 2),
-        (STANDS, 2, NOTHING, dict(near=YES, ahead=NO), {"changed"}, 2),
+        (STANDS, 2, NOTHING, dict(near=YES, counts=NO), {"changed"}, 2),
         (STANDS, 2, NOTHING, dict(near=YES, rest=0.11), set(), 0),
         (STANDS, 2, NOTHING, dict(near=YES, rest=0.09), {"changed"}, 2),
         (STANDS, 2, (YES, 1, 0.5, NO, NO), dict(near=YES), {"changed"}, 2),
         (STANDS, 2, (YES, 1, 0.5, NO, NO), {}, {"landing"}, 2),
         (STANDS, 2, (YES, 0, 0.5, NO, NO), dict(near=YES), {"landing"}, 1),
         (STANDS, 2, (NO, 0, 1.0, NO, YES), dict(near=YES), set(), 0),
-        (FALLS, 0, NOTHING, dict(near=YES), {"struck"}, 0),
+        (FALLS, 0, NOTHING, dict(near=YES), {"arrived"}, 0),
         (FALLS, 2, NOTHING, dict(near=YES), {"landing"}, 0),
         (FALLS, 0, (YES, 0, 0.2, NO, NO), dict(near=YES), {"landing"}, 1),
-        (FALLS, 0, (YES, 0, 0.5, NO, NO), dict(near=YES), {"struck"}, 0),
+        (FALLS, 0, (YES, 0, 0.5, NO, NO), dict(near=YES), {"arrived"}, 0),
         (FALLS, 0, (YES, 0, 0.5, NO, NO), {}, {"landing"}, 0),
     ],
 )
@@ -266,14 +278,14 @@ def test_a_fall_behind_a_change_of_mode_ends_no_step():
 def test_a_fall_in_the_same_step_is_landed_on_before_a_change_that_was_due():
     how = dict(modes=modes_of(2), changes=NOTHING, onto=dict(near=YES))
     (told, _), _ = after([3.0] * 6, TIPS, error=1e-8, **how)
-    assert outcome(told) == {"landing", "falling"}
+    assert outcome(told) == {"landing", "ending"}
     assert not bool(told.modes.changed)
     assert int(told.modes.changing) == 0
 
 
 @jax.jit
 def landed(now, onto):
-    return _landing(walk_for(), now, now.state, onto)
+    return _landing(ROLLING, walk_for(), now, now.state, onto)
 
 
 @pytest.mark.parametrize(
@@ -281,14 +293,14 @@ def landed(now, onto):
     [
         (dict(), dict(near=NO), (2, NO, 0)),
         (dict(), dict(near=YES), (2, YES, 0)),
-        (dict(), dict(near=YES, ahead=NO), (0, NO, 0)),
-        (dict(), dict(near=NO, ahead=NO), (2, NO, 0)),
+        (dict(), dict(near=YES, counts=NO), (0, NO, 0)),
+        (dict(), dict(near=NO, counts=NO), (2, NO, 0)),
         (dict(landing=11), dict(near=NO), (12, NO, 0)),
         (dict(landing=12), dict(near=NO), (13, NO, int(Ending.SOLVER_FAILED))),
         (dict(landing=12), dict(near=YES), (13, YES, 0)),
-        (dict(falling=YES), dict(near=NO), (2, NO, 0)),
-        (dict(falling=YES), dict(near=YES), (2, NO, int(Ending.FELL_BACK))),
-        (dict(falling=YES), dict(near=YES, ahead=NO), (2, NO, int(Ending.FELL_BACK))),
+        (dict(ending=YES), dict(near=NO), (2, NO, 0)),
+        (dict(ending=YES), dict(near=YES), (2, NO, int(Ending.FELL_BACK))),
+        (dict(ending=YES), dict(near=YES, counts=NO), (2, NO, int(Ending.FELL_BACK))),
     ],
 )
 @pytest.mark.parametrize("changing", [None, 0, 2])
@@ -303,9 +315,9 @@ def test_newtons_steps_onto_an_event_end_beside_it(now, onto, expected, changing
     told = landed(begin, there)
     falls = int(told.code) in (int(Ending.FELL_BACK), int(Ending.FELL_FORWARD))
     landing, struck, code = expected
-    if changing and not now.get("falling"):
+    if changing and not now.get("ending"):
         landing, struck = int(begin.landing) + 1, NO
-    assert (int(told.landing), bool(told.struck), int(told.code)) == (landing, struck, code)
+    assert (int(told.landing), bool(told.arrived), int(told.code)) == (landing, struck, code)
     assert float(told.t) == pytest.approx(1.7 + 1e-5 * falls, abs=1e-12)
     np.testing.assert_array_equal(told.state, there.state if falls else state)
     assert float(told.step) == 1e-5
@@ -315,7 +327,7 @@ def test_newtons_steps_onto_an_event_end_beside_it(now, onto, expected, changing
 
 def test_a_walker_that_leans_forward_lands_on_a_fall_forward():
     state = simplest_state(-1.0, 0.1)
-    begin = progress(state, (jnp.zeros(()),) * 2, landing=1, falling=YES)
+    begin = progress(state, (jnp.zeros(()),) * 2, landing=1, ending=YES)
     assert int(landed(begin, onto_of(state, near=YES)).code) == int(Ending.FELL_FORWARD)
 
 
@@ -332,10 +344,10 @@ def test_a_walker_that_leans_forward_lands_on_a_fall_forward():
 def test_the_next_strike_is_due_where_two_footsteps_lasted_alike(before, closing, steady):
     """In which the opening changes by less than √rtol / 5."""
     state = simplest_state(*STABLE)
-    now = progress(state, (jnp.zeros(()),) * 2, t=2.2, strike=1.5, period=before, landing=3)
+    now = progress(state, (jnp.zeros(()),) * 2, t=2.2, arrival=1.5, period=before, landing=3)
     other = simplest_state(*np.negative(STABLE))
-    told = _after_strike(walk_for(), now, onto_of(state, rest=1e-3, closing=closing), other)
-    assert float(told.t) == float(told.strike) == 2.201
+    told = _after_arrival(walk_for(), now, onto_of(state, rest=1e-3, closing=closing), other)
+    assert float(told.t) == float(told.arrival) == 2.201
     assert float(told.period) == pytest.approx(0.701)
     assert float(told.due) == (pytest.approx(2.902) if steady else np.inf)
     assert (int(told.landing), int(told.footsteps)) == (0, 4)
@@ -365,13 +377,20 @@ def beside():
     return {UNLOADED: turning(heavy), COMES: in_mode(FLAT, tipped, (), (True, False))}
 
 
-after_change, surfaces_of = host_jit()(_rigid_steps._after_change), host_jit()(course_of)
+@host_jit()
+def after_change(walk, trial, onto, course):
+    return _after_change(ROLLING, walk, trial, onto, course)
 
 
-@pytest.mark.parametrize(("struck", "changed", "event"), [(NO, NO, 0), (YES, NO, 1), (NO, YES, 3)])
+@host_jit()
+def surfaces_of(scene, state):
+    return ROLLING.course(scene, state)
+
+
+@pytest.mark.parametrize(("arrived", "changed", "event"), [(NO, NO, 0), (YES, NO, 1), (NO, YES, 3)])
 @pytest.mark.parametrize(("name", "stands"), [(UNLOADED, (NO, YES)), (COMES, (YES, YES))])
 def test_a_change_of_mode_is_noted_with_its_time_and_its_first_step(
-    beside, name, stands, struck, changed, event
+    beside, name, stands, arrived, changed, event
 ):
     """Of the second surface; where the other end of the foot stands the hip stays in its place."""
     at = jax.tree.map(jnp.asarray, beside[name])
@@ -380,14 +399,14 @@ def test_a_change_of_mode_is_noted_with_its_time_and_its_first_step(
         surfaces, 2, changed, 1, jnp.array([1.7, 1.9, 0.0, 0.0]), 0.1 * jnp.arange(1.0, 6.0), 1
     )
     elsewhere = at._replace(hip_x=at.hip_x + 0.25)
-    trial = progress(elsewhere, (), modes, landing=4, struck=struck, pace=0.7)
+    trial = progress(elsewhere, (), modes, landing=4, arrived=arrived, pace=0.7)
     how = 2.5, 4.0, TOLERANT, 100.0
-    walk, there = RigidWalk(FLAT, at, *map(jnp.asarray, how)), onto_of(at, rest=1e-3)
+    walk, there = Landing(FLAT, at, *map(jnp.asarray, how)), onto_of(at, rest=1e-3)
     told = after_change(walk, trial, there, surfaces)
     assert float(told.t) == pytest.approx(2.001 if changed else 2.0)
     if changed:
         assert tuple(mode_of(FLAT, told.state)[0]) == stands
-        places = [float(each[0] + root_place(FLAT, each)) for each in (told.state, at)]
+        places = [float(ROLLING.completed(FLAT, each)[0]) for each in (told.state, at)]
         assert places[0] == pytest.approx(places[1], abs=1e-15)
     else:
         np.testing.assert_array_equal(told.state, elsewhere)
@@ -396,7 +415,7 @@ def test_a_change_of_mode_is_noted_with_its_time_and_its_first_step(
     after = told.modes
     assert int(after.changing) == (0 if changed else 2)
     assert int(after.behind) == (event or 1)
-    np.testing.assert_allclose(after.met, [1.7, 2.001 if changed else 1.9, 0.0, 0.0])
+    np.testing.assert_allclose(after.times, [1.7, 2.001 if changed else 1.9, 0.0, 0.0])
     seen = surfaces_of(FLAT, told.state) if event else surfaces
     np.testing.assert_allclose(after.course.values, seen.values, rtol=1e-12)
     np.testing.assert_allclose(after.course.rates, seen.rates, rtol=1e-12)
@@ -446,7 +465,7 @@ def test_a_step_ends_where_a_strike_is_due_or_the_walk_ends(due, pace, landing, 
 )
 def test_a_mode_changes_as_long_behind_a_strike_as_before(met, due, landing, step, changing):
     state = simplest_state(*STABLE)
-    modes = modes_of(1, met=met)
+    modes = modes_of(1, times=met)
     now = progress(state, (jnp.zeros(()),) * 2, modes, due=due, landing=landing)
     told = next_step(walk_for(), now)
     assert float(told.step) == pytest.approx(step)
@@ -458,14 +477,14 @@ def test_a_walk_begins_with_a_short_step_and_nothing_behind_it():
     state = simplest_state(*STABLE)._replace(hip_x=jnp.asarray(0.4))
     for duration, step in ((2.5, 0.03), (0.01, 0.01)):
         walk = walk_for(duration, state=state)
-        told = initial_progress(walk)
+        told = initial_progress(ROLLING, walk)
         assert float(told.step) == float(told.pace) == pytest.approx(step)
-        assert [float(each) for each in (told.t, told.strike, told.period, told.due)] == [
+        assert [float(each) for each in (told.t, told.arrival, told.period, told.due)] == [
             0.0, 0.0, np.inf, np.inf,
         ]  # fmt: skip
         whole = told.landing, told.footsteps, told.grazes, told.pulls, told.accepted, told.rejected
-        assert [int(each) for each in (*whole, told.code, told.falling, told.struck)] == [0] * 9
-        np.testing.assert_allclose(told.rates, rolling_rates(walk.scene, state))
+        assert [int(each) for each in (*whole, told.code, told.ending, told.arrived)] == [0] * 9
+        np.testing.assert_allclose(told.accelerations, rolling_rates(walk.scene, state))
         assert told.modes is None
         # The root point is on a leg of length 1 that leans by the angle, above the standing foot.
         assert float(told.state[0]) == pytest.approx(0.4 + np.sin(STABLE[0]))

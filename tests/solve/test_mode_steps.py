@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from jaxbiped.solve._rolling_step import (
+from jaxbiped.hybrid._landing_system import SurfaceCourse
+from jaxbiped.solve._step_events import (
     ModeEvents,
     StepEvents,
-    SurfaceCourse,
     mode_events,
     onto_surface,
     with_changes,
@@ -176,8 +176,8 @@ def test_what_comes_behind_the_first_change_of_mode_does_not_happen():
         modes = ModeEvents(crosses, jnp.asarray(0), jnp.asarray(place), no, no)
         found = with_changes(happens, modes)
         assert bool(found.changes) == changes
-        kept = [flag and not changes for flag in map(bool, (happens.strikes, happens.falls))]
-        assert [bool(found.strikes), bool(found.falls)] == kept
+        kept = [flag and not changes for flag in map(bool, (happens.arrives, happens.ends))]
+        assert [bool(found.arrives), bool(found.ends)] == kept
         assert float(found.place) == (place if changes else float(happens.place))
         assert bool(found.above)
         assert bool(found.grazes) == (bool(happens.grazes) and not changes)
