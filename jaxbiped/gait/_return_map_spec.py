@@ -14,6 +14,7 @@ from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.compiler import LANES, XLA, AbstractEngine
+from jaxbiped.hybrid._scales import is_stiff
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
@@ -24,7 +25,6 @@ from jaxbiped.scene._scene import (
     AbstractWalkerScene,
     RedundantScene,
     Scene,
-    is_rigid,
 )
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
@@ -175,7 +175,7 @@ def return_map_spec(
         images = structure.leg_twins or range(len(structure.legs))
         check_legs_admitted_alike(args.clearance, structure.legs, images)
     section = section_of(args, section)
-    method = orbit_solver(solver, rigid=is_rigid(args))
+    method = orbit_solver(solver, stiff=is_stiff(args))
     obstacle = lane_obstacle(method, section, (args, state), columns=True)
     own, within = system_of(args.minimal) if system is None else system, None
     own = own.observed_at(section)
@@ -244,14 +244,14 @@ def patience_of(scene: AbstractScene) -> Scalar | float:
 
 
 def orbit_solver(
-    solver: str | diffrax.AbstractSolver[PyTree] | None, *, rigid: bool
+    solver: str | diffrax.AbstractSolver[PyTree] | None, *, stiff: bool
 ) -> diffrax.AbstractAdaptiveSolver[PyTree]:
-    """The solver of that name, the one given, or the usual one: "rodas4", and "rodas5p" if rigid.
+    """The solver of that name, the one given, or the usual one: "rodas4" where motion may be stiff.
 
     Raises:
         ArgumentError: an unknown name, or a solver that does not estimate its errors.
     """
-    usual = "rodas5p" if rigid else "rodas4"
+    usual = "rodas4" if stiff else "rodas5p"
     found = solver_named(usual if solver is None else solver)
     if not isinstance(found, diffrax.AbstractAdaptiveSolver):
         raise ArgumentError(

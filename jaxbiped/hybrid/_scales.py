@@ -37,9 +37,9 @@ _CHATTERS = 1000.0
 """Times that a tolerance is coarser than what resolves slip from which errors were seen."""
 
 
-def is_smooth(scene: PyTree) -> bool:
-    """Whether rates are smooth and never stiff between resets, as those of rigid feet are."""
-    return is_rigid(scene)
+def is_stiff(args: PyTree) -> bool:
+    """Whether a motion may be stiff: that of a scene as it says, of other parameters always."""
+    return not isinstance(args, AbstractScene) or args.stiff
 
 
 def resolve_slip_speed(rtol: RealScalarLike, scene: PyTree) -> RealScalarLike:

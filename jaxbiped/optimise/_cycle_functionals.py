@@ -37,8 +37,8 @@ from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, precision_of
 from jaxbiped.variational._tangents import Seeded
 
-_COMPLIANT = {"balanced": Precision(2e-8, 2e-7)}
-"""How exactly functionals of a compliant orbit are solved where that is not as the gait is: the
+_STIFF = {"balanced": Precision(2e-8, 2e-7)}
+"""How exactly functionals of a stiff orbit are solved where that is not as the gait is: the
 errors of derivatives of the spectral radius, of slip and of losses are then below 1e-5 of the
 elasticity, as those of the gait's own measures are; it doubles what an evaluation costs."""
 _DRIVEN, _BOUND = 0.3, 0.1
@@ -129,7 +129,7 @@ def cycle_spec(
     return ReturnMapSpec(
         system=system,
         section=section,
-        solver=orbit_solver(None, rigid=not scene.compliant),
+        solver=orbit_solver(None, stiff=scene.stiff),
         max_time=patience_of(scene),
         steps=arrivals,
         max_solver_steps=max(each.max_solver_steps for each in ACCURACIES.values()),
@@ -142,8 +142,8 @@ def functional_precision(
 ) -> Precision:
     """How exactly functionals are solved, as arrays: one program serves every accuracy."""
     found, share = precision_of(accuracy, scene), 1.0
-    if scene.compliant and accuracy in _COMPLIANT:
-        found, share = _COMPLIANT[accuracy], _DRIVEN if is_driven(scene) else 1.0
+    if scene.stiff and accuracy in _STIFF:
+        found, share = _STIFF[accuracy], _DRIVEN if is_driven(scene) else 1.0
         share = _BOUND if "radius_bound" in names else share
     return Precision(*(as_float(share * tolerance) for tolerance in found))
 

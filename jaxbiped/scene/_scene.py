@@ -58,6 +58,8 @@ class AbstractScene(eqx.Module):
             class.
         compliant: whether feet sink into the ground and slip on it by laws of contact; else they
             roll and strike. A property of the class.
+        stiff: whether its motion may be stiff, as that of feet that press into the ground: its
+            steps are then implicit, and dear. A property of the class.
         redundant: whether constraints hold more coordinates together than there are degrees of
             freedom. A property of the class.
         model: the word for it in the settings of results. A property of the class.
@@ -72,6 +74,7 @@ class AbstractScene(eqx.Module):
 
     compliant: AbstractClassVar[bool]
     redundant: AbstractClassVar[bool]
+    stiff: ClassVar[bool] = True
     model: ClassVar[str] = "hybrid system"
     bristles: ClassVar[tuple[str, ...]] = ()
     posture: ClassVar[tuple[str, ...]] = ()
@@ -320,6 +323,7 @@ class RigidScene(AbstractMinimalScene, AbstractWalkerScene):
     """
 
     compliant: ClassVar[bool] = False
+    stiff: ClassVar[bool] = False
     model: ClassVar[str] = "rigid"
     walker: Any
     ground: Ground

@@ -13,7 +13,6 @@ from jaxtyping import PyTree
 from jaxbiped.compiler import BY_NAME, DEVICES, Request
 from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait._return_map_spec import patience_of
-from jaxbiped.hybrid._scales import is_smooth
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractScene
@@ -140,7 +139,7 @@ def _steps(
 ) -> RigidSolve | AdaptiveSolve:
     """The functions of the program that labels starts. Labels by a number may doubt what grazes."""
     system, section, grazes = system_of(scene), effort.section, effort.wanted is not None
-    if is_smooth(scene):
+    if not scene.stiff:
         return RigidSolve(
             recorder=StrikeLabelRecorder(section, cycles, grazes),
             method=ExplicitMethod(embedded=effort.embedded),
