@@ -14,10 +14,10 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.compiler import host_jit
-from jaxbiped.gait._fixed_point_search import is_sound, search_by_lanes, takes_steps, with_looser
+from jaxbiped.gait._fixed_point_search import search_by_lanes, with_looser
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import Precision
 
 NO_WALK = -1
@@ -41,7 +41,7 @@ class Cycle(NamedTuple):
         code: 0 or that of the `Ending` that came instead.
         grazes: how often a switch was touched or missed by less than the tolerance resolves.
         sound: whether every footstep goes downhill and on the ground, and their mean is a step
-            (see `is_sound`).
+            (see `AbstractSystem.is_walk`).
     """
 
     recurring: Numbers
@@ -128,7 +128,7 @@ def _chain(
             peak=jnp.maximum(before.peak, once.peak),
             code=jnp.where(before.code != 0, before.code, once.code),
             grazes=before.grazes + once.grazes,
-            sound=before.sound & is_sound(scene, y, advance, once.period, 0),
+            sound=before.sound & spec.system.is_walk(scene, y, advance, once.period, 0),
         )
 
     zero = jnp.zeros(())
@@ -145,6 +145,4 @@ def _chain(
         sound=jnp.asarray(True),
     )
     end: Cycle = jax.lax.fori_loop(0, arrivals, add, begin)
-    if not isinstance(scene, AbstractWalkerScene):
-        return end
-    return end._replace(sound=end.sound & takes_steps(scene, end.advance, arrivals))
+    return end._replace(sound=end.sound & spec.system.takes_steps(scene, end.advance, arrivals))

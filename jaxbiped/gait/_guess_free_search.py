@@ -14,7 +14,6 @@ from jaxbiped.gait._fixed_point_search import (
     Search,
     crossings_of,
     minimal_cycle,
-    takes_steps,
     walks_only,
 )
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
@@ -32,7 +31,6 @@ from jaxbiped.gait._search_provenance import (
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
 from jaxbiped.gait._walk_waves import Walks, is_far_from_seed, state_rows, walks_of
 from jaxbiped.hybrid._scales import recurring_sizes
-from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.solve._accuracy import ACCURACIES
 
@@ -92,7 +90,7 @@ def search_in_stages(
     The branch is followed with `scout`: cycles of one footstep, in minimal coordinates. `now`
     counts the searches, and keeps in words what they found.
     """
-    modelled: Scene | RigidScene = problem.args.minimal
+    spec, modelled = problem.spec, problem.args.minimal
     seen: list[Seen] = []
     walks: list[Walks] = []
     branch = line = None
@@ -110,7 +108,7 @@ def search_in_stages(
 
     def add(found: Found, by: FoundBy) -> None:
         # What a walk itself settles on is one, however deep, but not where it stands and chatters.
-        steps = takes_steps(modelled, float(np.sum(found.last.advance)), problem.spec.steps)
+        steps = spec.system.takes_steps(modelled, float(np.sum(found.last.advance)), spec.steps)
         sound = bool(found.sound) or (by is FoundBy.WALKING and bool(steps))
         known = any(_same(found, old) for old in seen)
         if int(found.ending) == int(Search.FOUND) and sound and not known:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_count, check_type
-from jaxbiped._types import Scalar, Time, by_numpy
+from jaxbiped._types import Scalar, Time
 from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.compiler import LANES, XLA, AbstractEngine
@@ -18,13 +18,9 @@ from jaxbiped.hybrid._scales import is_stiff
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._clearance import check_legs_admitted_alike
-from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._scene import (
     AbstractScene,
-    AbstractWalkerScene,
     RedundantScene,
-    Scene,
 )
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
@@ -32,10 +28,6 @@ from jaxbiped.solve._solvers import solver_named, with_projection
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
-_PATIENCE = 50.0
-"""Time allowed to the next arrival, in units of √(l/g)."""
-_PATIENCE_OF_SYSTEMS = 1e6
-"""The same of a hybrid system's, in its unit of time."""
 _MORE_STEPS = 4
 """Factor of the steps that a return may take where it carries columns of parameters: small
 sensitivities are solved as exactly as large ones."""
@@ -170,14 +162,11 @@ def return_map_spec(
     note_code(args, section, solver, system)
     if system is not None:
         check_type("system", system, AbstractSystem)
-    if isinstance(args, Scene | RedundantScene):
-        structure = args.mechanism.structure
-        images = structure.leg_twins or range(len(structure.legs))
-        check_legs_admitted_alike(args.clearance, structure.legs, images)
+    own, within = system_of(args.minimal) if system is None else system, None
+    own.check_cycles(args)
     section = section_of(args, section)
     method = orbit_solver(solver, stiff=is_stiff(args))
     obstacle = lane_obstacle(method, section, (args, state), columns=True)
-    own, within = system_of(args.minimal) if system is None else system, None
     own = own.observed_at(section)
     if system is None and isinstance(args, RedundantScene):
         within = system_of(args)
@@ -203,7 +192,7 @@ def return_map_spec(
         system=own,
         section=section,
         solver=method,
-        max_time=patience_of(args) if max_time is None else max_time,
+        max_time=own.longest_wait(args) if max_time is None else max_time,
         steps=steps,
         max_solver_steps=max_solver_steps,
         engine=by,
@@ -219,7 +208,7 @@ def arrivals_of(args: PyTree, footsteps: int | None) -> int:
         ArgumentError: the number is not one of whole cycles.
     """
     own = each = 1
-    if isinstance(args, AbstractWalkerScene):
+    if isinstance(args, AbstractScene):
         own, each = args.cycle_footsteps, args.arrival_footsteps
     if footsteps is None:
         return own // each
@@ -230,17 +219,6 @@ def arrivals_of(args: PyTree, footsteps: int | None) -> int:
             f"so give a multiple of {own}."
         )
     return int(footsteps) // each
-
-
-def patience_of(scene: AbstractScene) -> Scalar | float:
-    """Time that the next arrival may take [s]."""
-    if not isinstance(scene, AbstractWalkerScene):
-        return _PATIENCE_OF_SYSTEMS * scene.time_unit
-    check_pulls(scene.ground)
-    found: Scalar = by_numpy(
-        lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.mechanism.height, scene.ground.g
-    )
-    return found
 
 
 def orbit_solver(

@@ -11,7 +11,8 @@ from jaxbiped._checks import warn
 from jaxbiped._ending import Ending, NamedCode
 from jaxbiped._summary import call_text
 from jaxbiped._types import Scalar, is_traced
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search, takes_steps
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._clearance import AlwaysTouching
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
@@ -207,7 +208,8 @@ def _search_sentence(scene: Any, gait: "Gait") -> str:
         return f"the walk from the start ends ({gait.walk_outcome})"
     if gait.outcome is Search.NO_WALK:
         length = float(gait.measures.step_length) / len(gait.step_lengths)
-        if length > 0.0 and not takes_steps(scene.minimal, length, 1.0 / scene.arrival_footsteps):
+        arrivals = 1.0 / scene.arrival_footsteps
+        if length > 0.0 and not system_of(scene).takes_steps(scene, length, arrivals):
             return f"an orbit that returns has footsteps of {length:.2g} m, below 1 % of the height"
         return "an orbit that returns has a foot deep underground, or steps uphill"
     return "the search from the start does not converge"

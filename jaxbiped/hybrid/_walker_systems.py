@@ -1,5 +1,6 @@
 """Walkers as hybrid systems: with laws of contact in either coordinates, and on rigid feet."""
 
+import abc
 import functools
 from collections.abc import Callable, Collection
 from typing import Any, ClassVar
@@ -25,6 +26,15 @@ from jaxbiped.dynamics._state import cyclic_names
 from jaxbiped.dynamics._surfaces import lead, opening
 from jaxbiped.hybrid._compliant_guards import contact_changes, gaps, switches
 from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface, rigid_ending
+from jaxbiped.hybrid._footsteps import (
+    distances,
+    longest_wait,
+    outlasts_chatter,
+    places_after_strikes,
+    places_of_landings,
+    stands_too_deep,
+    takes_steps,
+)
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._implicit_field import ImplicitField, with_unit_mass
 from jaxbiped.hybrid._rigid_guards import mode_switches
@@ -32,7 +42,14 @@ from jaxbiped.hybrid._scales import sizes_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._start_placement import held_like, passes_a_stop, standing_like
 from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._clearance import check_legs_admitted_alike
+from jaxbiped.scene._scene import (
+    AbstractWalkerScene,
+    CompliantScene,
+    RedundantScene,
+    RigidScene,
+    Scene,
+)
 from jaxbiped.scene._state_types import State
 
 _SHALLOW = 1e-9
@@ -45,10 +62,50 @@ def system_of(scene: object) -> AbstractSystem:
     raise ArgumentError(f"scene is a {type(scene).__name__}, which is not allowed: give a scene.")
 
 
-class AbstractWalking(AbstractSystem):
-    """A walker on compliant ground: legs exchanged at each footstep."""
+class AbstractWalkerSystem(AbstractSystem):
+    """A walker, whose cycles are footsteps."""
 
     watches: ClassVar[tuple[str, ...]] = WATCHES
+
+    def longest_wait(self, args: AbstractWalkerScene) -> Scalar:
+        return longest_wait(args)
+
+    def takes_steps(self, args: AbstractWalkerScene, advance: Any, arrivals: Any) -> Any:
+        return takes_steps(args, advance, arrivals)
+
+    def is_walk(
+        self,
+        args: AbstractWalkerScene,
+        y: PyTree,
+        advance: Scalar,
+        period: Scalar,
+        arrivals: int = 1,
+    ) -> Scalar:
+        """Whether it steps downhill, takes its time, and stands on the ground (boolean)."""
+        forward = takes_steps(args, advance, arrivals) & outlasts_chatter(args, period)
+        return forward & self.stands(args, y)
+
+    def step_lengths(
+        self, args: AbstractWalkerScene, states: PyTree, advance: Scalar, arrivals: int
+    ) -> Scalar:
+        """Distances between the places of successive heel strikes [m], shape (footsteps,)."""
+        count = arrivals * args.arrival_footsteps
+        if count == 1:
+            return advance
+        return distances(self.strike_places(args, states, count), advance)
+
+    @abc.abstractmethod
+    def stands(self, args: Any, y: PyTree) -> Scalar:
+        """Whether no foot is deep underground (boolean)."""
+
+    @abc.abstractmethod
+    def strike_places(self, args: Any, states: PyTree, count: int) -> Scalar:
+        """Places of the first heel strikes of a cycle [m], shape (count,)."""
+
+
+class AbstractWalking(AbstractWalkerSystem):
+    """A walker on compliant ground: legs exchanged at each footstep."""
+
     footsteps_end_on_section: ClassVar[bool] = False
 
     def switches(self, args: CompliantScene, y: PyTree) -> tuple[Switch, ...]:
@@ -74,6 +131,17 @@ class AbstractWalking(AbstractSystem):
 
     def namings(self, args: CompliantScene) -> tuple[int, ...]:
         return args.mechanism.structure.namings
+
+    def check_cycles(self, args: CompliantScene) -> None:
+        structure = args.mechanism.structure
+        images = structure.leg_twins or range(len(structure.legs))
+        check_legs_admitted_alike(args.clearance, structure.legs, images)
+
+    def stands(self, args: CompliantScene, y: PyTree) -> Scalar:
+        return ~stands_too_deep(args.minimal, self.section_state(args, y))
+
+    def strike_places(self, args: CompliantScene, states: PyTree, count: int) -> Scalar:
+        return places_of_landings(args.minimal, states, count)
 
     def renamed(self, args: CompliantScene, y: PyTree, times: int) -> PyTree:
         return exchange_legs(args, y, times)
@@ -133,11 +201,10 @@ class RedundantWalking(AbstractWalking):
         return args.method.projects
 
 
-class Rolling(AbstractSystem):
+class Rolling(AbstractWalkerSystem):
     """The rigid walker: it rolls on one foot, and exchanges support at each heel strike."""
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (0,)
-    watches: ClassVar[tuple[str, ...]] = WATCHES
 
     def vector_field(self, t: Time, y: Any, args: RigidScene) -> Any:
         return rolling_field(t, y, args)
@@ -153,6 +220,13 @@ class Rolling(AbstractSystem):
 
     def placed_like(self, args: RigidScene, base: Any, states: Any, named: Collection[str]) -> Any:
         return held_like(args, base, states, named)
+
+    def stands(self, args: RigidScene, y: Any) -> Scalar:
+        return jnp.asarray(True)
+
+    def strike_places(self, args: RigidScene, states: Any, count: int) -> Scalar:
+        """Places of the standing foot just after the strikes [m], shape (count,)."""
+        return places_after_strikes(args, states)
 
     def on_held(self, args: RigidScene, y: Any) -> Any:
         return on_held(args, y)

@@ -24,11 +24,11 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import (
     ReturnMapSpec,
     orbit_solver,
-    patience_of,
     runs_by_lanes,
 )
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.optimise._augmented_system import MotionSection, integrals_of
 from jaxbiped.scene._parameter_access import select_parameters
@@ -130,7 +130,7 @@ def cycle_spec(
         system=system,
         section=section,
         solver=orbit_solver(None, stiff=scene.stiff),
-        max_time=patience_of(scene),
+        max_time=system_of(scene).longest_wait(scene),
         steps=arrivals,
         max_solver_steps=max(each.max_solver_steps for each in ACCURACIES.values()),
         engine=engine,
