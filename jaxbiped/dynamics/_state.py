@@ -16,7 +16,7 @@ from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar, as_float, by_numpy
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._scene import AbstractWalkerScene
+from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._state_types import SomeState, State, is_redundant
 
 Periods: TypeAlias = tuple[float | None, ...]
@@ -43,6 +43,11 @@ def seed_state() -> State:
         omega_1=as_float(-0.0052),
         omega_2=as_float(-1.2565),
     )
+
+
+def zero_state(scene: AbstractScene) -> Any:
+    """A state of a scene's kind, of zeros."""
+    return scene.state_type(*(as_float(0.0) for _ in scene.state_type._fields))
 
 
 def standing_height(

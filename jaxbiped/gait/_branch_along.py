@@ -24,6 +24,7 @@ from jaxbiped.gait._pseudo_arclength import (
     follow,
     locate,
 )
+from jaxbiped.gait._relaxation import has_seed_bodies
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.gait._search_starts import default_guess
@@ -31,7 +32,6 @@ from jaxbiped.gait._walk_waves import is_far_from_seed, walks_of
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._state_types import WalkerState
-from jaxbiped.scene._walker import Walker
 from jaxbiped.solve._accuracy import Precision
 
 _CONTROL = StepControl(first=0.08, largest=0.35, smallest=2e-4)
@@ -106,7 +106,7 @@ def branch_along(
     start = default_guess(begin)
     problem = problem._replace(active=_columns(line) if problem.active else ())
     first = search(problem._replace(args=begin, guess=start), _TURNS)
-    if int(first.ending) != int(Search.FOUND) and not isinstance(begin.walker, Walker):
+    if int(first.ending) != int(Search.FOUND) and not has_seed_bodies(begin):
         for point in _likely_gaits(begin, begins_at_model, search, problem, like):
             there = state_at(type(start), point)
             first = search(problem._replace(args=begin, guess=there), _TURNS)

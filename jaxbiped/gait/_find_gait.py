@@ -39,11 +39,11 @@ from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes
 from jaxbiped.gait._search_provenance import FoundBy, single_stage_origin, warn_of_unknown
 from jaxbiped.gait._search_starts import start_of_search
-from jaxbiped.hybrid._hybrid_system import HybridSystem
-from jaxbiped.hybrid._scales import recurring_sizes
+from jaxbiped.hybrid._hybrid_system import SCENES
+from jaxbiped.hybrid._scales import declared_sizes
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import AbstractScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import WALKER_SCENES, AbstractScene, WalkerScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import RigidState, State, WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
@@ -135,7 +135,7 @@ def find_gait(
         >>> str(gait.outcome), round(float(gait.measures.period), 4)
         ('found', 0.4438)
     """
-    scene = check_scene(scene, Scene, RigidScene, RedundantScene, HybridSystem)
+    scene = check_scene(scene, *SCENES)
     if not isinstance(accuracy, str | Precision):
         check_wanted(accuracy, optimiser=optimiser)
         find = functools.partial(
@@ -192,7 +192,7 @@ def find_gait(
         max_evaluations=int(most),
         residual=_RESIDUAL_SHARE * precision.rtol,
         patience=np.asarray(int(most)),
-        sizes=recurring_sizes(scene, start) if isinstance(scene, HybridSystem) else None,
+        sizes=declared_sizes(start),
     )
     # One program of lanes serves every search, whatever it is asked for, and what follows it.
     every = active if parameters is None else select_parameters(modelled, None)[1]
@@ -305,7 +305,7 @@ class Gaits(NamedTuple):
 
 
 @without_switches
-def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options: Any) -> Gaits:
+def find_gaits(scene: WalkerScene, starts: State | RigidState, **options: Any) -> Gaits:
     """Searches for periodic gaits from many starts at once, and distinguishes those that it finds.
 
     The gaits have no derivatives with respect to parameters. To obtain these, pass the state of a
@@ -322,7 +322,7 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
     Raises:
         ArgumentError: an argument is not allowed; raised before anything is compiled.
     """
-    scene = check_scene(scene, Scene, RigidScene)
+    scene = check_scene(scene, *WALKER_SCENES)
     shapes = {np.shape(leaf) for leaf in jtu.tree_leaves(starts)}
     if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
         raise ArgumentError(
@@ -345,7 +345,7 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
 
 
 @cached_jit
-def _find_each(scene: Scene | RigidScene, starts: WalkerState, options: dict[str, Any]) -> Gait:
+def _find_each(scene: WalkerScene, starts: WalkerState, options: dict[str, Any]) -> Gait:
     def one(start: WalkerState) -> Gait:
         return find_gait(scene, start, parameters=(), radius_sensitivities=False, **options)
 

@@ -17,7 +17,7 @@ from jaxbiped.gait._fixed_point_search import (
     walks_only,
 )
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
-from jaxbiped.gait._relaxation import relaxed
+from jaxbiped.gait._relaxation import has_seed_bodies, relaxed
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, return_map_spec
 from jaxbiped.gait._search_provenance import (
     MOST_OTHERS,
@@ -31,7 +31,6 @@ from jaxbiped.gait._search_provenance import (
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
 from jaxbiped.gait._walk_waves import Walks, is_far_from_seed, state_rows, walks_of
 from jaxbiped.hybrid._scales import recurring_sizes
-from jaxbiped.scene._walker import Walker
 from jaxbiped.solve._accuracy import ACCURACIES
 
 _PUSHES = (-0.05, -0.01, 0.01, 0.05)
@@ -168,7 +167,7 @@ def search_in_stages(
     if not has_stable():
         with stage(f"searching from {_SCATTERED} scattered starts"):
             scattered = state_rows(rolling_starts(modelled, _SCATTERED, spread=0.5, seed=2))
-            latest = [] if isinstance(modelled.walker, Walker) else walks[-_LATEST:]
+            latest = [] if has_seed_bodies(modelled) else walks[-_LATEST:]
             near = [point for each in latest for point in each.near_returns(_NEAR)]
             try_all([*near, *scattered[1:]], FoundBy.SCATTERED_STARTS)
     ordered = sorted(seen, key=lambda each: (not each.is_whole, each.radius))
@@ -214,7 +213,7 @@ def search_on(
         scene.minimal,
         problem.guess,
         solver=None,
-        engine="auto" if scene.redundant else engine,
+        engine=engine if scene.minimal is scene else "auto",
         max_solver_steps=ACCURACIES["balanced"].max_solver_steps,
     )
     staged = search_in_stages(search, problem, scout, first, now)

@@ -20,7 +20,6 @@ from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import (
     AbstractScene,
-    RedundantScene,
 )
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
@@ -162,17 +161,13 @@ def return_map_spec(
     note_code(args, section, solver, system)
     if system is not None:
         check_type("system", system, AbstractSystem)
-    own, within = system_of(args.minimal) if system is None else system, None
+    own, within = _systems_of(args, state) if system is None else (system, None)
     own.check_cycles(args)
     section = section_of(args, section)
     method = orbit_solver(solver, stiff=is_stiff(args))
     obstacle = lane_obstacle(method, section, (args, state), columns=True)
     own = own.observed_at(section)
-    if system is None and isinstance(args, RedundantScene):
-        within = system_of(args)
-        if is_redundant(state):
-            own, within = within, None
-    elif holds_arrays(system):
+    if holds_arrays(system):
         obstacle = f"the system {type(system).__name__} holds arrays, which belong in args"
     by = engine_for(engine, obstacle=obstacle, prefers_xla=system is not None)
     resets = has_switches(own, args, state, "resets")
@@ -199,6 +194,16 @@ def return_map_spec(
         within=within,
         resets=resets,
     )
+
+
+def _systems_of(
+    scene: AbstractScene, state: PyTree
+) -> tuple[AbstractSystem, AbstractSystem | None]:
+    """The system with the coordinates of a state, and the one that is solved if it is another."""
+    solved = system_of(scene)
+    if scene.minimal is scene or is_redundant(state):
+        return solved, None
+    return system_of(scene.minimal), solved
 
 
 def arrivals_of(args: PyTree, footsteps: int | None) -> int:

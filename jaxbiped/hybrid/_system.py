@@ -133,6 +133,14 @@ class AbstractSystem(eqx.Module):
         """
         return advance
 
+    def foot_ahead(self, args: PyTree, y: PyTree) -> Scalar | None:
+        """How far the standing foot is ahead of the place that advances. Default: no foot."""
+        return None
+
+    def minimal_start(self, args: PyTree, y: PyTree) -> PyTree:
+        """A start on its constraints, in minimal coordinates. Default: as it is, without any."""
+        return y
+
     def lies_beyond(self, args: PyTree, states: PyTree, by: float = SLACK) -> np.ndarray:
         """Whether states are so far beyond a surface that resets them (booleans).
 

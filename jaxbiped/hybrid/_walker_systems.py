@@ -12,7 +12,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time
-from jaxbiped.dynamics._constrained_motion import project
+from jaxbiped.dynamics._constrained_motion import consistent_state, project
 from jaxbiped.dynamics._contacts import feet, foot_force
 from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
 from jaxbiped.dynamics._footfalls import landings, leg_depth, standing_leg
@@ -23,7 +23,7 @@ from jaxbiped.dynamics._mode_changes import SLACK, change_mode_on_surface
 from jaxbiped.dynamics._redundant_motion import redundant_field
 from jaxbiped.dynamics._stance_motion import rolling, rolling_field
 from jaxbiped.dynamics._state import cyclic_names
-from jaxbiped.dynamics._surfaces import lead, opening
+from jaxbiped.dynamics._surfaces import foot_ahead, lead, opening
 from jaxbiped.hybrid._compliant_guards import contact_changes, gaps, switches
 from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface, rigid_ending
 from jaxbiped.hybrid._footsteps import (
@@ -93,6 +93,10 @@ class AbstractWalkerSystem(AbstractSystem):
         if count == 1:
             return advance
         return distances(self.strike_places(args, states, count), advance)
+
+    def foot_ahead(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
+        """How far the stance leg's foot stands ahead of the root point on a section [m]."""
+        return foot_ahead(args, y)
 
     @abc.abstractmethod
     def stands(self, args: Any, y: PyTree) -> Scalar:
@@ -196,6 +200,9 @@ class RedundantWalking(AbstractWalking):
 
     def section_state(self, args: RedundantScene, y: PyTree) -> PyTree:
         return minimal_state(args, y)
+
+    def minimal_start(self, args: RedundantScene, y: PyTree) -> PyTree:
+        return minimal_state(args, consistent_state(args, y).state)
 
     def projects(self, args: RedundantScene) -> bool:
         return args.method.projects

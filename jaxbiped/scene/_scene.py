@@ -66,8 +66,6 @@ class AbstractScene(eqx.Module):
         bristles: names of the states of friction, which are 0 where a start leaves them out.
         posture: names of the angles and rates from which the root point's place follows.
         coordinate_aliases: coordinates by other names that they have.
-        has_default_guess: whether it is known where a search for its gaits begins. A property of
-            the class.
         has_ground: whether it has feet on a ground, whose forces, losses and clearances are
             measured along a cycle. A property of the class.
     """
@@ -79,7 +77,6 @@ class AbstractScene(eqx.Module):
     bristles: ClassVar[tuple[str, ...]] = ()
     posture: ClassVar[tuple[str, ...]] = ()
     coordinate_aliases: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    has_default_guess: ClassVar[bool] = False
     has_ground: ClassVar[bool] = False
     time_unit: ClassVar[float] = 1.0
     endings: ClassVar[tuple[str, ...] | None] = None
@@ -130,7 +127,6 @@ class AbstractWalkerScene(AbstractScene):
         ground: slope and gravity.
     """
 
-    has_default_guess: ClassVar[bool] = True
     has_ground: ClassVar[bool] = True
     if TYPE_CHECKING:
         # A field of some scenes, a property of others.
@@ -461,6 +457,10 @@ class RedundantScene(AbstractWalkerScene):
 
 CompliantScene: TypeAlias = Scene | RedundantScene
 """A walker with laws of contact, in minimal or redundant coordinates."""
+WalkerScene: TypeAlias = Scene | RigidScene
+"""A walker in minimal coordinates."""
+WALKER_SCENES = (Scene, RigidScene)
+"""Kinds of those."""
 
 
 def is_walker(args: object) -> TypeGuard[AbstractWalkerScene]:
