@@ -46,20 +46,42 @@ def test_solves_know_systems_and_no_walker():
     assert known == KNOW_A_WALKER
 
 
+QUESTIONS = {"is_compliant", "is_rigid", "is_walker", "compliant", "redundant"}
 KINDS = {
-    "is_compliant", "is_rigid", "is_walker",  # the questions
-    "Scene", "RigidScene", "RedundantScene", "HybridSystem",  # the scenes
+    "Scene", "RigidScene", "RedundantScene", "HybridSystem", "LinkageScene",  # scenes
+    "AbstractWalkerScene", "AbstractMinimalScene", "WalkerScene", "CompliantScene",
     "Walking", "RedundantWalking", "Rolling", "GuardedMotion",  # and their systems
+    "AbstractWalking", "AbstractWalkerSystem",
 }  # fmt: skip
+SAME_FOR_ALL = ("gait", "continuation", "sweep", "optimise", "identify")
 
 
-@pytest.mark.parametrize("path", sorted((PACKAGE / "sweep").rglob("*.py")), ids=lambda p: p.name)
-def test_sweeps_ask_no_scene_which_kind_of_motion_it_has(path):
-    for node in ast.walk(ast.parse(path.read_text())):
+def _annotations_of(tree):
+    """What is written behind colons and arrows: signatures, and what a registered answer is for."""
+    for node in ast.walk(tree):
+        for part in (getattr(node, "annotation", None), getattr(node, "returns", None)):
+            yield from () if part is None else ast.walk(part)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for package in SAME_FOR_ALL for path in sorted((PACKAGE / package).rglob("*.py"))],
+    ids=lambda path: str(path.relative_to(PACKAGE)),
+)
+def test_no_file_asks_a_scene_which_kind_of_motion_it_has(path):
+    """Scenes and systems answer, or a function that is registered for a kind by its annotation."""
+    tree = ast.parse(path.read_text())
+    annotations = {id(node) for node in _annotations_of(tree)}
+    for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom):
-            assert not KINDS & {each.name for each in node.names}
+            assert not QUESTIONS & {each.name for each in node.names}
+            assert not KINDS & {each.name for each in node.names if each.asname is not None}
         elif isinstance(node, ast.Attribute):
-            assert node.attr not in ("compliant", "redundant")
+            assert node.attr not in QUESTIONS | KINDS
+        elif isinstance(node, ast.Name) and id(node) not in annotations:
+            assert node.id not in KINDS | QUESTIONS
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("isinstance", "issubclass"):
+            assert "SCENES" not in ast.unparse(node)  # doors alone name what they accept
 
 
 def test_every_package_has_a_layer():

@@ -32,7 +32,7 @@ from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.optimise._augmented_system import MotionSection, integrals_of
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, precision_of
 from jaxbiped.variational._tangents import Seeded
@@ -88,7 +88,7 @@ class Functionals(NamedTuple):
 
 
 def cycle_functionals(
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     state: WalkerState,
     *,
     arrivals: int = 1,
@@ -113,13 +113,13 @@ def cycle_functionals(
     return _functionals(spec, scene, system.begin(state), functional_precision(accuracy, scene))
 
 
-def integral_names(scene: Scene | RigidScene) -> tuple[str, ...]:
+def integral_names(scene: WalkerScene) -> tuple[str, ...]:
     """What `cycle_functionals` tells of a scene."""
     return (*integrals_of(scene).coordinates, "foot_clearance")
 
 
 def cycle_spec(
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     system: AbstractSystem,
     section: AbstractSection,
     arrivals: int,
@@ -138,7 +138,7 @@ def cycle_spec(
 
 
 def functional_precision(
-    accuracy: str, scene: Scene | RigidScene, names: tuple[str, ...] = ()
+    accuracy: str, scene: WalkerScene, names: tuple[str, ...] = ()
 ) -> Precision:
     """How exactly functionals are solved, as arrays: one program serves every accuracy."""
     found, share = precision_of(accuracy, scene), 1.0
@@ -165,9 +165,7 @@ class Orbits(NamedTuple):
     returns: LinearisedReturn
 
 
-def orbits_near(
-    spec: ReturnMapSpec, scene: Scene | RigidScene, y: PyTree, fine: Precision
-) -> Orbits:
+def orbits_near(spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precision) -> Orbits:
     """The orbits near a state on the section, after one more correction by Newton."""
     point = recurring_components(spec.system, y)
     _, active = select_parameters(scene, None)
@@ -192,7 +190,7 @@ def orbits_near(
 
 @host_jit(runs_by_lanes)
 def _functionals(
-    spec: ReturnMapSpec, scene: Scene | RigidScene, y: PyTree, fine: Precision
+    spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precision
 ) -> Functionals:
     found = orbits_near(spec, scene, y, fine)
     values, slopes = jax.vmap(_totals)(found.returns, found.points)

@@ -66,8 +66,6 @@ class AbstractScene(eqx.Module):
         bristles: names of the states of friction, which are 0 where a start leaves them out.
         posture: names of the angles and rates from which the root point's place follows.
         coordinate_aliases: coordinates by other names that they have.
-        has_ground: whether it has feet on a ground, whose forces, losses and clearances are
-            measured along a cycle. A property of the class.
     """
 
     compliant: AbstractClassVar[bool]
@@ -77,7 +75,6 @@ class AbstractScene(eqx.Module):
     bristles: ClassVar[tuple[str, ...]] = ()
     posture: ClassVar[tuple[str, ...]] = ()
     coordinate_aliases: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    has_ground: ClassVar[bool] = False
     time_unit: ClassVar[float] = 1.0
     endings: ClassVar[tuple[str, ...] | None] = None
     arrival_footsteps: ClassVar[int] = 1
@@ -127,7 +124,6 @@ class AbstractWalkerScene(AbstractScene):
         ground: slope and gravity.
     """
 
-    has_ground: ClassVar[bool] = True
     if TYPE_CHECKING:
         # A field of some scenes, a property of others.
         @property
