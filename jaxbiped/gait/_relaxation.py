@@ -22,7 +22,10 @@ from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
 from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
 
 _Law = TypeVar("_Law", bound=eqx.Module)
-_LAWS = {"normal": (NORMAL_LAWS, normal_law_like), "friction": (FRICTION_LAWS, friction_law_like)}
+_LAWS: dict[str, tuple[Mapping[str, type], Callable[[str], Any]]] = {
+    "normal": (NORMAL_LAWS, normal_law_like),
+    "friction": (FRICTION_LAWS, friction_law_like),
+}
 """Catalogues of the parts of a scene that are laws of contact, and what resembles the seed's."""
 _LIGHT, _STRENGTHS = 1e-3, ("mass", "inertia", "stiffness", "damping", "torque")
 """Factor of what is taken in along a line, and what is."""
