@@ -29,12 +29,12 @@ from jaxbiped.continuation._branch_point import (
     change_of,
     start_of,
 )
-from jaxbiped.continuation._cycle import Cycle, CycleProblem
+from jaxbiped.continuation._cycle import Cycle, follow_cycle
 from jaxbiped.continuation._trace import LIMITS, BranchStop, Trace, limit_cause, trace
 from jaxbiped.dynamics._state import zero_state
 from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Change, Curve, CurvePoint, correct
@@ -72,7 +72,7 @@ class ContinuationSetup(NamedTuple):
     axis: Axis
     arrivals: int
     accuracy: str
-    problem: CycleProblem
+    problem: FixedPointProblem
 
     @property
     def footsteps(self) -> int:
@@ -86,13 +86,19 @@ class ContinuationSetup(NamedTuple):
         def change(point: np.ndarray, s: float) -> Change:
             return change_of(self.cycle(point, self.axis.value(s)), point, self.axis.slope(s))
 
-        sizes = np.append(recurring_sizes(self.scene, self.problem.like), 1.0)
+        sizes = np.append(recurring_sizes(self.scene, self.problem.guess), 1.0)
         return Curve(change, sizes, _CONVERGED * float(self.problem.precision.rtol))
 
     def cycle(self, recurring: np.ndarray, value: float, arrivals: int | None = None) -> Cycle:
         """The cycle from these components at a value of the parameter."""
         count = self.arrivals if arrivals is None else arrivals
-        return self.problem.cycle(recurring, (self.axis.leaf,), [value], count)
+        return self.cycle_with(recurring, (self.axis.leaf,), [value], count)
+
+    def cycle_with(
+        self, recurring: np.ndarray, active: tuple[int, ...], values: list[float], arrivals: int
+    ) -> Cycle:
+        """The cycle from these components, parameters at positions `active` so changed."""
+        return follow_cycle(self.problem._replace(active=active), recurring, values, arrivals)
 
     def at_value(self, recurring: np.ndarray, value: float) -> Attempt:
         """The gait near these components at a value of the parameter."""
@@ -103,7 +109,7 @@ class ContinuationSetup(NamedTuple):
         return np.asarray(recurring_components(self.problem.spec.system, state))
 
     def state_of(self, recurring: np.ndarray) -> WalkerState:
-        return state_at(type(self.problem.like), recurring)
+        return state_at(type(self.problem.guess), recurring)
 
     def point(self, found: CurvePoint) -> BranchPoint:
         return branch_point(self.curve, self.axis, found)
@@ -152,7 +158,7 @@ class ContinuationSetup(NamedTuple):
             bifurcations=tuple(e._replace(point=self.with_footsteps(e.point)) for e in events),
             stops=(before.stop, after.stop),
             axis=self.axis,
-            state_type=type(self.problem.like),
+            state_type=type(self.problem.guess),
             footsteps=self.footsteps,
             accuracy=self.accuracy,
             engine=self.problem.spec.engine,
@@ -182,7 +188,7 @@ def continuation_setup(
     spec = return_map_spec(
         scene, like, section=section, solver=None, engine=engine, max_solver_steps=most
     )
-    problem = CycleProblem(spec, scene, like, precision_of(accuracy, scene))
+    problem = FixedPointProblem(spec, scene, (), like, precision_of(accuracy, scene))
     return ContinuationSetup(scene, axis, arrivals, accuracy, problem)
 
 

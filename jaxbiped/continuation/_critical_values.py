@@ -262,7 +262,7 @@ def fold_forcing(
     known = parameter_values(scene)
     _, leaves = select_parameters(scene, names)
     values = [float(known[name]) for name in names]
-    seen = setup.problem.cycle(recurring, leaves, values, setup.arrivals)
+    seen = setup.cycle_with(recurring, leaves, values, setup.arrivals)
     if int(seen.code[0]) != 0:
         return None
     m, sizes = len(recurring), setup.curve.sizes[:-1]

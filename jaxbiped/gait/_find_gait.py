@@ -40,7 +40,7 @@ from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by
 from jaxbiped.gait._search_provenance import FoundBy, single_stage_origin, warn_of_unknown
 from jaxbiped.gait._search_starts import start_of_search
 from jaxbiped.hybrid._hybrid_system import SCENES
-from jaxbiped.hybrid._scales import declared_sizes
+from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import WALKER_SCENES, AbstractScene, WalkerScene
@@ -192,7 +192,7 @@ def find_gait(
         max_evaluations=int(most),
         residual=_RESIDUAL_SHARE * precision.rtol,
         patience=np.asarray(int(most)),
-        sizes=declared_sizes(start),
+        sizes=recurring_sizes(scene, start) if hasattr(type(start), "scales") else None,
     )
     # One program of lanes serves every search, whatever it is asked for, and what follows it.
     every = active if parameters is None else select_parameters(modelled, None)[1]

@@ -112,7 +112,7 @@ class FixedPointProblem(NamedTuple):
         spec: of the return map.
         args: the scene, or the parameters of another system.
         active: positions among its leaves of the parameters that derivatives are with respect to.
-        guess: where the search begins, on the section or not.
+        guess: where the search begins, on the section or not; any state where none is sought.
         precision: of the solves in the end.
         method: how to search; None once the fixed point is known.
     """

@@ -1,52 +1,22 @@
-"""Footsteps of a walker's cycle: their strikes and lengths, and whether the cycle is a walk.
+"""Footsteps of a walker's cycle: where feet strike, and whether they are deep underground.
 
 The return map has fixed points that no walk reaches: under the clearance rule a foot may swing
 deep underground and be caught there. Stability does not tell them from gaits, so depth does.
 """
-
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, any_of, by_numpy
+from jaxbiped._types import Scalar, any_of
 from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._footfalls import FootMotion, landings, standing_leg, touches
-from jaxbiped.dynamics._surfaces import foot_ahead
-from jaxbiped.scene._ground import check_pulls
-from jaxbiped.scene._scene import AbstractWalkerScene, Scene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._structure import Structure
 
-_PATIENCE = 50.0
-"""Time allowed to the next arrival, in units of √(l/g)."""
-_SHORTEST = 0.1
-"""Duration of a cycle in units of √(l/g), about 2 for a footstep: a foot may also chatter."""
-_SHORTEST_STEP = 0.01
-"""Mean footstep, in units of the walker's height, up to which a gait is no walk."""
 _DEEPEST = 3.0
 """Elastic force of a standing foot, in units of the walker's weight: about 1 where it stands."""
-
-
-def longest_wait(scene: AbstractWalkerScene) -> Scalar:
-    """Time that a walker's next arrival may take [s]."""
-    check_pulls(scene.ground)
-    wait: Scalar = by_numpy(
-        lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.mechanism.height, scene.ground.g
-    )
-    return wait
-
-
-def takes_steps(scene: AbstractWalkerScene, advance: Any, arrivals: Any) -> Any:
-    """Whether an advance [m] in so many arrivals is one of footsteps (boolean)."""
-    shortest = _SHORTEST_STEP * scene.mechanism.height
-    return advance > shortest * arrivals * scene.arrival_footsteps
-
-
-def outlasts_chatter(scene: AbstractWalkerScene, period: Scalar) -> Scalar:
-    """Whether a cycle lasts longer than one in which a foot but chatters (boolean)."""
-    return period > _SHORTEST * jnp.sqrt(scene.mechanism.height / scene.ground.g)
 
 
 def stands_too_deep(scene: Scene, state: PyTree) -> Scalar:
@@ -57,16 +27,6 @@ def stands_too_deep(scene: Scene, state: PyTree) -> Scalar:
         return touches(foot) & (scene.normal.elastic_force(foot.penetration) > _DEEPEST * weight)
 
     return any_of([deep(foot) for foot in feet(scene, state)])
-
-
-def places_after_strikes(scene: AbstractWalkerScene, states: PyTree) -> Scalar:
-    """Places of the standing foot where arrivals at strikes begin [m], shape (arrivals,).
-
-    Leaves of the states have the shape (arrivals, nodes).
-    """
-    begins = jtu.tree_map(lambda x: x[:, 0], states)
-    ahead = jax.vmap(lambda y: foot_ahead(scene, y))(begins)
-    return jtu.tree_leaves(begins)[0] + ahead
 
 
 def places_of_landings(scene: Scene, states: PyTree, count: int) -> Scalar:

@@ -177,12 +177,6 @@ def recurring_sizes(args: PyTree, state: PyTree) -> np.ndarray:
     return np.array(recurring_leaves(sizes_of(args, state)[1]))
 
 
-def declared_sizes(state: Any) -> np.ndarray | None:
-    """Sizes of a state's recurring components, None where its class declares none of any."""
-    kind = type(state)
-    return np.array(recurring_leaves(kind(*own_sizes(kind)))) if hasattr(kind, "scales") else None
-
-
 def _by_dimension(state: PyTree, values: _Sizes) -> PyTree:
     """Of each leaf of a state the value for its powers of length and time; None where it is."""
     dimensions = dimensions_of(type(state))

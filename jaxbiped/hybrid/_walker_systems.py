@@ -5,13 +5,15 @@ import functools
 from collections.abc import Callable, Collection
 from typing import Any, ClassVar
 
+import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
-from jaxbiped._types import Scalar, Time
+from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.dynamics._constrained_motion import consistent_state, project
 from jaxbiped.dynamics._contacts import feet, foot_force
 from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
@@ -28,12 +30,8 @@ from jaxbiped.hybrid._compliant_guards import contact_changes, gaps, switches
 from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface, rigid_ending
 from jaxbiped.hybrid._footsteps import (
     distances,
-    longest_wait,
-    outlasts_chatter,
-    places_after_strikes,
     places_of_landings,
     stands_too_deep,
-    takes_steps,
 )
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._implicit_field import ImplicitField, with_unit_mass
@@ -43,6 +41,7 @@ from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._start_placement import held_like, passes_a_stop, standing_like
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.scene._clearance import check_legs_admitted_alike
+from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._scene import (
     AbstractWalkerScene,
     CompliantScene,
@@ -52,6 +51,12 @@ from jaxbiped.scene._scene import (
 )
 from jaxbiped.scene._state_types import State
 
+_PATIENCE = 50.0
+"""Time allowed to the next arrival, in units of √(l/g)."""
+_SHORTEST = 0.1
+"""Duration of a cycle in units of √(l/g), about 2 for a footstep: a foot may also chatter."""
+_SHORTEST_STEP = 0.01
+"""Mean footstep, in units of the walker's height, up to which a gait is no walk."""
 _SHALLOW = 1e-9
 """Depth of a foot in units of length up to which it just touches."""
 
@@ -68,10 +73,15 @@ class AbstractWalkerSystem(AbstractSystem):
     watches: ClassVar[tuple[str, ...]] = WATCHES
 
     def longest_wait(self, args: AbstractWalkerScene) -> Scalar:
-        return longest_wait(args)
+        check_pulls(args.ground)
+        wait: Scalar = by_numpy(
+            lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), args.mechanism.height, args.ground.g
+        )
+        return wait
 
     def takes_steps(self, args: AbstractWalkerScene, advance: Any, arrivals: Any) -> Any:
-        return takes_steps(args, advance, arrivals)
+        shortest = _SHORTEST_STEP * args.mechanism.height
+        return advance > shortest * arrivals * args.arrival_footsteps
 
     def is_walk(
         self,
@@ -82,7 +92,8 @@ class AbstractWalkerSystem(AbstractSystem):
         arrivals: int = 1,
     ) -> Scalar:
         """Whether it steps downhill, takes its time, and stands on the ground (boolean)."""
-        forward = takes_steps(args, advance, arrivals) & outlasts_chatter(args, period)
+        pace = jnp.sqrt(args.mechanism.height / args.ground.g)
+        forward = self.takes_steps(args, advance, arrivals) & (period > _SHORTEST * pace)
         return forward & self.stands(args, y)
 
     def step_lengths(
@@ -98,9 +109,9 @@ class AbstractWalkerSystem(AbstractSystem):
         """How far the stance leg's foot stands ahead of the root point on a section [m]."""
         return foot_ahead(args, y)
 
-    @abc.abstractmethod
     def stands(self, args: Any, y: PyTree) -> Scalar:
-        """Whether no foot is deep underground (boolean)."""
+        """Whether no foot is deep underground (boolean). Default: none comes to be."""
+        return jnp.asarray(True)
 
     @abc.abstractmethod
     def strike_places(self, args: Any, states: PyTree, count: int) -> Scalar:
@@ -228,12 +239,10 @@ class Rolling(AbstractWalkerSystem):
     def placed_like(self, args: RigidScene, base: Any, states: Any, named: Collection[str]) -> Any:
         return held_like(args, base, states, named)
 
-    def stands(self, args: RigidScene, y: Any) -> Scalar:
-        return jnp.asarray(True)
-
     def strike_places(self, args: RigidScene, states: Any, count: int) -> Scalar:
         """Places of the standing foot just after the strikes [m], shape (count,)."""
-        return places_after_strikes(args, states)
+        begins = jtu.tree_map(lambda x: x[:, 0], states)
+        return begins[0] + jax.vmap(functools.partial(self.foot_ahead, args))(begins)
 
     def on_held(self, args: RigidScene, y: Any) -> Any:
         return on_held(args, y)

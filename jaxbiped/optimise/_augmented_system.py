@@ -323,34 +323,20 @@ class DisturbedCycle(AbstractAugmentedSystem):
         return join(y, after, told)
 
     def scene_of(self, args: AbstractWalkerScene, y: PyTree) -> AbstractWalkerScene:
-        """The scene as it is disturbed."""
-        if self.disturbance == DROP:
-            return scene_with_step(args, y.drop * args.mechanism.height)
-        return _on_ground(args, dataclasses.replace(args.ground, slope=args.ground.slope + y.push))
+        """The scene as it is disturbed. Rolling feet meet the step at their section alone."""
+        ground: Ground | SteppedGround = args.ground
+        if self.disturbance == PUSH:
+            ground = dataclasses.replace(args.ground, slope=ground.slope + y.push)
+        else:
+            depth, leg = y.drop * args.mechanism.height, args.mechanism.structure.swing_leg
+            ground = SteppedGround(ground.slope, ground.g, depth, leg)
+        found: AbstractWalkerScene = eqx.tree_at(lambda each: each.ground, args, ground)
+        return found
 
 
 def disturbed_cycle(walker: AbstractSystem, disturbance: str) -> DisturbedCycle:
     more = (PUSH,) if disturbance == PUSH else ("fallen", DROP)
     return DisturbedCycle(walker, ("clock", *more), disturbance)
-
-
-@functools.singledispatch
-def scene_with_step(scene: Any, depth: Scalar) -> Any:
-    """The scene on ground that is lower by a depth [m] where the swing leg comes down.
-
-    As it is where its `section_with_step` has the step.
-    """
-    return scene
-
-
-@scene_with_step.register
-def _(scene: Scene, depth: Scalar) -> Scene:
-    ground, leg = scene.ground, scene.mechanism.structure.swing_leg
-    return _on_ground(scene, SteppedGround(ground.slope, ground.g, depth, leg))
-
-
-def _on_ground(scene: AbstractWalkerScene, ground: Ground | SteppedGround) -> Any:
-    return eqx.tree_at(lambda each: each.ground, scene, ground)
 
 
 @functools.singledispatch

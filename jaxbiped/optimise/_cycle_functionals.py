@@ -12,7 +12,7 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._energy import is_driven
-from jaxbiped.gait._fixed_point_search import looser
+from jaxbiped.gait._fixed_point_search import with_looser
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
@@ -184,8 +184,7 @@ def orbits_near(spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precis
         lost = jnp.where(away, int(Ending.TIMED_OUT), 0)
         return own, found._replace(code=jnp.where(found.code == 0, lost, found.code))
 
-    pairs = zip(fine, looser(fine), strict=True)
-    return Orbits(seeds, sizes, *jax.vmap(once)(Precision(*map(jnp.stack, pairs))))
+    return Orbits(seeds, sizes, *jax.vmap(once)(with_looser(fine)))
 
 
 @host_jit(runs_by_lanes)
