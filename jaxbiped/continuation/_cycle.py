@@ -64,8 +64,7 @@ def follow_cycle(
     """The cycle from a point of m components, the problem's active parameters so changed."""
     numbers: PyTree = np.asarray(point), np.asarray(values, float), np.asarray(arrivals)
     both = problem._replace(precision=with_looser(problem.precision))
-    found: Cycle = jax.device_get(_evaluate(both, *numbers))
-    return found
+    return jax.device_get(_evaluate(both, *numbers))
 
 
 @host_jit(search_by_lanes, within=True)

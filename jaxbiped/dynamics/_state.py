@@ -92,8 +92,7 @@ def _within_a_turn(angle: Scalar) -> Scalar:
     if known and not np.any(np.abs(np.asarray(angle)) > np.pi):
         return angle
     turn = 2.0 * np.pi
-    wrapped: Scalar = by_numpy(lambda numpy, x: x - turn * numpy.round(x / turn), angle)
-    return wrapped
+    return by_numpy(lambda numpy, x: x - turn * numpy.round(x / turn), angle)
 
 
 def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTree:
@@ -263,8 +262,7 @@ def recurring_leaves(state: Any) -> list[Any]:
 def periods_of(state: Any) -> Mapping[str, float]:
     """Period of each coordinate of a state, or of a kind of state, that turns, by name."""
     kind = state if isinstance(state, type) else type(state)
-    periods: Mapping[str, float] = getattr(kind, "periodic", {})
-    return periods
+    return getattr(kind, "periodic", {})
 
 
 def recurring_periods(state: Any) -> Periods:

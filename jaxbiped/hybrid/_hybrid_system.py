@@ -312,8 +312,7 @@ class GuardedMotion(AbstractSystem):
                 y = select(self._stays_on(guard, args, y), _reset(guard, y), y)
             return y
 
-        settled: PyTree = jax.lax.fori_loop(0, _ASKED_AGAIN, ask, y)
-        return settled
+        return jax.lax.fori_loop(0, _ASKED_AGAIN, ask, y)
 
     def _stays_on(self, guard: Guard, args: HybridSystem, y: PyTree) -> Scalar:
         """Whether a state is on a guard and does not leave it (boolean)."""

@@ -277,8 +277,7 @@ def _pushed(state: WalkerState, push: float) -> WalkerState:
     """The state with all its speeds so much larger, relative to themselves."""
     fast = [name for name in state._fields if unit_of(name) in ("m/s", "rad/s")]
     faster = {name: as_float(float(getattr(state, name)) * (1.0 + push)) for name in fast}
-    found: WalkerState = state._replace(**faster)
-    return found
+    return state._replace(**faster)
 
 
 def _judged(

@@ -209,8 +209,7 @@ def _weight(scene: WalkerScene) -> tuple[Scalar, Scalar]:
     """The walker's weight [N], and its derivatives with respect to all parameters, shape (p,)."""
 
     def of(there: Any) -> Scalar:
-        weight: Scalar = there.mechanism.total_mass * there.ground.g
-        return weight
+        return there.mechanism.total_mass * there.ground.g
 
     value, slopes = jax.value_and_grad(of)(scene)
     (_, places), leaves = select_parameters(scene, None), jtu.tree_leaves(slopes)
