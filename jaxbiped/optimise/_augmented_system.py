@@ -17,7 +17,6 @@ from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from equinox import AbstractVar
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, by_numpy, select
@@ -93,8 +92,8 @@ class AbstractAugmentedSystem(AbstractSystem):
         recurring: how many of them, the last ones, must return.
     """
 
-    walker: AbstractVar[AbstractSystem]
-    coordinates: AbstractVar[tuple[str, ...]]
+    walker: AbstractSystem
+    coordinates: tuple[str, ...] = eqx.field(static=True)
     recurring: ClassVar[int] = 0
 
     @property
@@ -165,15 +164,7 @@ def _driving(motors: tuple[Scalar, ...], like: Scalar) -> Scalar:
 
 
 class WalkingIntegrals(AbstractAugmentedSystem):
-    """`Walking` with its integrals; its load is the depth of a foot that swings [m].
-
-    Attributes:
-        walker: that system.
-        coordinates: names of the integrals.
-    """
-
-    walker: AbstractSystem
-    coordinates: tuple[str, ...] = eqx.field(static=True)
+    """`Walking` with its integrals; its load is the depth of a foot that swings [m]."""
 
     def vector_field(self, t: Time, y: PyTree, args: Scene) -> PyTree:
         state = motion_of(y)
@@ -222,14 +213,7 @@ class RollingIntegrals(AbstractAugmentedSystem):
     """`Rolling` with the energy that impacts and joints take; its load is the swing foot's depth.
 
     Impacts are also those of stops and soles. The work of motors includes that of the push-off.
-
-    Attributes:
-        walker: that system.
-        coordinates: names of the integrals.
     """
-
-    walker: AbstractSystem
-    coordinates: tuple[str, ...] = eqx.field(static=True)
 
     def vector_field(self, t: Time, y: PyTree, args: RigidScene) -> PyTree:
         state = motion_of(y)
@@ -301,8 +285,6 @@ class DisturbedCycle(AbstractAugmentedSystem):
         disturbance: "push" or "drop".
     """
 
-    walker: AbstractSystem
-    coordinates: tuple[str, ...] = eqx.field(static=True)
     disturbance: str = eqx.field(static=True)
     recurring: ClassVar[int] = 1
 
@@ -330,8 +312,7 @@ class DisturbedCycle(AbstractAugmentedSystem):
         else:
             depth, leg = y.drop * args.mechanism.height, args.mechanism.structure.swing_leg
             ground = SteppedGround(ground.slope, ground.g, depth, leg)
-        found: AbstractWalkerScene = eqx.tree_at(lambda each: each.ground, args, ground)
-        return found
+        return eqx.tree_at(lambda each: each.ground, args, ground)
 
 
 def disturbed_cycle(walker: AbstractSystem, disturbance: str) -> DisturbedCycle:
@@ -339,19 +320,8 @@ def disturbed_cycle(walker: AbstractSystem, disturbance: str) -> DisturbedCycle:
     return DisturbedCycle(walker, ("clock", *more), disturbance)
 
 
-@functools.singledispatch
-def section_with_step(scene: Any, section: AbstractSection) -> AbstractSection:
-    """A scene's own section, of the state of a disturbed cycle with a step in the ground."""
-    return MotionSection(section)
-
-
-@section_with_step.register
-def _(scene: RigidScene, section: AbstractSection) -> AbstractSection:
-    return SteppedSection(section)
-
-
 class SteppedSection(AbstractSection):
-    """A rigid walker's own section; its foot comes down where the ground now is.
+    """Heel strike of a rigid walker, whose foot comes down where the ground now is.
 
     Attributes:
         section: of the walker.
@@ -428,23 +398,20 @@ class SwingFoot(NamedTuple):
 
 @functools.singledispatch
 def swing_foot(scene: Any, state: PyTree, drop: Scalar | float = 0.0) -> SwingFoot:
-    """The foot that swings in the footstep of a cycle, which ends on ground lower by `drop` [m]."""
-    raise NotImplementedError(type(scene).__name__)
+    """The foot that swings in the footstep of a cycle, which ends on ground lower by `drop` [m].
 
-
-@swing_foot.register
-def _(scene: RigidScene, state: PyTree, drop: Scalar | float = 0.0) -> SwingFoot:
-    """That of a walker whose ground is lower at its section alone."""
-    return SwingFoot(clearance(scene, state), clearance_rate(scene, state), jnp.asarray(True))
-
-
-@swing_foot.register
-def _(scene: Scene, state: PyTree, drop: Scalar | float = 0.0) -> SwingFoot:
-    """The stance leg's, the lower one of several: the cycle has the footstep before, and the
-    exchange of legs behind."""
+    It is the stance leg's, the lower one of several: the cycle has the footstep before, and the
+    exchange of legs behind.
+    """
     structure, found = scene.mechanism.structure, feet(scene, state)
     lowest, *others = (found[k] for k in structure.feet_of_leg[structure.stance_leg])
     for foot in others:
         lowest = select(foot.penetration > lowest.penetration, foot, lowest)
     swings = jnp.logical_not(jnp.asarray(lowest.admitted))
     return SwingFoot(drop - lowest.penetration, -lowest.penetration_rate, swings)
+
+
+@swing_foot.register
+def _(scene: RigidScene, state: PyTree, drop: Scalar | float = 0.0) -> SwingFoot:
+    """That of a walker whose ground is lower at its section alone."""
+    return SwingFoot(clearance(scene, state), clearance_rate(scene, state), jnp.asarray(True))

@@ -19,7 +19,7 @@ from jaxbiped.gait._fixed_point_search import with_looser
 from jaxbiped.gait._orbit_derivatives import second_variation, slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
-from jaxbiped.hybrid._sections import section_of
+from jaxbiped.hybrid._sections import AbstractSection, HeelStrike, section_of
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.linalg._small_matrices import Eigensystem, eigenpairs, eigensystem, singular_pairs
 from jaxbiped.optimise._augmented_system import (
@@ -29,8 +29,8 @@ from jaxbiped.optimise._augmented_system import (
     LowestSwing,
     LowestSwingSection,
     MotionSection,
+    SteppedSection,
     disturbed_cycle,
-    section_with_step,
 )
 from jaxbiped.optimise._cycle_functionals import (
     Functionals,
@@ -305,7 +305,9 @@ def jacobian_functionals(
         on, count = section_of(scene, None), arrivals
         disturbed = disturbed_cycle(system_of(scene.minimal), DROP if by_step else PUSH)
         system: AbstractAugmentedSystem = disturbed
-        section = section_with_step(scene, on) if by_step else MotionSection(on)
+        # Mid-stance lies where it does, however high the ground.
+        is_moved = by_step and isinstance(on, HeelStrike)
+        section: AbstractSection = SteppedSection(on) if is_moved else MotionSection(on)
         if has_clearance:
             system, section = LowestSwing(disturbed), LowestSwingSection(section)
             count *= 2
