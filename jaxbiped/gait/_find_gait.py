@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -18,7 +17,8 @@ from jaxbiped._jax_versions import without_switches
 from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
+from jaxbiped.caching._caches import Once, bounded_cache
+from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.compiler import deferred_checks, host_jit
 from jaxbiped.dynamics._equivalent_states import BodiesState
 from jaxbiped.dynamics._state import recurring_leaves
@@ -208,7 +208,7 @@ def find_gait(
             found = walks_only(search(problem))
         return summarise_gait(asked, found, names, radius, origin)
     with stage("searching for a gait", unit="searches", show=progress) as now:
-        once = _compilation_of(_kind_of((problem, names, radius)))
+        once = _compilation_of(problem, names, radius)
         once(lambda: _compile(problem, asked, names, radius, origin))
         found, told = _search(problem), origin
         now.update()
@@ -246,8 +246,8 @@ def _search_within(problem: FixedPointProblem, patience: int) -> Found:
     return _search(problem._replace(method=dataclasses.replace(method, patience=most)))
 
 
-@bounded_cache(PROGRAMS)
-def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
+@known_by_shape
+def _compilation_of(problem: FixedPointProblem, names: tuple[str, ...], radius: bool) -> Once[None]:
     return Once()
 
 
@@ -269,14 +269,6 @@ def _compile(problem: FixedPointProblem, asked: FixedPointProblem, *more: Any) -
             raise
         for each in ready:
             each.result()
-
-
-def _kind_of(tree: PyTree) -> tuple[object, ...]:
-    """What decides whether one compiled program can serve for another."""
-    arrays, rest = eqx.partition(tree, eqx.is_array)
-    shapes = tuple((leaf.shape, leaf.dtype) for leaf in jtu.tree_leaves(arrays))
-    leaves, structure = jtu.tree_flatten(rest)
-    return jtu.tree_structure(arrays), shapes, tuple(leaves), structure
 
 
 def _empty_arrays(shape: PyTree) -> PyTree:

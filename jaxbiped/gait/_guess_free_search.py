@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._progress import Stage, stage
-from jaxbiped.gait._branch_along import FollowedBranch, Searching, branch_along, state_at
+from jaxbiped.gait._branch_along import TURNS, FollowedBranch, Searching, branch_along, state_at
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
@@ -17,7 +17,7 @@ from jaxbiped.gait._fixed_point_search import (
     walks_only,
 )
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
-from jaxbiped.gait._relaxation import has_seed_bodies, relaxed
+from jaxbiped.gait._relaxation import has_seed_bodies, is_far_from_seed, relaxed
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, return_map_spec
 from jaxbiped.gait._search_provenance import (
     MOST_OTHERS,
@@ -29,15 +29,13 @@ from jaxbiped.gait._search_provenance import (
     single_stage_origin,
 )
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
-from jaxbiped.gait._walk_waves import Walks, is_far_from_seed, state_rows, walks_of
+from jaxbiped.gait._walk_waves import Walks, state_rows, walks_of
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.solve._accuracy import ACCURACIES
 
 _PUSHES = (-0.05, -0.01, 0.01, 0.05)
 """Sizes (scaled) of the pushes off an unstable gait from which walks begin as well, and off a
 shorter cycle from which longer ones are sought."""
-_TURNS = 20
-"""Turns that each further search may take."""
 _SCATTERED, _NEAR, _LATEST = 12, 8, 4
 """Starts of the last stage; points where a wave of walks came nearest to a return, and of how many
 waves."""
@@ -119,7 +117,7 @@ def search_in_stages(
         nonlocal searches
         for point in points:
             searches += 1
-            add(search(problem._replace(guess=state_at(type(start), point)), _TURNS), by)
+            add(search(problem._replace(guess=state_at(type(start), point)), TURNS), by)
             now.update()
             if has_stable():
                 return

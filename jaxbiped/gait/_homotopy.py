@@ -16,7 +16,13 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, select
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, search, walks_only
 from jaxbiped.gait._poincare_map import recurring_components
-from jaxbiped.gait._relaxation import has_seed_bodies, like_model, relaxed, seed_like
+from jaxbiped.gait._relaxation import (
+    has_seed_bodies,
+    is_far_from_seed,
+    like_model,
+    relaxed,
+    seed_like,
+)
 from jaxbiped.gait._search_provenance import BranchEnd, FoundBy, Origin
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.linalg._small_matrices import eigenpairs
@@ -71,6 +77,8 @@ def homotopy_to(scene: AbstractWalkerScene) -> Homotopy | None:
     """
     if has_seed_bodies(scene):
         return Homotopy(scene.with_minimal(seed_like(scene.minimal)), scene)
+    if not is_far_from_seed(scene):
+        return None
     both = relaxed(scene)
     return line_from_model(scene) if both is None else Homotopy(*both)
 

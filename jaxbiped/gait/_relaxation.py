@@ -36,21 +36,13 @@ def has_seed_bodies(scene: AbstractWalkerScene) -> bool:
     return isinstance(scene.walker, Walker)
 
 
-@functools.singledispatch
+def is_far_from_seed(scene: AbstractWalkerScene) -> bool:
+    """Whether starts about the seed's mostly fall, and are dear: other bodies in stiff motion."""
+    return scene.stiff and scene.minimal is scene and not has_seed_bodies(scene)
+
+
 def relaxed(scene: Any) -> tuple[Any, Any] | None:
-    """A scene whose walker walks more easily, and the given one; None where there is no such."""
-    return None
-
-
-@functools.singledispatch
-def like_model(scene: Any) -> tuple[Any, Any] | None:
-    """A scene with legs of a model of the same kind, and the given one; None without a model."""
-    return None
-
-
-@relaxed.register
-def _(scene: Scene) -> tuple[Scene, Scene] | None:
-    """A scene of lighter, straighter and weaker parts; None where none can be.
+    """A scene whose walker walks more easily, and the given one; None where there is no such.
 
     Bodies that are no part of a leg have hardly any mass, and springs and latches on them are as
     weak. Mass centres of legs of one body lie on the line along it, and so do their feet.
@@ -77,9 +69,8 @@ def _(scene: Scene) -> tuple[Scene, Scene] | None:
     return jtu.tree_map(as_float, first), jtu.tree_map(as_float, last)
 
 
-@like_model.register
-def _(scene: Scene) -> tuple[Scene, Scene] | None:
-    """A scene with the legs of the seed's walker or of McGeer's kneed one.
+def like_model(scene: Any) -> tuple[Any, Any] | None:
+    """A scene with legs of a model of the same kind, and the given one; None without a model.
 
     They have the scene's size and weight, and the model's slope and laws of contact in proportion.
     Springs and latches hardly do anything.

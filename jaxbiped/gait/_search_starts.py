@@ -144,8 +144,7 @@ def _posed(scene: AbstractWalkerScene, lines: Lines) -> WalkerState:
         known |= {f"omega_{structure.bodies[j]}": each for j, each in rates.items()}
         if "mode" in kind._fields:
             known["mode"] = _starting_mode(scene, zero)
-        made: WalkerState = kind(**{name: known.get(name, zero) for name in kind._fields})
-        return made
+        return kind(**{name: known.get(name, zero) for name in kind._fields})
 
     own = None
     if _places_root(scene) or structure.turn is not None:
@@ -179,8 +178,7 @@ def _starting_mode(scene: AbstractWalkerScene, zero: Scalar) -> Scalar:
     own = scene.mechanism.structure.feet_of_leg[stance]
     stands = modes.standing(stance, (yes,) * len(own), zero) if modes.feet else ()
     mode = Mode(stands, held, (no,) * len(modes.locks))
-    found: Scalar = modes.encoded(jnp, mode, zero)
-    return found
+    return modes.encoded(jnp, mode, zero)
 
 
 def _limits(mechanism: Mechanism) -> dict[int, tuple[Any, Any]]:
@@ -224,8 +222,7 @@ def _root(scene: AbstractWalkerScene, state: WalkerState) -> _Root:
 def _with_root(scene: AbstractWalkerScene, state: WalkerState, point: _Root) -> WalkerState:
     root = scene.mechanism.structure.root
     named = {f"{root}_{name}": each for name, each in point._asdict().items()}
-    placed: WalkerState = state._replace(**named)
-    return placed
+    return state._replace(**named)
 
 
 @bounded_cache(1)
@@ -263,7 +260,7 @@ def rolling_starts(
 def _scatter(scene: WalkerScene, count: int, spread: float, seed: int) -> WalkerState:
     shape = scattered_start_count(scene), count
     scatter = jax.random.uniform(jax.random.key(seed), shape, minval=-1.0, maxval=1.0)
-    return _scattered(scene, spread * scatter.at[:, 0].set(0.0))
+    return starts_scattered_by(scene, spread * scatter.at[:, 0].set(0.0))
 
 
 def scattered_start_count(scene: WalkerScene) -> int:
@@ -289,10 +286,6 @@ def starts_scattered_by(scene: WalkerScene, scatter: Scalar) -> WalkerState:
         scene: the walker, compliant or rigid.
         scatter: shape (k, n), k as `scattered_start_count` tells.
     """
-    return _scattered(scene, scatter)
-
-
-def _scattered(scene: WalkerScene, scatter: Scalar) -> WalkerState:
     middle = default_guess(scene)
     lines, structure = _lines(scene, *_seed()), scene.mechanism.structure
     bends = bool(_limits(scene.mechanism))

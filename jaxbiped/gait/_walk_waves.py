@@ -18,7 +18,7 @@ from jaxbiped._progress import stage
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
-from jaxbiped.gait._relaxation import has_seed_bodies
+from jaxbiped.gait._relaxation import is_far_from_seed
 from jaxbiped.gait._search_starts import (
     rolling_starts,
     scattered_start_count,
@@ -155,11 +155,6 @@ def _arrivals(scene: WalkerScene, starts: WalkerState) -> tuple[Scalar, WalkerSt
         return walk.arrivals.total // each, named, walk.attempted
 
     return jax.vmap(one)(starts)
-
-
-def is_far_from_seed(scene: WalkerScene) -> bool:
-    """Whether starts about the seed's mostly fall, and are dear: other bodies in stiff motion."""
-    return scene.stiff and not has_seed_bodies(scene)
 
 
 def walks_of(scene: WalkerScene, pushed: Pushed, *, most: int = _MOST) -> Iterator[Walks]:

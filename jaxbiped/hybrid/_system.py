@@ -116,9 +116,7 @@ class AbstractSystem(eqx.Module):
         """Whether an advance in so many arrivals is one of footsteps (boolean). Default: it is."""
         return jnp.asarray(True)
 
-    def is_walk(
-        self, args: PyTree, y: PyTree, advance: Scalar, period: Scalar, arrivals: int = 1
-    ) -> Scalar:
+    def is_walk(self, args: Any, y: Any, advance: Scalar, period: Scalar, arrivals: int) -> Scalar:
         """Whether a cycle from a state on its section is one to which motions may come (boolean).
 
         It has so many `arrivals`. Default: nothing is required of it.

@@ -74,31 +74,21 @@ class AbstractWalkerSystem(AbstractSystem):
 
     def longest_wait(self, args: AbstractWalkerScene) -> Scalar:
         check_pulls(args.ground)
-        wait: Scalar = by_numpy(
+        return by_numpy(
             lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), args.mechanism.height, args.ground.g
         )
-        return wait
 
     def takes_steps(self, args: AbstractWalkerScene, advance: Any, arrivals: Any) -> Any:
         shortest = _SHORTEST_STEP * args.mechanism.height
         return advance > shortest * arrivals * args.arrival_footsteps
 
-    def is_walk(
-        self,
-        args: AbstractWalkerScene,
-        y: PyTree,
-        advance: Scalar,
-        period: Scalar,
-        arrivals: int = 1,
-    ) -> Scalar:
+    def is_walk(self, args: Any, y: Any, advance: Scalar, period: Scalar, arrivals: int) -> Scalar:
         """Whether it steps downhill, takes its time, and stands on the ground (boolean)."""
         pace = jnp.sqrt(args.mechanism.height / args.ground.g)
         forward = self.takes_steps(args, advance, arrivals) & (period > _SHORTEST * pace)
         return forward & self.stands(args, y)
 
-    def step_lengths(
-        self, args: AbstractWalkerScene, states: PyTree, advance: Scalar, arrivals: int
-    ) -> Scalar:
+    def step_lengths(self, args: Any, states: Any, advance: Scalar, arrivals: int) -> Scalar:
         """Distances between the places of successive heel strikes [m], shape (footsteps,)."""
         count = arrivals * args.arrival_footsteps
         if count == 1:

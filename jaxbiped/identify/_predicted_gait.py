@@ -52,7 +52,7 @@ class AnglesInTime(NamedTuple):
     mid_stance: float
 
     @classmethod
-    def of(cls, scene: AbstractMinimalScene, gait: Gait) -> "AnglesInTime":
+    def of(cls, scene: Any, gait: Gait) -> "AnglesInTime":
         """Those of a gait that was found; NaN for one that was lost."""
         times, states = gait.orbit
         splines, lasts = [], []
@@ -61,8 +61,7 @@ class AnglesInTime(NamedTuple):
             if gait.outcome is not Search.FOUND or known.sum() < 2:
                 return cls([], np.full(len(times), np.nan), np.nan)
             part = jtu.tree_map(lambda leaf, j=j, known=known: np.asarray(leaf)[j][known], states)
-            walker: Any = scene
-            exchanged = jtu.tree_map(np.asarray, exchange_legs(walker, part))
+            exchanged = jtu.tree_map(np.asarray, exchange_legs(scene, part))
             splines.append((_curves(clock[known], part), _curves(clock[known], exchanged)))
             lasts.append(clock[known][-1])
         return cls(splines, np.cumsum(lasts), _mid_stance(scene, gait))
@@ -126,10 +125,7 @@ def _mid_stance(scene: AbstractMinimalScene, gait: Gait) -> float:
 def _past_mid_stance(scene: AbstractMinimalScene, states: PyTree) -> tuple[Scalar, Scalar]:
     """A function of states that rises through zero at mid-stance, and its rate."""
     rates = system_of(scene).vector_field(0.0, states, scene)
-    found: tuple[Scalar, Scalar] = jax.jvp(
-        lambda y: MidStance().value(scene, y), (states,), (rates,)
-    )
-    return found
+    return jax.jvp(lambda y: MidStance().value(scene, y), (states,), (rates,))
 
 
 def clock_zero(angles: AnglesInTime, seen: MeasuredAngles) -> float:

@@ -416,14 +416,14 @@ def test_an_orbit_uphill_hasty_or_deep_underground_is_no_walk():
     walking = jb.hybrid.Walking()
     judge = jax.jit(walking.is_walk)
     sound = lambda *at: bool(judge(scene, *at))
-    assert sound(state, 0.18, 0.44)
-    assert not sound(state, -0.18, 0.44)
-    assert not sound(state, 0.18, 0.1 * np.sqrt(0.4 / 9.8))
+    assert sound(state, 0.18, 0.44, 1)
+    assert not sound(state, -0.18, 0.44, 1)
+    assert not sound(state, 0.18, 0.1 * np.sqrt(0.4 / 9.8), 1)
     # Footsteps of 1 % of the height, 0.4 m, in the mean.
-    assert (sound(state, 0.00404, 0.44), sound(state, 0.00396, 0.44)) == (True, False)
+    assert (sound(state, 0.00404, 0.44, 1), sound(state, 0.00396, 0.44, 1)) == (True, False)
     assert (sound(state, 0.00808, 0.44, 2), sound(state, 0.00792, 0.44, 2)) == (True, False)
     for length, expected in ((0.00404, True), (0.00396, False)):
-        rolls = jb.hybrid.Rolling().is_walk(jb.ladder()["rigid"], state, length, 0.44)
+        rolls = jb.hybrid.Rolling().is_walk(jb.ladder()["rigid"], state, length, 0.44, 1)
         assert bool(rolls) is expected
     for share in (0.99, 1.01):  # an arrival of unlike legs is two footsteps
         unlike = SimpleNamespace(mechanism=scene.mechanism, arrival_footsteps=2)
@@ -434,7 +434,7 @@ def test_an_orbit_uphill_hasty_or_deep_underground_is_no_walk():
         for depth, expected in ((1e-4, True), (1.6e-2, False)):
             low = state._replace(hip_z=0.4 - depth, **stands)
             low = jax.tree.map(jnp.asarray, low)
-            assert sound(low, 0.18, 0.44) is expected, (leg, depth)
+            assert sound(low, 0.18, 0.44, 1) is expected, (leg, depth)
     found = Found(*[np.asarray(0)] * 7, sound=np.asarray(False))
     assert int(walks_only(found).ending) == jb.gait.Search.NO_WALK
     assert int(walks_only(found._replace(sound=np.asarray(True))).ending) == jb.gait.Search.FOUND
