@@ -157,8 +157,7 @@ def _tell_version(frame: "_CallFrame") -> None:
 def _error_of(frame: "_CallFrame", message: str) -> int | None:
     told = message.encode()
     arguments = _ErrorArguments(ctypes.sizeof(_ErrorArguments), None, told, _INTERNAL_ERROR)
-    found: int | None = frame.api.contents.create_error(ctypes.addressof(arguments))
-    return found
+    return frame.api.contents.create_error(ctypes.addressof(arguments))
 
 
 def _register() -> object:

@@ -82,8 +82,7 @@ def _short(value: Any) -> str:
 def notebook_html(shown: object) -> str:
     """HTML of a result or a scene, see `jaxbiped.plot.notebook_html`."""
     # By its name: an import would make the keys of kept programs depend on all that draws.
-    html: str = importlib.import_module("jaxbiped.plot").notebook_html(shown)
-    return html
+    return importlib.import_module("jaxbiped.plot").notebook_html(shown)
 
 
 def _outcomes(code: ArrayLike, names: type[enum.IntEnum]) -> str:

@@ -121,8 +121,7 @@ def as_float(value: Parameter) -> Scalar:
 
 def rows_of(tree: SomeTree, rows: Any) -> SomeTree:
     """Rows of each leaf of a tree, as NumPy arrays; None for one more axis."""
-    found: SomeTree = jtu.tree_map(lambda leaf: np.asarray(leaf)[rows], tree)
-    return found
+    return jtu.tree_map(lambda leaf: np.asarray(leaf)[rows], tree)
 
 
 def in_parts(function: Callable[[Any], PyTree], tree: PyTree, size: int = AT_ONCE) -> PyTree:

@@ -29,17 +29,14 @@ def test_modules_are_short_and_arrows_point_one_way(path):
             assert module == "jaxbiped.compiler", f"past the compiler's front door: {module}"
 
 
+QUESTIONS = {"is_compliant", "is_rigid", "is_walker", "compliant", "redundant"}
 KINDS = {
-    "is_compliant", "is_rigid", "is_walker",  # the questions
-    "Scene", "RigidScene", "RedundantScene", "HybridSystem",  # the scenes
+    "Scene", "RigidScene", "RedundantScene", "HybridSystem", "LinkageScene",  # scenes
+    "AbstractWalkerScene", "AbstractMinimalScene", "WalkerScene", "CompliantScene",
     "Walking", "RedundantWalking", "Rolling", "GuardedMotion",  # and their systems
+    "AbstractWalking", "AbstractWalkerSystem",
 }  # fmt: skip
-
-
-def names_imported(path):
-    """Names that a file takes from other modules."""
-    nodes = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.ImportFrom)]
-    return {each.name for node in nodes for each in node.names}
+SAME_FOR_ALL = ("gait", "continuation", "sweep", "optimise", "identify")
 
 
 SOLVES = [
@@ -52,15 +49,37 @@ def test_solves_know_systems_and_no_walker(path):
     """They import no mechanism and no motion of one, nor the names by which kinds are known."""
     for module in imports_of(path):
         assert layer_of(module) not in ("scene", "dynamics"), module
-    assert not KINDS & names_imported(path)
-
-
-@pytest.mark.parametrize("path", sorted((PACKAGE / "sweep").rglob("*.py")), ids=lambda p: p.name)
-def test_sweeps_ask_no_scene_which_kind_of_motion_it_has(path):
-    assert not KINDS & names_imported(path)
     for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Attribute):
-            assert node.attr not in ("compliant", "redundant")
+        if isinstance(node, ast.ImportFrom):
+            assert not KINDS & {each.name for each in node.names}
+
+
+def _annotations_of(tree):
+    """What is written behind colons and arrows: signatures, and what a registered answer is for."""
+    for node in ast.walk(tree):
+        for part in (getattr(node, "annotation", None), getattr(node, "returns", None)):
+            yield from () if part is None else ast.walk(part)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for package in SAME_FOR_ALL for path in sorted((PACKAGE / package).rglob("*.py"))],
+    ids=lambda path: str(path.relative_to(PACKAGE)),
+)
+def test_no_file_asks_a_scene_which_kind_of_motion_it_has(path):
+    """Scenes and systems answer, or a function that is registered for a kind by its annotation."""
+    tree = ast.parse(path.read_text())
+    annotations = {id(node) for node in _annotations_of(tree)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            assert not QUESTIONS & {each.name for each in node.names}
+            assert not KINDS & {each.name for each in node.names if each.asname is not None}
+        elif isinstance(node, ast.Attribute):
+            assert node.attr not in QUESTIONS | KINDS
+        elif isinstance(node, ast.Name) and id(node) not in annotations:
+            assert node.id not in KINDS | QUESTIONS
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("isinstance", "issubclass"):
+            assert "SCENES" not in ast.unparse(node)  # doors alone name what they accept
 
 
 def test_every_package_has_a_layer():

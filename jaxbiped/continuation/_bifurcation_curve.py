@@ -165,7 +165,7 @@ def _gait_at(setup: ContinuationSetup, second: Axis, place: np.ndarray) -> Chang
     *scaled, s, t = place
     first, point = setup.axis, np.array(scaled) * setup.curve.sizes[:-1]
     values = [first.value(float(s)), second.value(float(t))]
-    seen = setup.problem.cycle(point, (first.leaf, second.leaf), values, setup.arrivals)
+    seen = setup.cycle_with(point, (first.leaf, second.leaf), values, setup.arrivals)
     return change_of(seen, point, first.slope(float(s)))
 
 

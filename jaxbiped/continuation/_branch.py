@@ -21,10 +21,10 @@ from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._gait import QUANTITIES
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import AbstractMinimalScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 
@@ -58,7 +58,7 @@ class Branch(eqx.Module, Tabular):
     """
 
     rows: ClassVar[str] = "point"
-    scene: Scene | RigidScene | HybridSystem
+    scene: AbstractMinimalScene
     points: tuple[BranchPoint, ...]
     bifurcations: tuple[BifurcationPoint, ...]
     stops: tuple[BranchStop, BranchStop]
@@ -219,7 +219,7 @@ def _entries(
 
 def open_branch(
     dataset: "xarray.Dataset",
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractMinimalScene,
     *,
     section: AbstractSection | None = None,
 ) -> Branch:
@@ -236,7 +236,7 @@ def open_branch(
     Raises:
         ArgumentError: the dataset is of another kind or another scene, or lacks a variable.
     """
-    scene = check_scene(scene, Scene, RigidScene, HybridSystem)
+    scene = check_scene(scene, *MINIMAL_SCENES)
     if "branch" not in dataset.attrs:
         raise ArgumentError("dataset is not allowed: it must be that of a branch.")
     settings = json.loads(dataset.attrs["branch"])

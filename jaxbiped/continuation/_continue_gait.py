@@ -29,23 +29,23 @@ from jaxbiped.continuation._branch_point import (
     change_of,
     start_of,
 )
-from jaxbiped.continuation._cycle import Cycle, CycleProblem
+from jaxbiped.continuation._cycle import Cycle, follow_cycle
 from jaxbiped.continuation._trace import LIMITS, BranchStop, Trace, limit_cause, trace
-from jaxbiped.dynamics._surfaces import foot_ahead
+from jaxbiped.dynamics._state import zero_state
 from jaxbiped.gait._branch_along import state_at
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Change, Curve, CurvePoint, correct
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
 from jaxbiped.gait._search_provenance import BranchEnd, explain_search
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
-from jaxbiped.hybrid._hybrid_system import HybridSystem, any_state
+from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import with_parameters
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene, is_walker
+from jaxbiped.scene._scene import AbstractMinimalScene, AbstractScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
@@ -68,11 +68,11 @@ class ContinuationSetup(NamedTuple):
         problem: how cycles are followed.
     """
 
-    scene: Scene | RigidScene | HybridSystem
+    scene: AbstractMinimalScene
     axis: Axis
     arrivals: int
     accuracy: str
-    problem: CycleProblem
+    problem: FixedPointProblem
 
     @property
     def footsteps(self) -> int:
@@ -86,13 +86,19 @@ class ContinuationSetup(NamedTuple):
         def change(point: np.ndarray, s: float) -> Change:
             return change_of(self.cycle(point, self.axis.value(s)), point, self.axis.slope(s))
 
-        sizes = np.append(recurring_sizes(self.scene, self.problem.like), 1.0)
+        sizes = np.append(recurring_sizes(self.scene, self.problem.guess), 1.0)
         return Curve(change, sizes, _CONVERGED * float(self.problem.precision.rtol))
 
     def cycle(self, recurring: np.ndarray, value: float, arrivals: int | None = None) -> Cycle:
         """The cycle from these components at a value of the parameter."""
         count = self.arrivals if arrivals is None else arrivals
-        return self.problem.cycle(recurring, (self.axis.leaf,), [value], count)
+        return self.cycle_with(recurring, (self.axis.leaf,), [value], count)
+
+    def cycle_with(
+        self, recurring: np.ndarray, active: tuple[int, ...], values: list[float], arrivals: int
+    ) -> Cycle:
+        """The cycle from these components, parameters at positions `active` so changed."""
+        return follow_cycle(self.problem._replace(active=active), recurring, values, arrivals)
 
     def at_value(self, recurring: np.ndarray, value: float) -> Attempt:
         """The gait near these components at a value of the parameter."""
@@ -103,21 +109,23 @@ class ContinuationSetup(NamedTuple):
         return np.asarray(recurring_components(self.problem.spec.system, state))
 
     def state_of(self, recurring: np.ndarray) -> WalkerState:
-        return state_at(type(self.problem.like), recurring)
+        return state_at(type(self.problem.guess), recurring)
 
     def point(self, found: CurvePoint) -> BranchPoint:
         return branch_point(self.curve, self.axis, found)
 
     def with_footsteps(self, point: BranchPoint) -> BranchPoint:
         """The same point with its cycle's footsteps, if these are several."""
-        if self.arrivals == 1 or point.footsteps is not None or not is_walker(self.scene):
+        if self.arrivals == 1 or point.footsteps is not None:
             return point
         scene = with_parameters(self.scene, {self.axis.name: point.value})
-        begins, rows = point.recurring, []
+        begins, rows, system = point.recurring, [], self.problem.spec.system
         for _ in range(self.arrivals):
+            ahead = system.foot_ahead(scene, self.state_of(begins))
+            if ahead is None:
+                return point
             once = self.cycle(begins, point.value, 1)
-            ahead = float(foot_ahead(scene, self.state_of(begins)))
-            rows.append((begins, once.period[0], once.advance[0], once.peak[0], ahead))
+            rows.append((begins, once.period[0], once.advance[0], once.peak[0], float(ahead)))
             begins = np.asarray(once.recurring[0])
         states, periods, advances, peaks, places = map(np.array, zip(*rows, strict=True))
         lengths = advances + np.roll(places, -1) - places
@@ -129,16 +137,16 @@ class ContinuationSetup(NamedTuple):
 
     def with_cause(self, part: Trace) -> Trace:
         """A part of a branch whose end is told by touch and slip, where these tell it."""
-        last, scene = part.points[-1], self.scene
-        if not isinstance(scene, Scene) or part.stop.end not in _TOLD_BY_CONTACT:
+        last = part.points[-1]
+        if part.stop.end not in _TOLD_BY_CONTACT:
             return part
         away = _BEYOND * float(np.sign(last.tangent[-1]))
-        here, before, beyond = (
-            with_parameters(scene, {self.axis.name: self.axis.value(float(last.place[-1]) + moved)})
-            for moved in (0.0, -away, away)
-        )
-        state = self.state_of(last.recurring)
-        cause = limit_cause(here, before, beyond, state, last.period)
+
+        def scene_at(share: float) -> AbstractScene:
+            value = self.axis.value(float(last.place[-1]) + share * away)
+            return with_parameters(self.scene, {self.axis.name: value})
+
+        cause = limit_cause(self.scene, scene_at, self.state_of(last.recurring), last.period)
         return part if cause is None else part._replace(stop=part.stop._replace(cause=cause))
 
     def branch(self, before: Trace, after: Trace) -> Branch:
@@ -150,7 +158,7 @@ class ContinuationSetup(NamedTuple):
             bifurcations=tuple(e._replace(point=self.with_footsteps(e.point)) for e in events),
             stops=(before.stop, after.stop),
             axis=self.axis,
-            state_type=type(self.problem.like),
+            state_type=type(self.problem.guess),
             footsteps=self.footsteps,
             accuracy=self.accuracy,
             engine=self.problem.spec.engine,
@@ -159,7 +167,7 @@ class ContinuationSetup(NamedTuple):
 
 
 def continuation_setup(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractMinimalScene,
     axis: Axis,
     *,
     footsteps: int | None,
@@ -172,15 +180,15 @@ def continuation_setup(
     Raises:
         ArgumentError: an engine that cannot, or footsteps that are no whole cycles.
     """
-    scene = check_scene(scene, Scene, RigidScene, HybridSystem)
+    scene = check_scene(scene, *MINIMAL_SCENES)
     arrivals = arrivals_of(scene, footsteps)
-    like = any_state(scene) if isinstance(scene, HybridSystem) else default_guess(scene)
+    like = zero_state(scene)
     # A branch may come to gaits that are costlier than those of a search.
     most = max(each.max_solver_steps for each in ACCURACIES.values())
     spec = return_map_spec(
         scene, like, section=section, solver=None, engine=engine, max_solver_steps=most
     )
-    problem = CycleProblem(spec, scene, like, precision_of(accuracy, scene))
+    problem = FixedPointProblem(spec, scene, (), like, precision_of(accuracy, scene))
     return ContinuationSetup(scene, axis, arrivals, accuracy, problem)
 
 
@@ -193,17 +201,17 @@ def setup_of(branch: Branch, **others: Any) -> ContinuationSetup:
 
 def check_followed(scene: object) -> None:
     """Raises `ArgumentError` for what is no scene, or one in redundant coordinates."""
-    if isinstance(scene, RedundantScene):
+    if getattr(scene, "minimal", scene) is not scene:
         raise ArgumentError(
             "scene is not allowed in redundant coordinates: its gaits are those of scene.minimal, "
             "which can be followed."
         )
-    check_scene(scene, Scene, RigidScene, HybridSystem)
+    check_scene(scene, *MINIMAL_SCENES)
     check_unbatched("scene", scene)
 
 
 def continue_gait(
-    scene: Scene | RigidScene | HybridSystem,
+    scene: AbstractMinimalScene,
     along: str = "slope",
     *,
     bounds: tuple[float, float],

@@ -33,7 +33,7 @@ from jaxbiped.scene._parameter_access import (
     select_parameters,
     with_parameters,
 )
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WALKER_SCENES, WalkerScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
@@ -70,7 +70,7 @@ class NearestBifurcation(NamedTuple):
     error: float
 
 
-def range_of(scene: Scene | RigidScene, along: str, factor: float = FACTOR) -> tuple[float, float]:
+def range_of(scene: WalkerScene, along: str, factor: float = FACTOR) -> tuple[float, float]:
     """The range in which a gait is followed from a parameter's own value.
 
     It ends where the walker allows no more, as a foot's radius at the leg's length.
@@ -86,7 +86,7 @@ def range_of(scene: Scene | RigidScene, along: str, factor: float = FACTOR) -> t
     return low, high
 
 
-def allows(scene: Scene | RigidScene, values: Mapping[str, float]) -> bool:
+def allows(scene: WalkerScene, values: Mapping[str, float]) -> bool:
     """Whether a walker may have these parameters."""
     try:
         with_parameters(scene, values)
@@ -95,7 +95,7 @@ def allows(scene: Scene | RigidScene, values: Mapping[str, float]) -> bool:
     return True
 
 
-def farthest_allowed(scene: Scene | RigidScene, name: str, end: float) -> float:
+def farthest_allowed(scene: WalkerScene, name: str, end: float) -> float:
     """The value of a parameter nearest to an end that the walker allows, seen from its own."""
     if allows(scene, {name: end}):
         return end
@@ -108,7 +108,7 @@ def farthest_allowed(scene: Scene | RigidScene, name: str, end: float) -> float:
 
 
 def nearest_bifurcation(
-    scene: Scene | RigidScene, gait: Gait, along: str = "slope", *, factor: float = FACTOR
+    scene: WalkerScene, gait: Gait, along: str = "slope", *, factor: float = FACTOR
 ) -> NearestBifurcation:
     """Follows a gait along a parameter to both sides, up to the first bifurcation or limit.
 
@@ -127,7 +127,7 @@ def nearest_bifurcation(
         ArgumentError: an argument is not allowed, or a parameter other than the slope is zero,
             which no factor changes; raised before anything is compiled.
     """
-    scene = check_scene(scene, Scene, RigidScene)
+    scene = check_scene(scene, *WALKER_SCENES)
     check_choice("along", along, parameter_names(scene))
     own = float(parameter_values(scene)[along])
     if not factor > 1.0:
@@ -262,7 +262,7 @@ def fold_forcing(
     known = parameter_values(scene)
     _, leaves = select_parameters(scene, names)
     values = [float(known[name]) for name in names]
-    seen = setup.problem.cycle(recurring, leaves, values, setup.arrivals)
+    seen = setup.cycle_with(recurring, leaves, values, setup.arrivals)
     if int(seen.code[0]) != 0:
         return None
     m, sizes = len(recurring), setup.curve.sizes[:-1]

@@ -14,11 +14,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.compiler import host_jit
-from jaxbiped.gait._fixed_point_search import is_sound, search_by_lanes, takes_steps, with_looser
-from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
-from jaxbiped.solve._accuracy import Precision
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, search_by_lanes, with_looser
+from jaxbiped.gait._poincare_map import linearised_return
 
 NO_WALK = -1
 """Code of an orbit that returns but is no walk: a foot underground, steps uphill or hardly any."""
@@ -41,7 +38,7 @@ class Cycle(NamedTuple):
         code: 0 or that of the `Ending` that came instead.
         grazes: how often a switch was touched or missed by less than the tolerance resolves.
         sound: whether every footstep goes downhill and on the ground, and their mean is a step
-            (see `is_sound`).
+            (see `AbstractSystem.is_walk`).
     """
 
     recurring: Numbers
@@ -61,59 +58,35 @@ class Cycle(NamedTuple):
         return int(self.code[0]) or (0 if bool(self.sound[0]) else NO_WALK)
 
 
-class CycleProblem(NamedTuple):
-    """Whose cycles are followed, and how exactly.
-
-    Attributes:
-        spec: of a return to the next arrival.
-        scene: the walker or system.
-        like: any state of it.
-        precision: of the solves.
-    """
-
-    spec: ReturnMapSpec
-    scene: AbstractScene
-    like: PyTree
-    precision: Precision
-
-    def cycle(
-        self, point: np.ndarray, active: tuple[int, ...], values: list[float], arrivals: int
-    ) -> Cycle:
-        """The cycle from a point of m components, parameters at positions `active` so changed."""
-        numbers: PyTree = np.asarray(point), np.asarray(values, float), np.asarray(arrivals)
-        both = self._replace(precision=with_looser(self.precision))
-        found: Cycle = jax.device_get(_evaluate(both, active, *numbers))
-        return found
+def follow_cycle(
+    problem: FixedPointProblem, point: np.ndarray, values: list[float], arrivals: int
+) -> Cycle:
+    """The cycle from a point of m components, the problem's active parameters so changed."""
+    numbers: PyTree = np.asarray(point), np.asarray(values, float), np.asarray(arrivals)
+    both = problem._replace(precision=with_looser(problem.precision))
+    return jax.device_get(_evaluate(both, *numbers))
 
 
 @host_jit(search_by_lanes, within=True)
-def _evaluate(
-    problem: CycleProblem,
-    active: tuple[int, ...],
-    point: Scalar,
-    values: Scalar,
-    arrivals: Scalar,
-) -> Cycle:
+def _evaluate(problem: FixedPointProblem, point: Scalar, values: Scalar, arrivals: Scalar) -> Cycle:
     """The cycle, and in a lane of its own the looser one."""
-    leaves, structure = jtu.tree_flatten(problem.scene)
-    for k, place in enumerate(active):
+    leaves, structure = jtu.tree_flatten(problem.args)
+    for k, place in enumerate(problem.active):
         leaves[place] = values[k]
-    there = problem._replace(scene=jtu.tree_unflatten(structure, leaves))
-    return jax.vmap(
-        lambda precision: _chain(there._replace(precision=precision), active, point, arrivals)
-    )(problem.precision)
+    there = problem._replace(args=jtu.tree_unflatten(structure, leaves))
+    return jax.vmap(lambda precision: _chain(there._replace(precision=precision), point, arrivals))(
+        problem.precision
+    )
 
 
-def _chain(
-    problem: CycleProblem, active: tuple[int, ...], point: Scalar, arrivals: Scalar
-) -> Cycle:
-    spec, scene, like, precision = problem
-    m, p = point.shape[0], len(active)
-    seeds, sizes = seed_directions(scene, active, m)
+def _chain(problem: FixedPointProblem, point: Scalar, arrivals: Scalar) -> Cycle:
+    spec, scene, precision = problem.spec, problem.args, problem.precision
+    m, p = point.shape[0], len(problem.active)
+    seeds, sizes = problem.directions(m)
     units = jnp.concatenate([jnp.ones(m), sizes])
 
     def add(_: int, before: Cycle) -> Cycle:
-        y = state_with(spec.system, like, jnp.asarray(before.recurring))
+        y = problem.state(jnp.asarray(before.recurring))
         once = linearised_return(spec, seeds, y, precision, before.code != 0)
         own = once.jacobian / units
         advance = once.advance[0] if len(once.advance) else jnp.asarray(jnp.nan)
@@ -128,7 +101,7 @@ def _chain(
             peak=jnp.maximum(before.peak, once.peak),
             code=jnp.where(before.code != 0, before.code, once.code),
             grazes=before.grazes + once.grazes,
-            sound=before.sound & is_sound(scene, y, advance, once.period, 0),
+            sound=before.sound & spec.system.is_walk(scene, y, advance, once.period, 0),
         )
 
     zero = jnp.zeros(())
@@ -145,6 +118,4 @@ def _chain(
         sound=jnp.asarray(True),
     )
     end: Cycle = jax.lax.fori_loop(0, arrivals, add, begin)
-    if not isinstance(scene, AbstractWalkerScene):
-        return end
-    return end._replace(sound=end.sound & takes_steps(scene, end.advance, arrivals))
+    return end._replace(sound=end.sound & spec.system.takes_steps(scene, end.advance, arrivals))

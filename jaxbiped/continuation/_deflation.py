@@ -24,7 +24,7 @@ from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._search_starts import rolling_starts
 from jaxbiped.scene._parameter_access import parameter_values
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
@@ -59,7 +59,7 @@ class IsolatedGait(NamedTuple):
 
 
 def find_isolated(
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     *,
     footsteps: int | None = None,
     known: tuple[WalkerState, ...] = (),

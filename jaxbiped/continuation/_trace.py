@@ -1,8 +1,9 @@
 """Trace of a curve of gaits in one direction: its points, its bifurcations, and how it ends."""
 
+import functools
 from collections.abc import Callable, Collection, Sequence
 from itertools import islice
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -52,20 +53,30 @@ LIMITS = (BranchEnd.WALK_ENDS, BranchEnd.BREAKS_OFF, BranchEnd.NO_WALK)
 BOUND = "the range ends"
 
 
+@functools.singledispatch
 def limit_cause(
-    here: Scene, before: Scene, beyond: Scene, state: WalkerState, period: float
+    scene: Any, scene_at: Callable[[float], Any], state: WalkerState, period: float
 ) -> str | None:
-    """What a limit between two scenes comes from; None where neither touch nor slip tells.
+    """What a limit of a scene's gaits comes from; None where neither touch nor slip tells.
 
     Args:
-        here: the scene of the last gait; at the limit itself rounding decides whether feet slide.
-        before, beyond: scenes as far before the limit as behind it.
+        scene: the scene that is followed.
+        scene_at: the scene at the last gait for 0, and as far before the limit for −1 as behind it
+            for 1; at the limit itself rounding decides whether feet slide.
         state: of the last gait, on the section.
         period: of its cycle [s].
     """
+    return None
+
+
+@limit_cause.register
+def _(
+    scene: Scene, scene_at: Callable[[float], Any], state: WalkerState, period: float
+) -> str | None:
+    here, before, beyond = map(scene_at, (0.0, -1.0, 1.0))
     if _load(here, state) < _UNLOADED:
         return "no touch: the stance foot carries nothing on the section"
-    known, found = (_slipping_load(scene, state, period) for scene in (before, beyond))
+    known, found = (_slipping_load(each, state, period) for each in (before, beyond))
     if slides(known, found):
         return "slip: beyond, a foot that lands slides on"
     return None

@@ -9,7 +9,7 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import load_shares, preload
-from jaxbiped.dynamics._equivalent_states import CompliantState, images, motion_in, poses_of
+from jaxbiped.dynamics._equivalent_states import CompliantState, exchange_legs, motion_in, poses_of
 from jaxbiped.dynamics._footfalls import (
     FootMotion,
     LegMotion,
@@ -113,13 +113,14 @@ def with_stance_leg_standing(scene: CompliantScene, state: SomeState) -> SomeSta
     """
     mechanism = scene.mechanism
     structure = mechanism.structure
-    *others, _ = images(scene, state)
-    if not others:
+    _, *names = structure.namings
+    if not names:
         return state
+    images = [(leg, exchange_legs(scene, state, k)) for k, leg in enumerate(names, 1)]
     leg, found = structure.stance_leg, feet(scene, cast("CompliantState", state))
     strikes = jnp.abs(leg_depth(structure, found, leg)) <= _JUST_TOUCHING * mechanism.height
     stands = standing_leg(structure, found)
-    for other, image in others:
+    for other, image in reversed(images):
         state = select((stands == 1 + other) & ~strikes, image, state)
     return state
 

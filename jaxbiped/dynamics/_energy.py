@@ -249,8 +249,7 @@ def kinetic_energy(scene: AbstractWalkerScene, state: Any) -> Scalar:
         rates = dict(enumerate((motion.vx, motion.vz, *motion.rates)))
         momenta: Any = product(stance.mass_matrix(), rates)
         others = (rates[i] * momenta[i] for i in range(1, len(rates)))
-        found: Scalar = 0.5 * sum(others, rates[0] * momenta[0])
-        return found
+        return 0.5 * sum(others, rates[0] * momenta[0])
 
     return of_stance(scene, state, energy)
 

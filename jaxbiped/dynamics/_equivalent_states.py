@@ -196,15 +196,6 @@ def exchange_legs(scene: AbstractWalkerScene, state: SomeState, times: int = 1) 
     return state._replace(**{name: values[names.get(name, name)] for name in state._fields})
 
 
-def images(scene: AbstractWalkerScene, state: SomeState) -> list[tuple[int, SomeState]]:
-    """The same motion in all names that a symmetry allows, those that it has last.
-
-    With each the number of the leg that is the stance leg in these names.
-    """
-    legs = scene.mechanism.structure.namings
-    return [(leg, exchange_legs(scene, state, k)) for k, leg in enumerate(legs)][::-1]
-
-
 def _turned(structure: Structure, state: SomeState, times: int) -> dict[str, Any]:
     """The leaves of a state, a body turned so many times."""
     assert structure.turn is not None

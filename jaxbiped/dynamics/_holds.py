@@ -150,8 +150,7 @@ def _sum(row: Row, values: Row, zero: Scalar) -> Scalar:
 
 def gap_of(scene: RigidScene, limit: Limit, stance: Stance) -> Scalar:
     """How far a limit is [rad]."""
-    found: Scalar = limit.distance(stance.mechanism, stance.pose.motion.angles, scene.ground.slope)
-    return found
+    return limit.distance(stance.mechanism, stance.pose.motion.angles, scene.ground.slope)
 
 
 def on_held(scene: RigidScene, state: Any) -> Any:

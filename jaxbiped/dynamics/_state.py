@@ -16,7 +16,7 @@ from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar, as_float, by_numpy
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._scene import AbstractWalkerScene
+from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.scene._state_types import SomeState, State, is_redundant
 
 Periods: TypeAlias = tuple[float | None, ...]
@@ -43,6 +43,11 @@ def seed_state() -> State:
         omega_1=as_float(-0.0052),
         omega_2=as_float(-1.2565),
     )
+
+
+def zero_state(scene: AbstractScene) -> Any:
+    """A state of a scene's kind, of zeros."""
+    return scene.state_type(*(as_float(0.0) for _ in scene.state_type._fields))
 
 
 def standing_height(
@@ -87,8 +92,7 @@ def _within_a_turn(angle: Scalar) -> Scalar:
     if known and not np.any(np.abs(np.asarray(angle)) > np.pi):
         return angle
     turn = 2.0 * np.pi
-    wrapped: Scalar = by_numpy(lambda numpy, x: x - turn * numpy.round(x / turn), angle)
-    return wrapped
+    return by_numpy(lambda numpy, x: x - turn * numpy.round(x / turn), angle)
 
 
 def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTree:
@@ -258,8 +262,7 @@ def recurring_leaves(state: Any) -> list[Any]:
 def periods_of(state: Any) -> Mapping[str, float]:
     """Period of each coordinate of a state, or of a kind of state, that turns, by name."""
     kind = state if isinstance(state, type) else type(state)
-    periods: Mapping[str, float] = getattr(kind, "periodic", {})
-    return periods
+    return getattr(kind, "periodic", {})
 
 
 def recurring_periods(state: Any) -> Periods:

@@ -30,10 +30,9 @@ length pass each other their feet are level as well, and none comes down."""
 
 def rate_unit(scene: AbstractWalkerScene) -> Scalar:
     """√(g/l), by the root point's height l with all angles 0 [1/s]."""
-    rate: Scalar = by_numpy(
+    return by_numpy(
         lambda numpy, g, length: numpy.sqrt(g / length), scene.ground.g, scene.mechanism.height
     )
-    return rate
 
 
 def clearance(scene: RigidScene, state: Any) -> Scalar:
@@ -71,8 +70,7 @@ def _distance_ahead(stance: Stance) -> Scalar:
 def standing_place(stance: Stance) -> Scalar:
     """Where the centre of the standing foot is, or those of a leg's feet on average [m]."""
     if len(stance.feet) == 1:
-        place: Scalar = stance.pose.motion.x
-        return place
+        return stance.pose.motion.x
     return mean([stance.foot(k).x for k in stance.feet])
 
 

@@ -63,7 +63,7 @@ def accurate_gait(
         radius: whether derivatives of the spectral radius are wanted.
     """
     check_untraced(wanted, (scene, guess), GAIT_ACCURACIES)
-    fifth = isinstance(orbit_solver(solver, rigid=not scene.compliant), Rodas5P)
+    fifth = isinstance(orbit_solver(solver, stiff=scene.stiff), Rodas5P)
     other = "rodas4p" if fifth else "rodas5p"
     near = guess
 

@@ -24,14 +24,14 @@ from jaxbiped.gait._pseudo_arclength import (
     follow,
     locate,
 )
+from jaxbiped.gait._relaxation import has_seed_bodies, is_far_from_seed
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.gait._search_starts import default_guess
-from jaxbiped.gait._walk_waves import is_far_from_seed, walks_of
+from jaxbiped.gait._walk_waves import walks_of
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._state_types import WalkerState
-from jaxbiped.scene._walker import Walker
 from jaxbiped.solve._accuracy import Precision
 
 _CONTROL = StepControl(first=0.08, largest=0.35, smallest=2e-4)
@@ -41,8 +41,8 @@ _MOST_STEPS = 150
 _AT_END = 1e-9
 _BEYOND_FOLD, _BACK = 24, 0.25
 """Steps, and distance in s, for which a branch is followed back behind its first fold."""
-_TURNS = 20
-"""Turns that each search may take."""
+TURNS = 20
+"""Turns that each further search may take."""
 _FINER = Precision(3e-7, 3e-6)
 """How exactly the seed's gait is followed again where it was lost, by finer steps."""
 _LEAPS, _GAPS = 4, (0.01, 0.05)
@@ -105,11 +105,11 @@ def branch_along(
     begin: Any = line.first
     start = default_guess(begin)
     problem = problem._replace(active=_columns(line) if problem.active else ())
-    first = search(problem._replace(args=begin, guess=start), _TURNS)
-    if int(first.ending) != int(Search.FOUND) and not isinstance(begin.walker, Walker):
+    first = search(problem._replace(args=begin, guess=start), TURNS)
+    if int(first.ending) != int(Search.FOUND) and not has_seed_bodies(begin):
         for point in _likely_gaits(begin, begins_at_model, search, problem, like):
             there = state_at(type(start), point)
-            first = search(problem._replace(args=begin, guess=there), _TURNS)
+            first = search(problem._replace(args=begin, guess=there), TURNS)
             if int(first.ending) == int(Search.FOUND):
                 break
     point = np.asarray(first.recurring)
@@ -186,7 +186,7 @@ def _beyond(
         about = walks_of(scene, lambda: [last], most=1)
         settled = (row for walks in about for row in walks.settled())
         for point in chain([last], settled):
-            gait = search(problem._replace(args=scene, guess=state_at(kind, point)), _TURNS)
+            gait = search(problem._replace(args=scene, guess=state_at(kind, point)), TURNS)
             if int(gait.ending) == int(Search.FOUND) and bool(gait.sound):
                 return np.asarray(gait.recurring), s
     return None

@@ -6,7 +6,6 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -18,7 +17,8 @@ from jaxbiped._jax_versions import without_switches
 from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
+from jaxbiped.caching._caches import Once, bounded_cache
+from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.compiler import deferred_checks, host_jit
 from jaxbiped.dynamics._equivalent_states import BodiesState
 from jaxbiped.dynamics._state import recurring_leaves
@@ -39,11 +39,11 @@ from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec, runs_by_lanes
 from jaxbiped.gait._search_provenance import FoundBy, single_stage_origin, warn_of_unknown
 from jaxbiped.gait._search_starts import start_of_search
-from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._hybrid_system import SCENES
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import AbstractScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import WALKER_SCENES, AbstractScene, WalkerScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import RigidState, State, WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
@@ -135,7 +135,7 @@ def find_gait(
         >>> str(gait.outcome), round(float(gait.measures.period), 4)
         ('found', 0.4438)
     """
-    scene = check_scene(scene, Scene, RigidScene, RedundantScene, HybridSystem)
+    scene = check_scene(scene, *SCENES)
     if not isinstance(accuracy, str | Precision):
         check_wanted(accuracy, optimiser=optimiser)
         find = functools.partial(
@@ -192,7 +192,7 @@ def find_gait(
         max_evaluations=int(most),
         residual=_RESIDUAL_SHARE * precision.rtol,
         patience=np.asarray(int(most)),
-        sizes=recurring_sizes(scene, start) if isinstance(scene, HybridSystem) else None,
+        sizes=recurring_sizes(scene, start) if hasattr(type(start), "scales") else None,
     )
     # One program of lanes serves every search, whatever it is asked for, and what follows it.
     every = active if parameters is None else select_parameters(modelled, None)[1]
@@ -208,7 +208,7 @@ def find_gait(
             found = walks_only(search(problem))
         return summarise_gait(asked, found, names, radius, origin)
     with stage("searching for a gait", unit="searches", show=progress) as now:
-        once = _compilation_of(_kind_of((problem, names, radius)))
+        once = _compilation_of(problem, names, radius)
         once(lambda: _compile(problem, asked, names, radius, origin))
         found, told = _search(problem), origin
         now.update()
@@ -246,8 +246,8 @@ def _search_within(problem: FixedPointProblem, patience: int) -> Found:
     return _search(problem._replace(method=dataclasses.replace(method, patience=most)))
 
 
-@bounded_cache(PROGRAMS)
-def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
+@known_by_shape
+def _compilation_of(problem: FixedPointProblem, names: tuple[str, ...], radius: bool) -> Once[None]:
     return Once()
 
 
@@ -269,14 +269,6 @@ def _compile(problem: FixedPointProblem, asked: FixedPointProblem, *more: Any) -
             raise
         for each in ready:
             each.result()
-
-
-def _kind_of(tree: PyTree) -> tuple[object, ...]:
-    """What decides whether one compiled program can serve for another."""
-    arrays, rest = eqx.partition(tree, eqx.is_array)
-    shapes = tuple((leaf.shape, leaf.dtype) for leaf in jtu.tree_leaves(arrays))
-    leaves, structure = jtu.tree_flatten(rest)
-    return jtu.tree_structure(arrays), shapes, tuple(leaves), structure
 
 
 def _empty_arrays(shape: PyTree) -> PyTree:
@@ -305,7 +297,7 @@ class Gaits(NamedTuple):
 
 
 @without_switches
-def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options: Any) -> Gaits:
+def find_gaits(scene: WalkerScene, starts: State | RigidState, **options: Any) -> Gaits:
     """Searches for periodic gaits from many starts at once, and distinguishes those that it finds.
 
     The gaits have no derivatives with respect to parameters. To obtain these, pass the state of a
@@ -322,7 +314,7 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
     Raises:
         ArgumentError: an argument is not allowed; raised before anything is compiled.
     """
-    scene = check_scene(scene, Scene, RigidScene)
+    scene = check_scene(scene, *WALKER_SCENES)
     shapes = {np.shape(leaf) for leaf in jtu.tree_leaves(starts)}
     if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
         raise ArgumentError(
@@ -345,7 +337,7 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
 
 
 @cached_jit
-def _find_each(scene: Scene | RigidScene, starts: WalkerState, options: dict[str, Any]) -> Gait:
+def _find_each(scene: WalkerScene, starts: WalkerState, options: dict[str, Any]) -> Gait:
     def one(start: WalkerState) -> Gait:
         return find_gait(scene, start, parameters=(), radius_sensitivities=False, **options)
 

@@ -1,8 +1,6 @@
-"""Fixed-point search of the return map, and whether what it came to is a walk at all.
+"""Fixed-point search of the return map, and the footsteps after which what it came to closes.
 
-The return map has fixed points that no walk reaches: under the clearance rule a foot may swing
-deep underground and be caught there. Stability does not tell them from gaits, so depth does. And
-the return map of n footsteps also has the gaits of every divisor of n as fixed points.
+The return map of n footsteps also has the gaits of every divisor of n as fixed points.
 """
 
 import functools
@@ -15,10 +13,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._ending import NamedCode
-from jaxbiped._types import RealScalarLike, Scalar, any_of, by_numpy, is_traced
-from jaxbiped.dynamics._contacts import feet
-from jaxbiped.dynamics._equivalent_states import minimal_state
-from jaxbiped.dynamics._footfalls import FootMotion, touches
+from jaxbiped._types import RealScalarLike, Scalar, by_numpy, is_traced
 from jaxbiped.gait._newton import Method, Progress, Stage, initial_progress, newton_iteration
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
@@ -28,19 +23,12 @@ from jaxbiped.gait._poincare_map import (
     state_with,
 )
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
-from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.variational._tangents import Seeded
 
 ROUGH = Precision(3e-6, 3e-4)
 """How exactly the search is solved until it is near."""
-_SHORTEST = 0.1
-"""Duration of a cycle in units of √(l/g), about 2 for a footstep: a foot may also chatter."""
-_SHORTEST_STEP = 0.01
-"""Mean footstep, in units of the walker's height, up to which a gait is no walk."""
-_DEEPEST = 3.0
-"""Elastic force of a standing foot, in units of the walker's weight: about 1 where it stands."""
 _ERRORS, _TOLERANCES = 4.0, 30.0
 """Distance of two crossings that are one: in units of the fixed point's error, and of rtol."""
 Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]
@@ -74,7 +62,7 @@ class Found(NamedTuple):
         both: the return from there, and behind it a looser one, the witness of its error.
         evaluations: how often the return map was evaluated.
         history: residual of each evaluation, shape (max_evaluations,), NaN beyond the last.
-        sound: whether the orbit is a walk (see `is_sound`).
+        sound: whether the orbit is a walk (see `AbstractSystem.is_walk`).
         columns: both returns solved once more, with derivatives with respect to parameters; None
             where they were not (see `with_parameter_columns`).
     """
@@ -124,7 +112,7 @@ class FixedPointProblem(NamedTuple):
         spec: of the return map.
         args: the scene, or the parameters of another system.
         active: positions among its leaves of the parameters that derivatives are with respect to.
-        guess: where the search begins, on the section or not.
+        guess: where the search begins, on the section or not; any state where none is sought.
         precision: of the solves in the end.
         method: how to search; None once the fixed point is known.
     """
@@ -178,7 +166,9 @@ def search(problem: FixedPointProblem, wanted: Scalar | bool = True) -> Found:
     )
     last = end.base_return
     # Not every system has a cyclic coordinate.
-    sound = is_sound(args, problem.state(end.base), jnp.sum(last.advance), last.period, spec.steps)
+    sound = spec.system.is_walk(
+        args, problem.state(end.base), jnp.sum(last.advance), last.period, spec.steps
+    )
     return Found(
         ending=ending,
         code=end.code,
@@ -246,35 +236,6 @@ def _iterate(run: Run, begin: Progress, method: Method) -> Progress:
         return newton_iteration(now, latest, method)
 
     return jax.lax.while_loop(goes_on, advance, begin)
-
-
-def is_sound(
-    scene: object, state: PyTree, step_length: Scalar, period: Scalar, arrivals: int = 1
-) -> Scalar:
-    """Whether an orbit through a state on its section steps downhill and on the ground (boolean).
-
-    Step length [m] and period [s] are those of a cycle of so many `arrivals`. Nothing is required
-    of an orbit whose `scene` is not a walker.
-    """
-    if not isinstance(scene, AbstractWalkerScene):
-        return jnp.asarray(True)
-    pace = jnp.sqrt(scene.mechanism.height / scene.ground.g)
-    forward = takes_steps(scene, step_length, arrivals) & (period > _SHORTEST * pace)
-    if not scene.compliant:
-        return forward
-    modelled = scene.minimal
-    weight = modelled.mechanism.total_mass * modelled.ground.g
-
-    def deep(foot: FootMotion) -> Scalar:
-        return touches(foot) & (modelled.normal.elastic_force(foot.penetration) > _DEEPEST * weight)
-
-    return forward & ~any_of([deep(foot) for foot in feet(modelled, minimal_state(scene, state))])
-
-
-def takes_steps(scene: AbstractWalkerScene, step_length: Any, arrivals: Any) -> Any:
-    """Whether an advance [m] in so many arrivals is one of footsteps (boolean)."""
-    shortest = _SHORTEST_STEP * scene.mechanism.height
-    return step_length > shortest * arrivals * scene.arrival_footsteps
 
 
 def minimal_cycle(

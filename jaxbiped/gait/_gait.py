@@ -201,12 +201,11 @@ class Gait(eqx.Module, Tabular):
     @property
     def stable(self) -> Scalar:
         """Whether a gait was found and all its multipliers lie inside the unit circle."""
-        found: Scalar = by_numpy(
+        return by_numpy(
             lambda _, ending, radius: (ending == int(Search.FOUND)) & (radius < 1.0),
             self.ending,
             self.measures.spectral_radius,
         )
-        return found
 
     def to_dataset(self) -> "xarray.Dataset":
         """The gait as a labelled dataset, for `to_netcdf` or `to_zarr`; for one gait, not a batch.

@@ -15,18 +15,18 @@ from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.gait._return_map_spec import AbstractGradient, Implicit
-from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.hybrid._hybrid_system import SCENES
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.linalg._small_matrices import solution
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.simulate._derivatives import first_derivatives_only
 
 
 def gait_measures(
-    scene: Scene | RigidScene | RedundantScene | HybridSystem,
+    scene: AbstractScene,
     guess: Gait | WalkerState | PyTree | None = None,
     *,
     gradient: AbstractGradient | None = None,
@@ -62,7 +62,7 @@ def gait_measures(
         raise ArgumentError(
             f"gradient = {gradient!r} is not allowed: choose Implicit(), Forward() or Reverse()."
         )
-    check_type("scene", scene, Scene, RigidScene, RedundantScene, HybridSystem)
+    check_type("scene", scene, *SCENES)
     scene = jtu.tree_map(as_float, scene)
     implicit = isinstance(gradient, Implicit)
     if implicit:

@@ -1,4 +1,4 @@
-"""Summary of a search as a gait: measures, derivatives and errors of its orbit; step lengths."""
+"""Summary of a search as a gait: measures, derivatives and errors of its orbit."""
 
 import jax
 import jax.numpy as jnp
@@ -7,10 +7,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._contacts import feet
-from jaxbiped.dynamics._footfalls import FootMotion, landings, standing_leg, touches
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
-from jaxbiped.dynamics._surfaces import foot_ahead
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
@@ -32,8 +29,6 @@ from jaxbiped.gait._search_provenance import Origin
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.scene._parameter_access import parameter_quantities
-from jaxbiped.scene._scene import AbstractWalkerScene
-from jaxbiped.scene._structure import Structure
 
 _NOTHING = 1e-9
 """A measure (SI units) that is zero but for the solve's error has no elasticity."""
@@ -62,7 +57,7 @@ def summary_of(
 ) -> Gait:
     """The gait of an orbit, whose nodes are given as `nodes_of` has them."""
     found, stability = orbit.found, orbit.stability
-    last, m = found.last, found.recurring.shape[0]
+    last, m, spec = found.last, found.recurring.shape[0], problem.spec
     lost = found.ending == int(Search.NO_RETURN)
 
     def known(tree: PyTree) -> PyTree:
@@ -84,7 +79,7 @@ def summary_of(
         multiplier_errors=stability.errors,
         directions=stability.directions,
         monodromy=last.monodromy[:, :m],
-        step_lengths=step_lengths(problem, last, path[1]),
+        step_lengths=spec.system.step_lengths(problem.args, path[1], last.advance, spec.steps),
         return_jacobian=rows[:, :m],
         unit_multiplier_error=stability.unit_error,
         sensitivities=jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes),
@@ -105,7 +100,7 @@ def summary_of(
         solver_steps=last.attempted,
         grazes=last.grazes,
         cycle_footsteps=problem.args.arrival_footsteps
-        * minimal_cycle(last, off, problem.precision.rtol, problem.spec.system.cyclic_coordinates),
+        * minimal_cycle(last, off, problem.precision.rtol, spec.system.cyclic_coordinates),
         sound=found.sound,
         origin=jtu.tree_map(jnp.asarray, origin),
         orbit=path,
@@ -205,74 +200,3 @@ def nodes_of(last: LinearisedReturn, like: PyTree) -> tuple[Scalar, PyTree]:
     assert nodes is not None
     times, *states = jax.vmap(lambda ends, start: ends.columns(start))(nodes.ends, nodes.start)
     return times, jtu.tree_unflatten(jtu.tree_structure(like), states)
-
-
-def step_lengths(problem: FixedPointProblem, last: LinearisedReturn, states: PyTree) -> Scalar:
-    """Distances between the places of successive heel strikes in a cycle [m], shape (footsteps,).
-
-    The first one is from the last strike of the cycle before. Rigid feet: of the standing foot's
-    places just after the strikes.
-    """
-    if not isinstance(problem.args, AbstractWalkerScene):
-        return last.advance
-    mechanism = problem.args.mechanism
-    structure, steps = mechanism.structure, problem.spec.steps
-    count = steps * problem.args.arrival_footsteps
-    if count == 1:
-        return last.advance
-    if not problem.args.compliant:
-        begins = jtu.tree_map(lambda x: x[:, 0], states)
-        ahead = jax.vmap(lambda y: foot_ahead(problem.args, y))(begins)
-        return _distances(jtu.tree_leaves(begins)[0] + ahead, last.advance)
-    scene = problem.args.minimal
-    found = jax.vmap(jax.vmap(lambda y: feet(scene, y)))(states)
-    before = jtu.tree_map(lambda x: x[:, :-1], found)
-    after = jtu.tree_map(lambda x: x[:, 1:], found)
-    lands = jnp.stack(landings(structure, before, after))
-    places = jnp.stack([_place_of_strike([after[k] for k in leg]) for leg in structure.feet_of_leg])
-    lands, places = (_in_names_of_start(structure, each) for each in (lands, places))
-    stands = standing_leg(structure, jtu.tree_map(lambda x: x[0, 0], found))
-    return _distances(_first_strikes(lands, places, stands - 1, count), last.advance)
-
-
-def _place_of_strike(feet_of_leg: list[FootMotion]) -> Scalar:
-    """Where the first of a leg's feet that touches is [m]."""
-    *others, place = [foot.x for foot in feet_of_leg]
-    for foot, own in zip(reversed(feet_of_leg[:-1]), reversed(others), strict=True):
-        place = jnp.where(touches(foot), own, place)
-    return place
-
-
-def _in_names_of_start(structure: Structure, values: Scalar) -> Scalar:
-    """Values of legs, shape (legs, arrivals, nodes), as (legs, all nodes).
-
-    Names are exchanged at each arrival.
-    """
-    every = [
-        jnp.stack([values[k, i] for k in structure.legs_renamed(i)]) for i in range(values.shape[1])
-    ]
-    return jnp.concatenate(every, axis=1)
-
-
-def _first_strikes(lands: Scalar, places: Scalar, stands: Scalar, count: int) -> Scalar:
-    """Places of the first footsteps, shape (count,); NaN where there are fewer.
-
-    A landing is one where another leg made the one before; at first `stands` is that leg's number,
-    −1 for none.
-    """
-    legs, n = lands.shape
-    number, node = jnp.arange(legs)[:, None], jnp.arange(n)
-    found, at = [], jnp.asarray(-1)
-    for _ in range(count):
-        ahead = lands & (node > at)
-        if legs > 1:
-            ahead &= number != stands
-        at = jnp.min(jnp.where(ahead, node, n))
-        here = ahead & (node == at)
-        stands = jnp.max(jnp.where(here, number, -1))
-        found.append(jnp.where(at < n, jnp.max(jnp.where(here, places, -jnp.inf)), jnp.nan))
-    return jnp.stack(found)
-
-
-def _distances(places: Scalar, advance: Scalar) -> Scalar:
-    return places - jnp.concatenate([places[-1:] - advance, places[:-1]])

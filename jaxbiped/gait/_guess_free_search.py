@@ -7,18 +7,17 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._progress import Stage, stage
-from jaxbiped.gait._branch_along import FollowedBranch, Searching, branch_along, state_at
+from jaxbiped.gait._branch_along import TURNS, FollowedBranch, Searching, branch_along, state_at
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
     Search,
     crossings_of,
     minimal_cycle,
-    takes_steps,
     walks_only,
 )
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
-from jaxbiped.gait._relaxation import relaxed
+from jaxbiped.gait._relaxation import has_seed_bodies, is_far_from_seed, relaxed
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, return_map_spec
 from jaxbiped.gait._search_provenance import (
     MOST_OTHERS,
@@ -30,17 +29,13 @@ from jaxbiped.gait._search_provenance import (
     single_stage_origin,
 )
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
-from jaxbiped.gait._walk_waves import Walks, is_far_from_seed, state_rows, walks_of
+from jaxbiped.gait._walk_waves import Walks, state_rows, walks_of
 from jaxbiped.hybrid._scales import recurring_sizes
-from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene._walker import Walker
 from jaxbiped.solve._accuracy import ACCURACIES
 
 _PUSHES = (-0.05, -0.01, 0.01, 0.05)
 """Sizes (scaled) of the pushes off an unstable gait from which walks begin as well, and off a
 shorter cycle from which longer ones are sought."""
-_TURNS = 20
-"""Turns that each further search may take."""
 _SCATTERED, _NEAR, _LATEST = 12, 8, 4
 """Starts of the last stage; points where a wave of walks came nearest to a return, and of how many
 waves."""
@@ -92,7 +87,7 @@ def search_in_stages(
     The branch is followed with `scout`: cycles of one footstep, in minimal coordinates. `now`
     counts the searches, and keeps in words what they found.
     """
-    modelled: Scene | RigidScene = problem.args.minimal
+    spec, modelled = problem.spec, problem.args.minimal
     seen: list[Seen] = []
     walks: list[Walks] = []
     branch = line = None
@@ -110,7 +105,7 @@ def search_in_stages(
 
     def add(found: Found, by: FoundBy) -> None:
         # What a walk itself settles on is one, however deep, but not where it stands and chatters.
-        steps = takes_steps(modelled, float(np.sum(found.last.advance)), problem.spec.steps)
+        steps = spec.system.takes_steps(modelled, float(np.sum(found.last.advance)), spec.steps)
         sound = bool(found.sound) or (by is FoundBy.WALKING and bool(steps))
         known = any(_same(found, old) for old in seen)
         if int(found.ending) == int(Search.FOUND) and sound and not known:
@@ -122,7 +117,7 @@ def search_in_stages(
         nonlocal searches
         for point in points:
             searches += 1
-            add(search(problem._replace(guess=state_at(type(start), point)), _TURNS), by)
+            add(search(problem._replace(guess=state_at(type(start), point)), TURNS), by)
             now.update()
             if has_stable():
                 return
@@ -170,7 +165,7 @@ def search_in_stages(
     if not has_stable():
         with stage(f"searching from {_SCATTERED} scattered starts"):
             scattered = state_rows(rolling_starts(modelled, _SCATTERED, spread=0.5, seed=2))
-            latest = [] if isinstance(modelled.walker, Walker) else walks[-_LATEST:]
+            latest = [] if has_seed_bodies(modelled) else walks[-_LATEST:]
             near = [point for each in latest for point in each.near_returns(_NEAR)]
             try_all([*near, *scattered[1:]], FoundBy.SCATTERED_STARTS)
     ordered = sorted(seen, key=lambda each: (not each.is_whole, each.radius))
@@ -216,7 +211,7 @@ def search_on(
         scene.minimal,
         problem.guess,
         solver=None,
-        engine="auto" if scene.redundant else engine,
+        engine=engine if scene.minimal is scene else "auto",
         max_solver_steps=ACCURACIES["balanced"].max_solver_steps,
     )
     staged = search_in_stages(search, problem, scout, first, now)

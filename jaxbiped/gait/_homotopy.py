@@ -16,12 +16,17 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, select
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found, Search, search, walks_only
 from jaxbiped.gait._poincare_map import recurring_components
-from jaxbiped.gait._relaxation import like_model, relaxed, seed_like
+from jaxbiped.gait._relaxation import (
+    has_seed_bodies,
+    is_far_from_seed,
+    like_model,
+    relaxed,
+    seed_like,
+)
 from jaxbiped.gait._search_provenance import BranchEnd, FoundBy, Origin
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.linalg._small_matrices import eigenpairs
-from jaxbiped.scene._scene import AbstractWalkerScene, Scene
-from jaxbiped.scene._walker import Walker
+from jaxbiped.scene._scene import AbstractWalkerScene
 
 _FIRST_STEP, _LARGEST_STEP, _LEAST_STEP = 0.05, 0.3, 1e-3
 """Steps along the line: the first, at most, and at which it is given up."""
@@ -70,15 +75,17 @@ def homotopy_to(scene: AbstractWalkerScene) -> Homotopy | None:
 
     Numbers of laws that are not in the catalogue stay those of `scene`. Its actuators are idle.
     """
-    if isinstance(scene.walker, Walker):
+    if has_seed_bodies(scene):
         return Homotopy(scene.with_minimal(seed_like(scene.minimal)), scene)
-    both = relaxed(scene) if isinstance(scene, Scene) else None
+    if not is_far_from_seed(scene):
+        return None
+    both = relaxed(scene)
     return line_from_model(scene) if both is None else Homotopy(*both)
 
 
 def line_from_model(scene: AbstractWalkerScene) -> Homotopy | None:
     """The line from the walker with the legs of a model whose gait is known (see `like_model`)."""
-    both = like_model(scene) if isinstance(scene, Scene) else None
+    both = like_model(scene)
     return None if both is None else Homotopy(*both)
 
 

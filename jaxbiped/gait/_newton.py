@@ -245,23 +245,18 @@ def _correction(slope: Scalar, change: Scalar) -> tuple[Scalar, Scalar]:
         solves = _size(slope @ smallest - change) <= _LEFT_OVER * _size(change)
         return jnp.where(solves, smallest, plain), solves
 
-    found: tuple[Scalar, Scalar] = jax.lax.cond(
-        is_far, of_family, lambda: (plain, jnp.asarray(False))
-    )
-    return found
+    return jax.lax.cond(is_far, of_family, lambda: (plain, jnp.asarray(False)))
 
 
 def _correction_of_kind(is_smallest: Scalar, slope: Scalar, change: Scalar) -> Scalar:
     """The correction of a change, smallest or plain; corrections of unlike kinds do not compare."""
-    found: Scalar = jax.lax.cond(is_smallest, _smallest_solution, solution, slope, change)
-    return found
+    return jax.lax.cond(is_smallest, _smallest_solution, solution, slope, change)
 
 
 def _smallest_solution(slope: Scalar, change: Scalar) -> Scalar:
     """The smallest solution of a linear system, which leaves out its singular directions."""
     damping = (_SINGULAR * jnp.max(jnp.abs(slope))) ** 2 * jnp.eye(len(change))
-    found: Scalar = slope.T @ solution(slope @ slope.T + damping, change)
-    return found
+    return slope.T @ solution(slope @ slope.T + damping, change)
 
 
 def _size(step: Scalar) -> Scalar:

@@ -80,8 +80,7 @@ def recurring_components(system: AbstractSystem, y: PyTree) -> Scalar:
     """The components that must return, shape (m,)."""
     leaves = jtu.tree_leaves(y)
     parts = [leaves[i] for i in recurring_indices(system, y)]
-    found: Scalar = by_numpy(lambda numpy, *leaves: numpy.stack(leaves), *parts)
-    return found
+    return by_numpy(lambda numpy, *leaves: numpy.stack(leaves), *parts)
 
 
 def state_with(system: AbstractSystem, like: PyTree, recurring: Scalar) -> PyTree:

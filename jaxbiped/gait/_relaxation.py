@@ -15,17 +15,33 @@ from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.scene._joint_parts import Motor, Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._ready_scenes import kneed_scene, seed_scene
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, Scene, WalkerScene
+from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.actuation._actuators import Actuation
 from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
 from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
 
 _Law = TypeVar("_Law", bound=eqx.Module)
+_LAWS: dict[str, tuple[Mapping[str, type], Callable[[str], Any]]] = {
+    "normal": (NORMAL_LAWS, normal_law_like),
+    "friction": (FRICTION_LAWS, friction_law_like),
+}
+"""Catalogues of the parts of a scene that are laws of contact, and what resembles the seed's."""
 _LIGHT, _STRENGTHS = 1e-3, ("mass", "inertia", "stiffness", "damping", "torque")
 """Factor of what is taken in along a line, and what is."""
 
 
-def relaxed(scene: Scene) -> tuple[Scene, Scene] | None:
+def has_seed_bodies(scene: AbstractWalkerScene) -> bool:
+    """Whether a walker is one of the seed paper, with other numbers."""
+    return isinstance(scene.walker, Walker)
+
+
+def is_far_from_seed(scene: AbstractWalkerScene) -> bool:
+    """Whether starts about the seed's mostly fall, and are dear: other bodies in stiff motion."""
+    return scene.stiff and scene.minimal is scene and not has_seed_bodies(scene)
+
+
+def relaxed(scene: Any) -> tuple[Any, Any] | None:
     """A scene whose walker walks more easily, and the given one; None where there is no such.
 
     Bodies that are no part of a leg have hardly any mass, and springs and latches on them are as
@@ -53,7 +69,7 @@ def relaxed(scene: Scene) -> tuple[Scene, Scene] | None:
     return jtu.tree_map(as_float, first), jtu.tree_map(as_float, last)
 
 
-def like_model(scene: Scene) -> tuple[Scene, Scene] | None:
+def like_model(scene: Any) -> tuple[Any, Any] | None:
     """A scene with legs of a model of the same kind, and the given one; None without a model.
 
     They have the scene's size and weight, and the model's slope and laws of contact in proportion.
@@ -195,26 +211,19 @@ def _weakened(piece: Any) -> Any:
     return with_fields(piece, **{k: _LIGHT * x for k, x in known.items() if x is not None})
 
 
-def seed_like(scene: Scene | RigidScene) -> Scene | RigidScene:
+def seed_like(scene: WalkerScene) -> WalkerScene:
+    """The seed's walker and ground, with the scene's laws, made to resemble the seed's."""
+    laws = {name: how for name, how in _LAWS.items() if hasattr(scene, name)}
     with jax.ensure_compile_time_eval():
         own = jtu.tree_map(float, seed_scene())
-        if isinstance(scene, RigidScene):
-            rigid = dataclasses.replace(
-                scene, walker=own.walker, ground=own.ground, actuation=_idle(scene)
-            )
-            return jtu.tree_map(as_float, rigid)
+        alike = {name: _like_seed(getattr(scene, name), *how) for name, how in laws.items()}
         begin = dataclasses.replace(
-            scene,
-            walker=own.walker,
-            ground=own.ground,
-            normal=_like_seed(scene.normal, NORMAL_LAWS, normal_law_like),
-            friction=_like_seed(scene.friction, FRICTION_LAWS, friction_law_like),
-            actuation=_idle(scene),
+            scene, walker=own.walker, ground=own.ground, actuation=_idle(scene), **alike
         )
         return jtu.tree_map(as_float, begin)
 
 
-def _idle(scene: Scene | RigidScene) -> Actuation:
+def _idle(scene: WalkerScene) -> Actuation:
     """The scene's actuators at strength zero: the seed's walker is passive."""
     return None if scene.actuation is None else tuple(part.idle() for part in scene.actuation)
 

@@ -21,7 +21,7 @@ from jaxbiped._checks import ArgumentError, check_choice, check_count, check_pos
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Scalar, Time, as_float, in_64_bits, select
 from jaxbiped.dynamics._equivalent_states import minimal_state, redundant_state
-from jaxbiped.dynamics._state import check_leaves, without_whole_turns
+from jaxbiped.dynamics._state import state_for
 from jaxbiped.gait._poincare_map import (
     PARAMETER_FLOOR,
     STATE_FLOOR,
@@ -40,12 +40,11 @@ from jaxbiped.gait._return_map_spec import (
     has_switches,
     return_map_spec,
 )
-from jaxbiped.hybrid._hybrid_system import HybridSystem, start_of_system
+from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES, SCENES
 from jaxbiped.hybrid._scales import units_of
 from jaxbiped.hybrid._sections import AbstractSection, section_of, with_leg_names_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.simulate._derivatives import first_derivatives_only
@@ -388,11 +387,12 @@ def return_map(
     max_time = 10.0 * getattr(args, "time_unit", 1.0) if max_time is None else max_time
     check_positive("max_time", max_time, "s", one=True)
     if system is None:
-        args = check_scene(args, Scene, RigidScene, RedundantScene, HybridSystem)
-        state = _checked_start(args, state)
+        args = check_scene(args, *SCENES)
+        modelled = args if is_redundant(state) else args.minimal
+        state = in_64_bits(state_for(modelled, state))
     arrivals = arrivals_of(args, footsteps)
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
-    enters = system is None and isinstance(args, RedundantScene) and not is_redundant(state)
+    enters = system is None and args.minimal is not args and not is_redundant(state)
     if enters:
         state = redundant_state(args, state)
     section = section_of(args, section)
@@ -418,14 +418,6 @@ def return_map(
         time = time + jnp.where(code == 0, lasted, 0.0)
         code = jnp.where(code == 0, came, code)
     return Return(minimal_state(args, state) if enters else state, time, code)
-
-
-def _checked_start(scene: Any, state: PyTree) -> PyTree:
-    if isinstance(scene, HybridSystem):
-        return start_of_system(scene, state)
-    if not hasattr(state, "_fields"):
-        raise ArgumentError(f"state = {state!r} is not allowed: give a State.")
-    return without_whole_turns(scene, in_64_bits(check_leaves(state, "state")))
 
 
 def linearise_return_map(
@@ -475,7 +467,7 @@ def linearise_return_map(
         ArgumentError: an argument is not allowed; raised before anything is compiled.
     """
     if system is None:
-        check_type("args", args, Scene, RigidScene, HybridSystem)
+        check_type("args", args, *MINIMAL_SCENES)
     for name, tolerance in (("rtol", rtol), ("tangent_rtol", tangent_rtol)):
         check_positive(name, tolerance)
     check_positive("max_time", max_time, "s", one=True)

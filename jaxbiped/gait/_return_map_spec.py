@@ -14,16 +14,12 @@ from jaxbiped._types import Scalar, Time
 from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.compiler import LANES, XLA, AbstractEngine
-from jaxbiped.hybrid._scales import patience_of
+from jaxbiped.hybrid._scales import is_stiff
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._clearance import check_legs_admitted_alike
 from jaxbiped.scene._scene import (
-    AbstractWalkerScene,
-    RedundantScene,
-    Scene,
-    is_rigid,
+    AbstractScene,
 )
 from jaxbiped.scene._state_types import is_redundant
 from jaxbiped.solve._engine_names import engine_for, lane_obstacle
@@ -165,20 +161,13 @@ def return_map_spec(
     note_code(args, section, solver, system)
     if system is not None:
         check_type("system", system, AbstractSystem)
-    if isinstance(args, Scene | RedundantScene):
-        structure = args.mechanism.structure
-        images = structure.leg_twins or range(len(structure.legs))
-        check_legs_admitted_alike(args.clearance, structure.legs, images)
+    own, within = _systems_of(args, state) if system is None else (system, None)
+    own.check_cycles(args)
     section = section_of(args, section)
-    method = orbit_solver(solver, rigid=is_rigid(args))
+    method = orbit_solver(solver, stiff=is_stiff(args))
     obstacle = lane_obstacle(method, section, (args, state), columns=True)
-    own, within = system_of(args.minimal) if system is None else system, None
     own = own.observed_at(section)
-    if system is None and isinstance(args, RedundantScene):
-        within = system_of(args)
-        if is_redundant(state):
-            own, within = within, None
-    elif holds_arrays(system):
+    if holds_arrays(system):
         obstacle = f"the system {type(system).__name__} holds arrays, which belong in args"
     by = engine_for(engine, obstacle=obstacle, prefers_xla=system is not None)
     resets = has_switches(own, args, state, "resets")
@@ -198,13 +187,23 @@ def return_map_spec(
         system=own,
         section=section,
         solver=method,
-        max_time=patience_of(args) if max_time is None else max_time,
+        max_time=own.longest_wait(args) if max_time is None else max_time,
         steps=steps,
         max_solver_steps=max_solver_steps,
         engine=by,
         within=within,
         resets=resets,
     )
+
+
+def _systems_of(
+    scene: AbstractScene, state: PyTree
+) -> tuple[AbstractSystem, AbstractSystem | None]:
+    """The system with the coordinates of a state, and the one that is solved if it is another."""
+    solved = system_of(scene)
+    if scene.minimal is scene or is_redundant(state):
+        return solved, None
+    return system_of(scene.minimal), solved
 
 
 def arrivals_of(args: PyTree, footsteps: int | None) -> int:
@@ -214,7 +213,7 @@ def arrivals_of(args: PyTree, footsteps: int | None) -> int:
         ArgumentError: the number is not one of whole cycles.
     """
     own = each = 1
-    if isinstance(args, AbstractWalkerScene):
+    if isinstance(args, AbstractScene):
         own, each = args.cycle_footsteps, args.arrival_footsteps
     if footsteps is None:
         return own // each
@@ -228,14 +227,14 @@ def arrivals_of(args: PyTree, footsteps: int | None) -> int:
 
 
 def orbit_solver(
-    solver: str | diffrax.AbstractSolver[PyTree] | None, *, rigid: bool
+    solver: str | diffrax.AbstractSolver[PyTree] | None, *, stiff: bool
 ) -> diffrax.AbstractAdaptiveSolver[PyTree]:
-    """The solver of that name, the one given, or the usual one: "rodas4", and "rodas5p" if rigid.
+    """The solver of that name, the one given, or the usual one: "rodas4" where motion may be stiff.
 
     Raises:
         ArgumentError: an unknown name, or a solver that does not estimate its errors.
     """
-    usual = "rodas5p" if rigid else "rodas4"
+    usual = "rodas4" if stiff else "rodas5p"
     found = solver_named(usual if solver is None else solver)
     if not isinstance(found, diffrax.AbstractAdaptiveSolver):
         raise ArgumentError(

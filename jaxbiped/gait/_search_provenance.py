@@ -11,12 +11,13 @@ from jaxbiped._checks import warn
 from jaxbiped._ending import Ending, NamedCode
 from jaxbiped._summary import call_text
 from jaxbiped._types import Scalar, is_traced
-from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search, takes_steps
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, Search
+from jaxbiped.gait._relaxation import has_seed_bodies
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._clearance import AlwaysTouching
 from jaxbiped.scene._parameter_access import parameter_values
-from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._state_types import WalkerState
-from jaxbiped.scene._walker import Walker
 
 if TYPE_CHECKING:
     from jaxbiped.gait._gait import Gait
@@ -207,7 +208,8 @@ def _search_sentence(scene: Any, gait: "Gait") -> str:
         return f"the walk from the start ends ({gait.walk_outcome})"
     if gait.outcome is Search.NO_WALK:
         length = float(gait.measures.step_length) / len(gait.step_lengths)
-        if length > 0.0 and not takes_steps(scene.minimal, length, 1.0 / scene.arrival_footsteps):
+        arrivals = 1.0 / scene.arrival_footsteps
+        if length > 0.0 and not system_of(scene).takes_steps(scene, length, arrivals):
             return f"an orbit that returns has footsteps of {length:.2g} m, below 1 % of the height"
         return "an orbit that returns has a foot deep underground, or steps uphill"
     return "the search from the start does not converge"
@@ -225,12 +227,13 @@ def _what_to_try(scene: Any, gait: "Gait") -> str:
     """A clearance rule if legs of one body may scuff, a guess if no branch was followed."""
     always = isinstance(getattr(scene.minimal, "clearance", None), AlwaysTouching)
     stumbled = gait.outcome is Search.NO_RETURN and gait.walk_outcome is Ending.STUMBLED
-    structure = scene.mechanism.structure
-    if always and stumbled and all(structure.parents[body] < 0 for body in structure.feet):
-        return (
-            "; its feet touch whenever they reach the ground: if its legs scuff at mid-swing, give "
-            "the scene clearance=jaxbiped.laws.StanceRotation()"
-        )
+    if always and stumbled:
+        structure = scene.mechanism.structure
+        if all(structure.parents[body] < 0 for body in structure.feet):
+            return (
+                "; its feet touch whenever they reach the ground: if its legs scuff at mid-swing, "
+                "give the scene clearance=jaxbiped.laws.StanceRotation()"
+            )
     if int(gait.origin.branch_end) != int(BranchEnd.NOT_FOLLOWED):
         return ""
     return (
@@ -239,14 +242,14 @@ def _what_to_try(scene: Any, gait: "Gait") -> str:
     )
 
 
-def _branch(scene: AbstractScene, gait: "Gait") -> str:
+def _branch(scene: Any, gait: "Gait") -> str:
     """Where the branch of the seed's gait ended, after a semicolon; nothing where it came here."""
     end = BranchEnd(int(gait.origin.branch_end))
     modelled = scene.minimal
     came = gait.outcome in (Search.FOUND, Search.NO_WALK)
     if end is BranchEnd.NOT_FOLLOWED or (end is BranchEnd.REACHED and came):
         return ""
-    of_seed = isinstance(scene, AbstractWalkerScene) and isinstance(scene.walker, Walker)
+    of_seed = has_seed_bodies(scene)
     begins = "the seed's gait" if of_seed else "the relaxed walker's gait"
     if end is BranchEnd.REACHED:
         return (

@@ -1,6 +1,7 @@
 """Starts of a search: the fitted guess, and scattered ones."""
 
-from typing import Any, NamedTuple, cast
+import functools
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,26 +13,24 @@ from jaxbiped._types import Scalar, as_float, in_64_bits
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._constrained_motion import consistent_state
 from jaxbiped.dynamics._contacts import legs_in
-from jaxbiped.dynamics._equivalent_states import minimal_state
 from jaxbiped.dynamics._joint_loads import motion_of
 from jaxbiped.dynamics._state import seed_state, state_for
 from jaxbiped.dynamics._surfaces import rate_unit
 from jaxbiped.dynamics._tree import pose_of
 from jaxbiped.gait._gait import Gait
 from jaxbiped.hybrid._sections import AbstractSection, with_leg_names_of
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._joint_parts import Stop
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode, rigid_modes
 from jaxbiped.scene._placement import root_on_feet
 from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene._scene import (
+    WALKER_SCENES,
     AbstractScene,
     AbstractWalkerScene,
-    RedundantScene,
-    RigidScene,
-    Scene,
+    WalkerScene,
 )
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import State, WalkerState
@@ -41,7 +40,14 @@ _BEND = 1.5
 """Largest bend of a joint with a stop in a scattered swing leg, in units of the spread [rad]."""
 
 
-def default_guess(scene: Any) -> WalkerState:
+@functools.singledispatch
+def default_guess(scene: Any) -> Any:
+    """The start of a search without a guess; None where a guess has to be given."""
+    return None
+
+
+@default_guess.register
+def _(scene: AbstractWalkerScene) -> Any:
     """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight.
 
     The stance leg's line from the root point to its feet has the angle and the rate of the seed's,
@@ -56,11 +62,13 @@ def default_guess(scene: Any) -> WalkerState:
 def state_of_guess(scene: AbstractScene, guess: Gait | WalkerState | PyTree | None) -> Any:
     """The checked state from which a search begins: a gait's, or the one given; None for None.
 
+    None stands for the default guess.
+
     Raises:
         ArgumentError: no state of this scene.
     """
     near = guess.measures.state if isinstance(guess, Gait) else guess
-    if near is None and not scene.has_default_guess:
+    if near is None and default_guess(scene) is None:
         raise ArgumentError(
             f"guess = None is not allowed for a {type(scene).__name__}: give a state."
         )
@@ -69,9 +77,9 @@ def state_of_guess(scene: AbstractScene, guess: Gait | WalkerState | PyTree | No
 
 def start_of_search(scene: Any, section: AbstractSection, guess: PyTree) -> Any:
     """The checked state from which a gait is searched, the default where there is no guess."""
-    start = default_guess(scene) if guess is None and scene.has_default_guess else guess
-    if scene.redundant and not isinstance(guess, Gait):  # whose state is minimal
-        start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
+    start = default_guess(scene) if guess is None else guess
+    if not isinstance(guess, Gait):  # whose state is minimal
+        start = system_of(scene).minimal_start(scene, start)
     start = in_64_bits(state_of_guess(scene.minimal, start))
     return with_leg_names_of(section, scene.minimal, start)
 
@@ -93,10 +101,10 @@ class Lines(NamedTuple):
 
 
 @host_jit()  # many small operations
-def _fitted(scene: AbstractWalkerScene, seed: State, own: Scene) -> WalkerState:
+def _fitted(scene: AbstractWalkerScene, seed: State, own: AbstractWalkerScene) -> WalkerState:
     """`own` is the seed's scene. As constants XLA would divide by its numbers by reciprocals."""
     start = _posed(scene, _lines(scene, seed, own))
-    if scene.compliant:
+    if _places_root(scene):
         of_seed, rolling = _root(own, seed), _root(scene, start)
         depth = (of_seed.z - seed.hip_z) * (scene.mechanism.height / own.mechanism.height)
         forward, up = rolling.vx / of_seed.vx, rolling.vz / of_seed.vz
@@ -105,7 +113,7 @@ def _fitted(scene: AbstractWalkerScene, seed: State, own: Scene) -> WalkerState:
     return jax.tree.map(as_float, start)
 
 
-def _lines(scene: AbstractWalkerScene, seed: State, own: Scene) -> Lines:
+def _lines(scene: AbstractWalkerScene, seed: State, own: AbstractWalkerScene) -> Lines:
     """The seed's, at the pace of the scene."""
     size = scene.mechanism.height / own.mechanism.height
     pace = jnp.sqrt(scene.ground.g / own.ground.g / size)
@@ -136,11 +144,10 @@ def _posed(scene: AbstractWalkerScene, lines: Lines) -> WalkerState:
         known |= {f"omega_{structure.bodies[j]}": each for j, each in rates.items()}
         if "mode" in kind._fields:
             known["mode"] = _starting_mode(scene, zero)
-        made: WalkerState = kind(**{name: known.get(name, zero) for name in kind._fields})
-        return made
+        return kind(**{name: known.get(name, zero) for name in kind._fields})
 
     own = None
-    if scene.compliant or structure.turn is not None:
+    if _places_root(scene) or structure.turn is not None:
         own = _leg_angles(scene, state())
     for j, leg in enumerate(legs):
         if leg is not None:
@@ -171,8 +178,7 @@ def _starting_mode(scene: AbstractWalkerScene, zero: Scalar) -> Scalar:
     own = scene.mechanism.structure.feet_of_leg[stance]
     stands = modes.standing(stance, (yes,) * len(own), zero) if modes.feet else ()
     mode = Mode(stands, held, (no,) * len(modes.locks))
-    found: Scalar = modes.encoded(jnp, mode, zero)
-    return found
+    return modes.encoded(jnp, mode, zero)
 
 
 def _limits(mechanism: Mechanism) -> dict[int, tuple[Any, Any]]:
@@ -199,6 +205,11 @@ class _Root(NamedTuple):
     vz: Scalar
 
 
+def _places_root(scene: AbstractWalkerScene) -> bool:
+    """Whether the root point's height is a coordinate, which else follows from the angles."""
+    return f"{scene.mechanism.structure.root}_z" in scene.state_type._fields
+
+
 def _root(scene: AbstractWalkerScene, state: WalkerState) -> _Root:
     """The root point on the stance leg, whose lowest foot just touches and rolls."""
     mechanism = scene.mechanism
@@ -211,19 +222,18 @@ def _root(scene: AbstractWalkerScene, state: WalkerState) -> _Root:
 def _with_root(scene: AbstractWalkerScene, state: WalkerState, point: _Root) -> WalkerState:
     root = scene.mechanism.structure.root
     named = {f"{root}_{name}": each for name, each in point._asdict().items()}
-    placed: WalkerState = state._replace(**named)
-    return placed
+    return state._replace(**named)
 
 
 @bounded_cache(1)
-def _seed() -> tuple[State, Scene]:
+def _seed() -> tuple[State, AbstractWalkerScene]:
     """The seed's start and its scene, of plain numbers, which take no time to make."""
     with jax.ensure_compile_time_eval():
         return jax.tree.map(float, (seed_state(), seed_scene()))
 
 
 def rolling_starts(
-    scene: Scene | RigidScene, count: int, *, spread: float = 0.3, seed: int = 0
+    scene: WalkerScene, count: int, *, spread: float = 0.3, seed: int = 0
 ) -> WalkerState:
     """Starts around the seed's: angles and leg rates are scattered, and the stance foot rolls.
 
@@ -240,20 +250,20 @@ def rolling_starts(
     Raises:
         ArgumentError: count below 1, or spread not above 0.
     """
-    scene = check_scene(scene, Scene, RigidScene)
+    scene = check_scene(scene, *WALKER_SCENES)
     check_positive("count", count)
     check_positive("spread", spread)
     return _scatter(scene, int(count), float(spread), int(seed))
 
 
 @cached_jit  # many small operations
-def _scatter(scene: Scene | RigidScene, count: int, spread: float, seed: int) -> WalkerState:
+def _scatter(scene: WalkerScene, count: int, spread: float, seed: int) -> WalkerState:
     shape = scattered_start_count(scene), count
     scatter = jax.random.uniform(jax.random.key(seed), shape, minval=-1.0, maxval=1.0)
-    return _scattered(scene, spread * scatter.at[:, 0].set(0.0))
+    return starts_scattered_by(scene, spread * scatter.at[:, 0].set(0.0))
 
 
-def scattered_start_count(scene: Scene | RigidScene) -> int:
+def scattered_start_count(scene: WalkerScene) -> int:
     """How many numbers scatter a start: of the legs' lines, and of each body that is on no leg."""
     return len(Lines._fields) - 1 + bool(_limits(scene.mechanism)) + 2 * len(_alone(scene))
 
@@ -269,17 +279,13 @@ def _alone(scene: AbstractWalkerScene) -> list[str]:
 
 
 @cached_jit  # many small operations
-def starts_scattered_by(scene: Scene | RigidScene, scatter: Scalar) -> WalkerState:
+def starts_scattered_by(scene: WalkerScene, scatter: Scalar) -> WalkerState:
     """Starts like `rolling_starts`, off the seed's by these relative changes.
 
     Args:
         scene: the walker, compliant or rigid.
         scatter: shape (k, n), k as `scattered_start_count` tells.
     """
-    return _scattered(scene, scatter)
-
-
-def _scattered(scene: Scene | RigidScene, scatter: Scalar) -> WalkerState:
     middle = default_guess(scene)
     lines, structure = _lines(scene, *_seed()), scene.mechanism.structure
     bends = bool(_limits(scene.mechanism))
@@ -291,7 +297,7 @@ def _scattered(scene: Scene | RigidScene, scatter: Scalar) -> WalkerState:
     for i, name in enumerate(_alone(scene)):
         angle, turning = scatter[4 + bends + 2 * i], rate * scatter[5 + bends + 2 * i]
         started = started._replace(**{f"theta_{name}": angle, f"omega_{name}": turning})
-    if scene.compliant:
+    if _places_root(scene):
         height = f"{structure.root}_z"
         depth = _root(scene, middle).z - getattr(middle, height)
         rolling = _root(scene, started)

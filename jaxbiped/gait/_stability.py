@@ -97,8 +97,7 @@ def critical_bifurcation(values: Numbers, errors: Numbers, closeness: float) -> 
         )
         return numpy.max(numpy.where(near, kinds, int(Bifurcation.NONE)))
 
-    found: Scalar = by_numpy(code, values, errors)
-    return found
+    return by_numpy(code, values, errors)
 
 
 def eigenvalue_errors(
@@ -120,8 +119,7 @@ def eigenvalue_errors(
         distances = numpy.abs(values[:, None] - looser[None, :])
         return numpy.maximum(moved, numpy.min(distances, axis=1))
 
-    bars: Scalar = by_numpy(errors, *found, change, looser)
-    return bars
+    return by_numpy(errors, *found, change, looser)
 
 
 def _nontrivial(matrix: Scalar, velocity: Scalar) -> tuple[Eigensystem, Scalar]:

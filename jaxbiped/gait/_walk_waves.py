@@ -18,6 +18,7 @@ from jaxbiped._progress import stage
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import recurring_leaves, state_of_recurring
+from jaxbiped.gait._relaxation import is_far_from_seed
 from jaxbiped.gait._search_starts import (
     rolling_starts,
     scattered_start_count,
@@ -26,9 +27,8 @@ from jaxbiped.gait._search_starts import (
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.hybrid._sections import section_of
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
-from jaxbiped.scene._walker import Walker
 from jaxbiped.simulate._simulate import simulate
 
 _DIGITS = 9
@@ -41,7 +41,7 @@ _SHORTEST = 0.02
 _DEPTH = 4
 """Longest cycle that is looked for in a walk's last arrivals."""
 _FEW, _MANY = (16, 64), (1024,)
-"""Starts from which walks of the seed's bodies are followed: compliant, rigid."""
+"""Starts from which walks are followed one after the other: in stiff motion, in other."""
 _SPREADS = (0.3, 0.8)
 """Largest relative scatter of the starts' angles and rates, of one half and of the other."""
 _COUNT, _BEST, _KEPT = 1024, 48, 16
@@ -115,7 +115,7 @@ class Walks(NamedTuple):
         return [points[i] * self.sizes for i in chosen]
 
 
-def walks_from(scene: Scene | RigidScene, starts: WalkerState) -> Walks:
+def walks_from(scene: WalkerScene, starts: WalkerState) -> Walks:
     """Walks from starts, leaves of shape (n,), for 40 cycles at most."""
     # Without last digits, in which versions of JAX differ: all come to the same gait, to the bit.
     rounded = jtu.tree_map(lambda leaf: np.round(np.asarray(leaf), _DIGITS), starts)
@@ -123,7 +123,7 @@ def walks_from(scene: Scene | RigidScene, starts: WalkerState) -> Walks:
 
 
 def _walks_at(
-    scene: Scene | RigidScene, counts: Scalar, arrivals: WalkerState, attempted: Scalar
+    scene: WalkerScene, counts: Scalar, arrivals: WalkerState, attempted: Scalar
 ) -> Walks:
     """Walks that arrived at these states, leaves of shape (n, 40), and how often."""
     sizes = recurring_sizes(scene, arrivals)
@@ -133,38 +133,31 @@ def _walks_at(
 
 
 @cached_jit
-def _arrivals(scene: Scene | RigidScene, starts: WalkerState) -> tuple[Scalar, WalkerState, Scalar]:
+def _arrivals(scene: WalkerScene, starts: WalkerState) -> tuple[Scalar, WalkerState, Scalar]:
     """Of each walk cycles, states at the arrivals that end them, the stance leg standing; steps."""
-    section, footsteps = section_of(scene, None), scene.mechanism.structure.cycle_footsteps
+    system, section, footsteps = system_of(scene), section_of(scene, None), scene.cycle_footsteps
     each, how = footsteps // scene.arrival_footsteps, dict[str, Any]()
-    if scene.compliant:
+    if scene.stiff:  # whose steps are dear
         how = dict(accuracy="draft", engine="lanes")
 
     def one(start: PyTree) -> tuple[Scalar, PyTree, Scalar]:
         walk = simulate(
             scene,
             start,
-            footsteps=footsteps * _CYCLES + scene.compliant,
+            footsteps=footsteps * _CYCLES + (not system.footsteps_end_on_section),
             save=section,
             max_arrivals=each * _CYCLES,
             **how,
         )
         assert walk.arrivals is not None
         at = jtu.tree_map(lambda leaf: leaf[each - 1 :: each], walk.arrivals.state)
-        named = at
-        if scene.compliant:
-            named = system_of(scene).in_nearest_names(section, scene, at, at)
+        named = system.in_nearest_names(section, scene, at, at)
         return walk.arrivals.total // each, named, walk.attempted
 
     return jax.vmap(one)(starts)
 
 
-def is_far_from_seed(scene: Scene | RigidScene) -> bool:
-    """Whether a walker on compliant feet has other bodies than the seed's."""
-    return isinstance(scene, Scene) and not isinstance(scene.walker, Walker)
-
-
-def walks_of(scene: Scene | RigidScene, pushed: Pushed, *, most: int = _MOST) -> Iterator[Walks]:
+def walks_of(scene: WalkerScene, pushed: Pushed, *, most: int = _MOST) -> Iterator[Walks]:
     """Walks from more and more starts, for as long as they are asked for; of waves `most`."""
     if is_far_from_seed(scene):
 
@@ -175,7 +168,7 @@ def walks_of(scene: Scene | RigidScene, pushed: Pushed, *, most: int = _MOST) ->
 
         yield from islice(_waves(scattered_start_count(scene), walk, pushed), most)
         return
-    for count in _FEW if isinstance(scene, Scene) else _MANY:
+    for count in _FEW if scene.stiff else _MANY:
         halves = [
             rolling_starts(scene, count // 2, spread=spread, seed=k)
             for k, spread in enumerate(_SPREADS)
@@ -192,7 +185,7 @@ def state_rows(starts: WalkerState) -> np.ndarray:
 
 
 def _walks_from_rows(
-    scene: Scene | RigidScene, kind: type, rows: np.ndarray, pushed: list[np.ndarray]
+    scene: WalkerScene, kind: type, rows: np.ndarray, pushed: list[np.ndarray]
 ) -> Walks:
     """Walks from states without hip_x, some of them but the first replaced by others."""
     others = pushed[: len(rows) // 2]

@@ -44,8 +44,7 @@ def admissible_directions(scene: Any, state: Any, scales: np.ndarray) -> np.ndar
     projection = projection_of(scene, state)
     if np.array_equal(projection, np.eye(len(projection))):
         return projection
-    found: np.ndarray = scipy.linalg.orth(projection / scales[:, None])
-    return found
+    return scipy.linalg.orth(projection / scales[:, None])
 
 
 def independent_names(scene: Any, state: Any) -> tuple[str, ...]:

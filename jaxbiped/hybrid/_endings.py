@@ -48,8 +48,7 @@ STUMBLE_SPEED = 1e-3
 
 def root_height(scene: Scene, state: State) -> Scalar:
     """Height of the root point in a state [m]."""
-    found: Scalar = getattr(state, f"{scene.mechanism.structure.root}_z")
-    return found
+    return getattr(state, f"{scene.mechanism.structure.root}_z")
 
 
 def fall_height(scene: Scene) -> Scalar:
@@ -86,8 +85,7 @@ class _Admitted(AbstractClearance):
 def _turning_rate(scene: Scene, state: State, leg: int) -> Scalar:
     """Rate of a leg's rate [rad/s²]."""
     rates = vector_field(0.0, state, scene)
-    found: Scalar = jax.jvp(lambda y: legs_at(scene, y)[leg].rate, (state,), (rates,))[1]
-    return found
+    return jax.jvp(lambda y: legs_at(scene, y)[leg].rate, (state,), (rates,))[1]
 
 
 def _at_turn(scene: Scene, state: State, leg: int) -> State:
@@ -216,8 +214,7 @@ def _event(condition: Callable[[Scene, Any], Scalar]) -> Callable[..., Scalar]:
 
 def _speed(scene: Scene, state: State) -> Scalar:
     """Speed of the root point along the slope [m/s]."""
-    found: Scalar = getattr(state, f"{scene.mechanism.structure.root}_vx")
-    return found
+    return getattr(state, f"{scene.mechanism.structure.root}_vx")
 
 
 def _fell_forward(scene: Scene, y: State) -> Scalar:

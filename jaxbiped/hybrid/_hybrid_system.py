@@ -16,7 +16,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice, check_unbatched
 from jaxbiped._ending import FIRST_OF_A_SYSTEM
 from jaxbiped._parameter_declaration import check_parameters
-from jaxbiped._types import Scalar, Time, any_of, as_float, by_numpy, in_64_bits, is_traced, select
+from jaxbiped._types import Scalar, Time, any_of, by_numpy, in_64_bits, is_traced, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped.dynamics._mode_changes import SLACK
@@ -32,7 +32,7 @@ from jaxbiped.hybrid._guards import Guard, Switch
 from jaxbiped.hybrid._sections import AbstractSection, Section, chosen_section, section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._scene import AbstractMinimalScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import WALKER_SCENES, AbstractMinimalScene, RedundantScene
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
@@ -109,9 +109,9 @@ class HybridSystem(AbstractMinimalScene):
         return guards[name]
 
 
-SCENES = (Scene, RigidScene, RedundantScene, HybridSystem)
+SCENES = (*WALKER_SCENES, RedundantScene, HybridSystem)
 """Kinds of scenes."""
-MINIMAL_SCENES = (Scene, RigidScene, HybridSystem)
+MINIMAL_SCENES = (*WALKER_SCENES, HybridSystem)
 """Those in minimal coordinates."""
 
 
@@ -172,12 +172,6 @@ def section_of_system(system: HybridSystem, section: Any) -> AbstractSection:
             "or a Section."
         )
     return section
-
-
-def any_state(system: HybridSystem) -> Any:
-    """A state of the system's kind."""
-    kind = type(system).state_type
-    return kind(*(as_float(0.0) for _ in kind._fields))
 
 
 @state_for.register
@@ -328,8 +322,7 @@ class GuardedMotion(AbstractSystem):
                 y = select(self._stays_on(guard, args, y), _reset(guard, y), y)
             return y
 
-        settled: PyTree = jax.lax.fori_loop(0, _ASKED_AGAIN, ask, y)
-        return settled
+        return jax.lax.fori_loop(0, _ASKED_AGAIN, ask, y)
 
     def _stays_on(self, guard: Guard, args: HybridSystem, y: PyTree) -> Scalar:
         """Whether a state is on a guard and does not leave it (boolean)."""

@@ -4,7 +4,9 @@ from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any, ClassVar
 
+import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._ending import Ending
@@ -29,12 +31,12 @@ from jaxbiped.dynamics._stance_motion import (
     turning_of,
 )
 from jaxbiped.dynamics._surfaces import lead, lean, opening, straight_legs, uprightness
-from jaxbiped.hybrid._endings import WATCHES
 from jaxbiped.hybrid._guards import Switch
 from jaxbiped.hybrid._landing_system import AbstractLandingSystem
 from jaxbiped.hybrid._sections import AbstractSection, check_section_body
 from jaxbiped.hybrid._start_placement import held_like, passes_a_stop
 from jaxbiped.hybrid._walker_starts import rolling_start
+from jaxbiped.hybrid._walker_system import AbstractWalkerSystem
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene
 
@@ -42,7 +44,7 @@ _LANDED = 1e-3
 """How near a landing comes to where a load is zero, in units of the tolerance."""
 
 
-class Rolling(AbstractLandingSystem):
+class Rolling(AbstractLandingSystem, AbstractWalkerSystem):
     """The rigid walker: it rolls on one foot, and exchanges support at each heel strike.
 
     Of the place along the slope, steps carry that of the standing foot at its body's angle 0, which
@@ -50,7 +52,6 @@ class Rolling(AbstractLandingSystem):
     """
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (0,)
-    watches: ClassVar[tuple[str, ...]] = WATCHES
     refuses: ClassVar[tuple[str, ...]] = ("atol", "adjoint")
     endings: ClassVar[tuple[Ending, ...]] = (Ending.FELL_FORWARD, Ending.FELL_BACK)
 
@@ -122,6 +123,11 @@ class Rolling(AbstractLandingSystem):
 
     def placed_like(self, args: RigidScene, base: Any, states: Any, named: Collection[str]) -> Any:
         return held_like(args, base, states, named)
+
+    def strike_places(self, args: RigidScene, states: Any, count: int) -> Scalar:
+        """Places of the standing foot just after the strikes [m], shape (count,)."""
+        begins = jtu.tree_map(lambda x: x[:, 0], states)
+        return begins[0] + jax.vmap(partial(self.foot_ahead, args))(begins)
 
     def on_held(self, args: RigidScene, y: Any) -> Any:
         return on_held(args, y)

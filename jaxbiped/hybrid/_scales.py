@@ -13,9 +13,8 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._types import Numbers, RealScalarLike, Scalar, by_numpy, is_traced
+from jaxbiped._types import Numbers, RealScalarLike, Scalar, is_traced
 from jaxbiped.dynamics._state import dimensions_of, recurring_leaves
-from jaxbiped.scene._ground import check_pulls
 from jaxbiped.scene._linkage_scene import LinkageScene, LinkageState
 from jaxbiped.scene._scene import (
     AbstractScene,
@@ -30,10 +29,6 @@ _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""
 _GRAVITY = 9.8
 """Gravity in the seed paper [m/s²]."""
-_PATIENCE = 50.0
-"""Time allowed to the next arrival, in units of √(l/g)."""
-_PATIENCE_OF_SYSTEMS = 1e6
-"""The same of a hybrid system's, in its unit of time."""
 _Sizes: TypeAlias = dict[tuple[float, float], Any]
 """Numbers by the powers of length and time in a unit."""
 _RESOLVED = 0.5
@@ -43,9 +38,9 @@ _CHATTERS = 1000.0
 """Times that a tolerance is coarser than what resolves slip from which errors were seen."""
 
 
-def is_smooth(scene: PyTree) -> bool:
-    """Whether rates are smooth and never stiff between resets, as those of rigid feet are."""
-    return is_rigid(scene)
+def is_stiff(args: PyTree) -> bool:
+    """Whether a motion may be stiff: that of a scene as it says, of other parameters always."""
+    return not isinstance(args, AbstractScene) or args.stiff
 
 
 def resolve_slip_speed(rtol: RealScalarLike, scene: PyTree) -> RealScalarLike:
@@ -99,17 +94,6 @@ def check_precision(scene: CompliantScene, dtype: np.dtype) -> None:
             f"dtype = {np.dtype(dtype).name} is too coarse for this contact: rounding a position "
             f"changes the reaction by {worst:.3g} times the walker's weight; use float64."
         )
-
-
-def patience_of(scene: AbstractScene) -> Scalar | float:
-    """Time that the next arrival may take [s]."""
-    if not isinstance(scene, AbstractWalkerScene):
-        return _PATIENCE_OF_SYSTEMS * scene.time_unit
-    check_pulls(scene.ground)
-    found: Scalar = by_numpy(
-        lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.mechanism.height, scene.ground.g
-    )
-    return found
 
 
 class Units(NamedTuple):

@@ -5,7 +5,7 @@ A walker is only one of them: solves and searches ask this interface, so a user'
 
 import abc
 from collections.abc import Callable, Collection
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -20,6 +20,9 @@ from jaxbiped.dynamics._mode_changes import SLACK
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._scales import sizes_of
 from jaxbiped.hybrid._sections import AbstractSection
+
+_PATIENCE = 1e6
+"""Time allowed to the next arrival, in units of the system's time."""
 
 
 class AbstractSystem(eqx.Module):
@@ -128,6 +131,40 @@ class AbstractSystem(eqx.Module):
         """The section's value at a state just before it, and whether a crossing there counts."""
         after_reset = self.section_state(args, self.reset_map(args, y))
         return section.value(args, after_reset), section.counts(args, after_reset)
+
+    def longest_wait(self, args: PyTree) -> Scalar | float:
+        """Time that the next arrival at a section may take. Default: 1e6 units of its time."""
+        return _PATIENCE * self.time_unit
+
+    def check_cycles(self, args: PyTree) -> None:
+        """Raises `ArgumentError` where no cycle closes by the reset map. Default: cycles may."""
+
+    def takes_steps(self, args: PyTree, advance: Any, arrivals: Any) -> Any:
+        """Whether an advance in so many arrivals is one of footsteps (boolean). Default: it is."""
+        return jnp.asarray(True)
+
+    def is_walk(self, args: Any, y: Any, advance: Scalar, period: Scalar, arrivals: int) -> Scalar:
+        """Whether a cycle from a state on its section is one to which motions may come (boolean).
+
+        It has so many `arrivals`. Default: nothing is required of it.
+        """
+        return jnp.asarray(True)
+
+    def step_lengths(self, args: PyTree, states: PyTree, advance: Scalar, arrivals: int) -> Scalar:
+        """Distances between the places of successive footsteps in a cycle, shape (footsteps,).
+
+        The cycle has the `advance`, shape (1,), and passes through states with leaves of the shape
+        (arrivals, nodes). Default: the cycle is one footstep.
+        """
+        return advance
+
+    def foot_ahead(self, args: PyTree, y: PyTree) -> Scalar | None:
+        """How far the standing foot is ahead of the place that advances. Default: no foot."""
+        return None
+
+    def minimal_start(self, args: PyTree, y: PyTree) -> PyTree:
+        """A start on its constraints, in minimal coordinates. Default: as it is, without any."""
+        return y
 
     def lies_beyond(self, args: PyTree, states: PyTree, by: float = SLACK) -> np.ndarray:
         """Whether states are so far beyond a surface that resets them (booleans).

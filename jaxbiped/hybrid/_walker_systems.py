@@ -11,7 +11,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._constrained_motion import project
+from jaxbiped.dynamics._constrained_motion import consistent_state, project
 from jaxbiped.dynamics._contacts import feet, foot_force
 from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
 from jaxbiped.dynamics._footfalls import landings, leg_depth, standing_leg
@@ -19,7 +19,8 @@ from jaxbiped.dynamics._minimal_motion import force_residual, mass_matrix, vecto
 from jaxbiped.dynamics._redundant_motion import redundant_field
 from jaxbiped.dynamics._state import cyclic_names
 from jaxbiped.hybrid._compliant_guards import contact_changes, gaps, switches
-from jaxbiped.hybrid._endings import WATCHES, ending_events, ending_surface
+from jaxbiped.hybrid._endings import ending_events, ending_surface
+from jaxbiped.hybrid._footsteps import places_of_landings, stands_too_deep
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._implicit_field import ImplicitField, with_unit_mass
 from jaxbiped.hybrid._rolling_system import Rolling
@@ -28,6 +29,8 @@ from jaxbiped.hybrid._sections import AbstractSection, check_section_body
 from jaxbiped.hybrid._start_placement import standing_like
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_starts import check_start_height, consistent_start, walking_start
+from jaxbiped.hybrid._walker_system import AbstractWalkerSystem
+from jaxbiped.scene._clearance import check_legs_admitted_alike
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, RigidScene, Scene
 from jaxbiped.scene._state_types import State
 
@@ -41,10 +44,9 @@ def system_of(scene: object) -> AbstractSystem:
     raise ArgumentError(f"scene is a {type(scene).__name__}, which is not allowed: give a scene.")
 
 
-class AbstractWalking(AbstractSystem):
+class AbstractWalking(AbstractWalkerSystem):
     """A walker on compliant ground: legs exchanged at each footstep."""
 
-    watches: ClassVar[tuple[str, ...]] = WATCHES
     footsteps_end_on_section: ClassVar[bool] = False
 
     def check_start(self, args: CompliantScene, y: PyTree, given: PyTree) -> None:
@@ -77,6 +79,17 @@ class AbstractWalking(AbstractSystem):
 
     def namings(self, args: CompliantScene) -> tuple[int, ...]:
         return args.mechanism.structure.namings
+
+    def check_cycles(self, args: CompliantScene) -> None:
+        structure = args.mechanism.structure
+        images = structure.leg_twins or range(len(structure.legs))
+        check_legs_admitted_alike(args.clearance, structure.legs, images)
+
+    def stands(self, args: CompliantScene, y: PyTree) -> Scalar:
+        return ~stands_too_deep(args.minimal, self.section_state(args, y))
+
+    def strike_places(self, args: CompliantScene, states: PyTree, count: int) -> Scalar:
+        return places_of_landings(args.minimal, states, count)
 
     def renamed(self, args: CompliantScene, y: PyTree, times: int) -> PyTree:
         return exchange_legs(args, y, times)
@@ -138,6 +151,9 @@ class RedundantWalking(AbstractWalking):
 
     def section_state(self, args: RedundantScene, y: PyTree) -> PyTree:
         return minimal_state(args, y)
+
+    def minimal_start(self, args: RedundantScene, y: PyTree) -> PyTree:
+        return minimal_state(args, consistent_state(args, y).state)
 
     def projects(self, args: RedundantScene) -> bool:
         return args.method.projects

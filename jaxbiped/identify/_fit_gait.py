@@ -17,23 +17,24 @@ from jaxbiped._checks import (
     warn,
 )
 from jaxbiped._progress import Stage, stage
-from jaxbiped.dynamics._state import cyclic_names, recurring_names
+from jaxbiped.dynamics._state import cyclic_names, recurring_names, zero_state
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
-from jaxbiped.gait._search_starts import state_of_guess
-from jaxbiped.hybrid._hybrid_system import HybridSystem
+from jaxbiped.gait._search_starts import default_guess, state_of_guess
+from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
 from jaxbiped.hybrid._sections import AbstractSection, section_of
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit, information
 from jaxbiped.identify._interval_end import AT_LIMIT, interval_end, linear_step
 from jaxbiped.identify._measured_gait import OF_STATE, MeasuredGait
-from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
+from jaxbiped.identify._predicted_gait import Prediction, predict
 from jaxbiped.scene._parameter_access import (
     parameter_names,
     parameter_quantities,
     parameter_values,
     with_parameters,
 )
-from jaxbiped.scene._scene import RigidScene, Scene, is_walker
+from jaxbiped.scene._scene import AbstractMinimalScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
@@ -56,7 +57,7 @@ Tried: TypeAlias = tuple[float, np.ndarray, list[Prediction]]
 
 
 def fit_gait(
-    scene: AnyScene,
+    scene: AbstractMinimalScene,
     vary: Sequence[str] | Mapping[str, tuple[float, float]],
     measured: MeasuredGait | Sequence[MeasuredGait],
     *,
@@ -106,7 +107,7 @@ def fit_gait(
         >>> str(fit.ending), round(fit.estimates["J"], 4)
         ('converged', 0.0096)
     """
-    scene = check_scene(scene, Scene, RigidScene, HybridSystem)
+    scene = check_scene(scene, *MINIMAL_SCENES)
     section = section_of(scene, section)
     bounds = _check_bounds(scene, vary)
     gaits = list(measured) if isinstance(measured, Sequence) else [measured]
@@ -130,7 +131,7 @@ def fit_gait(
 
 
 def _check_bounds(
-    scene: AnyScene, vary: Sequence[str] | Mapping[str, tuple[float, float]]
+    scene: AbstractMinimalScene, vary: Sequence[str] | Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
     """Bounds by name; without any, those between which the parameter keeps its sign."""
     check_type("vary", vary, Sequence, Mapping)
@@ -164,7 +165,9 @@ def _check_bounds(
     return bounds
 
 
-def _check_measured(scene: AnyScene, measured: MeasuredGait, bounds: Mapping[str, object]) -> None:
+def _check_measured(
+    scene: AbstractMinimalScene, measured: MeasuredGait, bounds: Mapping[str, object]
+) -> None:
     check_type("measured", measured, MeasuredGait)
     for name in measured.conditions:
         if name in bounds:
@@ -172,9 +175,9 @@ def _check_measured(scene: AnyScene, measured: MeasuredGait, bounds: Mapping[str
     with_parameters(scene, measured.conditions)
     arrivals_of(scene, measured.footsteps)
     kind = scene.state_type
-    lacks = () if is_walker(scene) else ("peak_normal", "angles")
-    if not is_walker(scene) and not cyclic_names(kind):
-        lacks = ("step_length", "speed", *lacks)
+    lacks = [] if system_of(scene).load_exists(scene, zero_state(scene)) else ["peak_normal"]
+    lacks += [] if scene.posture else ["angles"]
+    lacks += [] if cyclic_names(kind) else ["step_length", "speed"]
     given = [*measured.measures, *(["angles"] if measured.angles is not None else [])]
     for name in given:
         if name in lacks:
@@ -191,7 +194,7 @@ class Descent:
 
     def __init__(
         self,
-        scene: AnyScene,
+        scene: AbstractMinimalScene,
         bounds: dict[str, tuple[float, float]],
         measured: list[MeasuredGait],
         accuracy: str,
@@ -334,8 +337,8 @@ class Descent:
         except ArgumentError:
             return None  # such as static friction below kinetic
         one = predict(self.scene, each, values, sizes, guess, **self.how)
-        guessed = isinstance(self.scene, HybridSystem) or guess is None
-        if not one.found and self.searching and not guessed:
+        may_search = self.searching and guess is not None
+        if not one.found and may_search and default_guess(self.scene) is not None:
             one = predict(self.scene, each, values, sizes, None, **self.how)
         return one
 

@@ -20,14 +20,12 @@ from jaxbiped.dynamics._equivalent_states import exchange_legs
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
-from jaxbiped.hybrid._hybrid_system import HybridSystem
 from jaxbiped.hybrid._sections import AbstractSection, MidStance
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.identify._measured_gait import OF_STATE, MeasuredAngles, MeasuredGait
 from jaxbiped.scene._parameter_access import with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import AbstractMinimalScene
 
-AnyScene: TypeAlias = Scene | RigidScene | HybridSystem
 Curve = Callable[[np.ndarray], np.ndarray]
 Curves: TypeAlias = dict[str, tuple[Curve, Curve]]
 """Angles over time by their names in states, each with its rate."""
@@ -54,7 +52,7 @@ class AnglesInTime(NamedTuple):
     mid_stance: float
 
     @classmethod
-    def of(cls, scene: AnyScene, gait: Gait) -> "AnglesInTime":
+    def of(cls, scene: Any, gait: Gait) -> "AnglesInTime":
         """Those of a gait that was found; NaN for one that was lost."""
         times, states = gait.orbit
         splines, lasts = [], []
@@ -63,8 +61,7 @@ class AnglesInTime(NamedTuple):
             if gait.outcome is not Search.FOUND or known.sum() < 2:
                 return cls([], np.full(len(times), np.nan), np.nan)
             part = jtu.tree_map(lambda leaf, j=j, known=known: np.asarray(leaf)[j][known], states)
-            walker: Any = scene
-            exchanged = jtu.tree_map(np.asarray, exchange_legs(walker, part))
+            exchanged = jtu.tree_map(np.asarray, exchange_legs(scene, part))
             splines.append((_curves(clock[known], part), _curves(clock[known], exchanged)))
             lasts.append(clock[known][-1])
         return cls(splines, np.cumsum(lasts), _mid_stance(scene, gait))
@@ -110,12 +107,12 @@ def _curves(times: np.ndarray, states: PyTree) -> Curves:
     return found
 
 
-def _mid_stance(scene: AnyScene, gait: Gait) -> float:
+def _mid_stance(scene: AbstractMinimalScene, gait: Gait) -> float:
     """When the stance leg comes to mid-stance in a gait's first part [s]."""
     from scipy.interpolate import CubicHermiteSpline
 
-    if scene.compliant:
-        return 0.0  # where its cycles begin
+    if not system_of(scene).footsteps_end_on_section:
+        return 0.0  # cycles begin between the ends of footsteps, at mid-stance
     clock = np.asarray(gait.orbit[0])[0]
     known = np.isfinite(clock)
     states = rows_of(gait.orbit[1], 0)
@@ -125,13 +122,10 @@ def _mid_stance(scene: AnyScene, gait: Gait) -> float:
 
 
 @cached_jit
-def _past_mid_stance(scene: AnyScene, states: PyTree) -> tuple[Scalar, Scalar]:
+def _past_mid_stance(scene: AbstractMinimalScene, states: PyTree) -> tuple[Scalar, Scalar]:
     """A function of states that rises through zero at mid-stance, and its rate."""
     rates = system_of(scene).vector_field(0.0, states, scene)
-    found: tuple[Scalar, Scalar] = jax.jvp(
-        lambda y: MidStance().value(scene, y), (states,), (rates,)
-    )
-    return found
+    return jax.jvp(lambda y: MidStance().value(scene, y), (states,), (rates,))
 
 
 def clock_zero(angles: AnglesInTime, seen: MeasuredAngles) -> float:
@@ -191,7 +185,7 @@ class Prediction(NamedTuple):
 
 
 def predict(
-    scene: AnyScene,
+    scene: AbstractMinimalScene,
     measured: MeasuredGait,
     parameters: dict[str, float],
     sizes: np.ndarray,
@@ -208,7 +202,7 @@ def predict(
     """
     names = tuple(parameters)
 
-    def scene_at(values: dict[str, float]) -> AnyScene:
+    def scene_at(values: dict[str, float]) -> AbstractMinimalScene:
         return with_parameters(scene, {**values, **measured.conditions})
 
     def gait_at(values: dict[str, float], guess: PyTree | None, wanted: tuple[str, ...]) -> Gait:

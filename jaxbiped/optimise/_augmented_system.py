@@ -11,12 +11,12 @@ are those above the lower ground. Another coordinate tells where a swing foot is
 """
 
 import dataclasses
+import functools
 from collections import namedtuple
-from typing import Any, ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-from equinox import AbstractVar
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, by_numpy, select
@@ -27,22 +27,17 @@ from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._surfaces import clearance, clearance_rate, distance_ahead
 from jaxbiped.hybrid._guards import Switch
-from jaxbiped.hybrid._rolling_system import Rolling
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.hybrid._walker_systems import Walking
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._ground import Ground, SteppedGround
-from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene, is_rigid
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.scene._state_types import WalkerState
 
 _KINDS: dict[tuple[type, tuple[str, ...]], Any] = {}
 """Of each walker's state the augmented ones: always the same types, or all would compile again."""
-COMPLIANT = ("slip_distance", "friction_loss", "impact_loss")
-"""Integrals of a walker with laws of contact."""
-RIGID = ("impact_loss",)
-"""Those of the rigid walker."""
 MOTOR_WORK = "motor_work"
-"""What a driven walker of either kind has beside them."""
+"""An integral of driven walkers."""
 _APART = 1e-2
 """How far ahead a rigid walker's foot is that can come down, as a share of the walker's height."""
 PUSH, DROP = "push", "drop"
@@ -97,8 +92,8 @@ class AbstractAugmentedSystem(AbstractSystem):
         recurring: how many of them, the last ones, must return.
     """
 
-    walker: AbstractVar[AbstractSystem]
-    coordinates: AbstractVar[tuple[str, ...]]
+    walker: AbstractSystem
+    coordinates: tuple[str, ...] = eqx.field(static=True)
     recurring: ClassVar[int] = 0
 
     @property
@@ -169,15 +164,7 @@ def _driving(motors: tuple[Scalar, ...], like: Scalar) -> Scalar:
 
 
 class WalkingIntegrals(AbstractAugmentedSystem):
-    """`Walking` with its integrals; its load is the depth of a foot that swings [m].
-
-    Attributes:
-        walker: that system.
-        coordinates: names of the integrals.
-    """
-
-    walker: Walking
-    coordinates: tuple[str, ...] = eqx.field(static=True)
+    """`Walking` with its integrals; its load is the depth of a foot that swings [m]."""
 
     def vector_field(self, t: Time, y: PyTree, args: Scene) -> PyTree:
         state = motion_of(y)
@@ -226,14 +213,7 @@ class RollingIntegrals(AbstractAugmentedSystem):
     """`Rolling` with the energy that impacts and joints take; its load is the swing foot's depth.
 
     Impacts are also those of stops and soles. The work of motors includes that of the push-off.
-
-    Attributes:
-        walker: that system.
-        coordinates: names of the integrals.
     """
-
-    walker: Rolling
-    coordinates: tuple[str, ...] = eqx.field(static=True)
 
     def vector_field(self, t: Time, y: PyTree, args: RigidScene) -> PyTree:
         state = motion_of(y)
@@ -270,11 +250,25 @@ class RollingIntegrals(AbstractAugmentedSystem):
         return -clearance(args, motion_of(y))
 
 
-def integrals_of(scene: Scene | RigidScene) -> WalkingIntegrals | RollingIntegrals:
-    driven = (MOTOR_WORK,) if is_driven(scene) else ()
-    if scene.compliant:
-        return WalkingIntegrals(Walking(), (*COMPLIANT, *driven))
-    return RollingIntegrals(Rolling(), (*RIGID, *driven))
+@functools.singledispatch
+def integrals_of(scene: Any) -> Any:
+    """The system of a scene with the integrals along its cycle; None where it has no others."""
+    return None
+
+
+@integrals_of.register
+def _(scene: Scene) -> WalkingIntegrals:
+    names = ("slip_distance", "friction_loss", "impact_loss")
+    return WalkingIntegrals(system_of(scene), (*names, *_of_motors(scene)))
+
+
+@integrals_of.register
+def _(scene: RigidScene) -> RollingIntegrals:
+    return RollingIntegrals(system_of(scene), ("impact_loss", *_of_motors(scene)))
+
+
+def _of_motors(scene: AbstractWalkerScene) -> tuple[str, ...]:
+    return (MOTOR_WORK,) if is_driven(scene) else ()
 
 
 class DisturbedCycle(AbstractAugmentedSystem):
@@ -291,8 +285,6 @@ class DisturbedCycle(AbstractAugmentedSystem):
         disturbance: "push" or "drop".
     """
 
-    walker: AbstractSystem
-    coordinates: tuple[str, ...] = eqx.field(static=True)
     disturbance: str = eqx.field(static=True)
     recurring: ClassVar[int] = 1
 
@@ -306,24 +298,21 @@ class DisturbedCycle(AbstractAugmentedSystem):
         told = {"clock": y.clock, self.disturbance: jnp.zeros_like(y.clock)}
         if self.disturbance == DROP:
             told["fallen"] = y.drop
-            if args.compliant:
-                height = args.mechanism.structure.coordinates[1]
+            height = args.mechanism.structure.coordinates[1]
+            if height in after._fields:
                 raised = getattr(after, height) + y.drop * args.mechanism.height
                 after = after._replace(**{height: raised})
         return join(y, after, told)
 
     def scene_of(self, args: AbstractWalkerScene, y: PyTree) -> AbstractWalkerScene:
-        """The scene as it is disturbed; the step of a rigid walker is its section's."""
-        ground: Ground | SteppedGround
+        """The scene as it is disturbed. Rolling feet meet the step at their section alone."""
+        ground: Ground | SteppedGround = args.ground
         if self.disturbance == PUSH:
-            ground = dataclasses.replace(args.ground, slope=args.ground.slope + y.push)
-        elif args.compliant:
-            depth, leg = y.drop * args.mechanism.height, args.mechanism.structure.swing_leg
-            ground = SteppedGround(args.ground.slope, args.ground.g, depth, leg)
+            ground = dataclasses.replace(args.ground, slope=ground.slope + y.push)
         else:
-            return args
-        found: AbstractWalkerScene = eqx.tree_at(lambda each: each.ground, args, ground)
-        return found
+            depth, leg = y.drop * args.mechanism.height, args.mechanism.structure.swing_leg
+            ground = SteppedGround(ground.slope, ground.g, depth, leg)
+        return eqx.tree_at(lambda each: each.ground, args, ground)
 
 
 def disturbed_cycle(walker: AbstractSystem, disturbance: str) -> DisturbedCycle:
@@ -332,7 +321,7 @@ def disturbed_cycle(walker: AbstractSystem, disturbance: str) -> DisturbedCycle:
 
 
 class SteppedSection(AbstractSection):
-    """The walker's own section; a rigid walker's foot comes down where the ground now is.
+    """Heel strike of a rigid walker, whose foot comes down where the ground now is.
 
     Attributes:
         section: of the walker.
@@ -341,8 +330,6 @@ class SteppedSection(AbstractSection):
     section: AbstractSection
 
     def value(self, args: PyTree, y: PyTree) -> Scalar:
-        if not is_rigid(args):
-            return MotionSection(self.section).value(args, y)
         before, unit = exchange_legs(args, motion_of(y)), args.mechanism.height
         # In units of the feet's distance: the height itself is flat where the legs pass.
         apart = jnp.maximum(distance_ahead(args, before), _APART * unit)
@@ -373,10 +360,8 @@ class LowestSwing(AbstractAugmentedSystem):
 
     def reset_map(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
         motion, zero = motion_of(y), jnp.zeros_like(y.passed)
-        lowered = zero
-        if self.walker.disturbance == DROP and args.compliant:
-            lowered = y.drop * args.mechanism.height
-        height = _swing_foot(args, motion_of(motion)).height + lowered
+        drop = y.drop if self.walker.disturbance == DROP else zero
+        height = swing_foot(args, motion_of(motion), drop * args.mechanism.height).height
         told = {"clearance": y.clearance + height / args.mechanism.height, "passed": y.passed + 1.0}
         after = self.walker.reset_map(args, motion)
         at_section = join(y, after, {"clearance": y.clearance, "passed": zero})
@@ -394,16 +379,16 @@ class LowestSwingSection(AbstractSection):
 
     def value(self, args: PyTree, y: PyTree) -> Scalar:
         motion = motion_of(y)
-        rises = _swing_foot(args, motion_of(motion)).rate
+        rises = swing_foot(args, motion_of(motion)).rate
         return jnp.where(y.passed > 0.5, rises, self.section.value(args, motion))
 
     def counts(self, args: PyTree, y: PyTree) -> Scalar:
         motion = motion_of(y)
-        swings = _swing_foot(args, motion_of(motion)).swings
+        swings = swing_foot(args, motion_of(motion)).swings
         return jnp.where(y.passed > 0.5, swings, self.section.counts(args, motion))
 
 
-class _SwingFoot(NamedTuple):
+class SwingFoot(NamedTuple):
     """Height above its ground [m], its rate, and whether the clearance rule lets it pass."""
 
     height: Scalar
@@ -411,15 +396,22 @@ class _SwingFoot(NamedTuple):
     swings: Scalar
 
 
-def _swing_foot(args: AbstractWalkerScene, state: PyTree) -> _SwingFoot:
-    """A compliant walker's stance leg's, the lower one of several: its cycle has the footstep
-    before, and the exchange of legs behind."""
-    if not args.compliant:
-        rigid = cast("RigidScene", args)
-        return _SwingFoot(clearance(rigid, state), clearance_rate(rigid, state), jnp.asarray(True))
-    structure, found = args.mechanism.structure, feet(cast("Scene", args), state)
+@functools.singledispatch
+def swing_foot(scene: Any, state: PyTree, drop: Scalar | float = 0.0) -> SwingFoot:
+    """The foot that swings in the footstep of a cycle, which ends on ground lower by `drop` [m].
+
+    It is the stance leg's, the lower one of several: the cycle has the footstep before, and the
+    exchange of legs behind.
+    """
+    structure, found = scene.mechanism.structure, feet(scene, state)
     lowest, *others = (found[k] for k in structure.feet_of_leg[structure.stance_leg])
     for foot in others:
         lowest = select(foot.penetration > lowest.penetration, foot, lowest)
     swings = jnp.logical_not(jnp.asarray(lowest.admitted))
-    return _SwingFoot(-lowest.penetration, -lowest.penetration_rate, swings)
+    return SwingFoot(drop - lowest.penetration, -lowest.penetration_rate, swings)
+
+
+@swing_foot.register
+def _(scene: RigidScene, state: PyTree, drop: Scalar | float = 0.0) -> SwingFoot:
+    """That of a walker whose ground is lower at its section alone."""
+    return SwingFoot(clearance(scene, state), clearance_rate(scene, state), jnp.asarray(True))

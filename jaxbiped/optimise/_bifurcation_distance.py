@@ -26,7 +26,7 @@ from jaxbiped.gait._search_provenance import BranchEnd
 from jaxbiped.optimise._cycle_functionals import Functional
 from jaxbiped.optimise._jacobian_functionals import MODULI, jacobian_functionals
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WALKER_SCENES, WalkerScene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 KINDS = (BranchEvent.FOLD, BranchEvent.PERIOD_DOUBLING)
@@ -78,7 +78,7 @@ class BifurcationDistance(NamedTuple):
 
 
 def bifurcation_distance(
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     gait: Gait,
     kind: BranchEvent | str = BranchEvent.FOLD,
     along: str = "slope",
@@ -105,7 +105,7 @@ def bifurcation_distance(
         ArgumentError: an argument is not allowed, or a parameter other than the slope is zero,
             which no factor changes; raised before anything is compiled.
     """
-    check_type("scene", scene, Scene, RigidScene)
+    check_type("scene", scene, *WALKER_SCENES)
     check_choice("kind", kind, KINDS)
     check_choice("along", along, parameter_names(scene))
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
@@ -119,7 +119,7 @@ def bifurcation_distance(
 
 def _distance_along(
     axis: Axis,
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     kind: BranchEvent,
     parts: Sequence[Trace],
     locate: Callable[[BifurcationPoint], Functional | None],

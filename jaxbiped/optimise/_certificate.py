@@ -29,7 +29,7 @@ from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._optimality import Optimality
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.scene._parameter_access import parameter_names
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.simulate._simulate import simulate
 from jaxbiped.simulate._trajectory import Trajectory
@@ -235,7 +235,7 @@ class _Parts:
         return found
 
 
-def _labelling(scene: Scene | RigidScene, gait: Gait) -> Labelling | None:
+def _labelling(scene: WalkerScene, gait: Gait) -> Labelling | None:
     """What labels starts by the gait; None where a search from its state does not find it."""
     knows = labelling(scene, guess=gait.measures.state)
     return knows if knows.family.rows[0] else None
@@ -258,7 +258,7 @@ def _basin(knows: Labelling, gait: Gait, count: int, scatter: float, seed: int) 
     return Fraction(float(walking / max(possible, 1)), float(low), float(high), int(walking))
 
 
-def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> PushedWalk:
+def _walk(scene: WalkerScene, gait: Gait, count: int, push: float) -> PushedWalk:
     walk: Trajectory[Any] = simulate(
         scene,
         _pushed(gait.measures.state, push),
@@ -277,8 +277,7 @@ def _pushed(state: WalkerState, push: float) -> WalkerState:
     """The state with all its speeds so much larger, relative to themselves."""
     fast = [name for name in state._fields if unit_of(name) in ("m/s", "rad/s")]
     faster = {name: as_float(float(getattr(state, name)) * (1.0 + push)) for name in fast}
-    found: WalkerState = state._replace(**faster)
-    return found
+    return state._replace(**faster)
 
 
 def _judged(
@@ -296,7 +295,7 @@ def _other_than(engine: str) -> str:
     return next(name for name in ENGINES if name not in ("auto", engine))
 
 
-def _by_other(scene: Scene | RigidScene, gait: Gait) -> OtherEngine:
+def _by_other(scene: WalkerScene, gait: Gait) -> OtherEngine:
     other = _other_than(gait.engine)
     again = find_gait(scene, gait.measures.state, parameters=(), engine=other)
     return _compared(again, gait, other)

@@ -12,7 +12,7 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._energy import is_driven
-from jaxbiped.gait._fixed_point_search import looser
+from jaxbiped.gait._fixed_point_search import with_looser
 from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
@@ -26,19 +26,19 @@ from jaxbiped.gait._return_map_spec import (
     orbit_solver,
     runs_by_lanes,
 )
-from jaxbiped.hybrid._scales import patience_of
 from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.optimise._augmented_system import MotionSection, integrals_of
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, precision_of
 from jaxbiped.variational._tangents import Seeded
 
-_COMPLIANT = {"balanced": Precision(2e-8, 2e-7)}
-"""How exactly functionals of a compliant orbit are solved where that is not as the gait is: the
+_STIFF = {"balanced": Precision(2e-8, 2e-7)}
+"""How exactly functionals of a stiff orbit are solved where that is not as the gait is: the
 errors of derivatives of the spectral radius, of slip and of losses are then below 1e-5 of the
 elasticity, as those of the gait's own measures are; it doubles what an evaluation costs."""
 _DRIVEN, _BOUND = 0.3, 0.1
@@ -88,7 +88,7 @@ class Functionals(NamedTuple):
 
 
 def cycle_functionals(
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     state: WalkerState,
     *,
     arrivals: int = 1,
@@ -113,13 +113,13 @@ def cycle_functionals(
     return _functionals(spec, scene, system.begin(state), functional_precision(accuracy, scene))
 
 
-def integral_names(scene: Scene | RigidScene) -> tuple[str, ...]:
+def integral_names(scene: WalkerScene) -> tuple[str, ...]:
     """What `cycle_functionals` tells of a scene."""
     return (*integrals_of(scene).coordinates, "foot_clearance")
 
 
 def cycle_spec(
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     system: AbstractSystem,
     section: AbstractSection,
     arrivals: int,
@@ -129,8 +129,8 @@ def cycle_spec(
     return ReturnMapSpec(
         system=system,
         section=section,
-        solver=orbit_solver(None, rigid=not scene.compliant),
-        max_time=patience_of(scene),
+        solver=orbit_solver(None, stiff=scene.stiff),
+        max_time=system_of(scene).longest_wait(scene),
         steps=arrivals,
         max_solver_steps=max(each.max_solver_steps for each in ACCURACIES.values()),
         engine=engine,
@@ -138,12 +138,12 @@ def cycle_spec(
 
 
 def functional_precision(
-    accuracy: str, scene: Scene | RigidScene, names: tuple[str, ...] = ()
+    accuracy: str, scene: WalkerScene, names: tuple[str, ...] = ()
 ) -> Precision:
     """How exactly functionals are solved, as arrays: one program serves every accuracy."""
     found, share = precision_of(accuracy, scene), 1.0
-    if scene.compliant and accuracy in _COMPLIANT:
-        found, share = _COMPLIANT[accuracy], _DRIVEN if is_driven(scene) else 1.0
+    if scene.stiff and accuracy in _STIFF:
+        found, share = _STIFF[accuracy], _DRIVEN if is_driven(scene) else 1.0
         share = _BOUND if "radius_bound" in names else share
     return Precision(*(as_float(share * tolerance) for tolerance in found))
 
@@ -165,9 +165,7 @@ class Orbits(NamedTuple):
     returns: LinearisedReturn
 
 
-def orbits_near(
-    spec: ReturnMapSpec, scene: Scene | RigidScene, y: PyTree, fine: Precision
-) -> Orbits:
+def orbits_near(spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precision) -> Orbits:
     """The orbits near a state on the section, after one more correction by Newton."""
     point = recurring_components(spec.system, y)
     _, active = select_parameters(scene, None)
@@ -186,13 +184,12 @@ def orbits_near(
         lost = jnp.where(away, int(Ending.TIMED_OUT), 0)
         return own, found._replace(code=jnp.where(found.code == 0, lost, found.code))
 
-    pairs = zip(fine, looser(fine), strict=True)
-    return Orbits(seeds, sizes, *jax.vmap(once)(Precision(*map(jnp.stack, pairs))))
+    return Orbits(seeds, sizes, *jax.vmap(once)(with_looser(fine)))
 
 
 @host_jit(runs_by_lanes)
 def _functionals(
-    spec: ReturnMapSpec, scene: Scene | RigidScene, y: PyTree, fine: Precision
+    spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precision
 ) -> Functionals:
     found = orbits_near(spec, scene, y, fine)
     values, slopes = jax.vmap(_totals)(found.returns, found.points)

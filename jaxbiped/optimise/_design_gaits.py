@@ -25,7 +25,7 @@ from jaxbiped.optimise._objective_values import (
     functionals_of,
 )
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 
 CRITERIA = ("mean", "worst")
@@ -46,14 +46,14 @@ class GaitSettings(NamedTuple):
     section: AbstractSection | None = None
     radius_sensitivities: bool = False
 
-    def find(self, scene: Scene | RigidScene, start: PyTree | None) -> Gait:
+    def find(self, scene: WalkerScene, start: PyTree | None) -> Gait:
         """The gait of a scene near a state; from nothing for None."""
         return find_gait(scene, start, **self._asdict())
 
-    def find_near(self, scene: Scene | RigidScene, point: np.ndarray) -> Gait:
+    def find_near(self, scene: WalkerScene, point: np.ndarray) -> Gait:
         return self.find(scene, self.state_of(scene, point))
 
-    def state_of(self, scene: Scene | RigidScene, point: np.ndarray) -> WalkerState:
+    def state_of(self, scene: WalkerScene, point: np.ndarray) -> WalkerState:
         return jtu.tree_map(np.float64, state_of_recurring(scene.state_type, point))
 
 
@@ -63,12 +63,12 @@ def are_walks(gaits: Gait) -> np.ndarray:
 
 
 def gaits_near(
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     values: Mapping[str, np.ndarray],
     points: np.ndarray,
     settings: GaitSettings,
     wanted: tuple[str, ...] = (),
-) -> tuple[Scene | RigidScene, Gait, BothFunctionals]:
+) -> tuple[WalkerScene, Gait, BothFunctionals]:
     """Gaits of n scenes that differ in some parameters.
 
     The parameters' values by name have the shape (n,), and the points, guesses of the recurring
@@ -89,9 +89,9 @@ def gaits_near(
 
 @cached_jit
 def _find_each(
-    scenes: Scene | RigidScene, starts: PyTree, wanted: tuple[str, ...], settings: GaitSettings
+    scenes: WalkerScene, starts: PyTree, wanted: tuple[str, ...], settings: GaitSettings
 ) -> tuple[Gait, BothFunctionals]:
-    def one(scene: Scene | RigidScene, start: PyTree) -> tuple[Gait, BothFunctionals]:
+    def one(scene: WalkerScene, start: PyTree) -> tuple[Gait, BothFunctionals]:
         gait = settings.find(scene, start)
         return gait, functionals_of(scene, gait, wanted, settings.accuracy)
 
@@ -191,7 +191,7 @@ def with_worse_members(
 
 def evaluate_ensemble(
     ensemble: Ensemble,
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     nominal: Evaluation,
     wanted: tuple[str, ...],
     settings: GaitSettings,
@@ -207,7 +207,7 @@ def evaluate_ensemble(
 
 def evaluate_members(
     ensemble: Ensemble,
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     nominal: Evaluation,
     wanted: tuple[str, ...],
     settings: GaitSettings,

@@ -35,7 +35,7 @@ from jaxbiped.optimise._objective_values import (
 )
 from jaxbiped.optimise._objectives import OBJECTIVES, check_objective
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 
 _WORDS = re.compile(r"^\s*(\w+)\s*(<=|>=|==|<|>|=)\s*([^<>=]+?)\s*$")
@@ -400,11 +400,11 @@ class DesignProblem:
         found = np.stack(recurring_leaves(gait.measures.state))
         return None if np.any(np.abs(found - guess) > farthest) else self._keep(u, scene, gait)
 
-    def scene_at(self, u: np.ndarray) -> Scene | RigidScene:
+    def scene_at(self, u: np.ndarray) -> WalkerScene:
         """The scene of a design; raises `ArgumentError` where parameters do not go together."""
         return with_parameters(self.scene, self.variables.by_name(u))
 
-    def _keep(self, u: np.ndarray, scene: Scene | RigidScene, gait: Gait) -> Evaluation | None:
+    def _keep(self, u: np.ndarray, scene: WalkerScene, gait: Gait) -> Evaluation | None:
         if self.ensemble is None:
             known = evaluate(scene, gait, self.wanted, self.settings.accuracy)
         else:

@@ -19,7 +19,7 @@ from jaxbiped.gait._fixed_point_search import with_looser
 from jaxbiped.gait._orbit_derivatives import second_variation, slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
-from jaxbiped.hybrid._sections import AbstractSection, section_of
+from jaxbiped.hybrid._sections import AbstractSection, HeelStrike, section_of
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.linalg._small_matrices import Eigensystem, eigenpairs, eigensystem, singular_pairs
 from jaxbiped.optimise._augmented_system import (
@@ -39,7 +39,7 @@ from jaxbiped.optimise._cycle_functionals import (
     orbits_near,
     with_errors,
 )
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._adjoint_solve import COUNT
@@ -251,7 +251,7 @@ _OF_ROWS: dict[str, Callable[[Scalar, Scalar], WeightedEntries]] = {
 
 
 def jacobian_functionals(
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     state: WalkerState,
     names: tuple[str, ...] = JACOBIAN_FUNCTIONALS,
     *,
@@ -305,7 +305,9 @@ def jacobian_functionals(
         on, count = section_of(scene, None), arrivals
         disturbed = disturbed_cycle(system_of(scene.minimal), DROP if by_step else PUSH)
         system: AbstractAugmentedSystem = disturbed
-        section: AbstractSection = SteppedSection(on) if by_step else MotionSection(on)
+        # Mid-stance lies where it does, however high the ground.
+        is_moved = by_step and isinstance(on, HeelStrike)
+        section: AbstractSection = SteppedSection(on) if is_moved else MotionSection(on)
         if has_clearance:
             system, section = LowestSwing(disturbed), LowestSwingSection(section)
             count *= 2
@@ -323,7 +325,7 @@ def jacobian_functionals(
 @host_jit(runs_by_lanes)
 def _functionals(
     spec: ReturnMapSpec,
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     y: PyTree,
     names: tuple[str, ...],
     fine: Precision,

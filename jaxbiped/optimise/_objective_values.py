@@ -24,7 +24,7 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._augmented_system import MOTOR_WORK
+from jaxbiped.optimise._augmented_system import MOTOR_WORK, integrals_of
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import (
     Functional,
@@ -42,7 +42,7 @@ from jaxbiped.optimise._jacobian_functionals import (
 )
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.scene._parameter_access import parameter_names, select_parameters
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractScene, WalkerScene
 
 _OF_THE_GAIT = ("speed", "step_length", "period", "peak_normal")
 _DISTANCES = {
@@ -83,7 +83,7 @@ class Evaluation(NamedTuple):
 
 
 def functionals_of(
-    scene: Scene | RigidScene, gait: Gait, wanted: tuple[str, ...], accuracy: str
+    scene: WalkerScene, gait: Gait, wanted: tuple[str, ...], accuracy: str
 ) -> BothFunctionals:
     """What measures need beside the gait itself."""
     of_jacobian, of_cycle = functional_names(scene, wanted)
@@ -99,9 +99,9 @@ def functionals_of(
 def functional_names(scene: AbstractScene, wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
     """Which functionals of the Jacobian these measures need, and whether those of the cycle.
 
-    Where there is no ground all measures are known with the gait.
+    Where a cycle has no integrals all measures are known with the gait.
     """
-    if not scene.has_ground:
+    if integrals_of(scene) is None:
         return (), False
     needed = {*wanted, *(_WHOLE if "whole_sensitivity" in wanted else ())}
     of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
@@ -118,7 +118,7 @@ def _own(wanted: tuple[str, ...]) -> dict[str, Callable[[Any, Gait], tuple[Any, 
 
 
 def evaluate(
-    scene: Scene | RigidScene,
+    scene: WalkerScene,
     gait: Gait,
     names: Iterable[str],
     accuracy: str,
@@ -185,7 +185,7 @@ def _root_of_squares(rows: list[Functional]) -> Functional:
     return weighted_sum(shares, rows, len(rows[0].slopes))._replace(value=value)
 
 
-def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, Functional]) -> Functional:
+def _cost_of_transport(scene: WalkerScene, rows: dict[str, Functional]) -> Functional:
     """Work of the motors over weight times length, and gravity's share, exact over a cycle."""
     slope, length = float(scene.ground.slope), rows["step_length"]
     by_slope = np.zeros(len(length.slopes))
@@ -205,12 +205,11 @@ def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, Functional]) -
 
 
 @cached_jit
-def _weight(scene: Scene | RigidScene) -> tuple[Scalar, Scalar]:
+def _weight(scene: WalkerScene) -> tuple[Scalar, Scalar]:
     """The walker's weight [N], and its derivatives with respect to all parameters, shape (p,)."""
 
     def of(there: Any) -> Scalar:
-        weight: Scalar = there.mechanism.total_mass * there.ground.g
-        return weight
+        return there.mechanism.total_mass * there.ground.g
 
     value, slopes = jax.value_and_grad(of)(scene)
     (_, places), leaves = select_parameters(scene, None), jtu.tree_leaves(slopes)

@@ -11,6 +11,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._state import cyclic_names
 from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._augmented_system import integrals_of
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
@@ -135,7 +136,7 @@ OBJECTIVES = {
 
 
 def _of_ground(name: str, scene: AbstractScene) -> str | None:
-    if scene.has_ground or OBJECTIVES[name].measured is not None:
+    if integrals_of(scene) is not None or OBJECTIVES[name].measured is not None:
         return None
     advances = bool(cyclic_names(scene.state_type))
     own = ("period", "spectral_radius", *(("speed", "step_length") if advances else ()))

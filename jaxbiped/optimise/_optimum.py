@@ -13,7 +13,7 @@ from jaxbiped.optimise._objective_values import Evaluation
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.optimise._optimality import Optimality
 from jaxbiped.scene._parameter_access import parameter_quantities
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene import WalkerScene
 
 if TYPE_CHECKING:
     import xarray
@@ -89,7 +89,7 @@ class Optimum(Tabular):
     rows: ClassVar[str] = "variable"
     outcome: Outcome
     message: str
-    scene: Scene | RigidScene
+    scene: WalkerScene
     gait: Gait
     variables: dict[str, float]
     objective: float

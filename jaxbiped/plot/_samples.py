@@ -103,8 +103,7 @@ class DrawnMotion:
         if self._rigid is not None:
             return self._rigid.motion(t)
         states = state_at(self._trajectory, t)
-        found: dict[str, np.ndarray] = evaluate_along(self._scene, states, body_motion)
-        return found
+        return evaluate_along(self._scene, states, body_motion)
 
     def sampled(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """Times fit for drawing [s], and the motion at them with all scalars of its state."""

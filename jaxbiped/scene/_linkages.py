@@ -41,8 +41,7 @@ def _with_share(body: Body, root_mass: Parameter, share: float) -> Body:
     mass, inertia, *centre = by_numpy(
         add, root_mass, body.mass, body.inertia, body.centre.along, *ahead
     )
-    loaded: Body = with_fields(body, mass=mass, inertia=inertia, centre=Point(*centre))
-    return loaded
+    return with_fields(body, mass=mass, inertia=inertia, centre=Point(*centre))
 
 
 def check_loaded_bodies(mechanism: Mechanism) -> None:
@@ -102,12 +101,10 @@ def _from_centre(body: Body, place: Point | None) -> tuple[Scalar, Scalar]:
 
     point = Point(0.0) if place is None else place
     values = (point.along, point.ahead, body.centre.along, body.centre.ahead)
-    found: tuple[Scalar, Scalar] = by_numpy(of, *(0.0 if each is None else each for each in values))
-    return found
+    return by_numpy(of, *(0.0 if each is None else each for each in values))
 
 
 def _held_at(coupling: Coupling, angle: Angle, slope: Parameter) -> Scalar:
     """The sum of bodies' angles that a coupling holds [rad]."""
     rest = 0.0 if coupling.rest is None else coupling.rest
-    held: Scalar = by_numpy(lambda _, rest, slope: rest - angle.vertical * slope, rest, slope)
-    return held
+    return by_numpy(lambda _, rest, slope: rest - angle.vertical * slope, rest, slope)

@@ -210,8 +210,7 @@ class Mechanism(eqx.Module):
         """The mechanism without its mirror: each side has its own parameters, initially equal."""
         alone = Mechanism(**self.arguments() | {"mirror": ()})
         structure = dataclasses.replace(alone.structure, pairs=self.structure.pairs)
-        changed: Mechanism = with_fields(alone, structure=structure)
-        return changed
+        return with_fields(alone, structure=structure)
 
     @property
     def has_motors(self) -> bool:
@@ -224,8 +223,7 @@ class Mechanism(eqx.Module):
         masses = [body.mass for body in self.bodies]
         if self.root_mass is not None:
             masses.append(self.root_mass)
-        found: Scalar = by_numpy(lambda _, *each: sum(each[1:], each[0]), *masses)
-        return found
+        return by_numpy(lambda _, *each: sum(each[1:], each[0]), *masses)
 
     @property
     def height(self) -> Scalar:

@@ -58,26 +58,23 @@ class AbstractScene(eqx.Module):
             class.
         compliant: whether feet sink into the ground and slip on it by laws of contact; else they
             roll and strike. A property of the class.
+        stiff: whether its motion may be stiff, as that of feet that press into the ground: its
+            steps are then implicit, and dear. A property of the class.
         redundant: whether constraints hold more coordinates together than there are degrees of
             freedom. A property of the class.
         model: the word for it in the settings of results. A property of the class.
         bristles: names of the states of friction, which are 0 where a start leaves them out.
         posture: names of the angles and rates from which the root point's place follows.
         coordinate_aliases: coordinates by other names that they have.
-        has_default_guess: whether it is known where a search for its gaits begins. A property of
-            the class.
-        has_ground: whether it has feet on a ground, whose forces, losses and clearances are
-            measured along a cycle. A property of the class.
     """
 
     compliant: AbstractClassVar[bool]
     redundant: AbstractClassVar[bool]
+    stiff: ClassVar[bool] = True
     model: ClassVar[str] = "hybrid system"
     bristles: ClassVar[tuple[str, ...]] = ()
     posture: ClassVar[tuple[str, ...]] = ()
     coordinate_aliases: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    has_default_guess: ClassVar[bool] = False
-    has_ground: ClassVar[bool] = False
     time_unit: ClassVar[float] = 1.0
     endings: ClassVar[tuple[str, ...] | None] = None
     arrival_footsteps: ClassVar[int] = 1
@@ -127,8 +124,6 @@ class AbstractWalkerScene(AbstractScene):
         ground: slope and gravity.
     """
 
-    has_default_guess: ClassVar[bool] = True
-    has_ground: ClassVar[bool] = True
     if TYPE_CHECKING:
         # A field of some scenes, a property of others.
         @property
@@ -320,6 +315,7 @@ class RigidScene(AbstractMinimalScene, AbstractWalkerScene):
     """
 
     compliant: ClassVar[bool] = False
+    stiff: ClassVar[bool] = False
     model: ClassVar[str] = "rigid"
     walker: Any
     ground: Ground
@@ -457,6 +453,10 @@ class RedundantScene(AbstractWalkerScene):
 
 CompliantScene: TypeAlias = Scene | RedundantScene
 """A walker with laws of contact, in minimal or redundant coordinates."""
+WalkerScene: TypeAlias = Scene | RigidScene
+"""A walker in minimal coordinates."""
+WALKER_SCENES = (Scene, RigidScene)
+"""Kinds of those."""
 
 
 def is_walker(args: object) -> TypeGuard[AbstractWalkerScene]:

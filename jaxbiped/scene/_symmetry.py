@@ -294,5 +294,4 @@ def turned_foot(turn: Turn | None, foot: Foot, number: int) -> Foot:
     along, ahead = foot.centre.along, foot.centre.ahead
     given = (along,) if ahead is None else (along, ahead)
     places = by_numpy(lambda _, a, b=0.0: (cosine * a - sine * b, cosine * b + sine * a), *given)
-    changed: Foot = with_fields(foot, centre=Point(*places))
-    return changed
+    return with_fields(foot, centre=Point(*places))

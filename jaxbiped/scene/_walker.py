@@ -56,8 +56,7 @@ class Walker(eqx.Module):
     @property
     def hip_to_foot(self) -> Scalar:
         """Distance from the hip to the centre of the foot, l − r [m]."""
-        found: Scalar = by_numpy(lambda _, l, r: l - r, self.l, self.r)
-        return found
+        return by_numpy(lambda _, l, r: l - r, self.l, self.r)
 
     def mechanism(self) -> Mechanism:
         """The walker as a mechanism: bodies "1" and "2" on the hip, of which the second stands."""
@@ -71,8 +70,7 @@ class Walker(eqx.Module):
     @property
     def total_mass(self) -> Scalar:
         """Mass of both legs and the hip [kg]."""
-        found: Scalar = by_numpy(lambda _, m, hip: 2.0 * m + hip, self.m, self.hip_mass)
-        return found
+        return by_numpy(lambda _, m, hip: 2.0 * m + hip, self.m, self.hip_mass)
 
 
 class Kneed(eqx.Module):

@@ -17,7 +17,7 @@ from jaxbiped._checks import (
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Parameter
 from jaxbiped.hybrid._endings import WATCHES
-from jaxbiped.hybrid._scales import is_smooth, unresolved_slip
+from jaxbiped.hybrid._scales import is_stiff, unresolved_slip
 from jaxbiped.hybrid._sections import AbstractSection, HeelStrike
 from jaxbiped.scene._linkage_scene import LinkageScene, LinkageState
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
@@ -134,7 +134,7 @@ def simulate(
         check_function("extremes", extremes)
     if adjoint is not None:
         check_type("adjoint", adjoint, diffrax.AbstractAdjoint)
-    usual = "end" if is_smooth(scene) else "steps"
+    usual = "steps" if is_stiff(scene) else "end"
     asked = Options(
         duration=last_time(save) if duration is None and footsteps is None else duration,
         footsteps=footsteps,
@@ -154,7 +154,7 @@ def simulate(
     wanted = check_accurate_walk(accuracy, rtol=rtol, atol=atol, dt=dt)
     if wanted is not None:
         asked = asked._replace(accuracy="balanced")
-    kind: type[AbstractSimulation] = RigidSimulation if is_smooth(scene) else Simulation
+    kind: type[AbstractSimulation] = Simulation if is_stiff(scene) else RigidSimulation
     run = kind.of(scene, state, asked)
     if wanted is not None:
         return accurate_walk(run, wanted)

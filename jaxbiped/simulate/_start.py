@@ -19,7 +19,6 @@ from jaxbiped._checks import (
 )
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.hybrid._endings import WATCHES
-from jaxbiped.hybrid._scales import is_smooth, patience_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.solve.controllers._event_steps import PATIENCE
@@ -90,9 +89,10 @@ def longest_time(scene: Any, asked: Options) -> Scalar | float:
     if asked.duration is not None:
         check_positive("duration", asked.duration, "s")
         return asked.duration
-    if not is_smooth(scene):
+    if scene.stiff:
         return PATIENCE * (asked.footsteps or 0)
-    time: Scalar = by_numpy(lambda _, wait: asked.footsteps * wait, patience_of(scene))
+    wait = system_of(scene).longest_wait(scene)
+    time: Scalar = by_numpy(lambda _, wait: asked.footsteps * wait, wait)
     return time
 
 

@@ -8,7 +8,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice, check_positive
 from jaxbiped._types import RealScalarLike, Scalar
-from jaxbiped.hybrid._scales import is_smooth, resolve_slip_speed
+from jaxbiped.hybrid._scales import is_stiff, resolve_slip_speed
 
 
 class Tolerances(NamedTuple):
@@ -74,7 +74,7 @@ def tolerances(
     """
     check_choice("accuracy", accuracy, ACCURACIES)
     named = ACCURACIES[accuracy]
-    usual = named.rigid_walk if is_smooth(scene) else resolve_slip_speed(named.walk, scene)
+    usual = resolve_slip_speed(named.walk, scene) if is_stiff(scene) else named.rigid_walk
     relative = usual if rtol is None else rtol
     check_positive("rtol", relative)
     absolute = 1e-2 * relative if atol is None else atol
@@ -94,7 +94,7 @@ def precision_of(accuracy: str, scene: PyTree = None) -> Precision:
     Both are finer where the name's own would leave unresolved how friction builds up.
     """
     named = ACCURACIES[accuracy]
-    found = named.rigid_gait if is_smooth(scene) else named.gait
+    found = named.gait if is_stiff(scene) else named.rigid_gait
     assert found is not None
     rtol = _COARSER_THAN_A_WALK * resolve_slip_speed(found.rtol / _COARSER_THAN_A_WALK, scene)
     return Precision(rtol, found.tangent_rtol * (rtol / found.rtol))

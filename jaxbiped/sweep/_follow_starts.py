@@ -13,7 +13,6 @@ from jaxtyping import PyTree
 from jaxbiped.compiler import BY_NAME, DEVICES, Request
 from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.hybrid._landing_system import AbstractLandingSystem
-from jaxbiped.hybrid._scales import patience_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractScene
@@ -114,7 +113,7 @@ def follow_starts(
     def same(value: npt.ArrayLike) -> np.ndarray:
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
 
-    waits = np.asarray(patience_of(scene))
+    waits = np.asarray(system_of(scene).longest_wait(scene))
     steps = _steps(scene, effort, arrivals)
     start = steps.inputs(
         scene,

@@ -14,6 +14,7 @@ from jaxbiped._types import JsonObject, as_float
 from jaxbiped.dynamics._state import state_of_recurring
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.scene._parameter_access import SomeScene, with_parameters
 from jaxbiped.scene._scene import AbstractScene
@@ -166,7 +167,7 @@ def find_family(
     scenes = [scene_with(scene, names, values) for values in table]
 
     def seek(k: int, near: PyTree) -> tuple[Attractor, ...]:
-        guesses = [near, None] if scene.has_default_guess else [near]
+        guesses = [near] if default_guess(scene) is None else [near, None]
         found = _stable_gaits(scenes[k], guesses, scene.cycle_footsteps, effort.section)
         return tuple(with_radius(scenes[k], gait, effort) for gait in found)
 

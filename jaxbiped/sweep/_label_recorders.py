@@ -193,8 +193,7 @@ class AbstractLabelRecorder(AbstractRecorder):
             )
             return select(arrives, new, old)
 
-        trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(arrives), made, lambda: old)
-        return trace
+        return jax.lax.cond(eqxi.unvmap_any(arrives), made, lambda: old)
 
 
 def _time_out(solve: Any, memory: LabelMemory, t: Scalar) -> LabelMemory:
@@ -345,8 +344,7 @@ class StrikeLabelRecorder(AbstractLabelRecorder):
 def _advance(solve: Solve | Landing, solved: Solved) -> Scalar:
     """Change of the first cyclic coordinate; NaN without one."""
     for name in cyclic_names(solve.state):
-        advance: Scalar = getattr(solved.state, name) - getattr(solve.state, name)
-        return advance
+        return getattr(solved.state, name) - getattr(solve.state, name)
     return jnp.full_like(solve.duration, jnp.nan)
 
 

@@ -19,7 +19,7 @@ from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.dynamics._state import without_whole_turns
-from jaxbiped.hybrid._scales import is_smooth, resolve_slip_speed
+from jaxbiped.hybrid._scales import resolve_slip_speed
 from jaxbiped.scene._parameter_access import scene_identity, with_parameters
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._scene_checks import check_scene
@@ -32,8 +32,8 @@ from jaxbiped.sweep._label_recorders import Labelled
 
 _FINER = 10.0
 """From one tolerance to the next."""
-_FINEST = {False: 1e-10, True: 1e-13}
-"""Finest tolerance that is tried, by whether rates are smooth."""
+_FINEST = {True: 1e-10, False: 1e-13}
+"""Finest tolerance that is tried, by whether the motion is stiff."""
 _LEAST = 2.0
 """How many times looser the looser tolerance is at least."""
 _STEPS = 2
@@ -65,7 +65,7 @@ def relabel_doubtful(follow: Follow, count: int, effort: Effort, scene: Abstract
     doubtful = disagreed > 0 if first.grazes is None else (disagreed > 0) | (first.grazes > 0)
     doubt = np.where(doubtful, int(Doubt.REMAINS), int(Doubt.NONE))
     open_ = np.flatnonzero(doubtful)
-    agree, finer, finest = agree[open_], effort, _FINEST[is_smooth(scene)]
+    agree, finer, finest = agree[open_], effort, _FINEST[scene.stiff]
     while len(open_) and finer.rtol > 1.001 * finest:
         finer = finer._replace(rtol=max(finer.rtol / _FINER, finest))
         finer = finer._replace(max_attempts=_STEPS * finer.max_attempts)

@@ -15,7 +15,7 @@ from jaxbiped.basins._labels import Doubt, Label
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import default_guess, state_of_guess
 from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
-from jaxbiped.hybrid._scales import is_smooth, resolve_slip_speed
+from jaxbiped.hybrid._scales import resolve_slip_speed
 from jaxbiped.hybrid._sections import AbstractSection, chosen_section
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._scene_checks import check_scene
@@ -36,15 +36,15 @@ _ALIKE = 0.05
 """Distance of two starts' last states, in the components' scales, that count as one guess."""
 _MOST_GUESSES = 8
 """Of one cycle length for one combination of parameters."""
-_GAP_SHARE = {False: 30.0, True: 3.0}
-"""Gap between states that repeat each other in units of the tolerance, by whether rates are smooth:
-then solves err by less, and slow transients past an unstable gait move by as little as a wider
-gap."""
+_GAP_SHARE = {True: 30.0, False: 3.0}
+"""Gap between states that repeat each other in units of the tolerance, by whether the motion is
+stiff: if not, solves err by less, and slow transients past an unstable gait move by as little as a
+wider gap."""
 _FIRST = 3e-3
 """First tolerance as a share of the accuracy wanted, at most that of "draft": of 100,000 labels of
 the seed's slice 37 were wrong and not in doubt at 1e-5 by Rodas4, and 11 at 1e-6."""
-FINEST_FIRST = {False: 1e-9, True: 1e-11}
-"""Finest tolerance at which every start is labelled, by whether rates are smooth."""
+FINEST_FIRST = {True: 1e-9, False: 1e-11}
+"""Finest tolerance at which every start is labelled, by whether the motion is stiff."""
 
 
 def labelling(
@@ -136,10 +136,9 @@ def effort_of(
         )
     wanted = _share_wanted(accuracy, rtol)
     named = ACCURACIES["draft" if wanted is not None else str(accuracy)]
-    smooth = is_smooth(scene)
-    own = named.rigid_walk if smooth else named.walk
+    own = named.walk if scene.stiff else named.rigid_walk
     if wanted is not None:
-        own = min(own, max(_FIRST * wanted, FINEST_FIRST[smooth]))
+        own = min(own, max(_FIRST * wanted, FINEST_FIRST[scene.stiff]))
     tolerance = resolve_slip_speed(own, scene) if rtol is None else rtol
     check_positive("rtol", tolerance, one=True)
     method = solver_named(solver)
@@ -151,7 +150,7 @@ def effort_of(
         rtol=float(tolerance),
         footsteps=int(footsteps),
         max_attempts=int(max_solver_steps),
-        gap_share=_GAP_SHARE[smooth],
+        gap_share=_GAP_SHARE[scene.stiff],
         solver=method,
         engine=engine_for(engine, obstacle=None, by_device=True, by_any=True),
         may_move=engine == "auto",

@@ -141,8 +141,7 @@ def _normal_by(arrivals: Callable[[np.ndarray], PyTree], attractor: Attractor) -
         return np.where(walked[:, None] > 0, gradients, np.nan)
 
     def normal(points: np.ndarray) -> np.ndarray:
-        found: np.ndarray = in_parts(some, points, _AT_ONCE) if len(points) else np.array(points)
-        return found
+        return in_parts(some, points, _AT_ONCE) if len(points) else np.array(points)
 
     return normal
 

@@ -22,7 +22,6 @@ from jaxbiped.basins._labels import (
     Witness,
     estimate_label_errors,
 )
-from jaxbiped.hybrid._scales import is_smooth
 from jaxbiped.sweep._gait_family import Guesses
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import (
@@ -243,7 +242,7 @@ def tightened(
     starts, so that no label depends on the chunks.
     """
     layout, wanted = results.layout, labelling.effort.wanted
-    least = FINEST_FIRST[is_smooth(labelling.scene)]
+    least = FINEST_FIRST[labelling.scene.stiff]
     assert wanted is not None
     tolerances = json.loads(results.noted(_TOLERANCES) or json.dumps([labelling.effort.rtol]))
     while True:

@@ -372,8 +372,7 @@ def pull_back(
     """
     given = _Given(flow.args.args, nodes.arrival, leading, after)
     program = _program(_Kind.of(flow), True)
-    adjoints: Adjoints = engine.run(Request(program, given, stream=steps, quick=True)).outputs
-    return adjoints
+    return engine.run(Request(program, given, stream=steps, quick=True)).outputs
 
 
 class _Kind(NamedTuple):

@@ -268,10 +268,7 @@ class AdaptiveColumns:
             columns, shifts = meet(meeting, now.columns, now.shifts, given.sizes)
             return cross(step, columns, given.sizes, landed.past), shifts
 
-        found: tuple[list[Scalar], tuple[Scalar, ...]] = jax.lax.cond(
-            which != 0, met, lambda: (stepped, now.shifts)
-        )
-        return found
+        return jax.lax.cond(which != 0, met, lambda: (stepped, now.shifts))
 
     def _seeded(self, given: VariationalProblem) -> Seeded:
         m, p = given.by_state.shape[0], given.by_parameter.shape[0]

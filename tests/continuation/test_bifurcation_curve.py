@@ -65,7 +65,7 @@ def test_doublings_of_two_parameters_are_zeros_whose_derivatives_are_exact():
     setup = SimpleNamespace(
         curve=SimpleNamespace(sizes=sizes),
         axis=RATES,
-        problem=SimpleNamespace(cycle=_cycle),
+        cycle_with=_cycle,
         arrivals=1,
     )
     curve = _extended_curve(setup, DRAINS, BranchEvent.PERIOD_DOUBLING)

@@ -151,7 +151,7 @@ def test_the_derivatives_of_a_curve_of_doublings_are_those_of_its_values():
 
     setup = SimpleNamespace(
         curve=SimpleNamespace(sizes=np.array([0.5, 2.0, 1.0])), axis=first, arrivals=1,
-        problem=SimpleNamespace(cycle=cycle),
+        cycle_with=cycle,
     )  # fmt: skip
     curve = _extended_curve(setup, second, BranchEvent.PERIOD_DOUBLING)
     place, step = np.array([0.6, 0.1, 0.4, 0.7]), 1e-5

@@ -104,9 +104,9 @@ def fold_of_a_map(code):
     jacobian = np.hstack([[[1.0, 0.0], [0.3, 0.6]], [forces, 10.0 * np.arange(len(NAMES))]])
     seen = SimpleNamespace(code=np.array([code, 0]), jacobian=np.stack([jacobian, jacobian]))
     axis = nearest.axis_of(SCENE, "slope", (0.0, 0.1), None)
-    problem = SimpleNamespace(cycle=lambda *_: seen)
     curve = SimpleNamespace(sizes=np.array([0.5, 2.0, 1.0]))
-    return SimpleNamespace(scene=SCENE, axis=axis, arrivals=1, problem=problem, curve=curve)
+    parts = dict(scene=SCENE, axis=axis, arrivals=1, curve=curve)
+    return SimpleNamespace(**parts, cycle_with=lambda *_: seen)
 
 
 def test_a_fold_moves_as_what_forces_its_map_allows():

@@ -15,8 +15,6 @@ from jaxbiped.gait._accurate_gait import judge_gait
 from jaxbiped.gait._fixed_point_search import (
     FixedPointProblem,
     Found,
-    is_sound,
-    takes_steps,
     walks_only,
 )
 from jaxbiped.gait._gait_measures import _by_correction
@@ -415,26 +413,28 @@ def test_only_what_was_found_is_stable(ending, radius, stable):
 
 def test_an_orbit_uphill_hasty_or_deep_underground_is_no_walk():
     scene, state = jb.seed_scene(), jb.seed_state()
-    judge = jax.jit(is_sound)
+    walking = jb.hybrid.Walking()
+    judge = jax.jit(walking.is_walk)
     sound = lambda *at: bool(judge(scene, *at))
-    assert sound(state, 0.18, 0.44)
-    assert not sound(state, -0.18, 0.44)
-    assert not sound(state, 0.18, 0.1 * np.sqrt(0.4 / 9.8))
+    assert sound(state, 0.18, 0.44, 1)
+    assert not sound(state, -0.18, 0.44, 1)
+    assert not sound(state, 0.18, 0.1 * np.sqrt(0.4 / 9.8), 1)
     # Footsteps of 1 % of the height, 0.4 m, in the mean.
-    assert (sound(state, 0.00404, 0.44), sound(state, 0.00396, 0.44)) == (True, False)
+    assert (sound(state, 0.00404, 0.44, 1), sound(state, 0.00396, 0.44, 1)) == (True, False)
     assert (sound(state, 0.00808, 0.44, 2), sound(state, 0.00792, 0.44, 2)) == (True, False)
-    for rigid, expected in ((0.00404, True), (0.00396, False)):
-        assert bool(is_sound(jb.ladder()["rigid"], state, rigid, 0.44)) is expected
+    for length, expected in ((0.00404, True), (0.00396, False)):
+        rolls = jb.hybrid.Rolling().is_walk(jb.ladder()["rigid"], state, length, 0.44, 1)
+        assert bool(rolls) is expected
     for share in (0.99, 1.01):  # an arrival of unlike legs is two footsteps
         unlike = SimpleNamespace(mechanism=scene.mechanism, arrival_footsteps=2)
-        assert bool(takes_steps(unlike, 0.008 * share, 1)) is (share > 1.0)
+        assert bool(walking.takes_steps(unlike, 0.008 * share, 1)) is (share > 1.0)
     for leg, other in ((1, 2), (2, 1)):
         # On a leg that turns back, so deep that it would carry a hundred times the weight.
         stands = {f"theta_{leg}": 0.0, f"omega_{leg}": -1.0, f"theta_{other}": 1.5}
         for depth, expected in ((1e-4, True), (1.6e-2, False)):
             low = state._replace(hip_z=0.4 - depth, **stands)
             low = jax.tree.map(jnp.asarray, low)
-            assert sound(low, 0.18, 0.44) is expected, (leg, depth)
+            assert sound(low, 0.18, 0.44, 1) is expected, (leg, depth)
     found = Found(*[np.asarray(0)] * 7, sound=np.asarray(False))
     assert int(walks_only(found).ending) == jb.gait.Search.NO_WALK
     assert int(walks_only(found._replace(sound=np.asarray(True))).ending) == jb.gait.Search.FOUND

@@ -64,7 +64,8 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
     monkeypatch.setattr(_walk_waves, "walks_from", walks)
     monkeypatch.setattr(_guess_free_search, "branch_along", follow)
     scout = SimpleNamespace(engine=engine)
-    problem = FixedPointProblem(SimpleNamespace(steps=1), SCENE, (), START, Precision(1e-9, 1e-8))
+    spec = SimpleNamespace(steps=1, system=jb.hybrid.Rolling())
+    problem = FixedPointProblem(spec, SCENE, (), START, Precision(1e-9, 1e-8))
     now = Stage("searching for a gait", None, "searches", 0)
     return search_in_stages(search, problem, scout, first, now), took
 

@@ -438,3 +438,4 @@ def test_resets_that_gather_end_a_motion():
     lost = jb.find_gait(still, START, section=At("phase"), parameters=())
     assert str(lost.outcome) == "no return"
     assert str(lost.walk_outcome) == "chatters"
+    assert "ends (chatters); give a state near a gait" in jb.gait.explain_search(still, lost)

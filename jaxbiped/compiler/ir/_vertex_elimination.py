@@ -229,8 +229,7 @@ JACOBIAN = Primitive("jacobian")
 def jacobian(function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]) -> Scalar:
     """Derivatives of every output with respect to every input, shape (outputs, inputs)."""
     program, consts = _tangents_of(function, list(inputs))
-    found: Scalar = JACOBIAN.bind(*consts, *inputs, program=program)
-    return found
+    return JACOBIAN.bind(*consts, *inputs, program=program)
 
 
 def partial_derivatives(

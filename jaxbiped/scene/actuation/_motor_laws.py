@@ -73,8 +73,7 @@ class Constant(AbstractMotorLaw):
     torque: Parameter = parameter("motor torque", r"$\tau$", "N m")
 
     def __call__(self, motion: JointMotion) -> Scalar:
-        torque: Scalar = self.torque
-        return torque
+        return self.torque
 
 
 class PD(AbstractReadingLaw):

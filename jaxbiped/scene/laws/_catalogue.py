@@ -8,8 +8,6 @@ from jaxbiped.scene import laws
 from jaxbiped.scene.laws._abstract_laws import (
     FRICTION_LAWS,
     NORMAL_LAWS,
-    AbstractBristleLaw,
-    AbstractFrictionLaw,
     AbstractNormalLaw,
 )
 from jaxbiped.scene.laws.friction._stribeck import BengisuAkay
@@ -60,8 +58,7 @@ def normal_law_like(
     standing = Standing(seed, as_float(mass), as_float(g))
     check_positive("mass", standing.mass, "kg")
     check_positive("g", standing.g, "m/s^2")
-    made: AbstractNormalLaw = law.like_seed(seed, standing)
-    return made
+    return law.like_seed(seed, standing)
 
 
 def friction_law_like(
@@ -102,6 +99,4 @@ def friction_law_like(
     """
     check_choice("name", name, FRICTION_LAWS)
     law = cast("Any", FRICTION_LAWS[name])
-    made: AbstractFrictionLaw | AbstractBristleLaw
-    made = law.like_seed(BengisuAkay(mu_static, mu_kinetic, v0, xi))
-    return made
+    return law.like_seed(BengisuAkay(mu_static, mu_kinetic, v0, xi))

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from jaxbiped.dynamics import FootMotion
-from jaxbiped.gait._gait_summary import (
-    _distances,
+from jaxbiped.hybrid._footsteps import (
     _first_strikes,
     _in_names_of_start,
     _place_of_strike,
+    distances,
 )
 
 PLACES = jnp.arange(14.0).reshape(2, 7)
@@ -49,7 +49,7 @@ def test_a_single_leg_lands_again_and_again():
 
 
 def test_the_first_length_is_from_the_last_strike_of_the_cycle_before():
-    found = _distances(jnp.asarray([0.1, 0.4, 0.8]), jnp.asarray([0.9]))
+    found = distances(jnp.asarray([0.1, 0.4, 0.8]), jnp.asarray([0.9]))
     np.testing.assert_allclose(found, [0.2, 0.3, 0.4], rtol=1e-12)
 
 
