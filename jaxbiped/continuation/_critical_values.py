@@ -27,13 +27,15 @@ from jaxbiped.continuation._trace import Trace
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_starts import state_of_guess
+from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
+from jaxbiped.hybrid._sections import AbstractSection, section_of
 from jaxbiped.scene._parameter_access import (
     parameter_names,
     parameter_values,
     select_parameters,
     with_parameters,
 )
-from jaxbiped.scene._scene import WALKER_SCENES, WalkerScene
+from jaxbiped.scene._scene import AbstractMinimalScene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
@@ -70,7 +72,9 @@ class NearestBifurcation(NamedTuple):
     error: float
 
 
-def range_of(scene: WalkerScene, along: str, factor: float = FACTOR) -> tuple[float, float]:
+def range_of(
+    scene: AbstractMinimalScene, along: str, factor: float = FACTOR
+) -> tuple[float, float]:
     """The range in which a gait is followed from a parameter's own value.
 
     It ends where the walker allows no more, as a foot's radius at the leg's length.
@@ -86,7 +90,7 @@ def range_of(scene: WalkerScene, along: str, factor: float = FACTOR) -> tuple[fl
     return low, high
 
 
-def allows(scene: WalkerScene, values: Mapping[str, float]) -> bool:
+def allows(scene: AbstractMinimalScene, values: Mapping[str, float]) -> bool:
     """Whether a walker may have these parameters."""
     try:
         with_parameters(scene, values)
@@ -95,7 +99,7 @@ def allows(scene: WalkerScene, values: Mapping[str, float]) -> bool:
     return True
 
 
-def farthest_allowed(scene: WalkerScene, name: str, end: float) -> float:
+def farthest_allowed(scene: AbstractMinimalScene, name: str, end: float) -> float:
     """The value of a parameter nearest to an end that the walker allows, seen from its own."""
     if allows(scene, {name: end}):
         return end
@@ -108,7 +112,12 @@ def farthest_allowed(scene: WalkerScene, name: str, end: float) -> float:
 
 
 def nearest_bifurcation(
-    scene: WalkerScene, gait: Gait, along: str = "slope", *, factor: float = FACTOR
+    scene: AbstractMinimalScene,
+    gait: Gait,
+    along: str = "slope",
+    *,
+    section: AbstractSection | None = None,
+    factor: float = FACTOR,
 ) -> NearestBifurcation:
     """Follows a gait along a parameter to both sides, up to the first bifurcation or limit.
 
@@ -116,6 +125,7 @@ def nearest_bifurcation(
         scene: the scene of the gait.
         gait: gait at which to begin.
         along: the parameter's name (see `parameter_names`).
+        section: section on which its cycles begin. Default: as of `find_gait`.
         factor: range to follow: from the parameter's value divided by this factor to its value
             times it, as far as the walker allows; on level ground, 0.1 rad of slope to both sides.
 
@@ -127,14 +137,17 @@ def nearest_bifurcation(
         ArgumentError: an argument is not allowed, or a parameter other than the slope is zero,
             which no factor changes; raised before anything is compiled.
     """
-    scene = check_scene(scene, *WALKER_SCENES)
+    scene = check_scene(scene, *MINIMAL_SCENES)
+    section = section_of(scene, section)
     check_choice("along", along, parameter_names(scene))
     own = float(parameter_values(scene)[along])
     if not factor > 1.0:
         raise ArgumentError(f"factor = {factor!r} is not allowed: it must be above 1.")
     bounds = range_of(scene, along, factor)
-    axis, steps = axis_of(scene, along, bounds, None), gait.step_lengths.shape[0]
-    setup = continuation_setup(scene, axis, footsteps=steps, accuracy="balanced", engine="auto")
+    axis, steps = axis_of(scene, along, bounds, None), gait.step_lengths.shape[0] or None
+    setup = continuation_setup(
+        scene, axis, footsteps=steps, accuracy="balanced", engine="auto", section=section
+    )
     begin = first_gait(setup, own, state_of_guess(scene, gait), "auto")
     parts: tuple[Trace, ...] = ()
     if not isinstance(begin, str):
@@ -281,6 +294,7 @@ def _of_modulus(
         branch.scene_at(point),
         branch.state(point),
         footsteps=branch.footsteps,
+        section=branch.section,
         accuracy=accuracy,
         parameters=names,
         engine=branch.engine,

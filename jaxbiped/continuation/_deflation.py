@@ -24,7 +24,8 @@ from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._search_starts import rolling_starts
 from jaxbiped.scene._parameter_access import parameter_values
-from jaxbiped.scene._scene import WalkerScene
+from jaxbiped.scene._scene import WALKER_SCENES, WalkerScene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
@@ -91,6 +92,7 @@ def find_isolated(
         ArgumentError: an argument is not allowed; raised before anything is compiled.
     """
     check_followed(scene)
+    check_scene(scene, *WALKER_SCENES)
     check_count("starts", starts)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     checked = [state_for(scene, each, "guess") for each in known]

@@ -149,6 +149,40 @@ def test_its_branch_has_the_fold_and_the_doubling_in_closed_form(bounce):
     np.testing.assert_array_equal(again.values, branch.values)
 
 
+def _amplitudes(e, w, g):
+    """The amplitudes of the fold and of the doubling of one impact in a period."""
+    least = (1.0 - e) / (1.0 + e) * jnp.pi * g / w**2
+    return least, jnp.hypot(least, 2.0 * g * (1.0 + e**2) / (1.0 + e) ** 2 / w**2)
+
+
+def test_what_becomes_of_its_bifurcations_is_as_in_closed_form(bounce):
+    own = {name: float(getattr(BALL, name)) for name in ("restitution", "frequency", "gravity")}
+    fold, doubling = _amplitudes(*own.values())
+    nearest = jb.continuation.nearest_bifurcation(BALL, bounce, "amplitude")
+    assert str(nearest.kind) == "fold"
+    np.testing.assert_allclose(nearest.value, fold, rtol=1e-8)
+    branch = jb.continue_gait(BALL, "amplitude", bounds=(0.02, 0.06), guess=bounce)
+    at = dict(zip(("fold", "period-doubling"), branch.bifurcations, strict=True))
+    for k, (kind, point) in enumerate(at.items()):
+        assert str(point.kind) == kind
+        told = jb.continuation.bifurcation_sensitivities(branch, point, tuple(own))
+        slopes = jax.jacfwd(lambda x, k=k: _amplitudes(*x)[k])(jnp.array([*own.values()]))
+        np.testing.assert_allclose(told.slopes, slopes, rtol=1e-5)
+    curve = jb.continuation.bifurcation_curve(
+        branch, at["fold"], "restitution", bounds=(0.45, 0.55), max_points=8
+    )
+    e = curve.values[:, 1]
+    least, _ = _amplitudes(e, own["frequency"], own["gravity"])
+    np.testing.assert_allclose(curve.values[:, 0], least, rtol=1e-8)
+    assert np.ptp(e) > 0.04
+    cascade = jb.continuation.doubling_cascade(branch)
+    np.testing.assert_allclose(cascade.values[0], doubling, rtol=1e-8)
+    assert len(cascade.values) >= 4
+    assert 4.5 < cascade.ratios[-1] < 4.8  # Feigenbaum's number is 4.669
+    with pytest.raises(jb.ArgumentError, match="it must be a Scene or a RigidScene"):
+        jb.continuation.find_isolated(BALL)
+
+
 def test_a_sweep_a_fit_and_an_optimum_of_it(bounce, tmp_path):
     swept = jb.gait_sweep(
         BALL, {"restitution": [0.5, 0.52]}, guess=bounce, parameters=(), radius_sensitivities=False
