@@ -100,13 +100,15 @@ def check_precision(scene: CompliantScene, dtype: np.dtype) -> None:
         )
 
 
-def patience_of(scene: AbstractScene) -> Scalar | float:
-    """Time that the next arrival may take [s]."""
+def patience_of(scene: AbstractScene, footsteps: int = 1) -> Scalar | float:
+    """Time that the next arrival, or so many footsteps, may take [s]."""
     if not isinstance(scene, AbstractWalkerScene):
-        return _PATIENCE_OF_SYSTEMS * scene.time_unit
+        return footsteps * (_PATIENCE_OF_SYSTEMS * scene.time_unit)
     check_pulls(scene.ground)
     found: Scalar = by_numpy(
-        lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.mechanism.height, scene.ground.g
+        lambda numpy, l, g: footsteps * (_PATIENCE * numpy.sqrt(l / g)),
+        scene.mechanism.height,
+        scene.ground.g,
     )
     return found
 

@@ -21,7 +21,7 @@ from jaxbiped._checks import (
     warn,
 )
 from jaxbiped._jax_versions import untraced
-from jaxbiped._types import Scalar, by_numpy, is_traced
+from jaxbiped._types import Scalar, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._constraint_methods import check_independent
 from jaxbiped.dynamics._constrained_motion import Consistent, consistent_state, coordinates_of
@@ -192,8 +192,7 @@ def longest_time(scene: Any, asked: Options) -> Scalar | float:
         return asked.duration
     if not is_smooth(scene):
         return PATIENCE * (asked.footsteps or 0)
-    time: Scalar = by_numpy(lambda _, wait: asked.footsteps * wait, patience_of(scene))
-    return time
+    return patience_of(scene, asked.footsteps or 0)
 
 
 def watched_by(scene: Any, watch: Any) -> tuple[str, ...]:
