@@ -73,9 +73,10 @@ def tolerances(
         ArgumentError: an unknown name, or a tolerance that is not above zero.
     """
     check_choice("accuracy", accuracy, ACCURACIES)
-    named = ACCURACIES[accuracy]
-    usual = named.rigid_walk if is_smooth(scene) else resolve_slip_speed(named.walk, scene)
-    relative = usual if rtol is None else rtol
+    relative, named = rtol, ACCURACIES[accuracy]
+    if relative is None:
+        smooth = is_smooth(scene)
+        relative = named.rigid_walk if smooth else resolve_slip_speed(named.walk, scene)
     check_positive("rtol", relative)
     absolute = 1e-2 * relative if atol is None else atol
     check_positive("atol", absolute)
