@@ -36,6 +36,7 @@ from jaxbiped.solve._recorders import (
 from jaxbiped.solve._solved import Solved
 from jaxbiped.solve._step_records import landing_record
 
+ROLLING = Rolling()
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""
 _ROWS = 64
@@ -148,7 +149,7 @@ class RigidSimulation(AbstractSimulation):
         (t, told), dense = single_time(solved.t, solved.state), None
         arrivals, changes = arrivals_among(self._no_rows, solved.footsteps, state), (rows, total)
         if self.save_steps:
-            record = landing_record(Rolling(), scene, state, rows, total)
+            record = landing_record(ROLLING, scene, state, rows, total)
             t, told, dense, changes = record.t, record.state, record.dense, record.resets
             arrivals = arrivals_among(record.strikes, solved.footsteps, state)
         elif self.times is not None:
@@ -235,7 +236,7 @@ class RigidSimulation(AbstractSimulation):
         """What is solved, the rows that are recorded, and how many there were."""
         endings = EndingWatch.LOCATED if "fall" in self.watch else EndingWatch.IGNORED
         steps = LandingSolve(
-            system=Rolling(),
+            system=ROLLING,
             recorder=recorder,
             extremes=self.extremes,
             waits=self.waits,

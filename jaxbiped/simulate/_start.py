@@ -17,7 +17,7 @@ from jaxbiped._checks import (
     check_unbatched,
     holds_somewhere,
 )
-from jaxbiped._types import Scalar, by_numpy
+from jaxbiped._types import Scalar
 from jaxbiped.hybrid._endings import WATCHES
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
@@ -91,9 +91,8 @@ def longest_time(scene: Any, asked: Options) -> Scalar | float:
         return asked.duration
     if scene.stiff:
         return PATIENCE * (asked.footsteps or 0)
-    wait = system_of(scene).longest_wait(scene)
-    time: Scalar = by_numpy(lambda _, wait: asked.footsteps * wait, wait)
-    return time
+    wait: Scalar = (asked.footsteps or 0) * system_of(scene).longest_wait(scene)
+    return wait
 
 
 def watched_by(scene: Any, watch: Any) -> tuple[str, ...]:

@@ -73,9 +73,10 @@ def tolerances(
         ArgumentError: an unknown name, or a tolerance that is not above zero.
     """
     check_choice("accuracy", accuracy, ACCURACIES)
-    named = ACCURACIES[accuracy]
-    usual = resolve_slip_speed(named.walk, scene) if is_stiff(scene) else named.rigid_walk
-    relative = usual if rtol is None else rtol
+    relative, named = rtol, ACCURACIES[accuracy]
+    if relative is None:
+        stiff = is_stiff(scene)
+        relative = resolve_slip_speed(named.walk, scene) if stiff else named.rigid_walk
     check_positive("rtol", relative)
     absolute = 1e-2 * relative if atol is None else atol
     check_positive("atol", absolute)

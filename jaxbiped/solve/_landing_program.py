@@ -192,5 +192,5 @@ class LandingSolve(AbstractSolve):
 
     def _end_is_known(self, tried: Attempted) -> Scalar:
         """Whether a step's end is known: one beyond an event is followed back to it."""
-        ended = any_of([tried.after.code == int(each) for each in self.system.endings])
+        ended = any_of([tried.after.code == int(code) for code in self.system.endings])
         return tried.accepted & ((tried.after.landing == 0) | ended)

@@ -300,16 +300,16 @@ def _along(
     """
     positions, velocities = system.coordinates(args, state)
 
-    def value(positions: Any) -> Scalar:
+    def at(positions: Any) -> Scalar:
         return surface(system.with_coordinates(args, state, (*positions, *velocities)))
 
     def course(positions: Any, velocities: Any) -> tuple[Scalar, Scalar]:
-        return jax.jvp(value, (positions,), (velocities,))
+        return jax.jvp(at, (positions,), (velocities,))
 
     accelerations = rates[-len(positions) :]
     along = jax.jvp(course, (positions, velocities), (velocities, accelerations))
-    (value_, rate), (_, curvature) = along
-    return value_, rate, jnp.asarray(curvature)
+    (value, rate), (_, curvature) = along
+    return value, rate, jnp.asarray(curvature)
 
 
 def _turns(course: Quintic, width: Scalar, from_second: Scalar) -> tuple[Scalar, Scalar]:

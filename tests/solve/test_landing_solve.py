@@ -1,98 +1,29 @@
 """Landing solve of a system that is no walker, against the parabolas of a ball that bounces."""
 
-from typing import ClassVar, NamedTuple
-
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxbiped import Ending
-from jaxbiped.compiler import BY_NAME, Request
-from jaxbiped.hybrid._landing_system import AbstractLandingSystem
-from jaxbiped.solve._landing_program import LandingSolve
-from jaxbiped.solve._recorders import StrikeRecorder, TimeRecorder, program_of
-
-
-class Height(NamedTuple):
-    z: jax.Array
-    v: jax.Array
-
-
-class Drop(NamedTuple):
-    """Gravity, the coefficient of restitution, and the height of a ceiling."""
-
-    g: jax.Array
-    restitution: jax.Array
-    ceiling: jax.Array
-
-
-class Ball(AbstractLandingSystem):
-    """It bounces, which counts as a footstep, until it hits the ceiling."""
-
-    endings: ClassVar[tuple[Ending, ...]] = (Ending.FINISHED,)
-
-    def vector_field(self, t, y, args):
-        return Height(y.v, -args.g)
-
-    def switches(self, args, y):
-        return ()
-
-    def reset_map(self, args, y):
-        return Height(y.z, -args.restitution * y.v)
-
-    def load(self, args, y):
-        return None
-
-    def positions(self, args):
-        return slice(0, 1)
-
-    def accelerations(self, args, y):
-        return (0.0 * y.z - args.g,)
-
-    def time_scale(self, args):
-        return jnp.sqrt(1.0 / args.g)
-
-    def arrival_surface(self, args, y):
-        return y.z
-
-    def arrival_counts(self, args, y):
-        return 1.0 + 0.0 * y.z
-
-    def surface_of_ending(self, args, near):
-        return lambda y: args.ceiling - y.z
-
-    def ending_on_surface(self, args, y):
-        return jnp.asarray(int(Ending.FINISHED))
-
-
-def solved(recorder, engine, *, restitution=0.5, v=0.0, duration=10.0, **asked):
-    """From a height of 1 under a ceiling of 3, with a gravity of 2."""
-    args = Drop(*map(jnp.asarray, (2.0, restitution, 3.0)))
-    start = Height(jnp.asarray(1.0), jnp.asarray(v))
-    how = LandingSolve(system=Ball(), recorder=recorder)
-    limits = dict(duration=duration, footsteps=3.0, rtol=1e-9, max_attempts=1000.0)
-    inputs = how.inputs(args, start, **{name: jnp.asarray(x) for name, x in limits.items()})
-    return BY_NAME[engine].run(Request(program_of(how), inputs, **asked))
+from tests.solve.bouncing_ball import solved
 
 
 @pytest.mark.parametrize("engine", ["lanes", "xla"])
 def test_a_ball_bounces_half_as_fast_each_time(engine):
     """From rest it takes a second to the ground; then as long again, then half as long."""
-    end, rows, _ = solved(StrikeRecorder(), engine, room=3)
+    end, rows, _ = solved("bounces", engine, room=3)
     assert int(end.footsteps) == 3
     np.testing.assert_allclose(rows.values[:, 0], [1.0, 2.0, 2.5], atol=1e-8)
     np.testing.assert_allclose(rows.values[:, 1:], [[0.0, 1.0], [0.0, 0.5], [0.0, 0.25]], atol=1e-8)
 
 
 def test_its_states_at_times_lie_on_the_parabolas():
-    _, rows, _ = solved(TimeRecorder(), "lanes", times=np.array([0.5, 1.0 + 0.5, 2.25]))
+    _, rows, _ = solved("times", "lanes", times=np.array([0.5, 1.0 + 0.5, 2.25]))
     np.testing.assert_allclose(rows.values[:, 1], [0.75, 0.25, 0.0625], atol=1e-8)
 
 
 def test_one_that_is_thrown_up_comes_to_the_ceiling():
     """At z = 1 + 3 t − t² it is there after one second."""
-    end, *_ = solved(None, "lanes", v=3.0)
+    end, *_ = solved("end", "lanes", v=3.0)
     assert Ending.of(end.ending) is Ending.FINISHED
     assert float(end.t) == pytest.approx(1.0, abs=1e-8)
     assert float(end.state.v) == pytest.approx(1.0, abs=1e-8)
