@@ -118,8 +118,8 @@ def units_of(args: PyTree, state: PyTree) -> Units:
         TypeError: a leaf whose unit is not known.
     """
     if not is_walker(args) and isinstance(args, AbstractScene):
-        inverse = jtu.tree_map(lambda size: np.asarray(1.0 / size), _own_sizes(state))
-        return Units(inverse, np.asarray(args.time_unit))
+        inverses = jtu.tree_map(lambda size: np.asarray(1.0 / size), _own_sizes(state))
+        return Units(inverses, np.asarray(args.time_unit))
     if not is_compliant(args):
         return Units(jtu.tree_map(jnp.ones_like, state), np.ones(()))
     length, time = _length_and_time(args)

@@ -91,8 +91,7 @@ def longest_time(scene: Any, asked: Options) -> Scalar | float:
         return asked.duration
     if scene.stiff:
         return PATIENCE * (asked.footsteps or 0)
-    wait: Scalar = (asked.footsteps or 0) * system_of(scene).longest_wait(scene)
-    return wait
+    return (asked.footsteps or 0) * system_of(scene).longest_wait(scene)
 
 
 def watched_by(scene: Any, watch: Any) -> tuple[str, ...]:

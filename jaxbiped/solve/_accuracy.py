@@ -73,10 +73,13 @@ def tolerances(
         ArgumentError: an unknown name, or a tolerance that is not above zero.
     """
     check_choice("accuracy", accuracy, ACCURACIES)
-    relative, named = rtol, ACCURACIES[accuracy]
-    if relative is None:
-        stiff = is_stiff(scene)
-        relative = resolve_slip_speed(named.walk, scene) if stiff else named.rigid_walk
+    relative: RealScalarLike
+    if rtol is not None:
+        relative = rtol
+    elif is_stiff(scene):
+        relative = resolve_slip_speed(ACCURACIES[accuracy].walk, scene)
+    else:
+        relative = ACCURACIES[accuracy].rigid_walk
     check_positive("rtol", relative)
     absolute = 1e-2 * relative if atol is None else atol
     check_positive("atol", absolute)

@@ -142,10 +142,10 @@ def recorded_steps(
     times = np.append(ends[0], np.inf)
     infos = np.vstack([begins.T, rows[:, 1:].T])
     infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
-    groups = [kind.unflatten(infos[k : k + size]) for k in range(0, len(infos), size)]
+    groups = [jtu.tree_unflatten(kind, infos[k : k + size]) for k in range(0, len(infos), size)]
     # One transfer for all of them: each costs as much as several steps.
     counts = len(rows) + 1, 1  # of a weak type, as a number in diffrax's own would be
-    parts = times, groups, ends[0], kind.unflatten(ends[1:]), np.float64(0.0), counts
+    parts = times, groups, ends[0], jtu.tree_unflatten(kind, ends[1:]), np.float64(0.0), counts
     times, groups, t, states, zero, (count, one) = jax.device_put(parts)
     dense = diffrax.DenseInterpolation(
         ts=times,
