@@ -42,7 +42,7 @@ def main(options: Options):
         name: [row[name] for row in found if row["multipliers"] is not None]
         for name in ("multipliers", "elasticities")
     }
-    groups = _merged(by_group(rows, VERDICTS))
+    groups, by_value = _merged(by_group(rows, VERDICTS)), _by_value(rows)
     return {
         "catalogue": len(cases),
         **_counted(rows, groups),
@@ -60,7 +60,8 @@ def main(options: Options):
             "largest_error": {name: max(each) for name, each in errors.items()},
         },
         "grazing": [_grazed(each) for each in grazing(**options.sized({}, dict(each=4, laws=1)))],
-        "picture": _draw(options, rows),
+        "by_value": by_value,
+        "picture": _draw(options, by_value),
     }
 
 
@@ -99,25 +100,32 @@ def _grazed(swept):
     }
 
 
-def _draw(options, rows):
-    """Verdicts of the cases of one parameter by its value."""
-    figure = new_figure(11.0, 8.5)
-    *axes, _, last = figure.subplots(4, 4).ravel()
-    for ax, name in zip(axes, RANGES, strict=True):
+def _by_value(rows):
+    """Of each parameter: its values, each with the number of cases of each verdict."""
+    told = {}
+    for name in RANGES:
         own = [
             {"at": row["case"]["at"][name], "verdict": row["verdict"]}
             for row in rows
             if name in row["case"]["at"] and row["case"]["group"] != "laws"
         ]
-        values = by("at", own)
-        order, bottom = sorted(values), np.zeros(len(values))
-        for verdict, colour in zip(VERDICTS, COLOURS, strict=True):
-            tall = [sum(row["verdict"] == verdict for row in values[value]) for value in order]
-            words = verdict.replace("_", " ")
-            ax.bar(range(len(order)), tall, 0.9, bottom, color=colour, label=words)
+        found = sorted(by("at", own).items())
+        told[name] = [[at, *(counts(each, VERDICTS)[v] for v in VERDICTS)] for at, each in found]
+    return told
+
+
+def _draw(options, by_value):
+    """Verdicts of the cases of one parameter by its value."""
+    figure = new_figure(11.0, 8.5)
+    *axes, _, last = figure.subplots(4, 4).ravel()
+    for ax, (name, told) in zip(axes, by_value.items(), strict=True):
+        values, *counted = zip(*told, strict=True)
+        places, bottom = range(len(values)), np.zeros(len(values))
+        for verdict, tall, colour in zip(VERDICTS, counted, COLOURS, strict=True):
+            ax.bar(places, tall, 0.9, bottom, color=colour, label=verdict.replace("_", " "))
             bottom = bottom + tall
-        shown = range(0, len(order), max(1, (len(order) + 2) // 3))
-        ax.set_xticks(list(shown), [_as_text(order[k]) for k in shown])
+        shown = places[:: max(1, (len(values) + 2) // 3)]
+        ax.set_xticks(shown, [_as_text(values[k]) for k in shown])
         ax.set(xlabel=WORDS[name], ylabel="cases")
         ax.grid(axis="x", visible=False)
         ax.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10], integer=True))

@@ -30,6 +30,8 @@ DURATION = 2.0
 """Of a walk [s]: five footsteps."""
 SPREAD = 0.05
 """Starts lie about the seed's, by so much of its rates and angles."""
+POINTS = 60
+"""Of a line of the picture, at most, ever closer to the walks that differ most."""
 LONGEST = 3600.0
 """No setting takes longer than this [s]."""
 
@@ -56,8 +58,7 @@ def main(options: Options):
     settings = settings_of(count, quick=options.quick)
     found = [run(options, each, count) for each in tqdm(settings, desc="settings")]
     rows = [compared(each, own, found[0]) for each, own in zip(settings, found, strict=True)]
-    picture = draw(options, rows, [apart(own, found[0]) for own in found])
-    return {"walks": count, "rows": rows, "picture": picture}
+    return {"walks": count, "rows": rows, "picture": draw(options, rows)}
 
 
 def settings_of(count, *, quick):
@@ -145,7 +146,8 @@ def apart(own, other):
 def compared(setting, own, other):
     """How a setting's numbers differ from the first one's; walks that end alike are compared."""
     alike = own["endings"] == other["endings"]
-    differences = apart(own, other)[alike]
+    every = apart(own, other)
+    differences = every[alike]
     row = {
         "name": setting.name,
         "same_bits": int(np.sum(np.all(own["ends"] == other["ends"], axis=1))),
@@ -154,6 +156,7 @@ def compared(setting, own, other):
         "median": float(np.median(differences)),
         "labels": None,
         "gait": None,
+        "exceeded": exceeded(every) if np.any(every > 0.0) else None,
     }
     if setting.sweeps:
         period = float(abs(own["period"] / other["period"] - 1.0))
@@ -163,13 +166,19 @@ def compared(setting, own, other):
     return row
 
 
-def draw(options, rows, differences):
+def exceeded(differences):
+    """Points of a line: a difference, and the share of walks that differ by so much or more."""
+    falling, count = np.sort(differences)[::-1].tolist(), len(differences)
+    ranks = np.unique(np.geomspace(1, count, POINTS).astype(int)).tolist()
+    return [[falling[rank - 1], rank / count] for rank in ranks]
+
+
+def draw(options, rows):
     """How many walks differ by more than what, of the settings that differ at all."""
     ax = new_figure(6.4, 4.2).subplots()
-    pairs = zip(rows, differences, strict=True)
-    differing = [(row["name"], np.sort(own)[::-1]) for row, own in pairs if np.any(own > 0.0)]
-    for k, (name, own) in enumerate(differing):
-        ax.plot(own, np.arange(1, len(own) + 1) / len(own), label=name, **line_of(k))
+    differing = [row for row in rows if row["exceeded"]]
+    for k, row in enumerate(differing):
+        ax.plot(*zip(*row["exceeded"], strict=True), label=row["name"], **line_of(k))
     same = len(rows) - len(differing) - 1
     words = "difference of the final state (relative)", "share of walks that differ by more (–)"
     label(ax, *words, f"{same} other settings: the same to the last bit", log="xy")

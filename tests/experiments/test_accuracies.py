@@ -1,5 +1,6 @@
 """Errors and what is said of them, at the quick size, against far finer and precise solves."""
 
+import numpy as np
 import pytest
 
 from tests.experiments.quick import drawn_run
@@ -43,6 +44,10 @@ def test_no_extreme_is_silently_wrong(tmp_path):
     assert numbers["silently_wrong"] == numbers["gaits"]["silently_wrong"] == 0
     assert numbers["accurate"] > 0.7 * numbers["run"]
     assert numbers["gaits"]["compared"] >= 2
+    counted = {name: np.sum(told, axis=0)[1:] for name, told in numbers["by_value"].items()}
+    for name, found in counted.items():
+        group = numbers["groups"][name]
+        assert found.tolist() == [group[verdict] for verdict in group if verdict != "run"]
     for graze, least in zip(numbers["grazing"], (4, 8), strict=True):
         assert graze["derivatives"] == 8
         assert graze["accurate"] >= least

@@ -1,5 +1,6 @@
 """Sweeps of labels, at their quick size, against labels by SciPy, in memory and of one worker."""
 
+import numpy as np
 import pytest
 
 from tests.drawn import points_of
@@ -49,3 +50,9 @@ def test_lanes_give_the_same_bits_and_xla_what_an_ulp_does(tmp_path):
     assert moved["same_bits"] == 0
     assert 0.0 < xla["median"] < 3.0 * moved["median"]
     assert xla["endings"] == 0
+    # A line of the picture, from the walk that differs most to the one that differs least.
+    walks, points = numbers["walks"], np.array(xla["exceeded"])
+    assert points[0].tolist() == [xla["largest"], 1.0 / walks]
+    assert points[-1, 1] == 1.0
+    assert np.all(np.diff(points[:, 0]) <= 0.0)
+    assert np.all(np.diff(points[:, 1]) > 0.0)
