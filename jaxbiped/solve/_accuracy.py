@@ -73,8 +73,11 @@ def tolerances(
         ArgumentError: an unknown name, or a tolerance that is not above zero.
     """
     check_choice("accuracy", accuracy, ACCURACIES)
-    relative, named = rtol, ACCURACIES[accuracy]
-    if relative is None:
+    named = ACCURACIES[accuracy]
+    relative: RealScalarLike
+    if rtol is not None:
+        relative = rtol
+    else:
         smooth = is_smooth(scene)
         relative = named.rigid_walk if smooth else resolve_slip_speed(named.walk, scene)
     check_positive("rtol", relative)
