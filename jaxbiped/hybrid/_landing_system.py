@@ -151,3 +151,10 @@ class AbstractLandingSystem(AbstractSystem):
             jnp.stack(bends) if bends else jnp.zeros(0, value[0].dtype),
             accelerations,
         )
+
+
+class LandingMotion(NamedTuple):
+    """What moves: a landing system, and its parameters."""
+
+    system: AbstractLandingSystem
+    args: PyTree

@@ -13,6 +13,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import as_float, by_numpy, is_traced
 from jaxbiped.compiler import BY_NAME, Request
+from jaxbiped.hybrid._landing_system import LandingMotion
 from jaxbiped.hybrid._mode_history import history_of
 from jaxbiped.hybrid._rolling_system import Rolling
 from jaxbiped.hybrid._sections import HeelStrike
@@ -115,7 +116,7 @@ class RigidSimulation(AbstractSimulation):
             for count in (self.footsteps or 0, self.max_solver_steps)
         )
         limits = (self.duration, footsteps, self.rtol, most)
-        return Landing(self.scene, self.state, *limits, dt=self.dt)
+        return Landing(ROLLING, self.scene, self.state, *limits, dt=self.dt)
 
     @property
     def room(self) -> int:
@@ -149,7 +150,7 @@ class RigidSimulation(AbstractSimulation):
         (t, told), dense = single_time(solved.t, solved.state), None
         arrivals, changes = arrivals_among(self._no_rows, solved.footsteps, state), (rows, total)
         if self.save_steps:
-            record = landing_record(ROLLING, scene, state, rows, total)
+            record = landing_record(LandingMotion(ROLLING, scene), state, rows, total)
             t, told, dense, changes = record.t, record.state, record.dense, record.resets
             arrivals = arrivals_among(record.strikes, solved.footsteps, state)
         elif self.times is not None:

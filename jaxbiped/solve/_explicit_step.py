@@ -8,10 +8,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.hybrid._landing_system import AbstractLandingSystem
+from jaxbiped.hybrid._landing_system import LandingMotion
 from jaxbiped.solve._explicit_methods import ExplicitMethod
 from jaxbiped.solve._step_polynomials import Quintic
 
@@ -21,8 +20,7 @@ Rates = tuple[Scalar, ...]
 
 
 def explicit_step(
-    system: AbstractLandingSystem,
-    args: PyTree,
+    motion: LandingMotion,
     state: Any,
     accelerations: tuple[Scalar, ...],
     step: Scalar,
@@ -37,13 +35,14 @@ def explicit_step(
     `accelerations` are those at the start. Of the error, the root mean square over positions and
     rates; infinite where it is no number.
     """
-    tableau, (_, rates) = method.tableau, system.coordinates(args, state)
+    (system, args), tableau = motion, method.tableau
+    _, rates = system.coordinates(args, state)
     stages = jnp.stack([*rates, *accelerations])
     stages = jnp.pad(stages[None], ((0, len(tableau.stages)), (0, 0)))
 
     def stage(stages: Scalar, weights: Any) -> tuple[Scalar, None]:
         row, here = weights
-        at = advance(system, args, state, step, list(row), [tuple(rates) for rates in stages])
+        at = advance(motion, state, step, list(row), [tuple(rates) for rates in stages])
         _, moves = system.coordinates(args, at)
         rates = jnp.stack([*moves, *system.accelerations(args, at)])
         return jnp.where(here[:, None], rates, stages), None
@@ -52,7 +51,7 @@ def explicit_step(
     here = np.eye(len(tableau.stages) + 1, dtype=bool)[1:]
     stages, _ = jax.lax.scan(stage, stages, (tableau.stages.astype(stages.dtype), here))
     rows: list[Rates] = [tuple(row) for row in stages]
-    end = advance(system, args, state, step, tableau.end, rows)
+    end = advance(motion, state, step, tableau.end, rows)
     share = jnp.zeros_like(step)
     starts, ends = (sum(system.coordinates(args, y), ()) for y in (state, end))
     pairs = list(zip(starts, ends, strict=True))
@@ -66,14 +65,14 @@ def explicit_step(
 
 
 def within_step(
-    system: AbstractLandingSystem,
-    args: PyTree,
+    motion: LandingMotion,
     step: Scalar,
     place: Scalar,
     before: tuple[Any, Rates],
     after: tuple[Any, Rates],
 ) -> Any:
     """The state at a share of a step, from states and accelerations at both ends: of order five."""
+    system, args = motion
     ends = [(*system.coordinates(args, y), bends) for y, bends in (before, after)]
     positions, rates = [], []
     for old, new in zip(zip(*ends[0], strict=True), zip(*ends[1], strict=True), strict=True):
@@ -84,14 +83,14 @@ def within_step(
 
 
 def advance(
-    system: AbstractLandingSystem,
-    args: PyTree,
+    motion: LandingMotion,
     state: Any,
     step: Scalar,
     weights: Sequence[Any] | np.ndarray,
     stages: list[Rates],
 ) -> Any:
     """The state a step further, at weighted rates of its positions and of their rates."""
+    system, args = motion
     old = sum(system.coordinates(args, state), ())
     new = tuple(x + step * _weighted(weights, stages, i) for i, x in enumerate(old))
     return system.with_coordinates(args, state, new)
@@ -108,8 +107,7 @@ def _weighted(weights: Sequence[Any] | np.ndarray, stages: list[Rates], i: int) 
 
 
 def state_after(
-    system: AbstractLandingSystem,
-    args: PyTree,
+    motion: LandingMotion,
     state: Any,
     accelerations: tuple[Scalar, ...],
     time: Scalar,
@@ -118,5 +116,5 @@ def state_after(
     """The whole state so much later [s], by one step from a carried one and its accelerations."""
     # The tolerance scales the step's error, which is not asked.
     rtol = jnp.ones_like(time)
-    end, *_ = explicit_step(system, args, state, accelerations, time, rtol, method=method)
-    return system.completed(args, end)
+    end, *_ = explicit_step(motion, state, accelerations, time, rtol, method=method)
+    return motion.system.completed(motion.args, end)

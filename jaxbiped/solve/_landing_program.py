@@ -11,7 +11,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, any_of
-from jaxbiped.hybrid._landing_system import AbstractLandingSystem
+from jaxbiped.hybrid._landing_system import AbstractLandingSystem, LandingMotion
 from jaxbiped.solve._explicit_methods import ExplicitMethod
 from jaxbiped.solve._explicit_step import DOPRI8, state_after, within_step
 from jaxbiped.solve._landing_steps import (
@@ -40,15 +40,14 @@ class LandingCourse(diffrax.AbstractLocalInterpolation):
 
     Attributes:
         t0, t1: ends of what is known of it [s].
-        system, scene: what moves.
+        motion: what moves.
         before, after: carried states at the step's ends, and the accelerations there.
         step: its length [s], which a reset may have cut short.
     """
 
     t0: Scalar  # type: ignore[misc]
     t1: Scalar  # type: ignore[misc]
-    system: AbstractLandingSystem
-    scene: PyTree
+    motion: LandingMotion
     before: tuple[Any, tuple[Scalar, ...]]
     after: tuple[Any, tuple[Scalar, ...]]
     step: Scalar
@@ -56,9 +55,8 @@ class LandingCourse(diffrax.AbstractLocalInterpolation):
     def evaluate(self, t0: Any, t1: Any = None, left: bool = True) -> Any:
         del t1, left
         place = (t0 - self.t0) / jnp.where(self.step == 0.0, 1.0, self.step)
-        ends = self.before, self.after
-        state = within_step(self.system, self.scene, self.step, place, *ends)
-        return self.system.completed(self.scene, state)
+        state = within_step(self.motion, self.step, place, self.before, self.after)
+        return self.motion.system.completed(self.motion.args, state)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -81,18 +79,18 @@ class LandingSolve(AbstractSolve):
 
     def inputs(self, scene: Any, state: Any, **limits: Any) -> Landing:
         """The inputs of a solve that only waits for its recorder, from its `limits` by name."""
-        return Landing(scene, state, **limits)
+        return Landing(self.system, scene, state, **limits)
 
     def start(self, solve: Landing) -> _Now:
         observed = self.observed_start(solve)
-        return _Now(initial_progress(self.system, solve), *observed)
+        return _Now(initial_progress(solve), *observed)
 
     def attempt(self, solve: Landing, now: _Now) -> tuple[_Now, Scalar]:
         system, before, endings = self.system, now.progress, self.endings
         # A step behind an ending tells which it was, unless that may change.
         if endings is EndingWatch.INTERPOLATED and not system.ending_stays(solve.scene):
             endings = EndingWatch.LOCATED
-        tried = attempt_step(system, solve, before, method=self.method, endings=endings)
+        tried = attempt_step(solve, before, method=self.method, endings=endings)
         after, over = tried.after, tried.over
         if self.counts_pulls:
             pulled = (after.accepted > before.accepted) & self._pulls(solve, after)
@@ -136,13 +134,12 @@ class LandingSolve(AbstractSolve):
     def course(self, solve: Landing, last: LastStep, t: Scalar, state: PyTree) -> LandingCourse:
         accelerations, length, end, then = last.coefficients
         ends = (last.state, accelerations), (end, then)
-        return LandingCourse(last.t, t, self.system, solve.scene, *ends, length)
+        return LandingCourse(last.t, t, solve.motion, *ends, length)
 
     def state_at(self, solve: Landing, last: LastStep, now: Moment, time: Scalar) -> Any:
         """The state at a time within the last step, by a step that ends there."""
         (accelerations, *_), length = last.coefficients, time - last.t
-        start = last.state, accelerations
-        return state_after(self.system, solve.scene, *start, length, self.method)
+        return state_after(solve.motion, last.state, accelerations, length, self.method)
 
     def arrival_near(
         self,

@@ -11,7 +11,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
-from jaxbiped.hybrid._landing_system import AbstractLandingSystem, SurfaceCourse
+from jaxbiped.hybrid._landing_system import AbstractLandingSystem, LandingMotion, SurfaceCourse
 from jaxbiped.solve._explicit_methods import ExplicitMethod
 from jaxbiped.solve._explicit_step import DOPRI8, Rates, advance, explicit_step
 from jaxbiped.solve._step_events import (
@@ -35,7 +35,7 @@ class Landing(NamedTuple):
     """One simulation's inputs; every leaf a floating-point number.
 
     Attributes:
-        scene, state: what moves, and from where.
+        system, scene, state: what moves, its parameters, and from where.
         duration: simulated time [s].
         footsteps: arrivals after which to end, 0 for no limit.
         rtol: relative tolerance; the absolute one (SI) is a hundredth of it.
@@ -44,6 +44,7 @@ class Landing(NamedTuple):
         dt: length of all steps [s]; None: each is as long as its error allows.
     """
 
+    system: AbstractLandingSystem
     scene: PyTree
     state: Any
     duration: Scalar
@@ -52,6 +53,11 @@ class Landing(NamedTuple):
     max_attempts: Scalar
     recording: Any = None
     dt: Scalar | None = None
+
+    @property
+    def motion(self) -> LandingMotion:
+        """What moves, with its parameters."""
+        return LandingMotion(self.system, self.scene)
 
 
 class LandingProgress(NamedTuple):
@@ -118,29 +124,30 @@ class ModeProgress(NamedTuple):
     behind: Scalar
 
 
-def initial_progress(system: AbstractLandingSystem, solve: Landing) -> LandingProgress:
+def initial_progress(solve: Landing) -> LandingProgress:
     """Before the first step."""
+    (system, args), state = solve.motion, solve.state
     zero = jnp.zeros_like(solve.duration)
     none = jnp.zeros((), dtype=jnp.int64)
     step = solve.dt
     if step is None:
-        step = _FIRST_STEP * system.time_scale(solve.scene)
+        step = _FIRST_STEP * system.time_scale(args)
     step = jnp.minimum(step, solve.duration)
     no = jnp.asarray(False)
-    state, modes = solve.state, None
-    if system.changes_mode(solve.scene):
-        state = system.change_mode(solve.scene, state)
-        course = system.course(solve.scene, state)
+    modes = None
+    if system.changes_mode(args):
+        state = system.change_mode(args, state)
+        course = system.course(args, state)
         paces = jnp.zeros(1 + len(course.values), zero.dtype)
         times = jnp.full_like(paces[1:], -jnp.inf)
         modes = ModeProgress(course, none, no, state.mode, times, paces, none)
         accelerations = course.accelerations
     else:
-        accelerations = system.accelerations(solve.scene, state)
+        accelerations = system.accelerations(args, state)
     never = jnp.full_like(zero, jnp.inf)
     return LandingProgress(
         t=zero,
-        state=system.carried(solve.scene, state),
+        state=system.carried(args, state),
         accelerations=accelerations,
         step=step,
         pace=step,
@@ -221,7 +228,6 @@ class EndingWatch(enum.Enum):
 
 
 def attempt_step(
-    system: AbstractLandingSystem,
     solve: Landing,
     now: LandingProgress,
     *,
@@ -229,32 +235,30 @@ def attempt_step(
     endings: EndingWatch = EndingWatch.LOCATED,
 ) -> Attempted:
     """One attempted step further."""
-    args = solve.scene
+    motion = system, args = solve.motion
     trial, error, stages = explicit_step(
-        system, args, now.state, now.accelerations, now.step, solve.rtol, method=method
+        motion, now.state, now.accelerations, now.step, solve.rtol, method=method
     )
     roughly = stages[-1]
-    onto = euler_step_onto(system, args, now.ending, trial, roughly, solve.rtol)
+    onto = euler_step_onto(motion, now.ending, trial, roughly, solve.rtol)
     length = method.length(error)
     course = changes = None
     if now.modes is not None:
         course = system.course(args, trial)
         changes = mode_events(now.step, now.modes.course, course, solve.rtol, length, method)
         surface = onto_surface(course, now.modes.changing - 1, solve.rtol, now.pace)
-        there = _along_course(system, args, trial, course, surface.rest)
+        there = _along_course(motion, trial, course, surface.rest)
         change = onto._replace(near=surface.near, rest=surface.rest, state=there)
         onto = select(now.modes.changing > 0, change, onto)
     free, kept = _after_free_step(
-        system, solve, now, trial, error, length, method, roughly, onto, endings, changes
+        solve, now, trial, error, length, method, roughly, onto, endings, changes
     )
     landing = now.landing > 0
-    after = select(landing, _landing(system, solve, now, trial, onto), free)
+    after = select(landing, _landing(solve, now, trial, onto), free)
     if now.modes is None:
-        reset = _after_reset(system, solve, onto)
+        reset = _after_reset(solve, onto)
     else:  # with stops an impact is much work
-        reset = jax.lax.cond(
-            after.arrived, lambda: _after_reset(system, solve, onto), lambda: onto.state
-        )
+        reset = jax.lax.cond(after.arrived, lambda: _after_reset(solve, onto), lambda: onto.state)
     tried = after
 
     def end() -> Any:
@@ -269,7 +273,7 @@ def attempt_step(
         accelerations = select(accepted, accelerations, now.accelerations)
     else:
         here = select(accepted, course, now.modes.course)
-        after = _after_change(system, solve, after, onto, here)
+        after = _after_change(solve, after, onto, here)
         assert after.modes is not None
         accelerations = after.modes.course.accelerations
     one = jnp.where(accepted, 1, 0)
@@ -294,22 +298,18 @@ def ending_of(solve: Landing, now: LandingProgress, waits: Scalar) -> Scalar:
     return jnp.where(late, int(Ending.TIMED_OUT), now.code)
 
 
-def _after_reset(system: AbstractLandingSystem, solve: Landing, onto: StepOnto) -> Any:
+def _after_reset(solve: Landing, onto: StepOnto) -> Any:
     """The state behind an arrival."""
-    after = system.reset_map(solve.scene, onto.state)
-    return system.in_place(solve.scene, onto.state, after)
+    system, args = solve.motion
+    return system.in_place(args, onto.state, system.reset_map(args, onto.state))
 
 
 def _after_change(
-    system: AbstractLandingSystem,
-    solve: Landing,
-    trial: LandingProgress,
-    onto: StepOnto,
-    course: Any,
+    solve: Landing, trial: LandingProgress, onto: StepOnto, course: Any
 ) -> LandingProgress:
     """After the change of mode beside a trial; with its surfaces, wherever the motion is now."""
     assert trial.modes is not None
-    args, changed = solve.scene, trial.modes.changed
+    (system, args), changed = solve.motion, trial.modes.changed
     state = jax.lax.cond(
         changed,
         lambda: system.change_mode(args, onto.state, solve.rtol),
@@ -357,18 +357,15 @@ def _after_arrival(
     )
 
 
-def _along_course(
-    system: AbstractLandingSystem, args: PyTree, state: Any, course: SurfaceCourse, time: Scalar
-) -> Any:
+def _along_course(motion: LandingMotion, state: Any, course: SurfaceCourse, time: Scalar) -> Any:
     """A state so short a time later that accelerations stay as they are."""
-    _, rates = system.coordinates(args, state)
+    _, rates = motion.system.coordinates(motion.args, state)
     half = 0.5 * time
     middle = (v + half * a for v, a in zip(rates, course.accelerations, strict=True))
-    return advance(system, args, state, time, [1.0], [(*middle, *course.accelerations)])
+    return advance(motion, state, time, [1.0], [(*middle, *course.accelerations)])
 
 
 def _after_free_step(
-    system: AbstractLandingSystem,
     solve: Landing,
     now: LandingProgress,
     trial: Any,
@@ -386,8 +383,7 @@ def _after_free_step(
     those of the trial, roughly.
     """
     happens = events_within(
-        system,
-        solve.scene,
+        solve.motion,
         now.step,
         (now.state, now.accelerations),
         (trial, rates),
@@ -402,7 +398,7 @@ def _after_free_step(
         happens = with_changes(happens, changes)
         grazes = happens.grazes | changes.grazes
     ignored = endings is EndingWatch.IGNORED
-    ending = _lost if ignored else functools.partial(system.ending, solve.scene)
+    ending = _lost if ignored else functools.partial(solve.system.ending, solve.scene)
     code = ending(now.state)
     fits = error <= 1.0 if solve.dt is None else jnp.isfinite(error)
     keep = fits & ~happens.unclear & (code == 0)
@@ -457,13 +453,7 @@ def _lost(state: Any) -> Scalar:
     return jnp.where(jnp.isfinite(sum(state)), 0, int(Ending.SOLVER_FAILED))
 
 
-def _landing(
-    system: AbstractLandingSystem,
-    solve: Landing,
-    now: LandingProgress,
-    trial: Any,
-    onto: StepOnto,
-) -> LandingProgress:
+def _landing(solve: Landing, now: LandingProgress, trial: Any, onto: StepOnto) -> LandingProgress:
     """After a step back towards an event: Newton's method goes on, or it has come."""
     missed = ~onto.near & (now.landing >= _MOST_LANDINGS)
     ends, lands, modes = now.ending & onto.near, onto.near & ~now.ending, now.modes
@@ -475,7 +465,7 @@ def _landing(
     arrived = lands & onto.counts
     passes = lands & ~onto.counts
     t = now.t + now.step
-    code = system.ending_on_surface(solve.scene, trial)
+    code = solve.system.ending_on_surface(solve.scene, trial)
     code = jnp.where(ends, code, jnp.where(missed, int(Ending.SOLVER_FAILED), now.code))
     return now._replace(
         t=t + jnp.where(ends, onto.rest, 0.0),

@@ -12,10 +12,9 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.hybrid._landing_system import AbstractLandingSystem, SurfaceCourse
+from jaxbiped.hybrid._landing_system import LandingMotion, SurfaceCourse
 from jaxbiped.solve._explicit_methods import ExplicitMethod
 from jaxbiped.solve._explicit_step import DOPRI8, Rates, advance
 from jaxbiped.solve._step_polynomials import Quintic, StepCubic
@@ -186,8 +185,7 @@ def with_changes(happens: StepEvents, changes: ModeEvents) -> StepEvents:
 
 
 def events_within(
-    system: AbstractLandingSystem,
-    args: PyTree,
+    motion: LandingMotion,
     step: Scalar,
     before: tuple[Any, Rates],
     after: tuple[Any, Rates],
@@ -204,8 +202,10 @@ def events_within(
     `endings` tells whether endings are watched for.
     """
 
+    system, args = motion
+
     def course(surface: Callable[[Any], Scalar]) -> Quintic:
-        ends = (_along(system, args, surface, *end) for end in (before, after))
+        ends = (_along(motion, surface, *end) for end in (before, after))
         return Quintic.of(step, *ends)
 
     arrival = course(functools.partial(system.arrival_surface, args))
@@ -263,41 +263,34 @@ class StepOnto(NamedTuple):
 
 
 def euler_step_onto(
-    system: AbstractLandingSystem,
-    args: PyTree,
-    ends: Scalar,
-    trial: Any,
-    rates: Rates,
-    rtol: Scalar,
+    motion: LandingMotion, ends: Scalar, trial: Any, rates: Rates, rtol: Scalar
 ) -> StepOnto:
     """From a trial with these rates, roughly, onto an ending where it `ends`, else an arrival."""
+    system, args = motion
     ending = system.surface_of_ending(args, trial)
     value, rate, curvature = select(
         ends,
-        _along(system, args, ending, trial, rates),
-        _along(system, args, functools.partial(system.arrival_surface, args), trial, rates),
+        _along(motion, ending, trial, rates),
+        _along(motion, functools.partial(system.arrival_surface, args), trial, rates),
     )
     rest = -value / jnp.where(rate == 0.0, 1.0, rate)
     near = jnp.abs(value) <= EULER_DISTANCE * jnp.sqrt(rtol)
     near = near & (rate < 0.0)
     near = near & (jnp.abs(curvature) * rest * rest <= 0.4 * EULER_DISTANCE * rtol)
     counts = functools.partial(system.arrival_counts, args)
-    ahead, drift, _ = _along(system, args, counts, trial, rates)
-    there = advance(system, args, trial, rest, [1.0], [rates])
+    ahead, drift, _ = _along(motion, counts, trial, rates)
+    there = advance(motion, trial, rest, [1.0], [rates])
     return StepOnto(near, rest, there, rate, ahead + rest * drift > 0.0)
 
 
 def _along(
-    system: AbstractLandingSystem,
-    args: PyTree,
-    surface: Callable[[Any], Scalar],
-    state: Any,
-    rates: Rates,
+    motion: LandingMotion, surface: Callable[[Any], Scalar], state: Any, rates: Rates
 ) -> tuple[Scalar, Scalar, Scalar]:
     """A function of the positions in a motion: its value and its first two derivatives.
 
     `rates` end with the accelerations.
     """
+    system, args = motion
     positions, velocities = system.coordinates(args, state)
 
     def at(positions: Any) -> Scalar:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, PyTree
 
 from jaxbiped._types import Numbers, Scalar, by_numpy, is_traced
-from jaxbiped.hybrid._landing_system import AbstractLandingSystem
+from jaxbiped.hybrid._landing_system import LandingMotion
 from jaxbiped.solve._explicit_step import state_after
 from jaxbiped.solve._recorders import NO_RESET, STRIKE
 from jaxbiped.solve._stepper import Stepper
@@ -21,22 +21,21 @@ class LandingStep(diffrax.AbstractLocalInterpolation):
 
     Attributes:
         t0, t1: its ends [s].
-        system, scene: what moves.
+        motion: what moves.
         y0: the state where it began.
         accelerations: of the positions there.
     """
 
     t0: Scalar  # type: ignore[misc]
     t1: Scalar  # type: ignore[misc]
-    system: AbstractLandingSystem
-    scene: PyTree
+    motion: LandingMotion
     y0: Any
     accelerations: tuple[Scalar, ...]
 
     def evaluate(self, t0: Any, t1: Any = None, left: bool = True) -> Any:
         del t1, left
-        start = self.system.carried(self.scene, self.y0), self.accelerations
-        return state_after(self.system, self.scene, *start, jnp.asarray(t0 - self.t0))
+        start = self.motion.system.carried(self.motion.args, self.y0)
+        return state_after(self.motion, start, self.accelerations, jnp.asarray(t0 - self.t0))
 
 
 class LandingRecord(NamedTuple):
@@ -58,7 +57,7 @@ class LandingRecord(NamedTuple):
 
 
 def landing_record(
-    system: AbstractLandingSystem, scene: PyTree, start: Any, rows: Numbers, total: Scalar
+    motion: LandingMotion, start: Any, rows: Numbers, total: Scalar
 ) -> LandingRecord:
     """The steps that a `StepRecorder` saved as rows, `total` in all, from a start."""
     size, kind = len(start), type(start)
@@ -101,8 +100,7 @@ def landing_record(
         ts=ends,
         ts_size=1 + count.astype(np.int32),  # diffrax's own width
         infos=dict(
-            system=system,
-            scene=jtu.tree_map(lambda leaf: _repeated(leaf, len(insides[0])), scene),
+            motion=jtu.tree_map(lambda leaf: _repeated(leaf, len(insides[0])), motion),
             y0=kind(*insides[:size]),
             accelerations=tuple(insides[size:]),
         ),

@@ -215,7 +215,7 @@ def test_nothing_is_left_when_caches_are_cleared_and_results_stay():
 
 def test_a_compiled_program_that_somebody_has_is_found_again():
     rigid = jb.ladder()["rigid"]
-    walk = Landing(rigid, default_guess(rigid), *[jnp.ones(())] * 4)
+    walk = Landing(Rolling(), rigid, default_guess(rigid), *[jnp.ones(())] * 4)
 
     def program():
         return LaneEngine().compile(

@@ -49,7 +49,7 @@ def numbers(tree):
 def walk_for(duration=DURATION, footsteps=4.0, state=None):
     state = simplest_state(*STABLE) if state is None else state
     how = duration, footsteps, RTOL, 100.0
-    return Landing(simplest_walker(), state, *map(jnp.asarray, how))
+    return Landing(ROLLING, simplest_walker(), state, *map(jnp.asarray, how))
 
 
 def progress(state, turning, modes=None, **more):
@@ -80,7 +80,6 @@ def onto_of(state, near=NO, rest=1e-5, counts=YES, closing=-0.5):
 def by_landing_on_falls(walk, now, trial, error, rates, onto, changes):
     return [
         _after_free_step(
-            ROLLING,
             walk,
             now,
             trial,
@@ -285,7 +284,7 @@ def test_a_fall_in_the_same_step_is_landed_on_before_a_change_that_was_due():
 
 @jax.jit
 def landed(now, onto):
-    return _landing(ROLLING, walk_for(), now, now.state, onto)
+    return _landing(walk_for(), now, now.state, onto)
 
 
 @pytest.mark.parametrize(
@@ -379,7 +378,7 @@ def beside():
 
 @host_jit()
 def after_change(walk, trial, onto, course):
-    return _after_change(ROLLING, walk, trial, onto, course)
+    return _after_change(walk, trial, onto, course)
 
 
 @host_jit()
@@ -401,7 +400,7 @@ def test_a_change_of_mode_is_noted_with_its_time_and_its_first_step(
     elsewhere = at._replace(hip_x=at.hip_x + 0.25)
     trial = progress(elsewhere, (), modes, landing=4, arrived=arrived, pace=0.7)
     how = 2.5, 4.0, TOLERANT, 100.0
-    walk, there = Landing(FLAT, at, *map(jnp.asarray, how)), onto_of(at, rest=1e-3)
+    walk, there = Landing(ROLLING, FLAT, at, *map(jnp.asarray, how)), onto_of(at, rest=1e-3)
     told = after_change(walk, trial, there, surfaces)
     assert float(told.t) == pytest.approx(2.001 if changed else 2.0)
     if changed:
@@ -477,7 +476,7 @@ def test_a_walk_begins_with_a_short_step_and_nothing_behind_it():
     state = simplest_state(*STABLE)._replace(hip_x=jnp.asarray(0.4))
     for duration, step in ((2.5, 0.03), (0.01, 0.01)):
         walk = walk_for(duration, state=state)
-        told = initial_progress(ROLLING, walk)
+        told = initial_progress(walk)
         assert float(told.step) == float(told.pace) == pytest.approx(step)
         assert [float(each) for each in (told.t, told.arrival, told.period, told.due)] == [
             0.0, 0.0, np.inf, np.inf,

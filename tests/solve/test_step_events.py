@@ -11,6 +11,7 @@ import jaxbiped as jb
 from jaxbiped.dynamics import rolling_field
 from jaxbiped.dynamics._stance_motion import rolling_rates
 from jaxbiped.hybrid import Rolling
+from jaxbiped.hybrid._landing_system import LandingMotion
 from jaxbiped.solve._explicit_methods import ExplicitMethod
 from jaxbiped.solve._explicit_step import explicit_step
 from jaxbiped.solve._step_events import euler_step_onto, events_within
@@ -50,7 +51,7 @@ def ends_of(opening, stance):
 @jax.jit
 def within(before, after, length, begins_on_section):
     return events_within(
-        Rolling(), SCENE, jnp.asarray(STEP), before, after,
+        LandingMotion(Rolling(), SCENE), jnp.asarray(STEP), before, after,
         rtol=jnp.asarray(RTOL), length=length, begins_on_section=begins_on_section,
     )  # fmt: skip
 
@@ -190,7 +191,9 @@ def motion(swing, stance, swing_rate, stance_rate):
 @jax.jit
 def onto(falling, trial, turning):
     rates = *trial[3:], *turning
-    return euler_step_onto(Rolling(), SCENE, falling, trial, rates, jnp.asarray(RTOL))
+    return euler_step_onto(
+        LandingMotion(Rolling(), SCENE), falling, trial, rates, jnp.asarray(RTOL)
+    )
 
 
 @pytest.mark.parametrize(
@@ -248,7 +251,9 @@ def test_a_step_is_that_of_dormand_and_prince_with_its_error():
     def both(state, step):
         begin = state, rolling_rates(scene, state), step, jnp.asarray(RTOL)
         own = [
-            explicit_step(Rolling(), scene, *begin, method=ExplicitMethod(embedded=e))
+            explicit_step(
+                LandingMotion(Rolling(), scene), *begin, method=ExplicitMethod(embedded=e)
+            )
             for e in (False, True)
         ]
         term, solver = diffrax.ODETerm(rolling_field), diffrax.Dopri8(scan_kind="lax")
@@ -275,7 +280,7 @@ def test_the_embedded_method_is_one_order_lower():
 
     def end(step, state=ROLLING, **how):
         rates = rolling_rates(scene, state)
-        return explicit_step(Rolling(), scene, state, rates, step, 1e-6, **how)[0]
+        return explicit_step(LandingMotion(Rolling(), scene), state, rates, step, 1e-6, **how)[0]
 
     gaps = []
     for step in (0.06, 0.03):
@@ -291,7 +296,7 @@ def test_an_error_of_a_step_is_the_difference_of_the_two_orders_in_units_of_the_
     scene, rtol, step = jb.ladder()["rigid"], 1e-7, 0.05
     rates = rolling_rates(scene, ROLLING)
     (end, error, _), (other, *_) = (
-        explicit_step(Rolling(), scene, ROLLING, rates, step, rtol, method=method)
+        explicit_step(LandingMotion(Rolling(), scene), ROLLING, rates, step, rtol, method=method)
         for method in METHODS
     )
     ends = np.array([ROLLING, end, other], dtype=float)[:, 1:5]
