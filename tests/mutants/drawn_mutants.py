@@ -95,7 +95,7 @@ def stages(drawn: Drawn, nearness: Nearness, executed: ExecutedBlocks) -> list[S
 
 
 def _up_to(covering: Sequence[tuple[float, str]], seconds: float) -> list[str]:
-    """The quickest tests that take so long together, one at least."""
+    """The first tests that take so long together, one at least."""
     chosen: list[str] = []
     for took, test in covering:
         seconds -= took
