@@ -53,13 +53,29 @@ def logarithms(runs):
     return np.log([named["d"] / 0.1, named["slope"] / 0.02])
 
 
+@pytest.mark.parametrize("vary", [BOTH, {"d": (0.04, 0.115), "slope": (0.005, 0.03)}])
 @pytest.mark.parametrize(
     ("optimiser", "near"), [("trust-region", 1e-4), ("slsqp", 3e-3), ("trust-constr", 3e-3)]
 )
-def test_optimisers_come_to_the_same_optimum_and_say_so(optimiser, near):
-    runs = solved(formula_problem(BOTH, *FASTEST, "step_length<0.21"), optimiser=optimiser)
+def test_optimisers_come_to_the_same_optimum_and_say_so(optimiser, near, vary):
+    """In the lower half of both ranges, and in the upper one."""
+    runs = solved(formula_problem(vary, *FASTEST, "step_length<0.21"), optimiser=optimiser)
     assert logarithms(runs) == pytest.approx([0.2 - 0.05 * MU, 0.1 - 0.0125 * MU], abs=near)
     assert runs.history[-1].objective == pytest.approx(runs.best.known.values["speed"], abs=1e-4)
+    assert runs.ended.converged
+
+
+@pytest.mark.parametrize("kind", [ValueError, np.linalg.LinAlgError])
+def test_an_optimiser_that_breaks_down_has_not_converged(kind, monkeypatch):
+    made = formula_problem(BOTH, *FASTEST)
+
+    def objective(functions, u):
+        raise kind("array must not contain infs or NaNs")
+
+    monkeypatch.setattr("jaxbiped.optimise._design_functions.Functions.objective", objective)
+    ended = solved(made, optimiser="trust-constr").ended
+    assert not ended.converged
+    assert "broke down: array must not contain infs or NaNs" in ended.message
 
 
 def test_an_upper_bound_holds_an_optimum_with_the_multiplier_of_lagrange():
