@@ -38,6 +38,17 @@ def test_what_noise_determines_is_undetermined():
     )
 
 
+def test_what_errors_may_turn_into_a_direction_is_still_told():
+    """The last two make up for each other but for a hundredth of the first column, which its own
+    errors of two hundredths may hide: the first is told, unless it is known without errors."""
+    slopes = 100.0 * np.linalg.qr(np.random.default_rng(5).standard_normal((6, 3)))[0]
+    slopes[:, 2] = slopes[:, 1] + 0.01 * slopes[:, 0]
+    errors = EXACT.copy()
+    assert information(slopes, errors).undetermined.all()
+    errors[0, 0] = 2.0
+    np.testing.assert_array_equal(information(slopes, errors).undetermined, [False, True, True])
+
+
 def test_a_derivative_below_its_own_error_tells_nothing():
     slopes = 100.0 * np.random.default_rng(3).standard_normal((6, 3))
     errors = EXACT.copy()

@@ -15,6 +15,7 @@ from matplotlib.collections import EllipseCollection
 from PIL import Image
 
 import jaxbiped as jb
+from jaxbiped.plot._notebook import _with_error
 from tests.drawn import assert_is_drawn
 
 RIGID = jb.ladder()["rigid"]
@@ -121,3 +122,20 @@ def test_plot_is_imported_when_a_notebook_asks():
         "assert 'jaxbiped.plot' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "cells"),
+    [
+        (0.123456789, 3e-5, ("0.123457", "3e-05")),
+        (12.3456, 0.02, ("12.346", "0.02")),
+        (12.3456, 2.0, ("12.3", "2")),
+        (1234.56, 20.0, ("1235", "2e+01")),
+        (123456.7, 300.0, ("123457", "3e+02")),
+        (0.5, np.inf, ("0.5", "")),
+        (0.25, 0.0, ("0.25", "0")),
+    ],
+)
+def test_a_value_has_a_digit_more_than_its_error(value, error, cells):
+    """And no digit behind the point where the error is of tens."""
+    assert _with_error(value, error) == cells
