@@ -67,7 +67,9 @@ def test_waves_that_get_farther_go_on():
     def walk(scatter, others):
         gone = np.tile(np.arange(40) < next(counts), (len(scatter), 1))
         points = np.where(gone, 1.0 + np.arange(40) % 7, np.nan)[..., None]
-        return Walks(gone.sum(axis=1), points, np.ones(1), np.where(gone, np.arange(40.0), np.nan), 0)
+        return Walks(
+            gone.sum(axis=1), points, np.ones(1), np.where(gone, np.arange(40.0), np.nan), 0
+        )
 
     assert len(list(waves_of(walk))) == _walk_waves._MOST
 
