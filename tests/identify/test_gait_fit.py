@@ -1,7 +1,10 @@
 """What residuals tell of parameters, against linear least squares."""
 
 import numpy as np
+import pytest
 
+import jaxbiped as jb
+from jaxbiped.identify._fit_gait import Descent
 from jaxbiped.identify._gait_fit import information
 
 EXACT = np.zeros((6, 3))
@@ -65,3 +68,24 @@ def test_a_wide_error_is_dropped_and_the_rest_stays():
 
 def test_nothing_measured_tells_nothing():
     assert information(np.zeros((4, 2)), np.zeros((4, 2))).undetermined.all()
+
+
+@pytest.mark.parametrize(
+    ("bounds", "value", "variable"),
+    [
+        ((0.2, 0.8), 0.5, np.log(0.5 / 0.4)),
+        ((0.2, np.inf), 0.5, np.log(0.5 / 0.4)),
+        ((-np.inf, np.inf), 0.5, np.log(0.5 / 0.4)),
+        ((0.0, 0.8), 0.5, 0.1 / 0.8),
+        ((-0.2, 0.8), -0.1, -0.5 / 1.0),
+    ],
+)
+def test_a_parameter_is_varied_by_its_logarithm_unless_its_bounds_hold_zero(
+    bounds, value, variable
+):
+    """The leg's length, 0.4 m; between bounds that hold zero in units of their distance."""
+    scene = jb.ladder()["rigid"]
+    measured = [jb.identify.MeasuredGait({"period": (0.44, 1e-3)})]
+    fit = Descent(scene, {"l": bounds}, measured, "balanced", "lanes", None)
+    assert fit.variables(np.array([value])) == pytest.approx([variable])
+    assert fit.parameters(np.array([variable]))["l"] == pytest.approx(value)

@@ -15,7 +15,7 @@ from matplotlib.collections import EllipseCollection
 from PIL import Image
 
 import jaxbiped as jb
-from jaxbiped.plot._notebook import _with_error
+from jaxbiped.plot._notebook import _gait_figure, _with_error
 from tests.drawn import assert_is_drawn
 
 RIGID = jb.ladder()["rigid"]
@@ -57,6 +57,13 @@ def test_a_gait_shows_its_measures_with_their_errors_and_its_multipliers(gait):
     (picture,) = shown.pictures
     assert len(picture.getcolors(100_000)) > 20  # something is drawn
     assert picture.size == (640, 336)  # both charts, of 8 by 4.2 inches at 80 dots per inch
+
+
+def test_the_orbit_stands_left_of_the_multipliers(gait):
+    left, right = (ax.get_position() for ax in _gait_figure(gait).axes[:2])
+    assert left.x1 < right.x0
+    assert left.y0 < right.y1
+    assert right.y0 < left.y1
 
 
 def test_what_is_not_found_and_what_is_many_have_no_picture(gait):
