@@ -1,11 +1,15 @@
 """What residuals tell of parameters, against linear least squares."""
 
+import re
+
 import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.identify._fit_gait import Descent
+from jaxbiped.identify import MeasuredGait
+from jaxbiped.identify._fit_gait import Descent, _check_measured
 from jaxbiped.identify._gait_fit import information
+from tests.mechanisms import WALKERS
 
 EXACT = np.zeros((6, 3))
 
@@ -85,7 +89,29 @@ def test_a_parameter_is_varied_by_its_logarithm_unless_its_bounds_hold_zero(
 ):
     """The leg's length, 0.4 m; between bounds that hold zero in units of their distance."""
     scene = jb.ladder()["rigid"]
-    measured = [jb.identify.MeasuredGait({"period": (0.44, 1e-3)})]
+    measured = [MeasuredGait({"period": (0.44, 1e-3)})]
     fit = Descent(scene, {"l": bounds}, measured, "balanced", "lanes", None)
     assert fit.variables(np.array([value])) == pytest.approx([variable])
     assert fit.parameters(np.array([variable]))["l"] == pytest.approx(value)
+
+
+UNEQUAL = jb.RigidScene(walker=WALKERS["unequal"], ground=jb.Ground(slope=0.02))
+"""A walker whose cycle has two footsteps."""
+
+
+@pytest.mark.parametrize(
+    ("measures", "footsteps", "said"),
+    [
+        ({"state_omega_leg_2": (-1.0, 0.1), "state_theta_leg_1": (-0.2, 0.01)}, None, None),
+        ({"state_omega_9": (-1.0, 0.1)}, None, "'state_omega_9' is not known"),
+        ({"period": (0.88, 1e-3)}, 4, None),
+        ({"period": (0.88, 1e-3)}, 3, "footsteps = 3 is not allowed: a cycle of this walker has 2"),
+    ],
+)
+def test_a_measured_gait_is_of_the_scenes_own_states_and_cycles(measures, footsteps, said):
+    check = lambda: _check_measured(UNEQUAL, MeasuredGait(measures, footsteps=footsteps), {})
+    if said is None:
+        check()
+    else:
+        with pytest.raises(jb.ArgumentError, match=re.escape(said)):
+            check()

@@ -368,6 +368,13 @@ def beside():
 after_change, surfaces_of = host_jit()(_rigid_steps._after_change), host_jit()(course_of)
 
 
+def test_the_gaps_of_limits_alone_have_second_derivatives():
+    """Flat feet have surfaces, and no limit."""
+    course = surfaces_of(FLAT, in_mode(FLAT, BOTH, (), (True, True)))
+    assert len(course.values) == len(course.rates) == len(course.live) > 0
+    assert len(course.bends) == 0
+
+
 @pytest.mark.parametrize(("struck", "changed", "event"), [(NO, NO, 0), (YES, NO, 1), (NO, YES, 3)])
 @pytest.mark.parametrize(("name", "stands"), [(UNLOADED, (NO, YES)), (COMES, (YES, YES))])
 def test_a_change_of_mode_is_noted_with_its_time_and_its_first_step(
