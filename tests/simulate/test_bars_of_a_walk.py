@@ -6,6 +6,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped import Ending, Simulation, Trajectory
+from jaxbiped.simulate import _backends
 from jaxbiped.simulate._accurate_walk import Witness, judge_walk
 from jaxbiped.simulate._backends import _saveat, lane_request
 
@@ -69,3 +70,19 @@ def test_xla_saves_what_the_user_asked_for():
     assert not at_times.subs.t1
     assert (at_end.subs.t1, at_end.subs.ts, at_end.dense) == (True, None, False)
     assert (every_step.subs.t0, every_step.subs.steps, every_step.dense) == (True, 1, True)
+
+
+@pytest.mark.parametrize("solver", ["rodas4", "rodas4p", "rodas5p"])
+def test_xla_weighs_steps_across_a_switch_as_lanes_do(solver, monkeypatch):
+    told = {}
+
+    def control(*_, **how):
+        told.update(how)
+        raise KeyboardInterrupt
+
+    run = Simulation.prepare(SCENE, STATE, duration=0.1, solver=solver, engine="xla")
+    monkeypatch.setattr(_backends, "walk_control", control)
+    with pytest.raises(KeyboardInterrupt):
+        _backends.by_xla(run)
+    lanes = Simulation.prepare(SCENE, STATE, duration=0.1, solver=solver, engine="lanes")
+    assert told["switch_weight"] == _backends._stepper(lanes).switch_weight

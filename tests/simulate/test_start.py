@@ -117,3 +117,13 @@ def test_footsteps_of_rigid_feet_are_waited_for_in_units_of_the_pendulums_time()
     lengths = {name: 4.0 * value for name, value in dict(l=0.4, d=0.1, r=0.08).items()}
     assert longest_of(**lengths) == pytest.approx(2.0)
     assert longest_of(g=4.0 * 9.8) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("solver", ["dopri8", "tsit5", "dopri5", "bosh3"])
+def test_the_witness_of_a_rigid_walk_is_another_method(solver):
+    """Which estimates the error that the walk's own method makes."""
+    how = {} if solver == "dopri8" else {"solver": solver}
+    run = RigidSimulation.of(rigid_seed(), simplest_state(*STABLE), Options(footsteps=3, **how))
+    other, share, weight = run.by_other_method()
+    assert other.method != run.method
+    assert min(share, weight) > 0.0
