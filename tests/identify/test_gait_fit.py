@@ -1,6 +1,7 @@
 """What residuals tell of parameters, against linear least squares."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -115,3 +116,17 @@ def test_a_measured_gait_is_of_the_scenes_own_states_and_cycles(measures, footst
     else:
         with pytest.raises(jb.ArgumentError, match=re.escape(said)):
             check()
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize("beyond", [True, False])
+@pytest.mark.parametrize("off", [0.0, 0.5e-4, 2e-4])
+def test_a_parameter_is_at_a_bound_that_it_is_pushed_against(place, beyond, off):
+    """Of an error of a tenth: within a ten-thousandth of the bound, and better off beyond it."""
+    outwards = (-1.0, 1.0)[place]
+    fit = SimpleNamespace(limits=np.array([[-0.3, -np.inf], [0.7, np.inf]]))
+    at = np.array([fit.limits[place, 0] - outwards * off, 0.0])
+    slopes = np.array([[10.0, 0.0], [0.0, 10.0]])
+    residuals = np.array([(-1.0 if beyond else 1.0) * outwards, 3.0])
+    found = Descent._at_bounds(fit, at, residuals, slopes)
+    assert found.tolist() == [beyond and off < 1e-4, False]
