@@ -151,7 +151,7 @@ class AbstractLabelRecorder(AbstractRecorder):
     records: ClassVar[bool] = False
     section: AbstractSection
     cycles: tuple[int, ...]
-    grazes: bool = False
+    grazes: bool
 
     def begin(self, how: AbstractSolve, solve: Any) -> LabelMemory:
         zero = jnp.zeros_like(solve.duration)

@@ -89,6 +89,18 @@ def test_ctrl_c_keeps_the_rows_that_are_measured(tmp_path, measured_by, capsys):
     assert (first["errors.state"], second["errors.state"]) == ("1e-06", "")
 
 
+def test_a_walk_lasts_and_repeats_as_the_command_says(measured_by):
+    asked = []
+
+    def walk(scene, start, duration, repeats):
+        asked.append((duration, repeats))
+        return _NoGait(scene)
+
+    measured_by(walk, _NoGait)
+    run("trade", "--duration", "0.7", "--repeats", "5")
+    assert asked == [(0.7, 5)]
+
+
 def test_a_scene_without_a_gait_is_told_by_the_code(measured_by, capsys):
     measured_by(_NoGait, _NoGait)
     assert run("trade") == 1

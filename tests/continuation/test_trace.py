@@ -59,6 +59,32 @@ def test_a_bifurcation_is_located(family, start, kind, value, multiplier, tolera
     assert told == pytest.approx(multiplier, abs=max(tolerance, 1e-9))
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize(("doubling", "crossing"), [(0.006, 0.002), (0.002, 0.006)])
+def test_two_bifurcations_within_one_step_are_in_their_order(doubling, crossing, way):
+    """(x, y) → (−x (1 + r − a), y (1 + r − b − y²)): a doubling at r = a, branches cross at b."""
+    family = curve_of(
+        lambda x, r: np.array(
+            [-x[0] * (1.0 + r - doubling), x[1] * (1.0 + r - crossing) - x[1] ** 3]
+        ),
+        lambda x, r: np.array(
+            [
+                [doubling - r - 1.0, 0.0, -x[0]],
+                [0.0, 1.0 + r - crossing - 3.0 * x[1] ** 2, x[1]],
+            ]
+        ),
+        (-0.5, 0.5),
+    )
+    found = traced(*family, [0.0, 0.0], -0.4 * way, way=way)
+    expected = [(doubling, BranchEvent.PERIOD_DOUBLING), (crossing, BranchEvent.BRANCH_POINT)]
+    expected = sorted(expected, key=lambda event: way * event[0])
+    assert [event.kind for event in found.bifurcations] == [kind for _, kind in expected]
+    values = [event.value for event in found.bifurcations]
+    assert values == pytest.approx([value for value, _ in expected], abs=1e-8)
+    between = [min(values) < point.value < max(values) for point in found.points]
+    assert sum(between) == 0
+
+
 def test_the_points_beside_a_doubling_have_its_multipliers():
     found = traced(*logistic((2.0, 4.0)), [0.5], 2.0)
     assert found.bifurcations[0].value_error < 1e-9

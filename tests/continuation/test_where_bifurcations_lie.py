@@ -97,12 +97,14 @@ def fold_of_a_map(code):
     """A setup whose return map folds where slope + 2 d + J/2 is constant, at a point or nowhere.
 
     It moves the first component by that sum beside the square of its distance to the point, and
-    forces the second one, which contracts and is forced ten times as hard, too.
+    forces the second one, which contracts and is forced ten times as hard, too. A looser cycle is
+    forced by all parameters alike.
     """
     forces = np.zeros(len(NAMES))
     forces[[NAMES.index(name) for name in ("slope", "d", "J")]] = 1.0, 2.0, 0.5
     jacobian = np.hstack([[[1.0, 0.0], [0.3, 0.6]], [forces, 10.0 * np.arange(len(NAMES))]])
-    seen = SimpleNamespace(code=np.array([code, 0]), jacobian=np.stack([jacobian, jacobian]))
+    looser = np.hstack([jacobian[:, :2], np.ones((2, len(NAMES)))])
+    seen = SimpleNamespace(code=np.array([code, 0]), jacobian=np.stack([jacobian, looser]))
     axis = nearest.axis_of(SCENE, "slope", (0.0, 0.1), None)
     curve = SimpleNamespace(sizes=np.array([0.5, 2.0, 1.0]))
     parts = dict(scene=SCENE, axis=axis, arrivals=1, curve=curve)

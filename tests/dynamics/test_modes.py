@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from jaxbiped import Body, Foot, Mechanism, Spring, Stop
 from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._holds import on_held
 from jaxbiped.dynamics._mode_changes import change_mode, foot_loads
 from jaxbiped.dynamics._stance import stance_on
 from jaxbiped.dynamics._stance_motion import turning_of
@@ -168,6 +169,19 @@ def test_stops_take_part_in_an_impact_while_they_are_pressed(data, mechanism, he
 
 
 HEEL_TOE = WALKERS["flat"]
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_what_is_held_lies_flat_and_at_rest(flat):
+    """A foot that is nearly flat and turns slowly, where both of its ends are told to stand; one
+    step of Newton's method leaves the cube of 2 mrad."""
+    scene = rigid(HEEL_TOE)
+    state = scene.state(theta_leg_1=-0.3, theta_foot_2=2e-3, omega_foot_2=-0.1, omega_leg_2=-1.0)
+    state = in_mode(scene, state, (), stands=(True, flat))
+    held = host_jit()(on_held)(scene, state)
+    expected = {"theta_foot_2": 0.0, "omega_foot_2": 0.0} if flat else {}
+    for name, value in (state._asdict() | expected).items():
+        assert float(getattr(held, name)) == pytest.approx(float(value), abs=8e-9), name
 
 
 @settings(deadline=None, max_examples=6)

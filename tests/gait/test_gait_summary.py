@@ -8,6 +8,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.gait import FoundBy, LinearisedReturn, Slopes, Stability
 from jaxbiped.gait._fixed_point_search import FixedPointProblem, Found
+from jaxbiped.gait._gait import gait_entries
 from jaxbiped.gait._gait_summary import summary_of
 from jaxbiped.gait._orbit_derivatives import Orbit
 from jaxbiped.gait._return_map_spec import return_map_spec
@@ -112,3 +113,20 @@ def test_what_never_returned_is_not_a_number_and_at_no_bifurcation(summary):
 def test_a_gait_that_grazes_a_switch_warns(summary):
     with pytest.warns(RuntimeWarning, match="its sensitivities are not known"):
         warn_of_unknown(summary(jnp.asarray(0)))
+
+
+def test_of_several_gaits_what_was_not_found_is_unknown_in_every_entry(summary):
+    """Numbers, one for each multiplier and one for each parameter and measure alike."""
+    alone = gait_entries(summary(jnp.asarray(0)))
+    gaits = [summary(jnp.asarray(ending)) for ending in (0, 1, 0)]
+    together = gait_entries(jax.tree.map(lambda *leaves: jnp.stack(leaves), *gaits))
+    assert {np.ndim(each.values) for each in together.values()} >= {1, 2}
+    names = [name for name in alone if name.startswith(("period", "multiplier", "elasticity"))]
+    assert len(names) > 6
+    for name in names:
+        here, expected = together[name], alone[name]
+        for values, own in ((here.values, expected.values), (here.errors, expected.errors)):
+            if own is not None and not isinstance(own, str):
+                np.testing.assert_array_equal(values[0], own)
+                np.testing.assert_array_equal(values[2], own)
+                assert np.isnan(values[1]).all()

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait._search_starts import default_guess
+from jaxbiped.gait._search_starts import (
+    default_guess,
+    scattered_start_count,
+    starts_scattered_by,
+)
 from tests.mechanisms import KNEE, KNEES, TORSO, leg
 from tests.solve.test_accuracy import sized
 
@@ -59,3 +63,18 @@ def test_rolling_starts_do_not_slip_and_begin_with_the_seeds():
 def test_bad_arguments(count, spread, named):
     with pytest.raises(jb.ArgumentError, match=named):
         jb.gait.rolling_starts(jb.seed_scene(), count, spread=spread)
+
+
+def test_each_number_scatters_a_start_of_which_the_stance_foot_stands_as_deep():
+    scene = jb.seed_scene()
+    count = scattered_start_count(scene)
+    scatter = np.pad(0.3 * np.eye(count), ((0, 0), (1, 0)))
+    starts = starts_scattered_by(scene, scatter)
+    angles = np.stack([starts.theta_1, starts.theta_2, starts.omega_1, starts.omega_2])
+    moved = np.abs(angles[:, 1:] - angles[:, :1]) > 1e-3
+    np.testing.assert_array_equal(moved.any(axis=0), True)
+    guess = default_guess(scene)
+    # The foot is a circle about a point on the leg: what is below that does not turn.
+    depths = starts.hip_z - 0.32 * np.cos(starts.theta_2)
+    expected = float(guess.hip_z) - 0.32 * np.cos(float(guess.theta_2))
+    np.testing.assert_allclose(depths, expected, atol=1e-9)

@@ -7,7 +7,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.identify import _fit_gait
-from jaxbiped.identify._interval_end import interval_end
+from jaxbiped.identify._interval_end import interval_end, linear_step
 from jaxbiped.identify._predicted_gait import Prediction, predict
 from tests.mechanisms import scene_of
 
@@ -258,6 +258,44 @@ def test_a_parameter_may_be_limited_on_one_side_and_moves_the_others(predicts):
     assert fit.intervals["J"] == pytest.approx(
         (0.0, float(own["J"]) * most / (1.0 - most)), rel=0.02
     )
+
+
+@pytest.mark.parametrize("told", [1.0, 10.0, 1e3])
+@pytest.mark.parametrize(("bend", "sign"), [(0.2, 1.0), (1.0, 1.0), (1.0, -1.0)])
+def test_an_end_costs_few_evaluations_however_well_the_data_tell_it(told, bend, sign):
+    """Residuals t (x + b x²/2) and 0.3, so that t (x + b x²/2) is 1.96 at the end."""
+    bend, asked = bend * told / 2.0 / 1.96 * (1.0 if sign > 0.0 else 0.9), []
+
+    def model(x):
+        asked.append(x)
+        residuals = np.array([told * (x[0] + 0.5 * bend * x[0] ** 2), 0.3])
+        return residuals, np.array([[told * (1.0 + bend * x[0])], [0.0]])
+
+    known = model(np.zeros(1))
+    limits = np.array([[-np.inf], [np.inf]])
+    end = interval_end(model, np.zeros(1), known, 0.09 + 1.96**2, 0, sign, limits)
+    expected = (np.sqrt(1.0 + 2.0 * bend * sign * 1.96 / told) - 1.0) / bend
+    assert end == pytest.approx(expected, rel=1e-4)
+    assert len(asked) <= 6
+
+
+@pytest.mark.parametrize("spare", [0.01, 0.5, 4.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_linear_step_ends_where_the_sum_of_squares_is_what_it_may_be(spare, sign):
+    """At the point of an ellipsoid that is farthest along one axis, by Lagrange."""
+    random = np.random.default_rng(2)
+    slopes, residuals = random.standard_normal((6, 3)), random.standard_normal(6)
+    least = residuals - slopes @ np.linalg.pinv(slopes) @ residuals
+    square = float(least @ least) + spare
+    room = np.array([[-100.0] * 3, [100.0] * 3])
+    step, flat, worth = linear_step(residuals, slopes, square, 1, sign, room)
+    covariance = np.linalg.inv(slopes.T @ slopes)
+    best = -covariance @ slopes.T @ residuals
+    np.testing.assert_allclose(
+        step, best + sign * np.sqrt(spare / covariance[1, 1]) * covariance[1], rtol=1e-9
+    )
+    assert np.sum((residuals + slopes @ step) ** 2) == pytest.approx(square)
+    assert (flat, worth) == (0.0, pytest.approx(np.sqrt(spare / covariance[1, 1])))
 
 
 @pytest.mark.parametrize("far", [1.0, 10.0])

@@ -91,7 +91,7 @@ def run(chosen: Sequence[Mutation], *, jobs: int, near: bool) -> tuple[list[Verd
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
     parser.add_argument("only", nargs="*", metavar="NAME", help="mutations, or begins of names")
-    parser.add_argument("--jobs", type=int, default=1, help="mutations at a time (default: 1)")
+    parser.add_argument("--jobs", type=int, default=1, help="processes at a time (default: 1)")
     parser.add_argument("--near", action="store_true", help="only run the tests tried first")
     parser.add_argument("--list", action="store_true", help="print the mutations and end")
     parser.add_argument("--json", type=Path, metavar="PATH", help="write the verdicts there")
@@ -101,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--observe", action="store_true", help="keep which tests execute what")
     options = parser.parse_args(arguments)
     if options.observe:
-        return drawn_mutants.observe()
+        return drawn_mutants.observe(options.jobs)
     if options.draw:
         numbers = [int(number) for number in options.only]
         if options.list:

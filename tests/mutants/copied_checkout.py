@@ -86,20 +86,28 @@ class CopiedCheckout:
                 return line.split(" ", 1)[1].split(" - ")[0]
         return f"pytest ended with {run.exitcode}: {said[-300:]}"
 
-    def observe(self, to: Path) -> int:
-        """Runs the unit tests and writes which blocks each executes (`executed_blocks`)."""
-        names = self.folder / "names.json"
-        names.write_text(json.dumps(note_blocks(self.folder / "jaxbiped")))
+    def note_blocks(self) -> None:
+        """Makes each block of the package note its number (`executed_blocks`)."""
+        self._names.write_text(json.dumps(note_blocks(self.folder / "jaxbiped")))
+
+    def observe(self, paths: Sequence[str], to: Path) -> int:
+        """Runs unit tests and adds which noted blocks each executes to a file; pytest's code."""
         arguments = ["-n0", "-m", "not slow", "--ignore=tests/mutants", "--tb=no",
                      f"--rootdir={self.folder}", "--hypothesis-profile=mutants",
                      "-p", "tests.mutants.executed_blocks", f"--executed-blocks={to}",
-                     f"--block-names={names}", "-o", f"cache_dir={self.folder}/cache"]  # fmt: skip
+                     f"--block-names={self._names}",
+                     "-o", f"cache_dir={self.folder}/cache"]  # fmt: skip
         run = _SERVER.Process(
-            target=_run_pytest, args=(str(self.folder), self.folder / "output", arguments)
+            target=_run_pytest,
+            args=(str(self.folder), self.folder / "output", [*arguments, *paths]),
         )
         run.start()
         run.join()
         return run.exitcode or 0
+
+    @property
+    def _names(self) -> Path:
+        return self.folder / "names.json"
 
 
 class OutOfTime(Exception):  # noqa: N818

@@ -6,9 +6,11 @@ The verdicts are kept beside the draw's seed, so that a run that was stopped goe
 import ast
 import json
 import math
+import queue
 import tempfile
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,6 +31,10 @@ _OWN_CACHE = ("_", "caching/", "compiler/")
 """Begins of the files that could leave wrong programs in a cache: theirs is used once."""
 _HANGS = 5.0
 """Times that a test must take longer than without the mutation for its time-out to be a catch."""
+_FILES_AT_A_TIME = 20
+"""Files of tests that are observed in one process."""
+_NO_TEST = 5
+"""Pytest's code where no test of the tier is in the files."""
 
 
 class Stage(NamedTuple):
@@ -89,7 +95,7 @@ def stages(drawn: Drawn, nearness: Nearness, executed: ExecutedBlocks) -> list[S
 
 
 def _up_to(covering: Sequence[tuple[float, str]], seconds: float) -> list[str]:
-    """The quickest tests that take so long together, one at least."""
+    """The first tests that take so long together, one at least."""
     chosen: list[str] = []
     for took, test in covering:
         seconds -= took
@@ -205,18 +211,38 @@ def run(
     return kept.report() and failure is None
 
 
-def observe() -> int:
-    """Keeps which unit tests execute which blocks of the package; pytest's exit code.
+def observe(jobs: int) -> int:
+    """Keeps which unit tests execute which blocks of the package; the largest of pytest's codes.
 
-    Tests that read the package's source may fail in a copy that notes its blocks.
+    So many processes take the files of tests, some at a time, each in a copy of the checkout. Tests
+    that read the package's source may fail in a copy that notes its blocks.
     """
     OUT.mkdir(parents=True, exist_ok=True)
-    half = EXECUTED.with_suffix(".unfinished")
-    half.unlink(missing_ok=True)
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
+    names = [path.relative_to(ROOT).as_posix() for path in files if "mutants" not in path.parts]
     with tempfile.TemporaryDirectory(prefix="jaxbiped-mutants-") as temporary:
-        code = CopiedCheckout(Path(temporary) / "copy").observe(half)
+        copies: queue.SimpleQueue[CopiedCheckout] = queue.SimpleQueue()
+        for k in range(jobs):
+            checkout = CopiedCheckout(Path(temporary) / f"copy-{k}")
+            checkout.note_blocks()
+            copies.put(checkout)
+
+        def observe_some(first: int) -> int:
+            checkout = copies.get()
+            try:
+                some = names[first : first + _FILES_AT_A_TIME]
+                code = checkout.observe(some, Path(temporary) / f"{first}.jsonl")
+                return 0 if code == _NO_TEST else code
+            finally:
+                copies.put(checkout)
+
+        with ThreadPoolExecutor(jobs) as pool:
+            codes = list(pool.map(observe_some, range(0, len(names), _FILES_AT_A_TIME)))
+        parts = sorted(Path(temporary).glob("*.jsonl"))
+        half = EXECUTED.with_suffix(".unfinished")
+        half.write_text("".join(part.read_text() for part in parts))
     half.replace(EXECUTED)
-    return code
+    return max(codes, key=abs)
 
 
 class Kept:

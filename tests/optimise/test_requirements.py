@@ -218,3 +218,15 @@ def test_the_radius_is_a_variable_of_its_own_where_it_is_minimised():
     ):  # fmt: skip
         changed = SimpleNamespace(**vars(problem) | other)
         assert smooth_weights(changed) == (changed.weights, 0.0)
+
+
+def test_a_front_bounds_its_second_measure_alone():
+    with pytest.raises(ArgumentError, match="subject_to has 'speed' already"):
+        jb.optimise.pareto_front(
+            SCENE,
+            vary={"d": (0.09, 0.11)},
+            maximise="step_length",
+            against="speed",
+            bounds=[0.4],
+            subject_to="speed>0.3",
+        )

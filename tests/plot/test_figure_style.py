@@ -309,3 +309,9 @@ def test_a_legend_stands_beside_the_axes_or_below_them_in_one_column_of_a_paper(
     assert bool(entries.y1 < frame.y0) is below
     assert bool(entries.x0 > frame.x1) is not below
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["walking", "fallen"]
+
+
+def test_a_figure_of_the_usual_size_lies_on_its_side():
+    """Three to four parts wide where it is two high, as a screen is, and half a page."""
+    width, height = style.new_figure().get_size_inches()
+    assert 1.5 <= width / height <= 2.0

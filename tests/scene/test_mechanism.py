@@ -72,6 +72,20 @@ def test_height_is_that_of_the_lowest_foot():
     assert float(uneven.height) == 0.5
 
 
+def test_the_normal_is_an_angles_other_side_only_where_its_weights_need_one():
+    """A knee's angle is the difference of two bodies', a leg's is one from the slope's normal."""
+    walker = two_legs(
+        Spring({"leg_1": 1, "leg_2": -1}, stiffness=1.0, name="a"),
+        Spring("leg_1", stiffness=2.0, rest=0.1, name="b"),
+        Spring({"leg_1": 1, "vertical": -1}, stiffness=3.0, rest=0.2, name="c"),
+        mirror=(),
+    )
+    angles = [dict(joint.angle) for joint in walker.arguments()["joints"]]
+    assert angles[0] == {"leg_1": 1.0, "leg_2": -1.0}
+    assert angles[1] == {"leg_1": 1.0, "normal": -1.0}
+    assert angles[2] == {"leg_1": 1.0, "vertical": -1.0}
+
+
 def test_structures_pickle_and_are_their_own_identity():
     walker = kneed()
     again = pickle.loads(pickle.dumps(walker))

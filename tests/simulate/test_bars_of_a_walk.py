@@ -6,8 +6,9 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped import Ending, Simulation, Trajectory
+from jaxbiped.simulate import _backends
 from jaxbiped.simulate._accurate_walk import Witness, judge_walk
-from jaxbiped.simulate._backends import lane_request
+from jaxbiped.simulate._backends import _saveat, lane_request
 
 SCENE, STATE = jb.seed_scene(), jb.seed_state()
 TIME = np.sqrt(0.4 / 9.8)
@@ -57,3 +58,31 @@ def test_lanes_are_asked_for_what_the_user_said():
     assert float(asked.patience) == float(asked.duration) == 300.0
     assert 300.0 * (1.0 - 1e-12) < float(asked.almost) < 300.0
     assert [float(leaf) for leaf in asked.state] == [float(leaf) for leaf in STATE]
+
+
+def test_xla_saves_what_the_user_asked_for():
+    times = np.array([0.1, 0.25])
+    at_times, at_end, every_step = (
+        _saveat(Simulation.prepare(SCENE, STATE, duration=0.3, **how))
+        for how in ({"save": times}, {"save": "end"}, {"save": "steps"})
+    )
+    np.testing.assert_array_equal(at_times.subs.ts, times)
+    assert not at_times.subs.t1
+    assert (at_end.subs.t1, at_end.subs.ts, at_end.dense) == (True, None, False)
+    assert (every_step.subs.t0, every_step.subs.steps, every_step.dense) == (True, 1, True)
+
+
+@pytest.mark.parametrize("solver", ["rodas4", "rodas4p", "rodas5p"])
+def test_xla_weighs_steps_across_a_switch_as_lanes_do(solver, monkeypatch):
+    told = {}
+
+    def control(*_, **how):
+        told.update(how)
+        raise KeyboardInterrupt
+
+    run = Simulation.prepare(SCENE, STATE, duration=0.1, solver=solver, engine="xla")
+    monkeypatch.setattr(_backends, "walk_control", control)
+    with pytest.raises(KeyboardInterrupt):
+        _backends.by_xla(run)
+    lanes = Simulation.prepare(SCENE, STATE, duration=0.1, solver=solver, engine="lanes")
+    assert told["switch_weight"] == _backends._stepper(lanes).switch_weight

@@ -386,6 +386,13 @@ def surfaces_of(scene, state):
     return ROLLING.course(scene, state)
 
 
+def test_the_gaps_of_limits_alone_have_second_derivatives():
+    """Flat feet have surfaces, and no limit."""
+    course = surfaces_of(FLAT, in_mode(FLAT, BOTH, (), (True, True)))
+    assert len(course.values) == len(course.rates) == len(course.live) > 0
+    assert len(course.bends) == 0
+
+
 @pytest.mark.parametrize(("arrived", "changed", "event"), [(NO, NO, 0), (YES, NO, 1), (NO, YES, 3)])
 @pytest.mark.parametrize(("name", "stands"), [(UNLOADED, (NO, YES)), (COMES, (YES, YES))])
 def test_a_change_of_mode_is_noted_with_its_time_and_its_first_step(

@@ -4,10 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import jaxbiped as jb
 from jaxbiped._progress import Stage
-from jaxbiped.sweep._gait_grid import extrapolated, interpolated, neighbours
+from jaxbiped.sweep._gait_grid import GaitGrid, extrapolated, interpolated, neighbours
 from jaxbiped.sweep._gait_sweep import GaitWaves, rings, waves
 
 SHAPES = [((100, 100), (37, 80)), ((97,), (3,)), ((30, 5, 7), (0, 4, 6)), ((8, 8), (7, 0))]
@@ -142,3 +143,10 @@ def test_holes_and_islands_are_searched():
     }
     assert beside <= set(alone)
     assert len(set(alone) - beside) < 20
+
+
+def test_a_gait_on_the_edge_of_stability_is_not_stable():
+    """Its errors neither fade nor grow; where there is no gait nothing is."""
+    radii = xr.Dataset({"spectral_radius": ("slope", [1.0 - 1e-12, 1.0, 1.0 + 1e-12, np.nan])})
+    grid = GaitGrid(radii, jb.dynamics.RigidState, None)
+    assert [grid.is_stable((k,)) for k in range(4)] == [True, False, False, False]

@@ -218,7 +218,7 @@ class Straight:
 @pytest.fixture(scope="module")
 def attempt():
     """One step of a labelling, from one given state to another."""
-    recorder = LabelRecorder(jb.MidStance(), (1,))
+    recorder = LabelRecorder(jb.MidStance(), (1,), grazes=False)
 
     @jax.jit
     def one(before, after, t, strike, landed, radius):

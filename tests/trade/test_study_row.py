@@ -105,6 +105,13 @@ def test_errors_count_in_units_of_their_axis():
     assert found == pytest.approx({"state": 0.5})
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_axis_is_as_large_as_its_largest_number_of_either_sign(sign):
+    truth = truth_of({"gradient": sign * np.array([-8.0, 2.0])}, {})
+    found = truth.errors({"gradient": sign * np.array([-8.0, 4.0])})
+    assert found == pytest.approx({"gradient": 0.25})
+
+
 @pytest.mark.parametrize("found", [np.array([1.0]), np.array([np.nan, 1.0]), np.ones((2, 2))])
 def test_what_is_no_number_or_too_few_is_off_by_infinity(found):
     truth = truth_of({"step_time": np.array([1.0, 2.0])}, {})

@@ -96,6 +96,20 @@ def test_of_two_switches_it_is_the_one_that_was_passed_last():
     np.testing.assert_array_equal(found.by_state, [0.0, 1.0])
 
 
+@pytest.mark.parametrize("delays", [(1e-6, 1e-8, 1e-10), (1e-8, 1e-10, 1e-6), (1e-10, 1e-6, 1e-8)])
+def test_of_three_switches_it_is_the_one_that_was_passed_last(delays):
+    """In whatever order they are listed; the motion falls at 3 m/s."""
+    levels = [3.0 * delay for delay in delays]
+    watch = Watch(
+        field=field,
+        switches=lambda args, y: tuple(
+            Switch(y[0] - args[0] - above, True, force_jumps=True) for above in levels
+        ),
+    )
+    found = saltation(watch, 0.5, -3.0)
+    np.testing.assert_array_equal(found.which, np.array(delays) == 1e-10)
+
+
 def test_across_a_speed_the_rate_of_crossing_is_the_one_before():
     """Friction that comes on at −2 m/s: the speed falls by 9.8 m/s² before and by 4.8 behind."""
     watch = Watch(

@@ -198,7 +198,7 @@ def _gather(w: HostWriter, op: Operation) -> list[Value]:
     shape, dtype = op.result()
     p = op.params
     operand, indices = (w.full(each) for each in op.inputs)
-    fill, numbers = _fill_value(p, dtype), p["dimension_numbers"]
+    fill, numbers = _fill_value(p), p["dimension_numbers"]
     sizes = tuple(map(int, p["slice_sizes"]))
     if indices.constant is not None and operand.constant is None:
         # Of the entries' numbers instead of the entries it tells where each is.
@@ -216,18 +216,14 @@ def _gather(w: HostWriter, op: Operation) -> list[Value]:
     return w.emit_whole(form, op)
 
 
-def _fill_value(params: dict[str, Any], dtype: np.dtype) -> Any:
+def _fill_value(params: dict[str, Any]) -> Any:
     """What stands for entries beyond the end; None where the nearest do."""
-    mode, fill = params["mode"].name, params["fill_value"]
+    mode = params["mode"].name
     if mode in ("CLIP", "PROMISE_IN_BOUNDS"):
         return None
     if mode != "FILL_OR_DROP":
         raise UnwrittenError(f"a gather that may {mode}")
-    if fill is not None:
-        return fill
-    if np.issubdtype(dtype, np.inexact):
-        return np.nan
-    return True if dtype.kind == "b" else np.iinfo(dtype).min
+    return params["fill_value"]
 
 
 def _whole_rows(shape: tuple[int, ...], numbers: Any, sizes: tuple[int, ...]) -> int | None:

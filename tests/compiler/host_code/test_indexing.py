@@ -19,6 +19,9 @@ CASES = {
     "from the end": lambda x, i: (x[-i], x[-1]),
     "beyond the end": lambda x, i: x.at[i + 2].get(mode="fill", fill_value=-1.0),
     "beyond, not a number": lambda x, i: x.at[i + 2].get(mode="fill"),
+    "beyond, of other types": lambda x, i: [
+        x.astype(kind).at[i + 2].get(mode="fill") for kind in ("bool", "int32", "float32")
+    ],
     "moved inwards": lambda x, i: x.at[i + 2].get(mode="clip"),
     "a window": lambda x, i: jax.lax.dynamic_slice(x, (i[0], i[1]), (2, 3)),
     "each row its own": lambda x, i: jax.vmap(lambda row, k: row[k])(x[:3], i),

@@ -4,8 +4,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.extend.core import Primitive
 
 from tests.compiler.host_code.host_runs import check_against_xla, written
+from tests.compiler.one_shot import evaluate
 
 X = np.array([[0.3, -1.7, 2.5], [0.0, 4.0, -0.25]])
 Y = np.array([[2.0, -0.5, 2.5], [1.0, 3.0, -0.25]])
@@ -107,3 +109,18 @@ def test_one_text_that_stands_for_different_shapes():
         return a / b, jnp.stack([wide, jnp.array([a, b])[:1]], 1)
 
     check_against_xla(function, 2.0, 3.0)
+
+
+def test_a_polynomial_has_its_constant_coefficient_first():
+    """An operation that newer versions of JAX have, made here; by NumPy and by lanes."""
+    polynomial = Primitive("polynomial")
+    polynomial.def_abstract_eval(lambda x, *coefficients: x)
+    coefficients = (0.5, -2.0, 0.25, 3.0)
+
+    def function(x):
+        return polynomial.bind(x, *(jnp.full_like(x, each) for each in coefficients))
+
+    x = np.linspace(-2.0, 2.0, 9)
+    expected = 0.5 - 2.0 * x + 0.25 * x**2 + 3.0 * x**3
+    np.testing.assert_allclose(written(function, [x])([x]), expected, rtol=1e-14)
+    np.testing.assert_allclose(evaluate(function, x), expected, rtol=1e-14)

@@ -200,6 +200,15 @@ def test_what_numbers_alone_decide_is_known_before():
     assert count_operations(scaled, 2.0, ()) == {"fmul": 1}
 
 
+def test_a_condition_of_two_branches_is_compared_once():
+    """The number of the branch that JAX makes of it is not compared again."""
+
+    def one_of_two(x, _):
+        return jax.lax.cond(x > 0.5, lambda: 3.0 * x, lambda: x * x)
+
+    assert count_operations(one_of_two, 2.0, ()) == {"fmul": 2, "fcmp ogt": 1, "if": 1}
+
+
 def test_equal_calls_are_lowered_once():
     """Their conditionals, too, which are not shared by themselves."""
     called = jax.jit(lambda x: jax.lax.cond(x > 0.5, jnp.exp, lambda x: 2.0 * x, x))

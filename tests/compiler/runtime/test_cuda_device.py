@@ -12,7 +12,7 @@ import pytest
 from jaxbiped import ResourceError
 from jaxbiped.compiler import CUDA, LANES, LaneEngine, Program, Request
 from jaxbiped.compiler.runtime._cuda_device import CudaDriver, CudaError, devices
-from tests.compiler.fake_driver import FakeDriver, install, limit_room, load
+from tests.compiler.fake_driver import NOT_READY, FakeDriver, install, limit_room, load
 
 NEVER = 2000.0
 
@@ -197,3 +197,22 @@ def test_without_a_device_the_engine_cannot(monkeypatch):
     engine = LaneEngine(CUDA.processor)
     assert engine.can(Request(COUNTING, _inputs([1]), batch=True)) == "there is no CUDA device"
     assert not CUDA.processor.fills(1 << 30)
+
+
+class Answering(FakeDriver):
+    """A driver whose streams answer what they are told to."""
+
+    def cuStreamQuery(self, stream):  # noqa: N802
+        return self.answer
+
+
+@pytest.mark.parametrize("code", [1, 2, 400, 719])
+def test_a_stream_is_busy_or_idle_or_tells_of_an_error(code):
+    fake = Answering()
+    driver = CudaDriver(fake)
+    for fake.answer, busy in ((0, False), (NOT_READY, True)):
+        assert driver.is_busy(None) is busy
+    fake.answer = code
+    with pytest.raises(CudaError) as told:
+        driver.is_busy(None)
+    assert told.value.code == code
