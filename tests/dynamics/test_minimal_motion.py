@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from reference.compliant import derivative, numbers
 
 import jaxbiped as jb
-from jaxbiped.dynamics._minimal_motion import force_residual
 
 # XLA takes subnormal numbers for zero, and a law that asks for a sign then answers otherwise.
 floats = partial(st.floats, allow_subnormal=False)
@@ -30,33 +29,6 @@ def test_vector_field_equals_the_independent_one(y, hip, slope):
     got = jb.dynamics.vector_field(0.0, jb.State(*map(jnp.asarray, y)), scene)
     scale = max(1.0, np.abs(expected).max())
     np.testing.assert_allclose(np.array(got), expected, rtol=1e-9, atol=1e-11 * scale)
-
-
-def test_forces_are_left_over_by_the_inertia_of_rates_that_are_not_the_motions():
-    """F − M ẏ: nothing at the motion's own rates, and M times what is taken off them."""
-    random = np.random.default_rng(1)
-    scene = jb.seed_scene(slope=0.2, hip_mass=0.3)
-    state = jb.State(*map(jnp.asarray, (0.0, 0.36, -0.3, 0.2, 1.0, -0.5, 3.0, -2.0)))
-    rates = jb.dynamics.vector_field(0.0, state, scene)
-    off = jb.State(*map(jnp.asarray, random.normal(size=8)))
-    moved = jax.tree.map(jnp.subtract, rates, off)
-    at_rates, beside = (
-        np.array([each[i] for i in range(4, 8)])
-        for each in (force_residual(scene, state, rates), force_residual(scene, state, moved))
-    )
-    np.testing.assert_allclose(at_rates, 0.0, atol=1e-9)
-    walker = scene.walker
-    md, inertia = walker.m * walker.d, walker.J + walker.m * walker.d**2
-    (x, z), turns, angles = off[4:6], off[6:8], state[2:4]
-    expected = [
-        walker.total_mass * x + sum(md * np.cos(a) * w for a, w in zip(angles, turns, strict=True)),
-        walker.total_mass * z + sum(md * np.sin(a) * w for a, w in zip(angles, turns, strict=True)),
-        *(
-            md * (np.cos(a) * x + np.sin(a) * z) + inertia * w
-            for a, w in zip(angles, turns, strict=True)
-        ),
-    ]
-    np.testing.assert_allclose(beside, expected, rtol=1e-9)
 
 
 def test_free_flight():

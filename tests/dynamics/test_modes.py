@@ -1,8 +1,12 @@
 """Stops and flat feet on rigid feet, against maximal coordinates with what is held as loads."""
 
 import dataclasses
+import itertools
 from types import SimpleNamespace
+from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,9 +15,11 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from jaxbiped import Body, Foot, Mechanism, Spring, Stop
 from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._equivalent_states import _turned
 from jaxbiped.dynamics._holds import on_held
+from jaxbiped.dynamics._minimal_motion import force_residual
 from jaxbiped.dynamics._mode_changes import change_mode, foot_loads
-from jaxbiped.dynamics._stance import stance_on
+from jaxbiped.dynamics._stance import Sole, either, stance_on
 from jaxbiped.dynamics._stance_motion import turning_of
 from jaxbiped.hybrid import Rolling
 from jaxbiped.scene._bodies import Point
@@ -378,3 +384,87 @@ def test_whether_two_feet_stand_on_one_point_does_not_depend_on_the_walkers_size
     assert not touch(1e-4)
     assert touch(1.0, radius=1.0)
     assert not touch(1.0, radius=0.5)
+
+
+def test_forces_are_left_over_by_the_inertia_of_rates_that_are_not_the_motions():
+    """F − M ẏ: nothing at the motion's own rates, and M times what is taken off them."""
+    random = np.random.default_rng(1)
+    scene = jb.seed_scene(slope=0.2, hip_mass=0.3)
+    state = jb.State(*map(jnp.asarray, (0.0, 0.36, -0.3, 0.2, 1.0, -0.5, 3.0, -2.0)))
+    rates = jb.dynamics.vector_field(0.0, state, scene)
+    off = jb.State(*map(jnp.asarray, random.normal(size=8)))
+    moved = jax.tree.map(jnp.subtract, rates, off)
+    at_rates, beside = (
+        np.array([each[i] for i in range(4, 8)])
+        for each in (force_residual(scene, state, rates), force_residual(scene, state, moved))
+    )
+    np.testing.assert_allclose(at_rates, 0.0, atol=1e-9)
+    walker = scene.walker
+    md, inertia = walker.m * walker.d, walker.J + walker.m * walker.d**2
+    (x, z), turns, angles = off[4:6], off[6:8], state[2:4]
+    expected = [
+        walker.total_mass * x + sum(md * np.cos(a) * w for a, w in zip(angles, turns, strict=True)),
+        walker.total_mass * z + sum(md * np.sin(a) * w for a, w in zip(angles, turns, strict=True)),
+        *(
+            md * (np.cos(a) * x + np.sin(a) * z) + inertia * w
+            for a, w in zip(angles, turns, strict=True)
+        ),
+    ]
+    np.testing.assert_allclose(beside, expected, rtol=1e-9)
+
+
+ENTRIES = {"along": (0.3, 0.2), "ahead": (0.05, -0.1), "radius": (0.02, 0.01)}
+KNOWN = list(itertools.product([True, False], repeat=2))
+"""Whether the first sole has an entry, and whether the second one does: what is none is zero."""
+
+
+def sole(which, known):
+    numbers = {name: jnp.asarray(pair[which]) for name, pair in ENTRIES.items()}
+    numbers |= {name: None for name, has in known.items() if not has[which]}
+    return Sole(1, 3, Point(numbers["along"], numbers["ahead"]), numbers["radius"])
+
+
+@pytest.mark.parametrize("first_stands", [True, False])
+@pytest.mark.parametrize("ahead", KNOWN)
+@pytest.mark.parametrize("radius", KNOWN)
+def test_of_two_soles_the_entries_are_those_of_the_one_that_stands(ahead, radius, first_stands):
+    known = {"along": (True, True), "ahead": ahead, "radius": radius}
+    one, other = sole(0, known), sole(1, known)
+    found = either(jnp.asarray(first_stands), one, other)
+    stands = one if first_stands else other
+    assert (found.leg, found.body) == (1, 3)
+    for here, there in zip(
+        (found.centre.along, found.centre.ahead, found.radius),
+        (stands.centre.along, stands.centre.ahead, stands.radius),
+        strict=True,
+    ):
+        assert float(0.0 if here is None else here) == float(0.0 if there is None else there)
+
+
+class Wheel(NamedTuple):
+    """A wheel's orientation by Euler parameters and their rates."""
+
+    cos_half_wheel: float
+    sin_half_wheel: float
+    cos_rate_wheel: float
+    sin_rate_wheel: float
+
+
+def wheel(angle, rate):
+    """cos θ/2 and sin θ/2, and how they change."""
+    cosine, sine = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    return Wheel(cosine, sine, -0.5 * rate * sine, 0.5 * rate * cosine)
+
+
+@pytest.mark.parametrize("times", [0, 1, 3, -2])
+def test_a_wheel_that_is_turned_has_the_euler_parameters_of_the_larger_angle(times):
+    ends = [(0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)]
+    mechanism = Mechanism(
+        bodies=(Body("wheel", mass=1.0, inertia=0.5, centre=0.0),),
+        feet=[Foot("wheel", centre=end, leg=f"spoke_{k}") for k, end in enumerate(ends)],
+        turn={"wheel": 4},
+    )
+    state = Wheel(*map(jnp.asarray, wheel(0.3, -1.7)))
+    found = _turned(mechanism.structure, state, times)
+    expected = wheel(0.3 + times * 0.5 * np.pi, -1.7)._asdict()
+    assert {name: float(value) for name, value in found.items()} == pytest.approx(expected)

@@ -13,6 +13,7 @@ from jaxbiped.gait._gait_summary import summary_of
 from jaxbiped.gait._orbit_derivatives import Orbit
 from jaxbiped.gait._return_map_spec import return_map_spec
 from jaxbiped.gait._search_provenance import single_stage_origin, warn_of_unknown
+from jaxbiped.gait._stability import eigenvalue_errors
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._solve_to_section import Nodes
@@ -130,3 +131,18 @@ def test_of_several_gaits_what_was_not_found_is_unknown_in_every_entry(summary):
                 np.testing.assert_array_equal(values[0], own)
                 np.testing.assert_array_equal(values[2], own)
                 assert np.isnan(values[1]).all()
+
+
+@pytest.mark.parametrize("gap", [1e-9, 1e-6, 1e-3, 1.0])
+def test_eigenvalues_part_as_the_root_of_a_change_where_they_are_near(gap):
+    """A bar m of an eigenvalue a gap away from its neighbour solves m (1 + m/gap) = what it would
+    be of one far away: a change that is small beside the gap counts whole, another by its root."""
+    change = 1e-5 * np.eye(2)
+
+    def bars(values):
+        found = np.array(values), np.eye(2), np.eye(2)
+        return np.asarray(eigenvalue_errors(found, change, np.array(values)))
+
+    (alone, _) = bars([0.5, -1e6])
+    for bar in bars([0.5, 0.5 + gap]):
+        assert bar * (1.0 + bar / gap) == pytest.approx(alone, rel=1e-9)

@@ -6,7 +6,6 @@ import pytest
 import scipy.linalg
 
 from jaxbiped.gait import Bifurcation, stability_of
-from jaxbiped.gait._stability import eigenvalue_errors
 
 ROTATION = [[0.6, -0.8], [0.8, 0.6]]
 
@@ -63,18 +62,3 @@ def test_an_error_that_vanishes_by_chance_has_its_terms():
     np.testing.assert_allclose(errors(np.diag([0.5, 0.2]), np.diag([1e-6, 0.0])), [1e-6, 0.0])
     near = errors(np.array([[0.5, 1.0], [0.0, 0.5 + 1e-9]]), np.array([[0.0, 0.0], [1e-8, 0.0]]))
     assert np.all((near >= 0.99e-4) & (near < 1e-3))
-
-
-@pytest.mark.parametrize("gap", [1e-9, 1e-6, 1e-3, 1.0])
-def test_eigenvalues_part_as_the_root_of_a_change_where_they_are_near(gap):
-    """A bar m of an eigenvalue a gap away from its neighbour solves m (1 + m/gap) = what it would
-    be of one far away: a change that is small beside the gap counts whole, another by its root."""
-    change = 1e-5 * np.eye(2)
-
-    def bars(values):
-        found = np.array(values), np.eye(2), np.eye(2)
-        return np.asarray(eigenvalue_errors(found, change, np.array(values)))
-
-    (alone, _) = bars([0.5, -1e6])
-    for bar in bars([0.5, 0.5 + gap]):
-        assert bar * (1.0 + bar / gap) == pytest.approx(alone, rel=1e-9)

@@ -11,7 +11,6 @@ from jaxbiped import parameter_values
 from jaxbiped.dynamics._state import recurring_names
 from jaxbiped.gait import _walk_waves
 from jaxbiped.gait._homotopy import homotopy_to, line_from_model
-from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.gait._walk_waves import Walks
 from tests.mechanisms import FEET, LEGS, PAIR, TORSO, scene_of
 
@@ -72,19 +71,6 @@ def test_waves_that_get_farther_go_on():
         )
 
     assert len(list(waves_of(walk))) == _walk_waves._MOST
-
-
-def test_starts_are_scattered_as_widely_as_each_spread(monkeypatch):
-    """About the first one; their numbers are even between both ends, by which they are divided."""
-    asked = []
-    monkeypatch.setattr(_walk_waves, "_walks_from_rows", lambda *given: asked.append(given[2]))
-    scene = jb.ladder()["rigid"]
-    next(_walk_waves.walks_of(scene, list))
-    widths = [np.abs(half - half[0]).mean(axis=0) for half in np.split(asked[0], 2)]
-    moved = [name.startswith("theta") for name in recurring_names(default_guess(scene))]
-    shares = (widths[1] / widths[0])[moved]
-    narrow, wide = _walk_waves._SPREADS
-    assert shares == pytest.approx(wide / narrow, rel=0.2)
 
 
 def test_waves_end_where_walks_take_too_many_steps():

@@ -6,20 +6,14 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.optimise import _jacobian_functionals
-from jaxbiped.optimise._cycle_functionals import Functionals
 from jaxbiped.optimise._jacobian_functionals import (
-    _BY_STEP,
-    CLEARANCE_NORMS,
     CLUSTER,
-    JACOBIAN_FUNCTIONALS,
     _eigen,
     _in_pairs,
     entry_weights,
-    jacobian_functionals,
     leading_multipliers,
 )
-from tests.optimise.drawn_designs import SCENE, difference
+from tests.optimise.drawn_designs import difference
 
 LENGTH = np.array([0.4, 0.9])
 SIZES = np.array([1.0, 2.0, 2.0, 5.0, 5.0])
@@ -138,29 +132,3 @@ def test_a_push_counts_relative_to_step_length_and_period():
         slope = difference(lambda h, along=along: float(norms(rows, LENGTH + h * along)[0][0]))
         assert float(weighted[3][k]) == pytest.approx(slope, rel=1e-6)
     np.testing.assert_array_equal(clearance[3], [0.0, 0.0])
-
-
-def test_functionals_of_several_systems_come_in_the_order_asked_for(monkeypatch):
-    """A push, a step in the ground and the height of the swinging foot are systems of their own."""
-    plain = [name for name in JACOBIAN_FUNCTIONALS if name not in (*_BY_STEP, *CLEARANCE_NORMS)]
-    others = [name for name in JACOBIAN_FUNCTIONALS if name in (*_BY_STEP, *CLEARANCE_NORMS)]
-    names = [*others[:2], plain[0], *others[2:], plain[1]]
-    asked = []
-
-    def solved(spec, scene, begun, group, precision):
-        asked.append(group)
-        own = jnp.asarray([float(names.index(name)) for name in group])
-        rows = own[:, None] * jnp.asarray([1.0, 10.0])
-        return Functionals(own, -own, rows, -rows, jnp.asarray(3 if plain[0] in group else 0))
-
-    monkeypatch.setattr(_jacobian_functionals, "_functionals", solved)
-    monkeypatch.setattr(_jacobian_functionals, "cycle_spec", lambda *_: None)
-    found = jacobian_functionals(SCENE, SCENE.state(), tuple(names))
-    assert len(asked) > 2
-    assert sum(map(len, asked)) == len(names)
-    order = np.arange(float(len(names)))
-    np.testing.assert_array_equal(found.values, order)
-    np.testing.assert_array_equal(found.errors, -order)
-    np.testing.assert_array_equal(found.slopes, order[:, None] * [1.0, 10.0])
-    np.testing.assert_array_equal(found.slope_errors, -found.slopes)
-    assert int(found.code) == 3

@@ -15,7 +15,6 @@ from matplotlib.collections import EllipseCollection
 from PIL import Image
 
 import jaxbiped as jb
-from jaxbiped.plot._notebook import _gait_figure, _with_error
 from tests.drawn import assert_is_drawn
 
 RIGID = jb.ladder()["rigid"]
@@ -57,13 +56,6 @@ def test_a_gait_shows_its_measures_with_their_errors_and_its_multipliers(gait):
     (picture,) = shown.pictures
     assert len(picture.getcolors(100_000)) > 20  # something is drawn
     assert picture.size == (640, 336)  # both charts, of 8 by 4.2 inches at 80 dots per inch
-
-
-def test_the_orbit_stands_left_of_the_multipliers(gait):
-    left, right = (ax.get_position() for ax in _gait_figure(gait).axes[:2])
-    assert left.x1 < right.x0
-    assert left.y0 < right.y1
-    assert right.y0 < left.y1
 
 
 def test_what_is_not_found_and_what_is_many_have_no_picture(gait):
@@ -129,20 +121,3 @@ def test_plot_is_imported_when_a_notebook_asks():
         "assert 'jaxbiped.plot' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "cells"),
-    [
-        (0.123456789, 3e-5, ("0.123457", "3e-05")),
-        (12.3456, 0.02, ("12.346", "0.02")),
-        (12.3456, 2.0, ("12.3", "2")),
-        (1234.56, 20.0, ("1235", "2e+01")),
-        (123456.7, 300.0, ("123457", "3e+02")),
-        (0.5, np.inf, ("0.5", "")),
-        (0.25, 0.0, ("0.25", "0")),
-    ],
-)
-def test_a_value_has_a_digit_more_than_its_error(value, error, cells):
-    """And no digit behind the point where the error is of tens."""
-    assert _with_error(value, error) == cells

@@ -9,10 +9,12 @@ from matplotlib.collections import LineCollection
 import jaxbiped as jb
 from jaxbiped import plot
 from jaxbiped.measure._samples import evaluate_along
+from jaxbiped.plot._notebook import _gait_figure, _with_error
 from jaxbiped.plot._skeleton import body_motion, poses, skeleton_of
 from jaxbiped.plot.style import LEG_COLOURS
 from tests.drawn import assert_is_drawn, legend_of
 from tests.mechanisms import WALKERS, scene_of, start_of
+from tests.plot.test_gait_charts import _gait as made_gait
 
 
 class Walks(dict):
@@ -205,3 +207,27 @@ def test_the_orbit_of_a_gait_has_its_own_walker_s_bodies(scene, bodies):
         name = name.removeprefix("leg ")
         begin = [getattr(state, f"{word}_{name}") for word in ("theta", "omega")]
         np.testing.assert_allclose(curve[0], begin, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "cells"),
+    [
+        (0.123456789, 3e-5, ("0.123457", "3e-05")),
+        (12.3456, 0.02, ("12.346", "0.02")),
+        (12.3456, 2.0, ("12.3", "2")),
+        (1234.56, 20.0, ("1235", "2e+01")),
+        (123456.7, 300.0, ("123457", "3e+02")),
+        (0.5, np.inf, ("0.5", "")),
+        (0.25, 0.0, ("0.25", "0")),
+    ],
+)
+def test_a_value_has_a_digit_more_than_its_error(value, error, cells):
+    """And no digit behind the point where the error is of tens."""
+    assert _with_error(value, error) == cells
+
+
+def test_the_orbit_stands_left_of_the_multipliers():
+    left, right = (ax.get_position() for ax in _gait_figure(made_gait()).axes[:2])
+    assert left.x1 < right.x0
+    assert left.y0 < right.y1
+    assert right.y0 < left.y1

@@ -6,9 +6,11 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped import Ending, Simulation, Trajectory
-from jaxbiped.simulate import _backends
 from jaxbiped.simulate._accurate_walk import Witness, judge_walk
 from jaxbiped.simulate._backends import _saveat, lane_request
+from jaxbiped.simulate._rigid_simulation import RigidSimulation
+from jaxbiped.simulate._start import Options
+from tests.rigid_walkers import STABLE, rigid_seed, simplest_state
 
 SCENE, STATE = jb.seed_scene(), jb.seed_state()
 TIME = np.sqrt(0.4 / 9.8)
@@ -72,17 +74,29 @@ def test_xla_saves_what_the_user_asked_for():
     assert (every_step.subs.t0, every_step.subs.steps, every_step.dense) == (True, 1, True)
 
 
-@pytest.mark.parametrize("solver", ["rodas4", "rodas4p", "rodas5p"])
-def test_xla_weighs_steps_across_a_switch_as_lanes_do(solver, monkeypatch):
-    told = {}
+def longest_of(**numbers):
+    """How long a rigid walk of three footsteps may take, relative to the seed's walker."""
+    plain = rigid_seed()
+    scenes = plain, jb.with_parameters(plain, numbers)
+    walks = [
+        RigidSimulation.of(scene, simplest_state(*STABLE), Options(footsteps=3)).walk
+        for scene in scenes
+    ]
+    return float(walks[1].duration / walks[0].duration)
 
-    def control(*_, **how):
-        told.update(how)
-        raise KeyboardInterrupt
 
-    run = Simulation.prepare(SCENE, STATE, duration=0.1, solver=solver, engine="xla")
-    monkeypatch.setattr(_backends, "walk_control", control)
-    with pytest.raises(KeyboardInterrupt):
-        _backends.by_xla(run)
-    lanes = Simulation.prepare(SCENE, STATE, duration=0.1, solver=solver, engine="lanes")
-    assert told["switch_weight"] == _backends._stepper(lanes).switch_weight
+def test_footsteps_of_rigid_feet_are_waited_for_in_units_of_the_pendulums_time():
+    """Times go with √(l/g): four times the lengths double them, four times g halves them."""
+    lengths = {name: 4.0 * value for name, value in dict(l=0.4, d=0.1, r=0.08).items()}
+    assert longest_of(**lengths) == pytest.approx(2.0)
+    assert longest_of(g=4.0 * 9.8) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("solver", ["dopri8", "tsit5", "dopri5", "bosh3"])
+def test_the_witness_of_a_rigid_walk_is_another_method(solver):
+    """Which estimates the error that the walk's own method makes."""
+    how = {} if solver == "dopri8" else {"solver": solver}
+    run = RigidSimulation.of(rigid_seed(), simplest_state(*STABLE), Options(footsteps=3, **how))
+    other, share, weight = run.by_other_method()
+    assert other.method != run.method
+    assert min(share, weight) > 0.0

@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.simulate._rigid_simulation import RigidSimulation
-from jaxbiped.simulate._start import Options
-from tests.rigid_walkers import STABLE, rigid_seed, simplest_state
 
 SEED = jb.seed_scene()
 WIDTHS = {
@@ -99,31 +96,3 @@ def test_allowed(scene, start):
 
 def test_what_is_traced_passes():
     jax.eval_shape(lambda z: begun(SEED, _start()._replace(hip_z=z)), 0.2)
-
-
-def longest_of(**numbers):
-    """How long a rigid walk of three footsteps may take, relative to the seed's walker."""
-    plain = rigid_seed()
-    scenes = plain, jb.with_parameters(plain, numbers)
-    walks = [
-        RigidSimulation.of(scene, simplest_state(*STABLE), Options(footsteps=3)).walk
-        for scene in scenes
-    ]
-    return float(walks[1].duration / walks[0].duration)
-
-
-def test_footsteps_of_rigid_feet_are_waited_for_in_units_of_the_pendulums_time():
-    """Times go with √(l/g): four times the lengths double them, four times g halves them."""
-    lengths = {name: 4.0 * value for name, value in dict(l=0.4, d=0.1, r=0.08).items()}
-    assert longest_of(**lengths) == pytest.approx(2.0)
-    assert longest_of(g=4.0 * 9.8) == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("solver", ["dopri8", "tsit5", "dopri5", "bosh3"])
-def test_the_witness_of_a_rigid_walk_is_another_method(solver):
-    """Which estimates the error that the walk's own method makes."""
-    how = {} if solver == "dopri8" else {"solver": solver}
-    run = RigidSimulation.of(rigid_seed(), simplest_state(*STABLE), Options(footsteps=3, **how))
-    other, share, weight = run.by_other_method()
-    assert other.method != run.method
-    assert min(share, weight) > 0.0

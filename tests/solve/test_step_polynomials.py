@@ -8,6 +8,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from jaxbiped.hybrid._scales import Units
+from jaxbiped.solve._recorders import arrival_time
 from jaxbiped.solve._runge_kutta import dense_rows, stepper_of, weights_of
 from jaxbiped.solve._solvers import SOLVERS, with_root_tolerances
 from jaxbiped.solve._step_polynomials import Quintic, StepCubic
@@ -186,3 +187,21 @@ def test_a_stage_that_is_not_found_makes_the_error_infinite():
 )
 def test_other_solvers_have_no_stepper(solver):
     assert stepper_of(solver) is None
+
+
+@pytest.mark.parametrize(
+    ("curve", "end"), [(lambda x: x * x - 0.25, 2.0), (lambda x: 0.25 - (2.0 - x) ** 2, 0.0)]
+)
+def test_an_end_that_stays_twice_counts_half(curve, end):
+    """The Illinois method over [0, 2]: Dowell and Jarratt, "A modified regula falsi method", BIT 11
+    (1971) 168. On the side of this end no chord meets zero."""
+    asked = []
+    with jax.disable_jit():
+        arrival_time(
+            lambda x: asked.append(float(x)) or curve(x), jnp.asarray(0.0), jnp.asarray(2.0)
+        )
+    near = 2.0 - end
+    for share, found in zip((1.0, 1.0, 0.5, 0.25), asked[2:], strict=False):
+        there = share * curve(end)
+        near = near - curve(near) * (end - near) / (there - curve(near))
+        assert found == pytest.approx(near, rel=1e-14)
