@@ -4,7 +4,7 @@ import pytest
 
 from tests.scene_trip import above, imports, trip_through
 
-MOST = {"simulate": (21, 2), "find_gait": (24, 6), "labelling": (28, 7)}
+MOST = {"simulate": (20, 3), "find_gait": (24, 6), "labelling": (28, 7)}
 """Files entered, and climbs back to a file above."""
 
 

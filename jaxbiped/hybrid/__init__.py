@@ -6,6 +6,7 @@ from jaxbiped.hybrid._guards import Guard as Guard
 from jaxbiped.hybrid._guards import Switch as Switch
 from jaxbiped.hybrid._hybrid_system import At as At
 from jaxbiped.hybrid._hybrid_system import HybridSystem as HybridSystem
+from jaxbiped.hybrid._linkage_system import Swinging as Swinging
 from jaxbiped.hybrid._rolling_system import Rolling as Rolling
 from jaxbiped.hybrid._sections import AbstractSection as AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem as AbstractSystem

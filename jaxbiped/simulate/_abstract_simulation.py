@@ -13,7 +13,14 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array, ArrayLike, PyTree
 
-from jaxbiped._checks import check_choice, check_room, check_unbatched, traced_rules, warn
+from jaxbiped._checks import (
+    check_choice,
+    check_room,
+    check_type,
+    check_unbatched,
+    traced_rules,
+    warn,
+)
 from jaxbiped._types import Scalar, as_array, is_traced
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
@@ -77,6 +84,8 @@ class AbstractSimulation(eqx.Module):
     def of(cls, scene: Any, state: PyTree, asked: Options) -> Self:
         """Checks what is asked, and forms it."""
         given, dt, footsteps, times = state, asked.dt, asked.footsteps, asked.times
+        check_type("scene", scene, *cls.kinds)
+        asked.refuse(scene, *system_of(scene).refuses)
         method = cls.method_of(asked)
         check_limits(asked.duration, footsteps, asked.max_solver_steps)
         for name, value in (("rtol", asked.rtol), ("atol", asked.atol)):
@@ -84,7 +93,6 @@ class AbstractSimulation(eqx.Module):
         with traced_rules() as rules:
             scene = check_scene(scene, *cls.kinds)
             system, section = system_of(scene), asked.section
-            asked.refuse(scene, *system.refuses)
             if section is not None:
                 system.check_section(scene, section)
             if not scene.redundant:

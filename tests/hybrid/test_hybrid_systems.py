@@ -58,8 +58,8 @@ def test_steps_of_one_size_land_on_guards(solver):
     np.testing.assert_allclose(walk.arrivals.t[:5], times, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(walk.arrivals.state.speed[:5], speeds, rtol=0.0, atol=1e-8)
     assert int(walk.missed_contacts) == 0
-    steps = np.asarray(moved(BALL, start, 1.2, save="steps", **how).t)
-    grid = dt * np.arange(121)
+    steps = np.asarray(moved(BALL, start, 0.25, save="steps", **how).t)
+    grid = dt * np.arange(26)
     np.testing.assert_allclose(steps[np.argmin(np.abs(steps - grid[:, None]), axis=1)], grid)
     assert np.max(np.diff(steps)) < dt * (1.0 + 1e-12)
 
