@@ -79,8 +79,7 @@ def longest_of(**numbers):
     plain = rigid_seed()
     scenes = plain, jb.with_parameters(plain, numbers)
     walks = [
-        RigidSimulation.of(scene, simplest_state(*STABLE), Options(footsteps=3)).walk
-        for scene in scenes
+        RigidSimulation.of(scene, simplest_state(*STABLE), Options(footsteps=3)) for scene in scenes
     ]
     return float(walks[1].duration / walks[0].duration)
 
