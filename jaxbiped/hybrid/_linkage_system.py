@@ -90,9 +90,12 @@ class Swinging(AbstractSystem):
         return LinkageState(*map(tuple, correct_step(args.linkage, args.method, *y)))
 
 
+_SWINGING = Swinging()
+
+
 @system_of.register
 def _(scene: LinkageScene) -> AbstractSystem:
-    return Swinging()
+    return _SWINGING
 
 
 def _check_joints(scene: LinkageScene, state: LinkageState, off: Scalar) -> None:

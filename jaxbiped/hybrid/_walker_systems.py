@@ -159,16 +159,20 @@ class RedundantWalking(AbstractWalking):
         return args.method.projects
 
 
+# The same each time: to form one costs more than what a warm call asks of it.
+_WALKING, _REDUNDANT_WALKING, _ROLLING = Walking(), RedundantWalking(), Rolling()
+
+
 @system_of.register
 def _(scene: Scene) -> AbstractSystem:
-    return Walking()
+    return _WALKING
 
 
 @system_of.register
 def _(scene: RedundantScene) -> AbstractSystem:
-    return RedundantWalking()
+    return _REDUNDANT_WALKING
 
 
 @system_of.register
 def _(scene: RigidScene) -> AbstractSystem:
-    return Rolling()
+    return _ROLLING
