@@ -34,8 +34,8 @@ CODE = {
     "string": ("gait/_find_gait.py", '"newton"', '"newtons"'),
     "registered for a class": (
         "hybrid/_walker_systems.py",
-        "return RedundantWalking()",
-        "return Walking()",
+        "return _REDUNDANT_WALKING",
+        "return _WALKING",
     ),
     "compiler": ("compiler/ir/_liveness.py", "value.op in", "value.op not in"),
     "how programs are kept": ("caching/_cached_jit.py", '_KIND = "xla"', '_KIND = "lax"'),
