@@ -21,16 +21,12 @@ from jaxbiped.constraints._linkage import constraints_of
 from jaxbiped.dynamics._constrained_motion import linkage_field
 from jaxbiped.hybrid._endings import ending_events
 from jaxbiped.hybrid._guards import Switch
-from jaxbiped.hybrid._hybrid_system import HybridSystem
 from jaxbiped.hybrid._implicit_field import ImplicitField, with_unit_mass
 from jaxbiped.hybrid._sections import AbstractSection, Section
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._linkage_scene import LinkageScene, LinkageState
-from jaxbiped.scene._scene import RedundantScene, Scene
 
-ADAPTIVE_SCENES = (Scene, RedundantScene, LinkageScene, HybridSystem)
-"""Kinds of scenes whose motions any solver takes, in steps as long as their errors allow."""
 _FAR = 0.5
 """Distance of a start from its joints, in units of the longest arm, beyond which it is refused."""
 

@@ -180,6 +180,10 @@ class Rolling(AbstractLandingSystem, AbstractWalkerSystem):
         return of_stance(args, y, load)
 
 
+ROLLING = Rolling()
+"""It has no parts: one serves all."""
+
+
 def _falls(value: Scalar, live: Scalar) -> Switch:
     return Switch(value, live, resets=True, first_only=True)
 

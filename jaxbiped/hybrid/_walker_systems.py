@@ -23,7 +23,7 @@ from jaxbiped.hybrid._endings import ending_events, ending_surface
 from jaxbiped.hybrid._footsteps import places_of_landings, stands_too_deep
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.hybrid._implicit_field import ImplicitField, with_unit_mass
-from jaxbiped.hybrid._rolling_system import Rolling
+from jaxbiped.hybrid._rolling_system import ROLLING
 from jaxbiped.hybrid._scales import check_precision, sizes_of
 from jaxbiped.hybrid._sections import AbstractSection, check_section_body
 from jaxbiped.hybrid._start_placement import standing_like
@@ -160,7 +160,7 @@ class RedundantWalking(AbstractWalking):
 
 
 # The same each time: to form one costs more than what a warm call asks of it.
-_WALKING, _REDUNDANT_WALKING, _ROLLING = Walking(), RedundantWalking(), Rolling()
+_WALKING, _REDUNDANT_WALKING = Walking(), RedundantWalking()
 
 
 @system_of.register
@@ -175,4 +175,4 @@ def _(scene: RedundantScene) -> AbstractSystem:
 
 @system_of.register
 def _(scene: RigidScene) -> AbstractSystem:
-    return _ROLLING
+    return ROLLING

@@ -85,14 +85,14 @@ class AbstractSimulation(eqx.Module):
         """Checks what is asked, and forms it."""
         given, dt, footsteps, times = state, asked.dt, asked.footsteps, asked.times
         check_type("scene", scene, *cls.kinds)
-        asked.refuse(scene, *system_of(scene).refuses)
+        system, section = system_of(scene), asked.section
+        asked.refuse(scene, *system.refuses)
         method = cls.method_of(asked)
         check_limits(asked.duration, footsteps, asked.max_solver_steps)
         for name, value in (("rtol", asked.rtol), ("atol", asked.atol)):
             check_unbatched(name, value)
         with traced_rules() as rules:
             scene = check_scene(scene, *cls.kinds)
-            system, section = system_of(scene), asked.section
             if section is not None:
                 system.check_section(scene, section)
             if not scene.redundant:

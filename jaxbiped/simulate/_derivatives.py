@@ -26,7 +26,7 @@ from jaxbiped.compiler import CUDA, host_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._stance_motion import rolling_field
 from jaxbiped.dynamics._surfaces import opening, uprightness
-from jaxbiped.hybrid._rolling_system import Rolling
+from jaxbiped.hybrid._rolling_system import ROLLING
 from jaxbiped.hybrid._scales import units_of
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
@@ -237,7 +237,7 @@ def rigid_slopes_of(
     """
     scene, state = in_64_bits((walk.scene, walk.state))
     start, seeded = seeded_directions(scene, state, places, active)
-    watch = Watch.of(Rolling(), resets=hasattr(state, "mode"))
+    watch = Watch.of(ROLLING, resets=hasattr(state, "mode"))
     how = motion_solve(watch, Rodas5P(), walk.rtol)
     unit = jnp.sqrt(scene.mechanism.height / scene.ground.g)
     n = len(places) + len(active)

@@ -15,7 +15,7 @@ from jaxbiped._types import as_float, by_numpy, is_traced
 from jaxbiped.compiler import BY_NAME, Request
 from jaxbiped.hybrid._landing_system import LandingMotion
 from jaxbiped.hybrid._mode_history import history_of
-from jaxbiped.hybrid._rolling_system import Rolling
+from jaxbiped.hybrid._rolling_system import ROLLING
 from jaxbiped.hybrid._sections import HeelStrike
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene
@@ -37,7 +37,6 @@ from jaxbiped.solve._recorders import (
 from jaxbiped.solve._solved import Solved
 from jaxbiped.solve._step_records import landing_record
 
-ROLLING = Rolling()
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""
 _ROWS = 64

@@ -69,7 +69,7 @@ def simulate(
 
     Args:
         scene: the scene; a `RedundantScene` for coordinates of each body. For a `RigidScene`,
-            `atol` and `adjoint` do not apply; for a `LinkageScene`, `footsteps` and `watch`.
+            `atol` and `adjoint` do not apply; for a `LinkageScene`, `footsteps` does not.
         state: start, a `State`; if friction has bristles, also a `BristleState` (in a `State`, they
             are zero). The precision of the solve is that of the most precise leaf, by default 64
             bits. A redundant scene also accepts a redundant state, which is first moved onto its
@@ -136,7 +136,7 @@ def simulate(
         check_type("adjoint", adjoint, diffrax.AbstractAdjoint)
     usual = "steps" if is_stiff(scene) else "end"
     asked = Options(
-        duration=last_time(save) if duration is None and footsteps is None else duration,
+        duration=duration,
         footsteps=footsteps,
         solver=solver,
         accuracy=accuracy,
@@ -151,6 +151,8 @@ def simulate(
         adjoint=adjoint,
         engine=engine,
     )
+    if duration is None and footsteps is None:
+        asked = asked._replace(duration=last_time(asked))
     wanted = check_accurate_walk(accuracy, rtol=rtol, atol=atol, dt=dt)
     if wanted is not None:
         asked = asked._replace(accuracy="balanced")

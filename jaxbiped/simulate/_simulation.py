@@ -14,10 +14,11 @@ from jaxtyping import ArrayLike, PyTree
 
 from jaxbiped._types import Numbers
 from jaxbiped.compiler import BY_NAME, Request
-from jaxbiped.hybrid._linkage_system import ADAPTIVE_SCENES
+from jaxbiped.hybrid._hybrid_system import HybridSystem
 from jaxbiped.hybrid._scales import Units, resolve_slip_speed, si_units, units_of
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._linkage_scene import LinkageScene
+from jaxbiped.scene._scene import AbstractScene, RedundantScene, Scene
 from jaxbiped.simulate._abstract_simulation import AbstractSimulation
 from jaxbiped.simulate._backends import (
     by_lanes,
@@ -56,7 +57,7 @@ class Simulation(AbstractSimulation):
         replaceable: whether XLA may replace the lanes engine.
     """
 
-    kinds: ClassVar[tuple[type, ...]] = ADAPTIVE_SCENES
+    kinds: ClassVar[tuple[type, ...]] = (Scene, RedundantScene, LinkageScene, HybridSystem)
     finest_tolerance: ClassVar[float] = 1e-12
     units: Units
     solver: diffrax.AbstractSolver[PyTree]

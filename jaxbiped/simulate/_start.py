@@ -136,12 +136,7 @@ def check_times(times: ArrayLike, duration: Scalar | float) -> None:
     """Raises `ArgumentError` unless they increase and lie within the duration [s]."""
     if isinstance(times, jax.core.Tracer) or isinstance(duration, jax.core.Tracer):
         return
-    try:
-        values = np.asarray(times, dtype=float)
-    except (TypeError, ValueError):
-        raise ArgumentError(
-            f'save = {times!r} is not allowed: give "steps", "end", a section or increasing times.'
-        ) from None
+    values = _numbers(times)
     allowed = values.ndim == 1 and np.all(np.diff(values) >= 0.0)
     if not allowed or not np.all((values >= 0.0) & (values <= float(duration))):
         raise ArgumentError(
@@ -149,8 +144,24 @@ def check_times(times: ArrayLike, duration: Scalar | float) -> None:
         )
 
 
-def last_time(save: Any) -> Any:
-    """The last of the times to save at; None where none are given."""
-    if isinstance(save, str | AbstractSection) or save is None or np.ndim(save) != 1:
+def last_time(asked: Options) -> Any:
+    """The last of the times to save at; None where none are given.
+
+    Raises:
+        ArgumentError: they are no numbers.
+    """
+    times = asked.times
+    if times is None:
         return None
-    return save[-1] if len(save) else None
+    values = times if isinstance(times, jax.core.Tracer) else _numbers(times)
+    return values[-1] if values.ndim == 1 and len(values) else None
+
+
+def _numbers(times: ArrayLike) -> np.ndarray:
+    """The times to save at as NumPy's numbers; raises `ArgumentError` for what has none."""
+    try:
+        return np.asarray(times, dtype=float)
+    except (TypeError, ValueError):
+        raise ArgumentError(
+            f'save = {times!r} is not allowed: give "steps", "end", a section or increasing times.'
+        ) from None

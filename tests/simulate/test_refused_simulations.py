@@ -157,6 +157,8 @@ NOSE = jb.MidStance(body="nose")
         (SEVERAL, START, dict(save=[1.0], footsteps=3), "footsteps = 3 is not allowed for a Link"),
         (SEVERAL, START, dict(), "duration = None and footsteps = None: give one of them"),
         (SEVERAL, START, dict(save=jb.MidStance(), duration=1.0), "give a Section"),
+        (SCENE, STATE, dict(save=[[0.1], [0.2, 0.3]]), "save = [[0.1], [0.2, 0.3]] is not allowed"),
+        (SCENE, STATE, dict(save=["soon", "late"]), "save = ['soon', 'late'] is not allowed"),
     ],
 )
 def test_options_of_other_kinds_of_scene_are_refused(scene, state, how, said):
