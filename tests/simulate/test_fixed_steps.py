@@ -116,6 +116,13 @@ def test_a_few_short_steps_are_not_where_few_are_allowed(most, recwarn):
     assert not [each for each in recwarn if each.category is RuntimeWarning]
 
 
+@pytest.mark.parametrize("steps", [5, 20, 49, 100])
+def test_there_are_as_many_as_divide_the_duration(steps):
+    """Here the first one's end is rounded otherwise than a fifth of five steps."""
+    walk = jb.simulate(SEED, STATE, duration=float(f"{steps}e-6"), dt=1e-6, **END)
+    assert int(walk.accepted) == steps
+
+
 def test_one_step_that_is_too_long_is_told_where_24_are_allowed():
     """Longer steps end with the walk, as this one does: only shorter ones lead elsewhere."""
     with pytest.warns(RuntimeWarning, match="dt = 0.1 is too long"):

@@ -29,6 +29,8 @@ _FIRST_STEP = 1e-5
 """First step tried, in units of time; a start that is not a number must not choose it."""
 _CLIPPED_ULPS = 100
 """A step that would end this near the end, in units in the last place, ends there."""
+_ALMOST_WHOLE = 1e-6
+"""A step that ends this part of its size too soon was not cut short, but rounded."""
 
 
 class StepControl(Protocol):
@@ -128,7 +130,7 @@ class EqualSteps(eqx.Module):
     def adapt_step_size(self, *step: Any) -> Adapted:
         attempt = Attempt(*step)
         keep = jtu.tree_leaves(attempt.error)[0] < jnp.inf
-        is_whole = attempt.t1 >= self._end_of(attempt.memory)
+        is_whole = attempt.t1 >= self._end_of(attempt.memory - _ALMOST_WHOLE)
         steps = attempt.memory + jnp.where(is_whole, 1.0, 0.0)
         until = self._end_of(steps)
         jump, success = jnp.asarray(False), diffrax.RESULTS.successful
