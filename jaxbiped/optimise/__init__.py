@@ -5,6 +5,10 @@ from jaxbiped.optimise._bifurcation_distance import Sought as Sought
 from jaxbiped.optimise._bifurcation_distance import bifurcation_distance as bifurcation_distance
 from jaxbiped.optimise._certificate import Certificate as Certificate
 from jaxbiped.optimise._certificate import certify as certify
+from jaxbiped.optimise._integrals import Along as Along
+from jaxbiped.optimise._integrals import Extreme as Extreme
+from jaxbiped.optimise._integrals import Integral as Integral
+from jaxbiped.optimise._named_costs import NAMED_COSTS as NAMED_COSTS
 from jaxbiped.optimise._objective_values import Evaluation as Evaluation
 from jaxbiped.optimise._objectives import OBJECTIVES as OBJECTIVES
 from jaxbiped.optimise._objectives import Objective as Objective

@@ -176,7 +176,7 @@ def orbits_near(spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precis
         by_state = linearised_return(
             spec, seeds, y, precision, jnp.asarray(False), carries_parameters=jnp.asarray(False)
         )
-        own = point + jnp.where(by_state.code == 0, _newton_step(by_state, point), 0.0)
+        own = point + jnp.where(by_state.code == 0, newton_step(by_state, point), 0.0)
         start = state_with(spec.system, y, own)
         found = linearised_return(spec, seeds, start, precision, jnp.asarray(False))
         # As where the swing foot is lowest behind the section, and another arrival is the next.
@@ -208,15 +208,23 @@ def with_errors(values: Scalar, slopes: Scalar, code: Scalar) -> Functionals:
     )
 
 
-def _newton_step(once: LinearisedReturn, point: Scalar) -> Scalar:
+def newton_step(once: LinearisedReturn, point: Scalar) -> Scalar:
+    """From a point to the fixed point, by Newton's correction."""
     m = len(point)
     return solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - point)
 
 
+def totals_of_advance(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:
+    """What coordinates gain that need not return, but for the place, and total derivatives.
+
+    They are those at the fixed point that Newton's correction gives.
+    """
+    rows, correction = once.advance_rows[1:, : len(point)], newton_step(once, point)
+    return once.advance[1:] + rows @ correction, slopes_of(once).advance[1:]
+
+
 def _totals(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:
-    """Values at the fixed point that Newton's correction gives, and total derivatives."""
-    m, correction, slopes = len(point), _newton_step(once, point), slopes_of(once)
-    gained = once.advance[1:] + once.advance_rows[1:, :m] @ correction
-    depth = once.peak + once.peak_row[:m] @ correction
-    values = jnp.append(gained, -depth)
-    return values, jnp.concatenate([slopes.advance[1:], -slopes.peak[None]])
+    """The integrals, and the swing foot's clearance, which is minus the load."""
+    gained, slopes = totals_of_advance(once, point)
+    depth = once.peak + once.peak_row[: len(point)] @ newton_step(once, point)
+    return jnp.append(gained, -depth), jnp.concatenate([slopes, -slopes_of(once).peak[None]])

@@ -6,6 +6,7 @@ A gait is sought from where the last one's derivatives point; where that fails, 
 branch, it is followed there in smaller steps. Every design is evaluated once and kept.
 """
 
+import contextlib
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
@@ -26,6 +27,7 @@ from jaxbiped.optimise._design_gaits import (
     evaluate_members,
     with_worse_members,
 )
+from jaxbiped.optimise._integrals import Along, Cost
 from jaxbiped.optimise._jacobian_functionals import CLUSTER
 from jaxbiped.optimise._objective_values import (
     Evaluation,
@@ -33,12 +35,19 @@ from jaxbiped.optimise._objective_values import (
     evaluate,
     functional_names,
 )
-from jaxbiped.optimise._objectives import OBJECTIVES, check_objective
+from jaxbiped.optimise._objectives import (
+    OBJECTIVES,
+    Measures,
+    Objective,
+    check_objective,
+    measures_named,
+    objective_named,
+)
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 
-_WORDS = re.compile(r"^\s*(\w+)\s*(<=|>=|==|<|>|=)\s*([^<>=]+?)\s*$")
+_WORDS = re.compile(r"^\s*(\w+(?:\[\w+\])?)\s*(<=|>=|==|<|>|=)\s*([^<>=]+?)\s*$")
 KEPT = 1e-6
 """Part of its bound by which a requirement may be missed and still counts as kept, at least."""
 _SMALLEST = 1.0 / 32.0
@@ -46,8 +55,9 @@ _SMALLEST = 1.0 / 32.0
 _FLOOR, _ASIDE, _NEAR = 0.1, 0.5, 0.02
 """Size below which components of the state count as of one size; how far aside, in units of the
 step, and how far at least, relative to it, a gait may lie from where it was expected."""
-SubjectTo: TypeAlias = Mapping[str, tuple[float | None, float | None]] | Sequence[str] | str | None
-"""Bounds by name, or words such as "spectral_radius<0.4"."""
+Bounds: TypeAlias = tuple[float | None, float | None]
+SubjectTo: TypeAlias = Mapping[str | Cost, Bounds] | Sequence[str | Along] | str | Along | None
+"""Bounds by measure, or words such as "spectral_radius<0.4" and constraints along the cycle."""
 
 
 class Variables(NamedTuple):
@@ -141,26 +151,28 @@ class Requirement(NamedTuple):
     high: float | None
 
 
-def requirements_of(scene: Any, subject_to: SubjectTo) -> tuple[Requirement, ...]:
+class Requirements(NamedTuple):
+    """What must hold, the measures that it is about, by name, and how these were given."""
+
+    each: tuple[Requirement, ...]
+    measures: Measures
+    given: Mapping[str, str | Cost]
+
+
+def requirements_of(scene: Any, subject_to: SubjectTo) -> Requirements:
     """What must hold, the bounds of each measure gathered.
 
     Raises:
         ArgumentError: what is not understood, an objective that is unknown or that the scene
             lacks, or bounds that contradict each other.
     """
-    if subject_to is None:
-        return ()
-    check_type("subject_to", subject_to, str, Mapping, Sequence)
-    if isinstance(subject_to, Mapping):
-        pairs = [(name, _pair(name, bounds)) for name, bounds in subject_to.items()]
-    else:
-        words = [subject_to] if isinstance(subject_to, str) else subject_to
-        for text in words:
-            check_type("subject_to", text, str)
-        pairs = [_parse(text) for text in words]
-    gathered: dict[str, tuple[float | None, float | None]] = {}
-    for name, (low, high) in pairs:
-        check_objective(name, scene, "subject_to")
+    gathered: dict[str, Bounds] = {}
+    measures: dict[str, Objective] = {}
+    told: dict[str, str | Cost] = {}
+    for given, (low, high) in _pairs(subject_to):
+        name, objective = check_objective(given, scene, "subject_to")
+        told[name] = given
+        add_measure(measures, name, objective)
         least, most = gathered.get(name, (None, None))
         gathered[name] = (
             max((each for each in (least, low) if each is not None), default=None),
@@ -172,7 +184,34 @@ def requirements_of(scene: Any, subject_to: SubjectTo) -> tuple[Requirement, ...
                 f"subject_to asks that {name} be at least {least:g} and at most {most:g}: these "
                 "contradict each other."
             )
-    return tuple(Requirement(name, low, high) for name, (low, high) in gathered.items())
+    each = (Requirement(name, low, high) for name, (low, high) in gathered.items())
+    return Requirements(tuple(each), measures, told)
+
+
+def add_measure(measures: dict[str, Objective], name: str, objective: Objective) -> None:
+    """Adds a measure to others; raises `ArgumentError` where its name is that of another one."""
+    taken = measures.get(name, OBJECTIVES.get(name, objective))
+    if taken != objective:
+        raise ArgumentError(
+            f"two measures are called {name!r}, which is not allowed: give one of them a quantity "
+            "of other words."
+        )
+    measures[name] = objective
+
+
+def _pairs(subject_to: SubjectTo) -> list[tuple[str | Cost, Bounds]]:
+    """Measures with their bounds, as they are given."""
+    if subject_to is None:
+        return []
+    check_type("subject_to", subject_to, str, Mapping, Along, Sequence)
+    if isinstance(subject_to, Mapping):
+        return [(given, _pair(given, bounds)) for given, bounds in subject_to.items()]
+    several = [subject_to] if isinstance(subject_to, str | Along) else subject_to
+    pairs: list[tuple[str | Cost, Bounds]] = []
+    for each in several:
+        check_type("subject_to", each, str, Along)
+        pairs += each.requirements() if isinstance(each, Along) else [_parse(each)]
+    return pairs
 
 
 def larger_is_worse(
@@ -196,7 +235,8 @@ def larger_is_worse(
     return found
 
 
-def _pair(name: str, bounds: object) -> tuple[float | None, float | None]:
+def _pair(given: str | Cost, bounds: object) -> Bounds:
+    name = getattr(given, "name", given)
     if not isinstance(bounds, tuple | list) or len(bounds) != 2 or list(bounds) == [None, None]:
         raise ArgumentError(
             f"subject_to[{name!r}] = {bounds!r} is not allowed: give (low, high), None for none."
@@ -208,13 +248,15 @@ def _pair(name: str, bounds: object) -> tuple[float | None, float | None]:
     return low, high
 
 
-def _parse(text: str) -> tuple[str, tuple[float | None, float | None]]:
-    found = _WORDS.match(text) if isinstance(text, str) else None
+def _parse(text: str) -> tuple[str, Bounds]:
+    found = _WORDS.match(text)
+    unit = None
     try:
         if found is None:
             raise ValueError
         name, sign = found[1], found[2]
-        unit = OBJECTIVES[name].quantity.unit if name in OBJECTIVES else None
+        with contextlib.suppress(ArgumentError):
+            unit = objective_named(name).quantity.unit
         value = si_number(found[3], unit)
     except ValueError:
         raise ArgumentError(
@@ -242,6 +284,7 @@ class DesignProblem:
         sense: 1 where the sum of the measures is minimised, −1 where it is maximised.
         weights: of the measures in the sum that is minimised, by name.
         requirements: what must hold.
+        wanted: all measures that play a part, by name.
         evaluations: of all designs so far.
         ensemble: over whose members measures are taken; None for the design alone.
         latest: the last design whose gait was found; `asked` all of them, in order.
@@ -256,6 +299,7 @@ class DesignProblem:
         told: Mapping[str, float],
         sense: float,
         requirements: tuple[Requirement, ...],
+        wanted: Measures,
         settings: GaitSettings,
         evaluations: Evaluations,
         ensemble: Ensemble | None = None,
@@ -264,7 +308,7 @@ class DesignProblem:
         self.sense, self.requirements = sense, requirements
         self.weights = {name: sense * weight for name, weight in told.items()}
         self.settings, self.evaluations, self.ensemble = settings, evaluations, ensemble
-        self.wanted = tuple(dict.fromkeys((*told, *(each.name for each in requirements))))
+        self.wanted = wanted
         self.latest: Design | None = None
         self.asked: list[Design] = []
         self.lost = self.unmeasured = 0
@@ -273,7 +317,7 @@ class DesignProblem:
     def has_cluster(self) -> bool:
         """Whether functionals of multipliers are of one gait, not means over an ensemble."""
         of_one = self.ensemble is None or self.ensemble.criterion != "mean"
-        return of_one and bool(functional_names(self.scene, CLUSTER[:1])[0])
+        return of_one and bool(functional_names(self.scene, measures_named(CLUSTER[:1]))[0])
 
     def begin(self, u: np.ndarray, guess: WalkerState | None = None) -> Design:
         """The first design; its gait is found near a guess, or from nothing.
@@ -330,15 +374,20 @@ class DesignProblem:
 
     def at(self, u: np.ndarray) -> Evaluation | None:
         """What is known of a design; None without a gait on the way there, or derivatives of it."""
+        known = self.beside(u)
+        if known is None:
+            self.lost += 1
+            return None
+        return self._note(u, known).known
+
+    def beside(self, u: np.ndarray) -> Evaluation | None:
+        """The same of a design that is looked at, and none of those that are asked for."""
         known = self.evaluations.get(u)
         if known is None and not self.evaluations.is_lost(u):
             known = self._follow(np.array(u))
             if known is None:
                 self.evaluations.add(u, None)
-        if known is None or not self._has_derivatives(known):
-            self.lost += 1
-            return None
-        return self._note(u, known).known
+        return None if known is None or not self._has_derivatives(known) else known
 
     def _has_derivatives(self, known: Evaluation) -> bool:
         """Whether those that are used are finite: bounded from above, the radius's own are not."""
@@ -408,7 +457,7 @@ class DesignProblem:
         if self.ensemble is None:
             known = evaluate(scene, gait, self.wanted, self.settings.accuracy)
         else:
-            nominal = evaluate(scene, gait, (), self.settings.accuracy)
+            nominal = evaluate(scene, gait, {}, self.settings.accuracy)
             members = evaluate_ensemble(self.ensemble, scene, nominal, self.wanted, self.settings)
             if members is None:
                 return None

@@ -1,17 +1,21 @@
 """Objectives: measures of a periodic gait by name, and which scenes have them."""
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
 
-from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._state import cyclic_names
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._augmented_system import integrals_of
+from jaxbiped.optimise._cycle_costs import check_cost
+from jaxbiped.optimise._integrals import Cost, Extreme, Integral
+from jaxbiped.optimise._named_costs import NAMED_COSTS
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
@@ -71,17 +75,24 @@ def _of_swing(scene: Any) -> str | None:
 class Objective(NamedTuple):
     """A measure that can be optimised or bounded. Add one of your own to `OBJECTIVES`.
 
+    One that is an integral along the cycle, or an extreme of the motion, needs no such entry: give
+    `optimise_gait` an `Integral`, an `Extreme` or a constraint `Along` the cycle.
+
     Attributes:
         quantity: words, symbol and unit.
         lacks: function that returns why a scene does not have this objective, or None if it has.
         measured: for an objective of your own, a function of a scene and its gait that returns the
             value, its error, the derivatives with respect to the p parameters, shape (p,), and
             their errors.
+        costs: integrals and extremes with their weights, whose sum it is; none for others.
+        quotient: names of the measures whose quotient it is; none for others.
     """
 
     quantity: Quantity
     lacks: Callable[[Any], str | None] = lambda _: None
     measured: Callable[[Any, Gait], tuple[Any, Any, Any, Any]] | None = None
+    costs: tuple[tuple[float, Cost], ...] = ()
+    quotient: tuple[str, str] | None = None
 
 
 OBJECTIVES = {
@@ -135,19 +146,93 @@ OBJECTIVES = {
 """
 
 
+_PER = {"_per_length": ("step_length", "length", "m"), "_per_time": ("period", "time", "s")}
+"""What a cost by name may be divided by: the measure, its words and its unit."""
+_DIVIDED = ("slip_distance", "friction_loss", "impact_loss", "motor_work")
+"""Objectives that are integrals along the cycle."""
+_OF_PART = re.compile(r"(\w+)\[(\w+)\]")
+
+Measures: TypeAlias = Mapping[str, Objective]
+"""Objectives by the names that an optimisation tells them by."""
+
+
+def objective_named(name: str, what: str = "objective") -> Objective:
+    """An objective by its name, that of a part as `NAME[part]`, or one per length or per time.
+
+    Raises:
+        ArgumentError: an unknown name.
+    """
+    if name in _SEARCHED:
+        raise ArgumentError(f"{what} = {name!r} is not allowed: {_SEARCHED[name]}.")
+    if name in OBJECTIVES:
+        return OBJECTIVES[name]
+    for suffix, (divisor, words, unit) in _PER.items():
+        base = name.removesuffix(suffix)
+        if base != name and (base in _DIVIDED or _part_of(base)[0] in NAMED_COSTS):
+            known = objective_named(base, what)
+            per = Quantity(
+                f"{known.quantity.words} per {words}", "", f"({known.quantity.unit})/{unit}"
+            )
+            return Objective(per, known.lacks, quotient=(base, divisor))
+    base, part = _part_of(name)
+    if base not in NAMED_COSTS or (part is not None and not NAMED_COSTS[base].part):
+        check_choice(what, name, (*OBJECTIVES, *NAMED_COSTS))
+    cost = NAMED_COSTS[base]
+    if part is None and cost.part == "angle":
+        raise ArgumentError(f"{what} = {name!r} is not allowed: name an angle, {name}[BODY].")
+    return Objective(cost.quantity, cost.lacks, costs=cost.costs(part))
+
+
+def _part_of(name: str) -> tuple[str, str | None]:
+    match = _OF_PART.fullmatch(name)
+    return (match[1], match[2]) if match else (name, None)
+
+
+def measures_named(names: Iterable[str]) -> dict[str, Objective]:
+    """The objectives of these names."""
+    return {name: objective_named(name) for name in names}
+
+
+def with_divided(measures: Measures) -> dict[str, Objective]:
+    """The measures, and those of which they are quotients."""
+    every = dict(measures)
+    for objective in measures.values():
+        for name in objective.quotient or ():
+            every.setdefault(name, objective_named(name))
+    return every
+
+
+def costs_of(measures: Measures) -> tuple[Cost, ...]:
+    """All integrals and extremes in measures, each once."""
+    return tuple(dict.fromkeys(cost for each in measures.values() for _, cost in each.costs))
+
+
 def _of_ground(name: str, scene: AbstractScene) -> str | None:
-    if integrals_of(scene) is not None or OBJECTIVES[name].measured is not None:
+    if integrals_of(scene) is not None:
         return None
     advances = bool(cyclic_names(scene.state_type))
     own = ("period", "spectral_radius", *(("speed", "step_length") if advances else ()))
     return None if name in own else f"a {type(scene).__name__} has {', '.join(own)}"
 
 
-def check_objective(name: str, scene: Any, what: str = "objective") -> None:
-    """Raises `ArgumentError` for an unknown objective, or one that the scene lacks."""
-    if name in _SEARCHED:
-        raise ArgumentError(f"{what} = {name!r} is not allowed: {_SEARCHED[name]}.")
-    check_choice(what, name, OBJECTIVES)
-    lacks = _of_ground(name, scene) or OBJECTIVES[name].lacks(scene)
+def check_objective(
+    given: str | Cost, scene: Any, what: str = "objective"
+) -> tuple[str, Objective]:
+    """The name of a measure that is asked for by name or as a cost, and the objective.
+
+    Raises:
+        ArgumentError: an unknown name, what is neither, or an objective that the scene lacks.
+    """
+    if isinstance(given, Integral | Extreme):
+        check_cost(given, scene)
+        return given.name, Objective(given.quantity, costs=((1.0, given),))
+    check_type(what, given, str, Integral, Extreme)
+    objective, lacks = objective_named(given, what), None
+    if objective.measured is None and not objective.costs:
+        lacks = _of_ground(objective.quotient[0] if objective.quotient else given, scene)
+    lacks = lacks or objective.lacks(scene)
     if lacks is not None:
-        raise ArgumentError(f"{what} = {name!r} is not allowed for this scene: {lacks}.")
+        raise ArgumentError(f"{what} = {given!r} is not allowed for this scene: {lacks}.")
+    for _, cost in objective.costs:
+        check_cost(cost, scene)
+    return given, objective

@@ -10,7 +10,6 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._objective_values import Evaluation
-from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.optimise._optimality import Optimality
 from jaxbiped.scene._parameter_access import parameter_quantities
 from jaxbiped.scene._scene import WalkerScene
@@ -78,6 +77,7 @@ class Optimum(Tabular):
         objective: the requested sum of measures.
         error: estimated error of the objective.
         known: measures in the objective and the requirements, with gradients and errors.
+        quantities: words, symbol and unit of these by name, of those that have some.
         optimality: the optimality conditions.
         history: every iterate, of all runs one after the other.
         evaluations: number of designs whose gait was found.
@@ -95,6 +95,7 @@ class Optimum(Tabular):
     objective: float
     error: float
     known: Evaluation
+    quantities: dict[str, Quantity]
     optimality: Optimality
     history: list[Iteration]
     evaluations: int
@@ -126,8 +127,7 @@ class Optimum(Tabular):
 
         units = parameter_quantities(self.scene)
         names = list(self.variables)
-        measures = [name for name in self.known.values if name in OBJECTIVES]
-        quantities = [OBJECTIVES[name].quantity for name in measures]
+        measures, quantities = list(self.quantities), list(self.quantities.values())
         at, value = ("iteration",), Quantity("value", unit="SI")
         values, errors = (
             [part[name] for name in measures] for part in (self.known.values, self.known.errors)

@@ -15,6 +15,7 @@ from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.optimise._design_functions import Functions
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem, Variables
+from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.optimise._optimality import OPTIMAL, doubt_of, is_flat, is_near, optimality_of
 from jaxbiped.optimise._optimisers import BY_NAME, RunEnding, run_optax, run_trust_region
 from jaxbiped.optimise._optimum import Iteration, Optimum, Outcome
@@ -152,6 +153,8 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     best = runs.best
     found, scene = problem.objective(best.known), problem.scene_at(best.u)
     gait, outcome = problem.settings.find_near(scene, best.known.state), runs.outcome()
+    objectives = {**OBJECTIVES, **problem.wanted}
+    named = [name for name in best.known.values if name in objectives]
     doubt = doubt_of(problem, best) if outcome is Outcome.CORNER else ""
     if outcome in (Outcome.CONVERGED, Outcome.FLAT):
         doubt = doubt_of_gait(gait.outcome, gait.critical)
@@ -165,6 +168,7 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
         objective=problem.sense * found.value,
         error=found.error,
         known=best.known,
+        quantities={name: objectives[name].quantity for name in named},
         optimality=optimality_of(problem, best),
         history=runs.history,
         evaluations=problem.evaluations.count,

@@ -54,6 +54,8 @@ from jaxbiped.variational._tangents import (
 
 SHARE = 0.1
 """Of a column's largest entry: what its smaller entries' errors are measured against."""
+_JUST_PAST = 1e-6
+"""How far past a maximum a step may have ended that was to end there, in units of time."""
 Along: TypeAlias = Callable[
     [Callable[[PyTree, PyTree], PyTree], Tangents, Seeded], tuple[PyTree, PyTree]
 ]
@@ -432,7 +434,8 @@ def peak_of(
     """The largest load and its derivatives.
 
     The solve landed just past the moment at which the load's rate is zero; that little time is
-    taken back, for the load's rate changes fast during an impact.
+    taken back, for the load's rate changes fast during an impact. Where it is largest at the end
+    of a step that is at no maximum, as at the solve's own ends, it stays as it is.
     """
     if watch.peak is None:
         return jnp.zeros(()), jnp.zeros(args.seeds.shape[1])
@@ -452,4 +455,5 @@ def peak_of(
     curvature = jax.jvp(lambda y: rate(y, args.args), (state,), (velocity,))[1]
     is_maximum = curvature < 0.0
     past = jnp.where(is_maximum, slope / jnp.where(is_maximum, curvature, 1.0), 0.0)
+    past = jnp.where(jnp.abs(past) < _JUST_PAST * watch.time_unit, past, 0.0)
     return highest - 0.5 * past * slope, row - past * slope_row

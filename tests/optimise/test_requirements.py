@@ -39,18 +39,18 @@ WORDS = {
 
 @pytest.mark.parametrize("words", WORDS)
 def test_a_requirement_in_words_is_its_bounds(words):
-    (found,) = requirements_of(SCENE, words)
+    (found,) = requirements_of(SCENE, words).each
     assert found == (words.strip().split("<")[0].split(">")[0].split("=")[0].strip(), *WORDS[words])
-    assert requirements_of(SCENE, {found.name: WORDS[words]}) == (found,)
+    assert requirements_of(SCENE, {found.name: WORDS[words]}).each == (found,)
 
 
 def test_bounds_of_one_measure_are_gathered():
     every = ["speed>0.1", "period<2", "speed<0.9", "speed>0.3", "speed<0.7"]
     speed, period = Requirement("speed", 0.3, 0.7), Requirement("period", None, 2.0)
-    assert requirements_of(SCENE, every) == (speed, period)
-    assert requirements_of(SCENE, None) == ()
+    assert requirements_of(SCENE, every).each == (speed, period)
+    assert requirements_of(SCENE, None).each == ()
     equal = {"speed": (0.5, 0.5)}
-    assert requirements_of(SCENE, equal) == (Requirement("speed", 0.5, 0.5),)
+    assert requirements_of(SCENE, equal).each == (Requirement("speed", 0.5, 0.5),)
     for wrong in (
         ["speed>0.5", "speed<0.4"], {"speed": (None, None)}, {"speed": 0.3}, {"speed": (0.1,)},
         {"speed": (np.nan, 1.0)}, "speed", "speed<", "speed<nan", "speed<2kg", 3, [3],
