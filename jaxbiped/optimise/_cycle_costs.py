@@ -16,8 +16,6 @@ from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._walker_motion import WalkerMotion
-from jaxbiped.gait._orbit_derivatives import slopes_of
-from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.hybrid._guards import Switch
 from jaxbiped.hybrid._sections import section_of
@@ -33,8 +31,8 @@ from jaxbiped.optimise._cycle_functionals import (
     Functionals,
     cycle_spec,
     functional_precision,
-    newton_step,
     orbits_near,
+    total_of_peak,
     totals_of_advance,
     with_errors,
 )
@@ -90,12 +88,11 @@ class IntegratedCycle(AbstractAugmentedSystem):
 
 
 class ExtremeCycle(AbstractAugmentedSystem):
-    """A walker whose load is a function of the motion, with its largest value at cycles' ends.
+    """A walker whose load is a function of the motion.
 
     Attributes:
-        walker: the walker without them.
-        coordinates: the largest value just before and just behind ends of cycles so far, and how
-            many ends there were.
+        walker: the walker with its own load.
+        coordinates: none.
         extreme: what is looked for; the load is its value, with the opposite sign for a smallest.
     """
 
@@ -103,24 +100,17 @@ class ExtremeCycle(AbstractAugmentedSystem):
 
     @classmethod
     def of(cls, walker: AbstractSystem, extreme: Extreme) -> "ExtremeCycle":
-        return cls(walker, ("at_ends", "ends"), extreme)
+        return cls(walker, (), extreme)
 
     def vector_field(self, t: Time, y: PyTree, args: PyTree) -> PyTree:
-        rates = self.walker.vector_field(t, motion_of(y), args)
-        return join(y, rates, dict.fromkeys(self.coordinates, jnp.zeros_like(y.ends)))
+        return join(y, self.walker.vector_field(t, motion_of(y), args), {})
 
     def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
-        before = motion_of(y)
-        after = self.walker.reset_map(args, before)
-        here = jnp.maximum(self._value(args, before), self._value(args, after))
-        largest = jnp.where(y.ends < 0.5, here, jnp.maximum(y.at_ends, here))
-        return join(y, after, {"at_ends": largest, "ends": y.ends + 1.0})
+        return join(y, self.walker.reset_map(args, motion_of(y)), {})
 
     def load(self, args: PyTree, y: PyTree) -> Scalar:
-        return self._value(args, motion_of(y))
-
-    def _value(self, args: PyTree, state: PyTree) -> Scalar:
-        return jnp.asarray(self.extreme.sign * self.extreme.value(WalkerMotion(args, state)))
+        motion = WalkerMotion(args, motion_of(y))
+        return jnp.asarray(self.extreme.sign * self.extreme.value(motion))
 
 
 def cost_functionals(
@@ -171,21 +161,13 @@ def _functionals(
     spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precision
 ) -> Functionals:
     orbits = orbits_near(spec, scene, y, fine)
-    found: Callable[..., tuple[Scalar, Scalar]] = totals_of_advance
     if isinstance(spec.system, ExtremeCycle):
-        found = _extreme
-    values, slopes = jax.vmap(found)(orbits.returns, orbits.points)
-    sign = spec.system.extreme.sign if isinstance(spec.system, ExtremeCycle) else 1.0
-    return with_errors(sign * values, sign * slopes / orbits.sizes, orbits.returns.code)
-
-
-def _extreme(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:
-    """The largest value within the cycle and at its ends, shape (1,), and derivatives."""
-    (at_ends, _), (row, _) = totals_of_advance(once, point)
-    inside = once.peak + once.peak_row[: len(point)] @ newton_step(once, point)
-    is_inside = inside > at_ends
-    slopes = jnp.where(is_inside, slopes_of(once).peak, row)
-    return jnp.where(is_inside, inside, at_ends)[None], slopes[None]
+        sign = spec.system.extreme.sign
+        peaks, slopes = jax.vmap(total_of_peak)(orbits.returns, orbits.points)
+        values, slopes = sign * peaks[:, None], sign * slopes[:, None]
+    else:
+        values, slopes = jax.vmap(totals_of_advance)(orbits.returns, orbits.points)
+    return with_errors(values, slopes / orbits.sizes, orbits.returns.code)
 
 
 def check_cost(cost: Cost, scene: Any) -> None:

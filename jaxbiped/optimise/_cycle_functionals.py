@@ -176,7 +176,7 @@ def orbits_near(spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precis
         by_state = linearised_return(
             spec, seeds, y, precision, jnp.asarray(False), carries_parameters=jnp.asarray(False)
         )
-        own = point + jnp.where(by_state.code == 0, newton_step(by_state, point), 0.0)
+        own = point + jnp.where(by_state.code == 0, _newton_step(by_state, point), 0.0)
         start = state_with(spec.system, y, own)
         found = linearised_return(spec, seeds, start, precision, jnp.asarray(False))
         # As where the swing foot is lowest behind the section, and another arrival is the next.
@@ -208,7 +208,7 @@ def with_errors(values: Scalar, slopes: Scalar, code: Scalar) -> Functionals:
     )
 
 
-def newton_step(once: LinearisedReturn, point: Scalar) -> Scalar:
+def _newton_step(once: LinearisedReturn, point: Scalar) -> Scalar:
     """From a point to the fixed point, by Newton's correction."""
     m = len(point)
     return solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - point)
@@ -219,12 +219,17 @@ def totals_of_advance(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Sc
 
     They are those at the fixed point that Newton's correction gives.
     """
-    rows, correction = once.advance_rows[1:, : len(point)], newton_step(once, point)
+    rows, correction = once.advance_rows[1:, : len(point)], _newton_step(once, point)
     return once.advance[1:] + rows @ correction, slopes_of(once).advance[1:]
+
+
+def total_of_peak(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:
+    """The largest load at that fixed point, and total derivatives."""
+    row = once.peak_row[: len(point)]
+    return once.peak + row @ _newton_step(once, point), slopes_of(once).peak
 
 
 def _totals(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:
     """The integrals, and the swing foot's clearance, which is minus the load."""
-    gained, slopes = totals_of_advance(once, point)
-    depth = once.peak + once.peak_row[: len(point)] @ newton_step(once, point)
-    return jnp.append(gained, -depth), jnp.concatenate([slopes, -slopes_of(once).peak[None]])
+    (gained, slopes), (depth, slope) = (f(once, point) for f in (totals_of_advance, total_of_peak))
+    return jnp.append(gained, -depth), jnp.concatenate([slopes, -slope[None]])

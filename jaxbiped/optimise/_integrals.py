@@ -65,8 +65,8 @@ class Integral(eqx.Module):
 class Extreme(eqx.Module):
     """The largest or the smallest value of a function of the motion along a cycle, as a measure.
 
-    It is looked for within the cycle and at its ends, just before and just behind them. Where two
-    places have the same value the measure has a corner.
+    It is looked for within the cycle and at its ends. Where two places have the same value the
+    measure has a corner.
 
     Attributes:
         value: a function of the motion, `value(motion)`.
