@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 import jaxbiped as jb
-from jaxbiped.hybrid import RedundantWalking, Rolling, Switch, Walking
+from jaxbiped.hybrid import Gap, RedundantWalking, Rolling, Switch, Walking
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._grazing import grazes, turns_of
 from jaxbiped.solve.controllers._step_size import step_control
@@ -346,6 +346,26 @@ def test_a_foot_that_touches_down_grazes_only_if_it_is_slowed(later, slows):
     below = falls._replace(hip_z=jnp.asarray(0.395), hip_vz=jnp.asarray(later))
     old, new = (jb.hybrid.Walking().gaps(jb.seed_scene(), y) for y in (above, below))
     assert bool(grazes(old, new, jnp.asarray(0.01), jnp.asarray(10.0))) is slows
+
+
+@pytest.mark.parametrize(
+    ("deepest", "share"), [(0.01, 0.2), (-0.01, 0.2), (0.01, 0.8), (-0.01, 0.8), (0.5, 1.5)]
+)
+def test_a_gap_grazes_where_it_turns_no_deeper_than_it_is_known(deepest, share):
+    """At constant deceleration it is deepest at a share of the step, or some time behind its end.
+
+    There it has closed within the step, and slows down.
+    """
+    span, size, slowing = 0.5, 3.0, 4.0
+    times = span * np.array([0.0, 1.0]) - span * share
+    depths, rates = deepest - 0.5 * slowing * times**2, -slowing * times
+    old, new = (
+        Gap(jnp.asarray(depth), jnp.asarray(rate), None, size)
+        for depth, rate in zip(depths, rates, strict=True)
+    )
+    for known, expected in ((1.1, True), (0.9, False)):
+        rtol = jnp.asarray(known * abs(deepest) / size)
+        assert bool(grazes((old,), (new,), jnp.asarray(span), rtol)) is expected
 
 
 def test_radau_is_exact_for_polynomials_and_its_clock_runs_in_the_root_of_time():
