@@ -191,6 +191,42 @@ def test_a_step_behind_a_jump_carries_the_columns_of_the_exact_motion():
     np.testing.assert_allclose(ours.state, exact(*start, level, fall + 0.01), rtol=1e-9)
 
 
+def test_columns_of_a_step_are_its_derivatives():
+    """Against JAX's own of the step alone: of a pendulum that is damped by what it has heated.
+
+    One rate is a component; two are not, and the first one of the state is among these.
+    """
+
+    def heated(t, y, args):
+        heat, speed, angle = y
+        (pull,) = args
+        return speed**2 - pull * heat, -pull * jnp.sin(angle) - heat * speed, speed
+
+    solver, span = jb.solvers.Rodas4(), 0.2
+    start, pull = (jnp.asarray(0.3), jnp.asarray(-1.2), jnp.asarray(0.8)), jnp.asarray(0.5)
+    watch = Watch(field=heated, switches=lambda args, y: ())
+
+    @jax.jit
+    def by_columns(start):
+        args = Seeded((pull,), jnp.asarray([[0.0, 0.0, 0.0, 1.0]]), jnp.zeros(4), (0,))
+        y0, made_jump = Tangents(start, jnp.eye(3, 4)), jnp.asarray(False)
+        term = diffrax.ODETerm(VariationalField(heated))
+        return TangentSolver(watch, solver).step(term, 0.0, span, y0, args, None, made_jump)[:2]
+
+    @jax.jit
+    @jax.jacfwd
+    def derivatives(z):
+        *y, pull = z
+        ends = solver.step(diffrax.ODETerm(heated), 0.0, span, tuple(y), (pull,), None, False)[:2]
+        return jnp.stack([jnp.stack(part) for part in ends])
+
+    end, error = derivatives(jnp.stack([*start, pull]))
+    tangents, errors = by_columns(start)
+    np.testing.assert_allclose(tangents.columns, end, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(errors.columns, error, rtol=1e-9, atol=1e-14)
+    assert np.min(np.abs(end)) > 1e-3
+
+
 @pytest.mark.parametrize(("height", "moves"), [(1e-11, False), (1e-9, True)])
 def test_the_short_step_across_a_switch_moves_no_column(height, moves):
     """At 3 m/s downwards for 10 ps: behind the level saltation is all that counts."""
