@@ -12,7 +12,7 @@ from jaxbiped.hybrid import Gap, RedundantWalking, Rolling, Switch, Walking
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._grazing import grazes, turns_of
 from jaxbiped.solve.controllers._step_size import step_control
-from jaxbiped.solve.controllers._switch_locator import SwitchLocator
+from jaxbiped.solve.controllers._switch_locator import MARGIN, SwitchLocator
 from jaxbiped.solve.controllers._wrapped_control import Adapted, Attempt
 from jaxbiped.solve.solvers import rms_norm
 from jaxbiped.variational._collocated_step import RADAU, KnownStep
@@ -150,6 +150,64 @@ def test_of_the_switches_within_a_step_the_first_one_ends_it(levels, corner, whi
     assert bool(crossed.switch)
     # The first step of a solve is no arrival.
     assert (bool(crossed.section), bool(arrives.section)) == (False, True)
+
+
+@pytest.mark.parametrize("before", [True, False])
+def test_an_arrival_counts_by_the_condition_of_the_section_itself(before):
+    """It is asked at the step's start or at its end; the switch counts where the section does not.
+
+    The second component says so: it is positive at one end of the step.
+    """
+    watch = Watch(
+        field=lambda t, y, args: (-1.0 + 0.0 * y[0], 0.0 * y[0]),
+        switches=lambda args, y: (Switch(y[0] - 0.5, y[1] < 0.0),),
+        section=lambda args, y: (0.1 - y[0], y[1] > 0.0),
+        asked_before=before,
+    )
+    locator = SwitchLocator(step_control(1e-6, 1e-8, rms_norm), watch)
+    zero, one = jnp.zeros(()), jnp.ones(())
+
+    @jax.jit
+    def arrives(at_start):
+        start, end = (one, at_start), (zero, -at_start)
+        memory = locator.init(None, zero, one, start, one, (), None, 4.0)[1]
+        later = memory._replace(accepted=jnp.asarray(1))
+        return locator._crossings(one, (), start, end, later)[0].section
+
+    assert (bool(arrives(one)), bool(arrives(-one))) == (before, not before)
+
+
+@pytest.mark.parametrize("kind", ["section", "corner"])
+def test_a_step_ends_so_little_past_a_surface_or_is_tried_again(kind):
+    """By a 10,000th of the way there, or by some margins, which are of the watch's own unit."""
+    ends_at_zero = dict(
+        section={"switches": lambda args, y: (), "section": lambda args, y: (-y[0], y[0] < 9.0)},
+        corner={"switches": lambda args, y: (Switch(y[0], True, corner=True),)},
+    )
+    unit = 2.0
+    margin = MARGIN * unit
+    fall = lambda t, y, args: (-1.0 + 0.0 * y[0],)
+    watch = Watch(field=fall, time_unit=unit, **ends_at_zero[kind])
+    locator = SwitchLocator(step_control(1e-6, 1e-8, rms_norm), watch)
+    zero = jnp.zeros(())
+
+    @jax.jit
+    def stepped(way, past):
+        start, end, span = (way,), (-past,), way + past
+        memory = locator.init(None, zero, span, start, zero, (), None, 4.0)[1]
+        later = memory._replace(accepted=jnp.asarray(1))
+        adapted = locator.adapt(Attempt(zero, span, start, end, (), (zero,), 4.0, later))
+        return adapted.keep, adapted.t0, adapted.t1
+
+    for way, past, kept in (
+        (1.0, 0.9e-4, True), (1.0, 1.1e-4, False), (1.0, 1.0, False),
+        (1e-9, 3.0 * margin, True), (1e-9, 5.0 * margin, False),
+    ):  # fmt: skip
+        keep, begin, end = stepped(jnp.asarray(way), jnp.asarray(past))
+        assert bool(keep) is kept
+        if not kept:
+            assert float(begin) == 0.0
+            assert 0.0 < float(end) - way <= 1e-4 * way + margin
 
 
 @pytest.mark.parametrize("share", [0.65, 0.9])
