@@ -24,6 +24,7 @@ from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.optimise._augmented_system import (
     AbstractAugmentedSystem,
     MotionSection,
+    integrals_of,
     join,
     motion_of,
 )
@@ -37,7 +38,7 @@ from jaxbiped.optimise._cycle_functionals import (
     with_errors,
 )
 from jaxbiped.optimise._integrals import Cost, Extreme, Integral
-from jaxbiped.scene._scene import AbstractWalkerScene, WalkerScene
+from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import Precision
 
@@ -172,7 +173,7 @@ def _functionals(
 
 def check_cost(cost: Cost, scene: Any) -> None:
     """Raises `ArgumentError` for a cost that the scene cannot have, before anything is compiled."""
-    if not isinstance(scene, AbstractWalkerScene):
+    if integrals_of(scene) is None:
         raise ArgumentError(
             f"{cost.name} is not allowed for a {type(scene).__name__}: costs are functions of a "
             "walker's motion; add a coordinate of its own to the system instead."
@@ -182,7 +183,7 @@ def check_cost(cost: Cost, scene: Any) -> None:
         if isinstance(cost, Integral)
         else {"value": cost.value}
     )
-    if functions.get("at_strike") is not None and scene.compliant:
+    if functions.get("at_strike") is not None and not system_of(scene).footsteps_end_on_section:
         raise ArgumentError(
             f"at_strike of {cost.name} is not allowed for compliant feet, which press into the "
             "ground for a while: give a rate."

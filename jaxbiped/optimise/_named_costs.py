@@ -9,11 +9,15 @@ import jax.numpy as jnp
 
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
+from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._walker_motion import Drive, WalkerMotion
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.optimise._integrals import Cost, Extreme, Integral
 from jaxbiped.scene.actuation._actuators import PushOff
+
+_PARTS = 64
+"""Parts of which a cost is kept: it is the same object each time, or all would compile again."""
 
 
 class NamedCost(NamedTuple):
@@ -91,43 +95,43 @@ def _value_of_angle(part: str | None, motion: WalkerMotion) -> Scalar:
     return motion.angle(part)
 
 
-@functools.cache
+@bounded_cache(_PARTS)
 def _torque_squared(part: str | None) -> tuple[tuple[float, Cost], ...]:
     rate = functools.partial(_sum, part, _square)
     return ((1.0, Integral(rate, Quantity("torque squared", r"$\int u^2$", "N^2 m^2 s"))),)
 
 
-@functools.cache
+@bounded_cache(_PARTS)
 def _absolute_work(part: str | None) -> tuple[tuple[float, Cost], ...]:
     rate = functools.partial(_sum, part, _absolute_power)
     quantity = Quantity("absolute work", "$W_a$", "J")
     return ((1.0, Integral(rate, quantity, corners=functools.partial(_powers, part))),)
 
 
-@functools.cache
+@bounded_cache(_PARTS)
 def _push_off_squared(part: str | None) -> tuple[tuple[float, Cost], ...]:
     quantity = Quantity("push off squared", r"$\frac{1}{2} P^2$", "N^2 s^2")
     return ((1.0, Integral(_nothing, quantity, at_strike=_half_square_of_push_off)),)
 
 
-@functools.cache
+@bounded_cache(_PARTS)
 def _jerk(part: str | None) -> tuple[tuple[float, Cost], ...]:
     return ((1.0, Integral(_square_of_jerk, Quantity("jerk", "$j$", "rad^2/s^5"))),)
 
 
-@functools.cache
+@bounded_cache(_PARTS)
 def _peak_torque(part: str | None) -> tuple[tuple[float, Cost], ...]:
     value = functools.partial(_largest, part, _absolute_torque)
     return ((1.0, Extreme(value, Quantity("peak torque", "$u$", "N m"))),)
 
 
-@functools.cache
+@bounded_cache(_PARTS)
 def _peak_power(part: str | None) -> tuple[tuple[float, Cost], ...]:
     value = functools.partial(_largest, part, _absolute_power)
     return ((1.0, Extreme(value, Quantity("peak power", "$P$", "W"))),)
 
 
-@functools.cache
+@bounded_cache(_PARTS)
 def _joint_range(part: str | None) -> tuple[tuple[float, Cost], ...]:
     value, quantity = functools.partial(_value_of_angle, part), Quantity("angle", "", "rad")
     return (1.0, Extreme(value, quantity)), (-1.0, Extreme(value, quantity, smallest=True))
