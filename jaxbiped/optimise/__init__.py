@@ -1,5 +1,6 @@
 """Optimisation of gaits: objectives, optimisers, certificates of an optimum."""
 
+from jaxbiped._quantity import Quantity as Quantity
 from jaxbiped.optimise._bifurcation_distance import BifurcationDistance as BifurcationDistance
 from jaxbiped.optimise._bifurcation_distance import Sought as Sought
 from jaxbiped.optimise._bifurcation_distance import bifurcation_distance as bifurcation_distance

@@ -35,9 +35,8 @@ class Integral(eqx.Module):
 
     Examples:
         >>> import jaxbiped as jb
-        >>> turned = jb.optimise.Integral(
-        ...     lambda motion: motion.rate("leg_1") ** 2, jb.Quantity("turning", "$R$", "rad^2/s")
-        ... )
+        >>> quantity = jb.optimise.Quantity("turning", "$R$", "rad^2/s")
+        >>> turned = jb.optimise.Integral(lambda motion: motion.rate("leg_1") ** 2, quantity)
         >>> turned.name
         'turning'
     """

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from jaxbiped.optimise._cycle_costs import cost_functionals
 from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
 from jaxbiped.optimise._design_gaits import GaitSettings, ensemble_of, evaluate_ensemble
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
@@ -31,3 +32,9 @@ def integrals_of(scene, state, **how):
 def of_return_jacobian(scene, state, names, **how):
     """What is a function of the derivatives of the return map at a state."""
     return jacobian_functionals(scene, state, names, **how)
+
+
+def evaluated_costs(scene, gait, *costs, accuracy="balanced"):
+    """Values of costs of a gait's motion, their derivatives, and the errors of these."""
+    found = cost_functionals(scene, gait.measures.state, costs, accuracy=accuracy)
+    return np.asarray(found.values), np.asarray(found.slopes), np.asarray(found.slope_errors)
