@@ -18,6 +18,7 @@ from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._walker_motion import WalkerMotion
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.hybrid._guards import Switch
+from jaxbiped.hybrid._motion_costs import Cost, Extreme, Integral
 from jaxbiped.hybrid._sections import section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
@@ -37,7 +38,6 @@ from jaxbiped.optimise._cycle_functionals import (
     totals_of_advance,
     with_errors,
 )
-from jaxbiped.optimise._integrals import Cost, Extreme, Integral
 from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import Precision

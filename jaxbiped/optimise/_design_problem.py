@@ -18,6 +18,7 @@ from jaxbiped._quantity import si_number
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_provenance import explain_search
+from jaxbiped.hybrid._motion_costs import Along, Cost
 from jaxbiped.optimise._cycle_functionals import Functional, weighted_sum
 from jaxbiped.optimise._design_gaits import (
     Ensemble,
@@ -27,7 +28,6 @@ from jaxbiped.optimise._design_gaits import (
     evaluate_members,
     with_worse_members,
 )
-from jaxbiped.optimise._integrals import Along, Cost
 from jaxbiped.optimise._jacobian_functionals import CLUSTER
 from jaxbiped.optimise._objective_values import (
     Evaluation,

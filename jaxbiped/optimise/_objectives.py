@@ -12,10 +12,10 @@ from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._state import cyclic_names
 from jaxbiped.gait._gait import Gait
+from jaxbiped.hybrid._motion_costs import Cost, Extreme, Integral
+from jaxbiped.hybrid._named_costs import NAMED_COSTS
 from jaxbiped.optimise._augmented_system import integrals_of
 from jaxbiped.optimise._cycle_costs import check_cost
-from jaxbiped.optimise._integrals import Cost, Extreme, Integral
-from jaxbiped.optimise._named_costs import NAMED_COSTS
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless

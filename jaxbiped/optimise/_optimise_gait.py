@@ -22,6 +22,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
 from jaxbiped.gait._search_starts import state_of_guess
 from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
+from jaxbiped.hybrid._motion_costs import Cost
 from jaxbiped.hybrid._sections import AbstractSection, chosen_section
 from jaxbiped.optimise._design_gaits import CRITERIA, Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._design_problem import (
@@ -33,7 +34,6 @@ from jaxbiped.optimise._design_problem import (
     start_of,
     variables_of,
 )
-from jaxbiped.optimise._integrals import Cost
 from jaxbiped.optimise._objective_values import Evaluations, functional_names
 from jaxbiped.optimise._objectives import (
     Measures,

@@ -12,8 +12,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._walker_motion import Drive, WalkerMotion
+from jaxbiped.hybrid._motion_costs import Cost, Extreme, Integral
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.optimise._integrals import Cost, Extreme, Integral
 from jaxbiped.scene.actuation._actuators import PushOff
 
 _PARTS = 64
