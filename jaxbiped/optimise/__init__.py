@@ -12,6 +12,8 @@ from jaxbiped.optimise._certificate import Certificate as Certificate
 from jaxbiped.optimise._certificate import certify as certify
 from jaxbiped.optimise._objective_values import Evaluation as Evaluation
 from jaxbiped.optimise._objectives import OBJECTIVES as OBJECTIVES
+from jaxbiped.optimise._objectives import FunctionOf as FunctionOf
+from jaxbiped.optimise._objectives import Linear as Linear
 from jaxbiped.optimise._objectives import Objective as Objective
 from jaxbiped.optimise._optimality import Held as Held
 from jaxbiped.optimise._optimality import Optimality as Optimality

@@ -18,7 +18,7 @@ from jaxbiped._quantity import si_number
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_provenance import explain_search
-from jaxbiped.hybrid._motion_costs import Along, Cost
+from jaxbiped.hybrid._motion_costs import Along
 from jaxbiped.optimise._cycle_functionals import Functional, weighted_sum
 from jaxbiped.optimise._design_gaits import (
     Ensemble,
@@ -37,6 +37,8 @@ from jaxbiped.optimise._objective_values import (
 )
 from jaxbiped.optimise._objectives import (
     OBJECTIVES,
+    Linear,
+    Measure,
     Measures,
     Objective,
     check_objective,
@@ -56,7 +58,9 @@ _FLOOR, _ASIDE, _NEAR = 0.1, 0.5, 0.02
 """Size below which components of the state count as of one size; how far aside, in units of the
 step, and how far at least, relative to it, a gait may lie from where it was expected."""
 Bounds: TypeAlias = tuple[float | None, float | None]
-SubjectTo: TypeAlias = Mapping[str | Cost, Bounds] | Sequence[str | Along] | str | Along | None
+SubjectTo: TypeAlias = (
+    Mapping[str | Measure, Bounds] | Sequence[str | Along | Linear] | str | Along | Linear | None
+)
 """Bounds by measure, or words such as "spectral_radius<0.4" and constraints along the cycle."""
 
 
@@ -156,7 +160,7 @@ class Requirements(NamedTuple):
 
     each: tuple[Requirement, ...]
     measures: Measures
-    given: Mapping[str, str | Cost]
+    given: Mapping[str, str | Measure]
 
 
 def requirements_of(scene: Any, subject_to: SubjectTo) -> Requirements:
@@ -168,7 +172,7 @@ def requirements_of(scene: Any, subject_to: SubjectTo) -> Requirements:
     """
     gathered: dict[str, Bounds] = {}
     measures: dict[str, Objective] = {}
-    told: dict[str, str | Cost] = {}
+    told: dict[str, str | Measure] = {}
     for given, (low, high) in _pairs(subject_to):
         name, objective = check_objective(given, scene, "subject_to")
         told[name] = given
@@ -199,18 +203,23 @@ def add_measure(measures: dict[str, Objective], name: str, objective: Objective)
     measures[name] = objective
 
 
-def _pairs(subject_to: SubjectTo) -> list[tuple[str | Cost, Bounds]]:
+def _pairs(subject_to: SubjectTo) -> list[tuple[str | Measure, Bounds]]:
     """Measures with their bounds, as they are given."""
     if subject_to is None:
         return []
-    check_type("subject_to", subject_to, str, Mapping, Along, Sequence)
+    check_type("subject_to", subject_to, str, Mapping, Along, Linear, Sequence)
     if isinstance(subject_to, Mapping):
         return [(given, _pair(given, bounds)) for given, bounds in subject_to.items()]
-    several = [subject_to] if isinstance(subject_to, str | Along) else subject_to
-    pairs: list[tuple[str | Cost, Bounds]] = []
+    several = [subject_to] if isinstance(subject_to, str | Along | Linear) else subject_to
+    pairs: list[tuple[str | Measure, Bounds]] = []
     for each in several:
-        check_type("subject_to", each, str, Along)
-        pairs += each.requirements() if isinstance(each, Along) else [_parse(each)]
+        check_type("subject_to", each, str, Along, Linear)
+        if isinstance(each, Along):
+            pairs += each.requirements()
+        else:
+            pairs.append(
+                (each, _pair(each, each.bounds)) if isinstance(each, Linear) else _parse(each)
+            )
     return pairs
 
 
@@ -235,7 +244,7 @@ def larger_is_worse(
     return found
 
 
-def _pair(given: str | Cost, bounds: object) -> Bounds:
+def _pair(given: str | Measure, bounds: object) -> Bounds:
     name = getattr(given, "name", given)
     if not isinstance(bounds, tuple | list) or len(bounds) != 2 or list(bounds) == [None, None]:
         raise ArgumentError(

@@ -15,7 +15,7 @@ from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.optimise._design_functions import Functions
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem, Variables
-from jaxbiped.optimise._objectives import OBJECTIVES
+from jaxbiped.optimise._objectives import OBJECTIVES, with_parts
 from jaxbiped.optimise._optimality import OPTIMAL, doubt_of, is_flat, is_near, optimality_of
 from jaxbiped.optimise._optimisers import BY_NAME, RunEnding, run_optax, run_trust_region
 from jaxbiped.optimise._optimum import Iteration, Optimum, Outcome
@@ -153,7 +153,7 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     best = runs.best
     found, scene = problem.objective(best.known), problem.scene_at(best.u)
     gait, outcome = problem.settings.find_near(scene, best.known.state), runs.outcome()
-    objectives = {**OBJECTIVES, **problem.wanted}
+    objectives = {**OBJECTIVES, **with_parts(problem.wanted)}
     named = [name for name in best.known.values if name in objectives]
     doubt = doubt_of(problem, best) if outcome is Outcome.CORNER else ""
     if outcome in (Outcome.CONVERGED, Outcome.FLAT):

@@ -16,6 +16,7 @@ from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import Program
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.solve._step_integrals import StepIntegrals, Summed
 from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import widened_extremes
 
@@ -114,6 +115,7 @@ class AbstractSolve(abc.ABC):
         recorder: what is saved; None: the end alone.
         extremes: a function of (scene, state) whose extremes over the steps' ends are wanted, on
             both sides of a reset, or None.
+        integrals: what is summed along the steps, or None.
         resets: whether recorders ask which steps end in a reset. A property of the class.
     """
 
@@ -121,6 +123,12 @@ class AbstractSolve(abc.ABC):
     system: AbstractSystem
     recorder: "AbstractRecorder | None" = None
     extremes: Callable[[PyTree, PyTree], PyTree] | None = None
+    integrals: StepIntegrals | None = None
+
+    @property
+    def observes(self) -> bool:
+        """Whether a step is asked for more than its end."""
+        return self.recorder is not None or self.integrals is not None
 
     @abc.abstractmethod
     def start(self, solve: Any) -> Any:
@@ -175,13 +183,38 @@ class AbstractSolve(abc.ABC):
         assert self.recorder is not None
         return self.recorder.record(self, solve, now.memory, self.moment(solve, now), time)
 
-    def observed_start(self, solve: Any) -> tuple[PyTree, tuple[PyTree, PyTree] | None]:
-        """The recorder's memory and the extremes before the first attempt."""
+    def observed_start(
+        self, solve: Any
+    ) -> tuple[PyTree, tuple[PyTree, PyTree] | None, Summed | None]:
+        """The recorder's memory, the extremes and the integrals before the first attempt."""
         memory = None if self.recorder is None else self.recorder.begin(self, solve)
-        if self.extremes is None:
-            return memory, None
-        values = _numbers(self.extremes(solve.scene, solve.state))
-        return memory, (values, values)
+        extremes = summed = None
+        if self.extremes is not None:
+            values = _numbers(self.extremes(solve.scene, solve.state))
+            extremes = values, values
+        if self.integrals is not None:
+            rates = _numbers(self.integrals.rates(solve.scene, solve.state))
+            nothing = jtu.tree_map(jnp.zeros_like, rates)
+            summed = Summed(no_step(self, solve, course=True), nothing)
+        return memory, extremes, summed
+
+    def summed(self, solve: Any, now: Any, step: Step | None) -> Summed | None:
+        """The integrals behind a step."""
+        before: Summed | None = now.summed
+        if self.integrals is None or before is None or step is None:
+            return None
+        last = last_step(step, before.last, course=True)
+        course = self.course(solve, last, step.t1, step.y1)
+        gained = self.integrals.over(solve.scene, course.evaluate, last.t, step.t1)
+        # A reset's own term; of other systems than those that land nothing resets the state.
+        if self.resets and step.strikes is not None and step.end is not None:
+            struck = step.strikes
+            terms = self.integrals.at_strike(solve.scene, step.end())
+            gained = jtu.tree_map(lambda a, b: a + jnp.where(struck, b, 0.0), gained, terms)
+        totals = jtu.tree_map(
+            lambda total, more: total + jnp.where(last.noted, more, 0.0), before.totals, gained
+        )
+        return Summed(last, totals)
 
     def widened(
         self, solve: Any, now: Any, ends: Callable[[], tuple[Scalar, Iterable[PyTree]]]
