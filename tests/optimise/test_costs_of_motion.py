@@ -240,14 +240,9 @@ def test_a_walk_sums_what_its_cycles_cost(gait, how):
 
 
 def test_a_number_as_accuracy_gives_integrals_their_bars(gait):
-    state = gait.measures.state
-    walk = jb.simulate(
-        DRIVEN,
-        state,
-        footsteps=1,
-        accuracy=1e-7,
-        integrals=("torque_squared", "torque_squared[hip]"),
-    )
+    names = ("torque_squared", "torque_squared[hip]")
+    how = dict(footsteps=1, accuracy=1e-7, integrals=names)
+    walk = jb.simulate(DRIVEN, gait.measures.state, **how)
     effort = evaluated(DRIVEN, gait, ("torque_squared",), "tight").values["torque_squared"]
     bars = walk.error.bars["integrals"]
     for name in names:
