@@ -22,7 +22,12 @@ from jaxbiped.scene.actuation._actuators import HipMotion
 
 
 class Drive(NamedTuple):
-    """A torque of a motor on an angle [N·m], and the rate of the angle [rad/s]."""
+    """A torque of a motor on an angle.
+
+    Attributes:
+        torque: the torque [N·m], positive where it increases the angle.
+        rate: the rate of the angle [rad/s].
+    """
 
     torque: Scalar
     rate: Scalar

@@ -24,15 +24,7 @@ from jaxbiped.gait._search_starts import state_of_guess
 from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
 from jaxbiped.hybrid._sections import AbstractSection, chosen_section
 from jaxbiped.optimise._design_gaits import CRITERIA, Ensemble, GaitSettings, ensemble_of
-from jaxbiped.optimise._design_problem import (
-    DesignProblem,
-    SubjectTo,
-    add_measure,
-    larger_is_worse,
-    requirements_of,
-    start_of,
-    variables_of,
-)
+from jaxbiped.optimise._design_problem import DesignProblem, start_of, variables_of
 from jaxbiped.optimise._objective_values import Evaluations, functional_names
 from jaxbiped.optimise._objectives import (
     Measure,
@@ -44,6 +36,12 @@ from jaxbiped.optimise._objectives import (
 )
 from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
 from jaxbiped.optimise._optimum import Optimum
+from jaxbiped.optimise._requirements import (
+    SubjectTo,
+    add_measure,
+    larger_is_worse,
+    requirements_of,
+)
 from jaxbiped.optimise._runs import Runs, optimum_of, scattered_designs
 from jaxbiped.scene._parameter_access import scene_identity
 from jaxbiped.scene._scene import AbstractScene

@@ -20,10 +20,11 @@ from jaxbiped._types import Numbers, Scalar, as_float, select
 from jaxbiped.compiler import without_barriers
 from jaxbiped.hybrid._endings import ending_code
 from jaxbiped.hybrid._scales import Units, units_of
-from jaxbiped.solve._recorders import AbstractSolve, LastStep, Moment, Step
+from jaxbiped.solve._recorders import AbstractSolve
 from jaxbiped.solve._solved import Solved
 from jaxbiped.solve._step_integrals import Summed
 from jaxbiped.solve._stepper import Stepper, Tolerance
+from jaxbiped.solve._steps import LastStep, Moment, Step
 from jaxbiped.solve._switch_resets import Gathering, reset_at_switch
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._event_steps import (

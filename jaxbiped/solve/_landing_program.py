@@ -23,9 +23,10 @@ from jaxbiped.solve._landing_steps import (
     ending_of,
     initial_progress,
 )
-from jaxbiped.solve._recorders import AbstractSolve, LastStep, Moment, Step
+from jaxbiped.solve._recorders import AbstractSolve
 from jaxbiped.solve._solved import Solved
 from jaxbiped.solve._step_integrals import Summed
+from jaxbiped.solve._steps import LastStep, Moment, Step
 
 
 class _Now(NamedTuple):

@@ -1,4 +1,4 @@
-"""Costs of a gait's motion: integrals, extremes and constraints along the cycle."""
+"""Costs of a gait's motion, against those of its walk: integrals, extremes, bounds along it."""
 
 import dataclasses
 
