@@ -151,11 +151,11 @@ def _torques(
         torques = part.motor_torques(now := hip())
         if torques is None:
             continue
+        drives = tuple(map(Drive, torques, now.rate))
         if getattr(part, "reaction", "swing") == "swing":
-            between = Drive(torques[0], now.rate[0] - now.rate[1])
-            by_name[part.name] = (between,)
-        else:
-            by_name[part.name] = tuple(map(Drive, torques, now.rate))
+            drives = (Drive(torques[0], now.rate[0] - now.rate[1]),)
+        name = str(part.name)
+        by_name[name] = by_name.get(name, ()) + drives
     mechanism = scene.mechanism
     on_angle: dict[int, dict[Angle, Scalar]] = {}
     for number, angle, torque in motor_torques(mechanism, motion, scene.ground.slope, *carriers):

@@ -148,7 +148,7 @@ def cost_functionals(
         rows |= {cost: [part[k] for part in told[:4]] for k, cost in enumerate(own)}
         codes.append(told.code)
     columns = zip(*(rows[cost] for cost in costs), strict=True)
-    return Functionals(*map(jnp.stack, columns), jnp.max(jnp.stack(codes)))
+    return Functionals._make([*map(jnp.stack, columns), jnp.max(jnp.stack(codes))])
 
 
 @host_jit(runs_by_lanes)

@@ -213,7 +213,7 @@ def _goal(
             'give either maximise or minimise: a measure of the gait, such as "speed".'
         )
     what, goal = ("minimise", minimise) if maximise is None else ("maximise", maximise)
-    given = goal if isinstance(goal, Mapping) else {goal: 1.0}
+    given: Mapping[Any, float] = goal if isinstance(goal, Mapping) else {goal: 1.0}
     if not given:
         raise ArgumentError(f"{what} = {goal!r} is not allowed: give a name, or weights by name.")
     weights: dict[str, float] = {}

@@ -216,7 +216,7 @@ def integrals_asked(scene: Any, given: Any) -> StepIntegrals | None:
     named = isinstance(given, Mapping)
     integrals: dict[str, Integral] = {}
     for each in given:
-        asked = given[each] if named else each
+        asked: Any = given[each] if named else each
         if isinstance(asked, str):
             cost, part = cost_named(asked, "integrals")
             if (lacks := cost.lacks(scene)) is not None:

@@ -177,7 +177,7 @@ class AdaptiveSolve(AbstractSolve):
             taken = Step(now.t, now.state, t, state, keep, lambda _: dense, strikes=strikes)
             if self.system.lands:
                 taken = taken._replace(grazes=self._landed(control).grazes)
-        if self.recorder is not None:
+        if self.recorder is not None and taken is not None:
             memory = self.recorder.follow(self, solve, memory, taken)
         after = _Now(
             t=t,

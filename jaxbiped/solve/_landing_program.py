@@ -99,7 +99,7 @@ class LandingSolve(AbstractSolve):
             pulled = (after.accepted > before.accepted) & self._pulls(solve, after)
             after = after._replace(pulls=after.pulls + jnp.where(pulled, 1, 0))
         memory, step = now.memory, self._step(solve, before, tried) if self.observes else None
-        if self.recorder is not None:
+        if self.recorder is not None and step is not None:
             memory = self.recorder.follow(self, solve, memory, step)
             if (decided := self.recorder.decides(memory)) is not None:
                 over = over | decided
