@@ -12,7 +12,7 @@ from jaxbiped.continuation._critical_values import allows, range_of
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.optimise._design_functions import Functions
+from jaxbiped.optimise._design_functions import Functions, restored
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem, Variables
 from jaxbiped.optimise._objectives import OBJECTIVES, with_parts
@@ -150,7 +150,7 @@ def doubt_of_gait(search: Search, critical: Bifurcation) -> str:
 
 def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     """The best of the designs that runs came to."""
-    best = runs.best
+    best = restored(problem, runs.best)
     found, scene = problem.objective(best.known), problem.scene_at(best.u)
     gait, outcome = problem.settings.find_near(scene, best.known.state), runs.outcome()
     objectives = {**OBJECTIVES, **with_parts(problem.wanted)}
