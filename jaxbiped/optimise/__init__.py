@@ -15,6 +15,7 @@ from jaxbiped.optimise._objectives import OBJECTIVES as OBJECTIVES
 from jaxbiped.optimise._objectives import FunctionOf as FunctionOf
 from jaxbiped.optimise._objectives import Linear as Linear
 from jaxbiped.optimise._objectives import Objective as Objective
+from jaxbiped.optimise._optimality import Curvature as Curvature
 from jaxbiped.optimise._optimality import Held as Held
 from jaxbiped.optimise._optimality import Optimality as Optimality
 from jaxbiped.optimise._optimise_gait import ParetoFront as ParetoFront
