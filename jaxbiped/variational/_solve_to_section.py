@@ -54,8 +54,6 @@ from jaxbiped.variational._tangents import (
 
 SHARE = 0.1
 """Of a column's largest entry: what its smaller entries' errors are measured against."""
-_JUST_PAST = 1e-6
-"""How far past a maximum a step may have ended that was to end there, in units of time."""
 Along: TypeAlias = Callable[
     [Callable[[PyTree, PyTree], PyTree], Tangents, Seeded], tuple[PyTree, PyTree]
 ]
@@ -346,7 +344,7 @@ def solve_to_section(
     y, time, time_columns = onto_section(watch, last, times[0][-1], args)
     peak, peak_columns = jnp.zeros(()), None
     if carries:
-        peak, rows = peak_of(watch, landed.at_peak, args)
+        peak, rows = peak_of(watch, landed.at_peak, args, start=plain_state(y0))
         # Columns do not tell how a load right behind a jump changes.
         peak_columns = jnp.where(landed.jumps_at_peak, jnp.nan, rows)
         peak, peak_columns = with_peak_at_end(watch, (peak, peak_columns), y, args)
@@ -430,13 +428,17 @@ def onto_section(
 
 
 def peak_of(
-    watch: Watch, at_peak: Tangents, args: Seeded, along: Along = along_columns
+    watch: Watch,
+    at_peak: Tangents,
+    args: Seeded,
+    along: Along = along_columns,
+    start: PyTree = None,
 ) -> tuple[Scalar, Scalar]:
     """The largest load and its derivatives.
 
     The solve landed just past the moment at which the load's rate is zero; that little time is
-    taken back, for the load's rate changes fast during an impact. Where it is largest at the start
-    of the solve it stays as it is.
+    taken back, for the load's rate changes fast during an impact. Where it is largest at the
+    `start` of the solve it stays as it is.
     """
     if watch.peak is None:
         return jnp.zeros(()), jnp.zeros(args.seeds.shape[1])
@@ -456,7 +458,9 @@ def peak_of(
     curvature = jax.jvp(lambda y: rate(y, args.args), (state,), (velocity,))[1]
     is_maximum = curvature < 0.0
     past = jnp.where(is_maximum, slope / jnp.where(is_maximum, curvature, 1.0), 0.0)
-    past = jnp.where(jnp.abs(past) < _JUST_PAST * watch.time_unit, past, 0.0)
+    if start is not None:
+        same = map(jnp.equal, jtu.tree_leaves(state), jtu.tree_leaves(start))
+        past = jnp.where(functools.reduce(jnp.logical_and, same), 0.0, past)
     return highest - 0.5 * past * slope, row - past * slope_row
 
 

@@ -212,7 +212,9 @@ class AdaptiveColumns:
             rates = field(zero, at_peak, given.args)
             peaks = at_fixed_time(rates, now.peak_columns, now.peak_shifts)
             highest = Tangents(at_peak, jnp.concatenate(peaks).T)
-            peak, peak_columns = peak_of(self.watch, highest, seeded, along_columns_in_turn)
+            peak, peak_columns = peak_of(
+                self.watch, highest, seeded, along_columns_in_turn, given.state
+            )
             peak_columns = jnp.where(now.landed.jumps_at_peak, jnp.nan, peak_columns)
             peak, peak_columns = with_peak_at_end(
                 self.watch, (peak, peak_columns), on_section, seeded, along_columns_in_turn

@@ -175,7 +175,7 @@ def test_derivatives_are_not_to_be_had_behind_a_graze_or_without_an_end(
 def problem(carries=1.0, max_time=9.0):
     """Two columns of the state and one of gravity, on the way to `finish`."""
     return SimpleNamespace(
-        args=ARGS.args, by_state=jnp.eye(2), by_parameter=jnp.zeros((1, 2)),
+        args=ARGS.args, state=tangents(0.0).state, by_state=jnp.eye(2), by_parameter=jnp.zeros((1, 2)),
         sizes=jnp.array([SIZE]), carries_parameters=jnp.asarray(carries),
         state_floors=jnp.zeros(2), parameter_floors=jnp.zeros(1), max_time=jnp.asarray(max_time),
     )  # fmt: skip
@@ -232,9 +232,26 @@ def test_columns_of_parameters_that_are_not_carried_are_not_known():
 
 
 def test_behind_a_jump_the_largest_load_has_no_derivatives():
-    told = finished(watch_of(peak=load), now_at(BEHIND, jumps_at_peak=YES))
-    assert np.isfinite(float(told.peak))
+    time, highest, _ = peak_and_columns()
+    told = finished(watch_of(peak=load), now_at(BEHIND, time, jumps_at_peak=YES))
+    assert float(told.peak) == pytest.approx(highest, abs=1e-9)
     assert np.all(np.isnan(told.peak_columns))
+
+
+def test_a_load_that_is_largest_at_the_arrival_is_that_on_the_section():
+    _, columns = landing_columns()
+    told = finished(watch_of(peak=lambda args, y: -y[1]), now_at(BEHIND, jumps_at_peak=YES))
+    assert float(told.peak) == pytest.approx(-at(LANDS)[1], abs=1e-12)
+    np.testing.assert_allclose(told.peak_columns, -columns[1], rtol=1e-9, atol=1e-10)
+
+
+def test_a_load_that_is_largest_at_the_start_is_the_starts():
+    """Where it falls from there, faster and faster, as beyond a maximum before it."""
+    time, *_ = peak_and_columns()
+    late = tangents(time + 0.02)
+    value, columns = peak_of(watch_of(peak=load), late, ARGS, start=late.state)
+    assert float(value) == float(load(None, late.state))
+    np.testing.assert_allclose(columns, along_columns(lambda y, a: load(a, y), late, ARGS)[1])
 
 
 def test_an_arrival_makes_another_state_and_its_columns():
