@@ -175,7 +175,8 @@ def test_derivatives_are_not_to_be_had_behind_a_graze_or_without_an_end(
 def problem(carries=1.0, max_time=9.0):
     """Two columns of the state and one of gravity, on the way to `finish`."""
     return SimpleNamespace(
-        args=ARGS.args, state=tangents(0.0).state, by_state=jnp.eye(2), by_parameter=jnp.zeros((1, 2)),
+        args=ARGS.args, state=tangents(0.0).state,
+        by_state=jnp.eye(2), by_parameter=jnp.zeros((1, 2)),
         sizes=jnp.array([SIZE]), carries_parameters=jnp.asarray(carries),
         state_floors=jnp.zeros(2), parameter_floors=jnp.zeros(1), max_time=jnp.asarray(max_time),
     )  # fmt: skip
