@@ -283,14 +283,14 @@ _compiled = cached_jit(by_lanes)
 def _step_by_step(run: "Simulation", request: Request) -> tuple[Solved, np.ndarray]:
     """One simulation, not traced, and the records of its steps, (n, numbers)."""
     engine, room = BY_NAME[run.engine], min(run.max_solver_steps, _ROOM)
-    if lanes := isinstance(engine, LaneEngine):
+    if batch := isinstance(engine, LaneEngine):
         one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], request.inputs)
         request = request._replace(inputs=one, batch=True)
     while True:
         found = engine.run(request._replace(room=room))
         outputs, recorded = found.outputs, found.records
         assert recorded is not None
-        if lanes:
+        if batch:
             outputs, recorded = jtu.tree_map(lambda leaf: leaf[0], (outputs, recorded))
         steps = int(recorded.counts)
         if steps <= room:
