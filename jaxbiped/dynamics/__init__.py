@@ -37,6 +37,8 @@ from jaxbiped.dynamics._redundant_motion import redundant_motion as redundant_mo
 from jaxbiped.dynamics._stance_motion import rolling as rolling
 from jaxbiped.dynamics._stance_motion import rolling_field as rolling_field
 from jaxbiped.dynamics._state import standing_height as standing_height
+from jaxbiped.dynamics._walker_motion import Drive as Drive
+from jaxbiped.dynamics._walker_motion import WalkerMotion as WalkerMotion
 from jaxbiped.scene._linkage_scene import LinkageScene as LinkageScene
 from jaxbiped.scene._linkage_scene import LinkageState as LinkageState
 from jaxbiped.scene._linkages import walker_linkage as walker_linkage

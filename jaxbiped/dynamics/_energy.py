@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeAlias, cast
+from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import jax.numpy as jnp
 
@@ -84,6 +84,7 @@ class Powers(NamedTuple):
 
 _Driving: TypeAlias = tuple[Scalar, tuple[Scalar, ...]]
 """The last two of `Powers`."""
+_Told = TypeVar("_Told")
 
 
 @kept_alone
@@ -195,11 +196,20 @@ def is_driven(scene: AbstractWalkerScene) -> bool:
 
 
 def _actuator_powers(scene: Any, state: Any) -> _Driving:
+    return in_driven_motion(scene, state, functools.partial(_driving, scene))
+
+
+def in_driven_motion(scene: Any, state: Any, function: Callable[..., _Told]) -> _Told:
+    """Calls a function of what actuators know, on feet of either kind.
+
+    It takes the motion of all bodies, the carriers, a function that returns the hip's motion, and
+    the powers of the feet's preloads [W].
+    """
     if not scene.compliant:
 
-        def standing(stance: Stance) -> _Driving:
+        def standing(stance: Stance) -> _Told:
             hip = functools.partial(hip_motion_of, stance)
-            return _driving(scene, stance.pose.motion, carriers_of(stance), hip)
+            return function(stance.pose.motion, carriers_of(stance), hip, ())
 
         return of_stance(scene, state, standing)
     structure = scene.mechanism.structure
@@ -211,7 +221,7 @@ def _actuator_powers(scene: Any, state: Any) -> _Driving:
         if moved is not None and force is not None:
             pressing.append(force * moved[1])
     hip = functools.partial(hip_motion, scene, contacts, motion)
-    return _driving(scene, motion, (legs, shares), hip, pressing)
+    return function(motion, (legs, shares), hip, pressing)
 
 
 def _driving(
@@ -219,7 +229,7 @@ def _driving(
     motion: Motion,
     carriers: Carriers,
     hip: Callable[[], HipMotion],
-    pressing: Sequence[Scalar] = (),
+    pressing: Sequence[Scalar],
 ) -> _Driving:
     """Computes the powers of all that drives a walker on feet of either kind.
 

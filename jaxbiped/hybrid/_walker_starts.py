@@ -11,8 +11,7 @@ from jaxbiped._checks import ArgumentError, check_unbatched, warn
 from jaxbiped._jax_versions import untraced
 from jaxbiped._types import Scalar, as_float, is_traced
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.constraints._constraint_methods import check_independent
-from jaxbiped.dynamics._constrained_motion import Consistent, consistent_state, coordinates_of
+from jaxbiped.dynamics._constrained_motion import Consistent, consistent_state
 from jaxbiped.dynamics._contacts import feet, limits_of
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._state import check_state, state_for, without_whole_turns
@@ -61,16 +60,16 @@ def rolling_start(scene: RigidScene, state: PyTree) -> PyTree:
 def consistent_start(scene: RedundantScene, state: PyTree) -> Consistent:
     """A checked start that was put on its constraints.
 
+    A walker's are independent: its hinges make a tree, and couplings that repeat each other are
+    no mechanism.
+
     Raises:
-        ArgumentError: a start that is not allowed, or constraints that the method cannot hold.
+        ArgumentError: a start that is not allowed.
     """
     check_single_scene(scene)
     state = in_own_precision(state)
     check_unbatched("state", state, "one start")
-    correction = consistent_state(scene, state)
-    q, _ = coordinates_of(scene, correction.state)
-    check_independent(scene.linkage, scene.method, q)
-    return correction
+    return consistent_state(scene, state)
 
 
 def in_own_precision(state: PyTree) -> PyTree:

@@ -209,14 +209,27 @@ def with_errors(values: Scalar, slopes: Scalar, code: Scalar) -> Functionals:
 
 
 def _newton_step(once: LinearisedReturn, point: Scalar) -> Scalar:
+    """From a point to the fixed point, by Newton's correction."""
     m = len(point)
     return solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - point)
 
 
+def totals_of_advance(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:
+    """What coordinates gain that need not return, but for the place, and total derivatives.
+
+    They are those at the fixed point that Newton's correction gives.
+    """
+    rows, correction = once.advance_rows[1:, : len(point)], _newton_step(once, point)
+    return once.advance[1:] + rows @ correction, slopes_of(once).advance[1:]
+
+
+def total_of_peak(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:
+    """The largest load at that fixed point, and total derivatives."""
+    row = once.peak_row[: len(point)]
+    return once.peak + row @ _newton_step(once, point), slopes_of(once).peak
+
+
 def _totals(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:
-    """Values at the fixed point that Newton's correction gives, and total derivatives."""
-    m, correction, slopes = len(point), _newton_step(once, point), slopes_of(once)
-    gained = once.advance[1:] + once.advance_rows[1:, :m] @ correction
-    depth = once.peak + once.peak_row[:m] @ correction
-    values = jnp.append(gained, -depth)
-    return values, jnp.concatenate([slopes.advance[1:], -slopes.peak[None]])
+    """The integrals, and the swing foot's clearance, which is minus the load."""
+    (gained, slopes), (depth, slope) = (f(once, point) for f in (totals_of_advance, total_of_peak))
+    return jnp.append(gained, -depth), jnp.concatenate([slopes, -slope[None]])

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import jax
@@ -19,11 +20,12 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.optimise._jacobian_functionals import CLUSTER
 from jaxbiped.optimise._objective_values import (
-    BothFunctionals,
+    AllFunctionals,
     Evaluation,
     evaluate,
     functionals_of,
 )
+from jaxbiped.optimise._objectives import Measures
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
@@ -67,8 +69,8 @@ def gaits_near(
     values: Mapping[str, np.ndarray],
     points: np.ndarray,
     settings: GaitSettings,
-    wanted: tuple[str, ...] = (),
-) -> tuple[WalkerScene, Gait, BothFunctionals]:
+    wanted: Measures = MappingProxyType({}),
+) -> tuple[WalkerScene, Gait, AllFunctionals]:
     """Gaits of n scenes that differ in some parameters.
 
     The parameters' values by name have the shape (n,), and the points, guesses of the recurring
@@ -84,14 +86,14 @@ def gaits_near(
     scenes = with_parameters(scene, {name: jnp.asarray(each) for name, each in values.items()})
     scenes = jtu.tree_map(lambda leaf: jnp.broadcast_to(jnp.asarray(leaf), (count,)), scenes)
     starts = state_of_recurring(scene.state_type, map(jnp.asarray, points.T), jnp.zeros(count))
-    return scenes, *jax.device_get(_find_each(scenes, starts, wanted, settings))
+    return scenes, *jax.device_get(_find_each(scenes, starts, dict(wanted), settings))
 
 
 @cached_jit
 def _find_each(
-    scenes: WalkerScene, starts: PyTree, wanted: tuple[str, ...], settings: GaitSettings
-) -> tuple[Gait, BothFunctionals]:
-    def one(scene: WalkerScene, start: PyTree) -> tuple[Gait, BothFunctionals]:
+    scenes: WalkerScene, starts: PyTree, wanted: Measures, settings: GaitSettings
+) -> tuple[Gait, AllFunctionals]:
+    def one(scene: WalkerScene, start: PyTree) -> tuple[Gait, AllFunctionals]:
         gait = settings.find(scene, start)
         return gait, functionals_of(scene, gait, wanted, settings.accuracy)
 
@@ -160,7 +162,7 @@ def ensemble_of(
 def with_worse_members(
     ensemble: Ensemble,
     evaluate: Callable[[Ensemble], Sequence[Evaluation | None]],
-    wanted: tuple[str, ...],
+    wanted: Measures,
     seed: int,
 ) -> Ensemble | None:
     """The ensemble with worse members than it has, which a search in its box comes upon.
@@ -193,7 +195,7 @@ def evaluate_ensemble(
     ensemble: Ensemble,
     scene: WalkerScene,
     nominal: Evaluation,
-    wanted: tuple[str, ...],
+    wanted: Measures,
     settings: GaitSettings,
 ) -> Evaluation | None:
     """The nominal design's evaluation with the measures wanted taken over all members.
@@ -209,7 +211,7 @@ def evaluate_members(
     ensemble: Ensemble,
     scene: WalkerScene,
     nominal: Evaluation,
-    wanted: tuple[str, ...],
+    wanted: Measures,
     settings: GaitSettings,
 ) -> list[Evaluation | None]:
     """Of each member the measures wanted; None where it has no gait."""

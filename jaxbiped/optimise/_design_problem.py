@@ -1,19 +1,15 @@
 """Design problem: variables, requirements and objective, whose gaits are found anew.
 
-Variables lie within bounds; requirements are given as mappings or in words.
-
 A gait is sought from where the last one's derivatives point; where that fails, or leads to another
 branch, it is followed there in smaller steps. Every design is evaluated once and kept.
 """
 
-import re
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
-from jaxbiped._quantity import si_number
+from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_provenance import explain_search
@@ -33,12 +29,15 @@ from jaxbiped.optimise._objective_values import (
     evaluate,
     functional_names,
 )
-from jaxbiped.optimise._objectives import OBJECTIVES, check_objective
+from jaxbiped.optimise._objectives import (
+    Measures,
+    measures_named,
+)
+from jaxbiped.optimise._requirements import Requirement
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 
-_WORDS = re.compile(r"^\s*(\w+)\s*(<=|>=|==|<|>|=)\s*([^<>=]+?)\s*$")
 KEPT = 1e-6
 """Part of its bound by which a requirement may be missed and still counts as kept, at least."""
 _SMALLEST = 1.0 / 32.0
@@ -46,8 +45,6 @@ _SMALLEST = 1.0 / 32.0
 _FLOOR, _ASIDE, _NEAR = 0.1, 0.5, 0.02
 """Size below which components of the state count as of one size; how far aside, in units of the
 step, and how far at least, relative to it, a gait may lie from where it was expected."""
-SubjectTo: TypeAlias = Mapping[str, tuple[float | None, float | None]] | Sequence[str] | str | None
-"""Bounds by name, or words such as "spectral_radius<0.4"."""
 
 
 class Variables(NamedTuple):
@@ -133,100 +130,6 @@ def start_of(scene: Any, variables: Variables) -> np.ndarray:
     return variables.positions(np.asarray([float(own[name]) for name in variables.names]))
 
 
-class Requirement(NamedTuple):
-    """A measure that must lie in an interval; None for no bound, equal bounds for an equality."""
-
-    name: str
-    low: float | None
-    high: float | None
-
-
-def requirements_of(scene: Any, subject_to: SubjectTo) -> tuple[Requirement, ...]:
-    """What must hold, the bounds of each measure gathered.
-
-    Raises:
-        ArgumentError: what is not understood, an objective that is unknown or that the scene
-            lacks, or bounds that contradict each other.
-    """
-    if subject_to is None:
-        return ()
-    check_type("subject_to", subject_to, str, Mapping, Sequence)
-    if isinstance(subject_to, Mapping):
-        pairs = [(name, _pair(name, bounds)) for name, bounds in subject_to.items()]
-    else:
-        words = [subject_to] if isinstance(subject_to, str) else subject_to
-        for text in words:
-            check_type("subject_to", text, str)
-        pairs = [_parse(text) for text in words]
-    gathered: dict[str, tuple[float | None, float | None]] = {}
-    for name, (low, high) in pairs:
-        check_objective(name, scene, "subject_to")
-        least, most = gathered.get(name, (None, None))
-        gathered[name] = (
-            max((each for each in (least, low) if each is not None), default=None),
-            min((each for each in (most, high) if each is not None), default=None),
-        )
-    for name, (least, most) in gathered.items():
-        if least is not None and most is not None and least > most:
-            raise ArgumentError(
-                f"subject_to asks that {name} be at least {least:g} and at most {most:g}: these "
-                "contradict each other."
-            )
-    return tuple(Requirement(name, low, high) for name, (low, high) in gathered.items())
-
-
-def larger_is_worse(
-    told: Mapping[str, float], sense: float, requirements: tuple[Requirement, ...]
-) -> dict[str, bool]:
-    """Of each measure, for the worst of several.
-
-    Raises:
-        ArgumentError: a measure of which both more and less would be worse.
-    """
-    sides = [(name, sense * weight > 0.0) for name, weight in told.items()]
-    sides += [(each.name, True) for each in requirements if each.high is not None]
-    sides += [(each.name, False) for each in requirements if each.low is not None]
-    found = dict(sides)
-    for name, larger in sides:
-        if larger != found[name]:
-            raise ArgumentError(
-                f"{name} is bounded and sought from both sides: its worst member is not defined; "
-                'choose criterion = "mean".'
-            )
-    return found
-
-
-def _pair(name: str, bounds: object) -> tuple[float | None, float | None]:
-    if not isinstance(bounds, tuple | list) or len(bounds) != 2 or list(bounds) == [None, None]:
-        raise ArgumentError(
-            f"subject_to[{name!r}] = {bounds!r} is not allowed: give (low, high), None for none."
-        )
-    for each in bounds:
-        if each is not None:
-            check_finite(f"subject_to[{name!r}]", each)
-    low, high = (None if each is None else float(each) for each in bounds)
-    return low, high
-
-
-def _parse(text: str) -> tuple[str, tuple[float | None, float | None]]:
-    found = _WORDS.match(text) if isinstance(text, str) else None
-    try:
-        if found is None:
-            raise ValueError
-        name, sign = found[1], found[2]
-        unit = OBJECTIVES[name].quantity.unit if name in OBJECTIVES else None
-        value = si_number(found[3], unit)
-    except ValueError:
-        raise ArgumentError(
-            f"subject_to = {text!r} is not understood: write name<number, name>number or "
-            "name=number, such as spectral_radius<0.4 or step_length>20cm."
-        ) from None
-    check_finite("subject_to", value)
-    if "<" in sign:
-        return name, (None, value)
-    return name, (value, None) if ">" in sign else (value, value)
-
-
 class Design(NamedTuple):
     """A design whose gait is known: its u, shape (k,), and what is known of it."""
 
@@ -242,6 +145,7 @@ class DesignProblem:
         sense: 1 where the sum of the measures is minimised, −1 where it is maximised.
         weights: of the measures in the sum that is minimised, by name.
         requirements: what must hold.
+        wanted: all measures that play a part, by name.
         evaluations: of all designs so far.
         ensemble: over whose members measures are taken; None for the design alone.
         latest: the last design whose gait was found; `asked` all of them, in order.
@@ -256,6 +160,7 @@ class DesignProblem:
         told: Mapping[str, float],
         sense: float,
         requirements: tuple[Requirement, ...],
+        wanted: Measures,
         settings: GaitSettings,
         evaluations: Evaluations,
         ensemble: Ensemble | None = None,
@@ -264,7 +169,7 @@ class DesignProblem:
         self.sense, self.requirements = sense, requirements
         self.weights = {name: sense * weight for name, weight in told.items()}
         self.settings, self.evaluations, self.ensemble = settings, evaluations, ensemble
-        self.wanted = tuple(dict.fromkeys((*told, *(each.name for each in requirements))))
+        self.wanted = wanted
         self.latest: Design | None = None
         self.asked: list[Design] = []
         self.lost = self.unmeasured = 0
@@ -273,7 +178,7 @@ class DesignProblem:
     def has_cluster(self) -> bool:
         """Whether functionals of multipliers are of one gait, not means over an ensemble."""
         of_one = self.ensemble is None or self.ensemble.criterion != "mean"
-        return of_one and bool(functional_names(self.scene, CLUSTER[:1])[0])
+        return of_one and bool(functional_names(self.scene, measures_named(CLUSTER[:1]))[0])
 
     def begin(self, u: np.ndarray, guess: WalkerState | None = None) -> Design:
         """The first design; its gait is found near a guess, or from nothing.
@@ -330,15 +235,20 @@ class DesignProblem:
 
     def at(self, u: np.ndarray) -> Evaluation | None:
         """What is known of a design; None without a gait on the way there, or derivatives of it."""
+        known = self.beside(u)
+        if known is None:
+            self.lost += 1
+            return None
+        return self._note(u, known).known
+
+    def beside(self, u: np.ndarray) -> Evaluation | None:
+        """The same of a design that is looked at, and none of those that are asked for."""
         known = self.evaluations.get(u)
         if known is None and not self.evaluations.is_lost(u):
             known = self._follow(np.array(u))
             if known is None:
                 self.evaluations.add(u, None)
-        if known is None or not self._has_derivatives(known):
-            self.lost += 1
-            return None
-        return self._note(u, known).known
+        return None if known is None or not self._has_derivatives(known) else known
 
     def _has_derivatives(self, known: Evaluation) -> bool:
         """Whether those that are used are finite: bounded from above, the radius's own are not."""
@@ -408,7 +318,7 @@ class DesignProblem:
         if self.ensemble is None:
             known = evaluate(scene, gait, self.wanted, self.settings.accuracy)
         else:
-            nominal = evaluate(scene, gait, (), self.settings.accuracy)
+            nominal = evaluate(scene, gait, {}, self.settings.accuracy)
             members = evaluate_ensemble(self.ensemble, scene, nominal, self.wanted, self.settings)
             if members is None:
                 return None

@@ -7,7 +7,7 @@ on where it was.
 
 import contextlib
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -26,6 +26,7 @@ from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._augmented_system import MOTOR_WORK, integrals_of
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
+from jaxbiped.optimise._cycle_costs import cost_functionals
 from jaxbiped.optimise._cycle_functionals import (
     Functional,
     Functionals,
@@ -40,7 +41,7 @@ from jaxbiped.optimise._jacobian_functionals import (
     SYMMETRIC,
     jacobian_functionals,
 )
-from jaxbiped.optimise._objectives import OBJECTIVES
+from jaxbiped.optimise._objectives import Combined, Measures, costs_of, with_parts
 from jaxbiped.scene._parameter_access import parameter_names, select_parameters
 from jaxbiped.scene._scene import AbstractScene, WalkerScene
 
@@ -51,8 +52,8 @@ _DISTANCES = {
 }
 _WHOLE = ("sensitivity_norm", "floor_sensitivity", *CLEARANCE_NORMS)
 """What the whole sensitivity is made of: step length, step time and clearance, by both."""
-BothFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None]
-"""Those of a gait's Jacobian and those of its cycle, None where no measure needs them."""
+AllFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None, Functionals | None]
+"""Those of a gait's Jacobian, of its cycle and its costs; None where no measure needs them."""
 
 
 class Evaluation(NamedTuple):
@@ -83,52 +84,54 @@ class Evaluation(NamedTuple):
 
 
 def functionals_of(
-    scene: WalkerScene, gait: Gait, wanted: tuple[str, ...], accuracy: str
-) -> BothFunctionals:
+    scene: WalkerScene, gait: Gait, wanted: Measures, accuracy: str
+) -> AllFunctionals:
     """What measures need beside the gait itself."""
     of_jacobian, of_cycle = functional_names(scene, wanted)
     how: Any = {"arrivals": len(gait.orbit[0]), "accuracy": accuracy, "engine": gait.engine}
-    state, first, second = gait.measures.state, None, None
+    state, first, second, third = gait.measures.state, None, None, None
     if of_jacobian:
         first = jacobian_functionals(scene, state, of_jacobian, **how)
     if of_cycle:
         second = cycle_functionals(scene, state, **how)
-    return first, second
+    if costs := costs_of(with_parts(wanted)):
+        third = cost_functionals(scene, state, costs, **how)
+    return first, second, third
 
 
-def functional_names(scene: AbstractScene, wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
+def functional_names(scene: AbstractScene, measures: Measures) -> tuple[tuple[str, ...], bool]:
     """Which functionals of the Jacobian these measures need, and whether those of the cycle.
 
     Where a cycle has no integrals all measures are known with the gait.
     """
     if integrals_of(scene) is None:
         return (), False
+    every = with_parts(measures)
+    wanted = [name for name, each in every.items() if not (each.costs or each.combined)]
     needed = {*wanted, *(_WHOLE if "whole_sensitivity" in wanted else ())}
     of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
     if "spectral_radius" in wanted:
         of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
-    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity", *_own(wanted)}
+    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity", *_own(every)}
     return of_jacobian, bool(set(wanted) - others)
 
 
-def _own(wanted: tuple[str, ...]) -> dict[str, Callable[[Any, Gait], tuple[Any, Any, Any, Any]]]:
+def _own(wanted: Measures) -> dict[str, Callable[[Any, Gait], tuple[Any, Any, Any, Any]]]:
     """Those of a user's own among these measures, by name."""
-    known = {name: OBJECTIVES[name].measured for name in wanted if name in OBJECTIVES}
-    return {name: measured for name, measured in known.items() if measured is not None}
+    return {name: each.measured for name, each in wanted.items() if each.measured is not None}
 
 
 def evaluate(
     scene: WalkerScene,
     gait: Gait,
-    names: Iterable[str],
+    wanted: Measures,
     accuracy: str,
-    functionals: BothFunctionals | None = None,
+    functionals: AllFunctionals | None = None,
 ) -> Evaluation:
     """Objectives of a gait that was found with the sensitivities to all parameters.
 
     `functionals` are those of `functionals_of`, where they are known.
     """
-    wanted = tuple(names)
     both = (gait.measures, gait.measure_errors, gait.sensitivities, gait.sensitivity_errors)
     of_jacobian, _ = functional_names(scene, wanted)
     of_gait = tuple(name for name in _OF_THE_GAIT if name in gait.measured)
@@ -138,7 +141,7 @@ def evaluate(
     rows |= {name: Functional(*measured(scene, gait)) for name, measured in _own(wanted).items()}
     if functionals is None:
         functionals = functionals_of(scene, gait, wanted, accuracy)
-    first, second = functionals
+    first, second, third = functionals
     if first is not None:
         # The orbit's own error moves the Jacobian, too, as its multipliers tell.
         shares = np.asarray(gait.multiplier_errors) / float(gait.measures.spectral_radius)
@@ -151,6 +154,11 @@ def evaluate(
     if second is not None:
         rows |= dict(zip(integral_names(scene), _rows_of(second), strict=True))
         rows["cost_of_transport"] = _cost_of_transport(scene, rows)
+    if third is not None:
+        rows |= _sums_of_costs(with_parts(wanted), third)
+    for name, objective in with_parts(wanted).items():
+        if objective.combined is not None:
+            rows[name] = _combination(objective.combined, rows)
     beyond_range = []
     for name in (name for name in wanted if name in _DISTANCES):
         told = bifurcation_distance(scene, gait, _DISTANCES[name], accuracy=accuracy)
@@ -158,7 +166,7 @@ def evaluate(
         if told.outcome is Sought.NONE_IN_RANGE:
             rows[name] = Functional(told.distance, 0.0, *[np.zeros_like(told.slopes)] * 2)
             beyond_range.append(name)
-    needed = dict.fromkeys((*wanted, *of_jacobian, *of_gait))
+    needed = dict.fromkeys((*with_parts(wanted), *of_jacobian, *of_gait))
     kept = {name: _row(*rows[name]) for name in needed}
     state, slopes = gait.measures.state, gait.sensitivities.state
     columns: Any = zip(*kept.values(), strict=True)
@@ -177,6 +185,27 @@ def _row(value: Any, error: Any, slopes: Any, slope_errors: Any) -> Functional:
 
 def _rows_of(found: Functionals) -> list[Functional]:
     return [_row(*each) for each in zip(*map(np.asarray, found[:4]), strict=True)]
+
+
+def _sums_of_costs(measures: Measures, found: Functionals) -> dict[str, Functional]:
+    """The measures that are weighted sums of costs, by name."""
+    rows = dict(zip(costs_of(measures), _rows_of(found), strict=True))
+    count = found.slopes.shape[1]
+    return {
+        name: weighted_sum([w for w, _ in each.costs], [rows[c] for _, c in each.costs], count)
+        for name, each in measures.items()
+        if each.costs
+    }
+
+
+def _combination(combined: Combined, rows: dict[str, Functional]) -> Functional:
+    """A function of functionals, to first order in their errors."""
+    parts = [rows[name] for name in combined.of]
+    values = [jnp.asarray(part.value) for part in parts]
+    value, by_part = jax.value_and_grad(combined.function, tuple(range(len(parts))))(*values)
+    return weighted_sum(map(float, by_part), parts, len(parts[0].slopes))._replace(
+        value=float(value)
+    )
 
 
 def _root_of_squares(rows: list[Functional]) -> Functional:

@@ -1,11 +1,12 @@
 """Optimality conditions of Karush, Kuhn and Tucker at a design: residual and multipliers."""
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
 import scipy  # its submodules are imported where they are first used
 
-from jaxbiped.optimise._design_functions import AnyRow, cluster_rows, rows_of
+from jaxbiped.optimise._design_functions import AnyRow, Row, cluster_rows, rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem, scale_of
 
 OPTIMAL = 1e-3
@@ -13,8 +14,13 @@ OPTIMAL = 1e-3
 _NEAR, _BEND = (1e-5, 2e-2), 0.1
 """Distances in u of designs whose differences the derivatives must explain, and what of the change
 of the derivatives between them these may miss."""
+_NEARER = 0.05
+"""Share of the way to another design at which derivatives must explain the difference that did not
+explain the whole one."""
 _AT_BOUND = 1e-6
 """Distance in u at which a variable is at its bound."""
+_ASIDE = 1e-3
+"""How far beside a design, in u, gradients are compared for its curvature."""
 _VANISHING = 1e-3
 """Size of a normal, as a share of the largest, below which it counts as none."""
 _FLAT = 1e-6
@@ -80,6 +86,7 @@ class _Balance(NamedTuple):
         errors: of that, from all error bars, of its shape.
         active: rows that hold it, of requirements first, then of the radius in the sum.
         multipliers, spreads: of these, then of the variables at a bound; and their errors.
+        normals: gradients of all these, (k, q), or (k + 1, q).
     """
 
     left: np.ndarray
@@ -87,6 +94,7 @@ class _Balance(NamedTuple):
     active: list[tuple[AnyRow, bool]]
     multipliers: np.ndarray
     spreads: np.ndarray
+    normals: np.ndarray
 
 
 def _smooth_gradient(problem: DesignProblem, design: Design) -> np.ndarray:
@@ -130,22 +138,71 @@ def _balance(problem: DesignProblem, design: Design, scale: float) -> _Balance:
     across = np.eye(len(gradient)) - sure @ np.linalg.pinv(sure)
     with np.errstate(invalid="ignore"):  # of errors without bound
         errors = np.abs(across) @ errors
-    return _Balance(gradient - matrix @ multipliers, errors, rows, multipliers, spreads)
+    return _Balance(gradient - matrix @ multipliers, errors, rows, multipliers, spreads, matrix)
 
 
 def lagrangian_change(
     problem: DesignProblem, here: Design, there: Design, scale: float
 ) -> np.ndarray:
     """How the gradient of the scaled Lagrangian changes, with the multipliers of `there`."""
-    balance = _balance(problem, there, scale)
-
-    def gradient(design: Design) -> np.ndarray:
-        total = _smooth_gradient(problem, design) / scale
-        for (row, _), multiplier in zip(balance.active, balance.multipliers, strict=False):
-            total = total - multiplier * problem.gradient(design.u, row.slopes(design.known))
-        return total
-
+    gradient = functools.partial(
+        _lagrangian_gradient, problem, _balance(problem, there, scale), scale
+    )
     return gradient(there) - gradient(here)
+
+
+def _lagrangian_gradient(
+    problem: DesignProblem, balance: _Balance, scale: float, design: Design
+) -> np.ndarray:
+    """The gradient of the scaled Lagrangian with these multipliers, but for the radius's part."""
+    total = _smooth_gradient(problem, design) / scale
+    for (row, _), multiplier in zip(balance.active, balance.multipliers, strict=False):
+        total = total - multiplier * problem.gradient(design.u, row.slopes(design.known))
+    return total
+
+
+class Curvature(NamedTuple):
+    """The reduced Hessian of an optimum: that of the Lagrangian where what holds it is kept.
+
+    It is for one whole range between a variable's bounds, relative to the objective's own size.
+
+    Attributes:
+        values: its eigenvalues in increasing order, one for each direction that is left; none
+            where multipliers of the gait play a part, beside which it is not smooth.
+        error: what they are known to.
+    """
+
+    values: np.ndarray
+    error: float
+
+
+def curvature_of(problem: DesignProblem, design: Design) -> Curvature:
+    """The reduced Hessian by differences of gradients of designs beside it."""
+    scale = max(abs(problem.objective(design.known).value), 1e-300)
+    balance = _balance(problem, design, scale)
+    is_smooth = len(balance.left) == len(design.u)
+    if not is_smooth or not all(isinstance(row, Row) for row, _ in balance.active):
+        return Curvature(np.zeros(0), 0.0)
+    holds = np.abs(balance.multipliers) > balance.spreads
+    holds[: len(balance.active)] |= np.array([row.equality for row, _ in balance.active], bool)
+    directions = scipy.linalg.null_space(balance.normals[:, holds].T)
+    gradient = functools.partial(_lagrangian_gradient, problem, balance, scale)
+    total, error = np.zeros((directions.shape[1],) * 2), 0.0
+    for k, direction in enumerate(directions.T):
+        ends = [design.u + side * _ASIDE * direction for side in (1.0, -1.0)]
+        within = [u for u in ends if np.all((u >= 0.0) & (u <= 1.0))]
+        both = [(u, problem.beside(u)) for u in within]
+        sides = [Design(u, known) for u, known in both if known is not None]
+        sides = sides if len(sides) == 2 else [*sides, design][:2]
+        if len(sides) < 2:
+            return Curvature(np.full(len(total), np.nan), np.inf)
+        one, other = sides
+        length = (one.u - other.u) @ direction
+        total[k] = directions.T @ (gradient(one) - gradient(other)) / length
+        bars = (problem.gradient(design.u, problem.objective(d.known).slope_errors) for d in sides)
+        error = max(error, float(np.sum(np.abs(list(bars))) / scale / abs(length)))
+    error += float(np.max(np.abs(total - total.T), initial=0.0))
+    return Curvature(np.linalg.eigvalsh(0.5 * (total + total.T)), error)
 
 
 def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
@@ -203,8 +260,13 @@ def doubt_of(problem: DesignProblem, design: Design) -> str:
         by_cluster = problem.has_cluster and held.name == "spectral_radius"
         if held.active and not (by_cluster or held.error <= OPTIMAL * scale_of(held.bound)):
             return f"What holds it, {held.name}, is known to within {held.error:.1e} only."
-    if not all(_explains(problem, design, e) for e in problem.asked if is_near(design, e)):
+    near = [other for other in problem.asked if is_near(design, other)]
+    if not all(_explains(problem, design, e) or _explains_nearer(problem, design, e) for e in near):
         return "Designs tried nearby differ from it by other amounts than the derivatives say."
+    curvature = curvature_of(problem, design)
+    least = np.min(curvature.values, initial=np.inf)
+    if least < -curvature.error:
+        return f"The objective curves down in a direction that nothing holds: {least:.1e}."
     return ""
 
 
@@ -213,16 +275,42 @@ def is_near(design: Design, other: Design) -> bool:
     return bool(_NEAR[0] <= np.max(np.abs(other.u - design.u)) <= _NEAR[1])
 
 
-def _explains(problem: DesignProblem, design: Design, other: Design) -> bool:
-    """Whether derivatives explain the difference of the smooth sum of a design that is near."""
+class _Missed(NamedTuple):
+    """A difference of the smooth sum of two designs, what derivatives miss of it, and its bar."""
+
+    difference: float
+    off: float
+    bar: float
+
+
+def _missed(problem: DesignProblem, design: Design, other: Design) -> _Missed:
     (weights, _), move, pair = smooth_weights(problem), other.u - design.u, (design, other)
     one, two = (problem.objective(end.known, weights) for end in pair)
     first, second = (_smooth_gradient(problem, end) @ move for end in pair)
-    off = abs(two.value - one.value - 0.5 * (first + second))
     spread = problem.gradient(design.u, one.slope_errors) @ np.abs(move)
     bar = one.error + two.error + abs(spread) + _BEND * abs(second - first)
+    difference = two.value - one.value
+    return _Missed(difference, abs(difference - 0.5 * (first + second)), bar)
+
+
+def _explains(problem: DesignProblem, design: Design, other: Design) -> bool:
+    """Whether derivatives explain the difference of the smooth sum of a design that is near."""
+    missed, move = _missed(problem, design, other), other.u - design.u
     size = abs(problem.objective(design.known).value) * np.max(np.abs(move))
-    return bool(off <= OPTIMAL * size + bar)
+    return bool(missed.off <= OPTIMAL * size + missed.bar)
+
+
+def _explains_nearer(problem: DesignProblem, design: Design, other: Design) -> bool:
+    """Whether they explain that of a design on the way to it, where the sum bends less.
+
+    There the share of the difference itself counts: near an optimum all differences are small.
+    """
+    u = design.u + _NEARER * (other.u - design.u)
+    known = problem.beside(u)
+    if known is None:
+        return False
+    missed = _missed(problem, design, Design(u, known))
+    return bool(missed.off <= OPTIMAL * abs(missed.difference) + missed.bar)
 
 
 def is_untried(u: np.ndarray, begin: np.ndarray) -> bool:

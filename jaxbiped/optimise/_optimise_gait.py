@@ -24,18 +24,24 @@ from jaxbiped.gait._search_starts import state_of_guess
 from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
 from jaxbiped.hybrid._sections import AbstractSection, chosen_section
 from jaxbiped.optimise._design_gaits import CRITERIA, Ensemble, GaitSettings, ensemble_of
-from jaxbiped.optimise._design_problem import (
-    DesignProblem,
-    SubjectTo,
-    larger_is_worse,
-    requirements_of,
-    start_of,
-    variables_of,
-)
+from jaxbiped.optimise._design_problem import DesignProblem, start_of, variables_of
 from jaxbiped.optimise._objective_values import Evaluations, functional_names
-from jaxbiped.optimise._objectives import check_objective
+from jaxbiped.optimise._objectives import (
+    Measure,
+    Measures,
+    Objective,
+    check_objective,
+    costs_of,
+    with_parts,
+)
 from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
 from jaxbiped.optimise._optimum import Optimum
+from jaxbiped.optimise._requirements import (
+    SubjectTo,
+    add_measure,
+    larger_is_worse,
+    requirements_of,
+)
 from jaxbiped.optimise._runs import Runs, optimum_of, scattered_designs
 from jaxbiped.scene._parameter_access import scene_identity
 from jaxbiped.scene._scene import AbstractScene
@@ -48,8 +54,8 @@ if TYPE_CHECKING:
 
 _ROUNDS = 3
 """Searches for worse members than an ensemble has, each with another run, at most."""
-Goal: TypeAlias = str | Mapping[str, float] | None
-"""A measure by name, or weights of several."""
+Goal: TypeAlias = str | Measure | Mapping[str | Measure, float] | None
+"""A measure by name or a cost, or weights of several."""
 
 
 def optimise_gait(
@@ -86,9 +92,11 @@ def optimise_gait(
         vary: bounds (low, high) by the name of each parameter (see `parameter_names`), SI units.
             Positive parameters are varied through their logarithm.
         maximise, minimise: give one of the two: the name of a measure of the gait (see
-            `OBJECTIVES`), or weights of several by name.
+            `OBJECTIVES` and `NAMED_COSTS`), an `Integral` or `Extreme` of its motion, a
+            `FunctionOf` measures, or weights of several.
         subject_to: bounds (low, high) by measure, with None for no bound and equal bounds for an
-            equality; or requirements as text, such as "spectral_radius<0.4", one or several.
+            equality; or requirements as text, such as "spectral_radius<0.4", constraints
+            `Along` the cycle and `Linear` ones among parameters, one or several.
         guess: a gait or a start near the gait of the first design. Default: the gait that
             `find_gait` finds; a hybrid system needs one.
         section: section on which the cycles of a hybrid system begin. Default: as of `find_gait`.
@@ -131,8 +139,11 @@ def optimise_gait(
     scene = check_scene(scene, *MINIMAL_SCENES)
     section = chosen_section(scene, section)
     variables = variables_of(scene, vary)
-    told, sense = _goal(scene, maximise, minimise)
-    requirements = requirements_of(scene, subject_to)
+    told, sense, measures = _goal(scene, maximise, minimise)
+    held = requirements_of(scene, subject_to)
+    requirements = held.each
+    for name, objective in held.measures.items():
+        add_measure(measures, name, objective)
     if isinstance(optimiser, str):
         check_choice("optimiser", optimiser, OPTIMISERS)
     else:
@@ -157,8 +168,7 @@ def optimise_gait(
     if scatter:
         worse = larger_is_worse(told, sense, requirements) if criterion == "worst" else {}
         ensemble = ensemble_of(scene, scatter, members, criterion, worse, seed)
-    measures = {*told, *(each.name for each in requirements)}
-    radius = "spectral_radius" in measures and not functional_names(scene, tuple(measures))[0]
+    radius = "spectral_radius" in measures and not functional_names(scene, measures)[0]
     settings = GaitSettings(footsteps, accuracy, engine, section, radius)
     evaluations = Evaluations()
     if store is not None:
@@ -168,7 +178,7 @@ def optimise_gait(
             own["guess"] = {name: float(leaf) for name, leaf in near._asdict().items()}
         evaluations = Evaluations(path, own)
     problem = DesignProblem(
-        scene, variables, told, sense, requirements, settings, evaluations, ensemble
+        scene, variables, told, sense, requirements, measures, settings, evaluations, ensemble
     )
     with stage("optimising the gait", unit="iterations", show=progress) as now:
         begin = problem.begin(start_of(scene, variables), near)
@@ -194,25 +204,32 @@ def optimise_gait(
     return optimum_of(problem, runs)
 
 
-def _goal(scene: Any, maximise: Goal, minimise: Goal) -> tuple[dict[str, float], float]:
+def _goal(
+    scene: Any, maximise: Goal, minimise: Goal
+) -> tuple[dict[str, float], float, dict[str, Objective]]:
+    """Weights by name, 1 to minimise their sum or −1 to maximise it, and the measures by name."""
     if (maximise is None) == (minimise is None):
         raise ArgumentError(
             'give either maximise or minimise: a measure of the gait, such as "speed".'
         )
     what, goal = ("minimise", minimise) if maximise is None else ("maximise", maximise)
-    weights = {goal: 1.0} if isinstance(goal, str) else goal
-    if not isinstance(weights, Mapping) or not weights:
+    given: Mapping[Any, float] = goal if isinstance(goal, Mapping) else {goal: 1.0}
+    if not given:
         raise ArgumentError(f"{what} = {goal!r} is not allowed: give a name, or weights by name.")
-    for name, weight in weights.items():
-        check_objective(name, scene, what)
+    weights: dict[str, float] = {}
+    measures: dict[str, Objective] = {}
+    for each, weight in given.items():
+        name, objective = check_objective(each, scene, what)
         check_finite(f"{what}[{name!r}]", weight)
-    return {name: float(w) for name, w in weights.items()}, -1.0 if what == "maximise" else 1.0
+        add_measure(measures, name, objective)
+        weights[name] = float(weight)
+    return weights, -1.0 if what == "maximise" else 1.0, measures
 
 
 def _problem_settings(
     scene: Any,
     vary: Mapping[str, tuple[float, float]],
-    measures: set[str],
+    measures: Measures,
     settings: GaitSettings,
     ensemble: Ensemble | None,
 ) -> JsonObject:
@@ -226,6 +243,7 @@ def _problem_settings(
         "model": own["model"],
         "vary": {name: [float(x) for x in bounds] for name, bounds in vary.items()},
         "measures": sorted(measures),
+        "costs": {each.name: identity(each) for each in costs_of(with_parts(measures))},
         "settings": settings._asdict() | {"section": identity(section) if chosen else None},
         "ensemble": None if ensemble is None else ensemble._asdict(),
         "writer": {name: writer[name] for name in DECISIVE},
@@ -252,11 +270,11 @@ def pareto_front(
     scene: AbstractScene,
     *,
     vary: Mapping[str, tuple[float, float]],
-    against: str,
+    against: str | Measure,
     bounds: Sequence[float] | np.ndarray,
     upper: bool = True,
-    maximise: str | None = None,
-    minimise: str | None = None,
+    maximise: Goal = None,
+    minimise: Goal = None,
     subject_to: SubjectTo = None,
     **options: Any,
 ) -> ParetoFront:
@@ -280,16 +298,17 @@ def pareto_front(
     Raises:
         ArgumentError: an argument is not allowed.
     """
-    check_objective(against, scene, "against")
+    name, _ = check_objective(against, scene, "against")
     values = np.asarray(bounds, dtype=float)
     if values.ndim != 1 or not values.size:
         raise ArgumentError(f"bounds has the shape {values.shape}: it must be (n,), n at least 1.")
-    more = {each.name: (each.low, each.high) for each in requirements_of(scene, subject_to)}
-    if against in more:
-        raise ArgumentError(f"subject_to has {against!r} already: the front bounds it itself.")
+    more = requirements_of(scene, subject_to)
+    if name in more.measures:
+        raise ArgumentError(f"subject_to has {name!r} already: the front bounds it itself.")
+    others = {more.given[each.name]: (each.low, each.high) for each in more.each}
     optima: list[Optimum] = []
     for bound in values.tolist():
-        held = {**more, against: (None, bound) if upper else (bound, None)}
+        held = {**others, against: (None, bound) if upper else (bound, None)}
         begin = optima[-1].scene if optima else scene
         optima.append(
             optimise_gait(

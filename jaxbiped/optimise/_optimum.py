@@ -10,8 +10,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._objective_values import Evaluation
-from jaxbiped.optimise._objectives import OBJECTIVES
-from jaxbiped.optimise._optimality import Optimality
+from jaxbiped.optimise._optimality import Curvature, Optimality
 from jaxbiped.scene._parameter_access import parameter_quantities
 from jaxbiped.scene._scene import WalkerScene
 
@@ -78,7 +77,9 @@ class Optimum(Tabular):
         objective: the requested sum of measures.
         error: estimated error of the objective.
         known: measures in the objective and the requirements, with gradients and errors.
+        quantities: words, symbol and unit of these by name, of those that have some.
         optimality: the optimality conditions.
+        curvature: the reduced Hessian of an optimum that converged; None of others.
         history: every iterate, of all runs one after the other.
         evaluations: number of designs whose gait was found.
         lost: number of evaluations in which no gait was found or a measure of the gait was not
@@ -95,7 +96,9 @@ class Optimum(Tabular):
     objective: float
     error: float
     known: Evaluation
+    quantities: dict[str, Quantity]
     optimality: Optimality
+    curvature: Curvature | None
     history: list[Iteration]
     evaluations: int
     lost: int
@@ -126,8 +129,7 @@ class Optimum(Tabular):
 
         units = parameter_quantities(self.scene)
         names = list(self.variables)
-        measures = [name for name in self.known.values if name in OBJECTIVES]
-        quantities = [OBJECTIVES[name].quantity for name in measures]
+        measures, quantities = list(self.quantities), list(self.quantities.values())
         at, value = ("iteration",), Quantity("value", unit="SI")
         values, errors = (
             [part[name] for name in measures] for part in (self.known.values, self.known.errors)

@@ -16,7 +16,6 @@ from jaxbiped.continuation._branch import Branch
 from jaxbiped.gait._gait import QUANTITIES
 from jaxbiped.identify._gait_fit import GaitFit
 from jaxbiped.identify._measured_gait import MEASURES, MeasuredGait
-from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import quantity_of
@@ -252,12 +251,12 @@ def _rows(optimum: Optimum) -> list[_Row]:
     measures = {name: [each.measures[name] for each in history] for name in history[0].measures}
     # One measure alone is the objective itself: its name and its unit are known.
     alone = [name for name, own in measures.items() if np.array_equal(own, values)]
-    quantity = OBJECTIVES[alone[0]].quantity if alone else Quantity("objective", unit="SI")
+    quantity = optimum.quantities[alone[0]] if alone else Quantity("objective", unit="SI")
     rows: list[_Row] = [(quantity, values, optimum.objective, optimum.error, None)]
     for name, own in measures.items():
         if name not in alone:
             told = known.values[name], known.errors[name]
-            rows.append((OBJECTIVES[name].quantity, own, *told, held.get(name)))
+            rows.append((optimum.quantities[name], own, *told, held.get(name)))
     quantities = parameter_quantities(optimum.scene)
     for name, value in optimum.variables.items():
         own = [each.variables[name] for each in history]

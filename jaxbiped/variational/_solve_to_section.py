@@ -16,7 +16,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar, Time, VectorField
+from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar, Time, VectorField, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import Recorded, Recording
 from jaxbiped.hybrid._scales import units_of
@@ -54,6 +54,8 @@ from jaxbiped.variational._tangents import (
 
 SHARE = 0.1
 """Of a column's largest entry: what its smaller entries' errors are measured against."""
+_JUST_PAST = 1e-6
+"""How far past a maximum a step may have ended that was to end there, in units of time."""
 Along: TypeAlias = Callable[
     [Callable[[PyTree, PyTree], PyTree], Tangents, Seeded], tuple[PyTree, PyTree]
 ]
@@ -347,6 +349,7 @@ def solve_to_section(
         peak, rows = peak_of(watch, landed.at_peak, args)
         # Columns do not tell how a load right behind a jump changes.
         peak_columns = jnp.where(landed.jumps_at_peak, jnp.nan, rows)
+        peak, peak_columns = with_peak_at_end(watch, (peak, peak_columns), y, args)
     return SectionArrival(
         y=y,
         time=time,
@@ -432,7 +435,8 @@ def peak_of(
     """The largest load and its derivatives.
 
     The solve landed just past the moment at which the load's rate is zero; that little time is
-    taken back, for the load's rate changes fast during an impact.
+    taken back, for the load's rate changes fast during an impact. Where it is largest at the start
+    of the solve it stays as it is.
     """
     if watch.peak is None:
         return jnp.zeros(()), jnp.zeros(args.seeds.shape[1])
@@ -452,4 +456,20 @@ def peak_of(
     curvature = jax.jvp(lambda y: rate(y, args.args), (state,), (velocity,))[1]
     is_maximum = curvature < 0.0
     past = jnp.where(is_maximum, slope / jnp.where(is_maximum, curvature, 1.0), 0.0)
+    past = jnp.where(jnp.abs(past) < _JUST_PAST * watch.time_unit, past, 0.0)
     return highest - 0.5 * past * slope, row - past * slope_row
+
+
+def with_peak_at_end(
+    watch: Watch,
+    peak: tuple[Scalar, Scalar],
+    end: Tangents,
+    args: Seeded,
+    along: Along = along_columns,
+) -> tuple[Scalar, Scalar]:
+    """The largest load and its derivatives, of a peak before and of the arrival on the section."""
+    if watch.peak is None or watch.section is None:
+        return peak
+    load = watch.peak
+    last = along(lambda y, a: load(a, y), end, args)
+    return select(last[0] > peak[0], last, peak)

@@ -37,7 +37,12 @@ from jaxbiped.variational._saltation import (
     meet,
     meeting_at,
 )
-from jaxbiped.variational._solve_to_section import SHARE, onto_section, peak_of
+from jaxbiped.variational._solve_to_section import (
+    SHARE,
+    onto_section,
+    peak_of,
+    with_peak_at_end,
+)
 from jaxbiped.variational._tangents import (
     Seeded,
     Tangents,
@@ -200,7 +205,7 @@ class AdaptiveColumns:
         time_columns = peak_columns = jnp.zeros(columns.shape[1])
         if self.watch.section is not None:
             y, t, time_columns = onto_section(self.watch, y, t, seeded, along_columns_in_turn)
-        reached = self.watch.node(given.args, y.state)
+        reached, on_section = self.watch.node(given.args, y.state), y
         y = behind_arrival(self.watch, y, seeded)
         if self.watch.peak is not None:
             at_peak = now.landed.at_peak
@@ -209,6 +214,9 @@ class AdaptiveColumns:
             highest = Tangents(at_peak, jnp.concatenate(peaks).T)
             peak, peak_columns = peak_of(self.watch, highest, seeded, along_columns_in_turn)
             peak_columns = jnp.where(now.landed.jumps_at_peak, jnp.nan, peak_columns)
+            peak, peak_columns = with_peak_at_end(
+                self.watch, (peak, peak_columns), on_section, seeded, along_columns_in_turn
+            )
         return VariationalSolution(
             t=t,
             reached=reached,

@@ -24,6 +24,7 @@ from jaxbiped.gait._orbit_derivatives import SecondVariation
 from jaxbiped.gait._return_map_spec import return_map_spec
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._solve_to_section import Nodes
+from jaxbiped.variational._tangents import Seeded
 from tests.systems import map_of
 from tests.variational.test_grazing import ABOVE, PULL, PUSH, Pulled
 from tests.variational.test_grazing import start as pulled_from
@@ -504,3 +505,23 @@ def test_an_orbit_that_grazes_has_no_sensitivities_and_multipliers_of_infinite_e
     assert np.all(np.isinf(grazing.stability.errors))
     assert np.all(np.isfinite(grazing.stability.multipliers))
     assert np.all(np.isnan(grazing.slopes.period))
+
+
+class Landing(Pulled):
+    """The ball whose motions across the ground are differentiated once."""
+
+    def switches(self, args, y):
+        return tuple(switch._replace(first_only=True) for switch in super().switches(args, y))
+
+
+def test_xla_compiles_no_second_derivatives_across_a_force_that_jumps():
+    """They are differences of first ones, by lanes alone: the return itself is not looked at."""
+    numbers, start = (jnp.asarray(PULL), jnp.asarray(PUSH)), pulled_from(1e-3)
+    spec = map_of(Landing(), ABOVE, engine="xla")
+    args = Seeded(numbers, jnp.eye(2), jnp.zeros(2), (0, 1))
+    leading, tangents = jnp.ones((1, 2)), jnp.ones((2, 2))
+    variation = _orbit_derivatives.second_variation(
+        spec, args, start, None, leading, leading, tangents, jnp.ones(2), Precision(1e-9, 1e-8)
+    )
+    assert np.isnan(variation.slopes).tolist() == [True, True]
+    assert np.isnan(variation.by_parameter).tolist() == [True, True]

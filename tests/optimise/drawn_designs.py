@@ -8,8 +8,10 @@ import jaxbiped as jb
 from jaxbiped._progress import stage
 from jaxbiped.optimise import Evaluation
 from jaxbiped.optimise._design_gaits import GaitSettings
-from jaxbiped.optimise._design_problem import DesignProblem, requirements_of, variables_of
+from jaxbiped.optimise._design_problem import DesignProblem, variables_of
 from jaxbiped.optimise._objective_values import Evaluations
+from jaxbiped.optimise._objectives import measures_named
+from jaxbiped.optimise._requirements import requirements_of
 from jaxbiped.optimise._runs import Runs
 
 SCENE = jb.ladder()["rigid"]
@@ -50,12 +52,16 @@ class Drawn(DesignProblem):
         self.evaluations.add(u, known)
         return known
 
+    def _keep(self, u, scene, gait):
+        return self._follow(u)
+
 
 def drawn(function, vary, told, sense=1.0, subject_to=None, *, begin=0.4, errors=0.0):
     """A problem of a function of the parameters by name and of u, begun at equal u."""
+    held = requirements_of(SCENE, subject_to)
     made = Drawn(
         jb.with_parameters(SCENE, {"slope": 0.02}), variables_of(SCENE, vary), told, sense,
-        requirements_of(SCENE, subject_to), GaitSettings(), Evaluations(),
+        held.each, {**measures_named(told), **held.measures}, GaitSettings(), Evaluations(),
     )  # fmt: skip
     made.function, made.errors = function, errors
     made.at(np.full(len(vary), begin))

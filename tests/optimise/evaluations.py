@@ -2,22 +2,25 @@
 
 import numpy as np
 
+from jaxbiped.optimise._cycle_costs import cost_functionals
 from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
 from jaxbiped.optimise._design_gaits import GaitSettings, ensemble_of, evaluate_ensemble
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._objective_values import evaluate
+from jaxbiped.optimise._objectives import measures_named
 
 
 def evaluated(scene, gait, names, accuracy="balanced"):
     """Objectives of a gait with their derivatives with respect to all parameters, and errors."""
-    return evaluate(scene, gait, tuple(names), accuracy)
+    return evaluate(scene, gait, measures_named(names), accuracy)
 
 
 def evaluated_over_members(scene, gait, names, criterion, larger):
     """The factors of four members that scatter in slope and d, and objectives over them."""
     ensemble = ensemble_of(scene, {"slope": 0.1, "d": 0.05}, 4, criterion, larger, seed=1)
     nominal = evaluated(scene, gait, ())
-    return ensemble.factors, evaluate_ensemble(ensemble, scene, nominal, names, GaitSettings())
+    wanted = measures_named(names)
+    return ensemble.factors, evaluate_ensemble(ensemble, scene, nominal, wanted, GaitSettings())
 
 
 def integrals_of(scene, state, **how):
@@ -29,3 +32,9 @@ def integrals_of(scene, state, **how):
 def of_return_jacobian(scene, state, names, **how):
     """What is a function of the derivatives of the return map at a state."""
     return jacobian_functionals(scene, state, names, **how)
+
+
+def evaluated_costs(scene, gait, *costs, accuracy="balanced"):
+    """Values of costs of a gait's motion, their derivatives, and the errors of these."""
+    found = cost_functionals(scene, gait.measures.state, costs, accuracy=accuracy)
+    return np.asarray(found.values), np.asarray(found.slopes), np.asarray(found.slope_errors)

@@ -15,6 +15,7 @@ from jaxbiped.dynamics import powers, push_off_work
 from jaxbiped.dynamics._actuation import hip_torques
 from jaxbiped.dynamics._stance import of_stance
 from jaxbiped.dynamics._stance_motion import hip_motion_of
+from jaxbiped.gait import Search
 from jaxbiped.optimise import Evaluation, Outcome, _certificate
 from jaxbiped.optimise._augmented_system import integrals_of
 from jaxbiped.optimise._cycle_functionals import Functional, _totals, with_errors
@@ -240,6 +241,44 @@ def test_a_search_in_the_box_finds_what_neither_sample_nor_corners_show():
     inside = wide._replace(factors=1.0 + 0.5 * (wide.factors - 1.0))
     lost = with_worse_members(inside, members, ("speed",), 0)
     assert lost.factors[-1][0] > 1.09
+
+
+def searched_by(find):
+    """A problem of three designs whose gaits this finds, and an ensemble of other members."""
+    made = formula_problem(BOTH, *FASTEST)
+    made.ensemble = ensemble_of(SCENE, {"m": 0.1}, 4, "worst", {"speed": False}, 0)
+    for d in (0.5, 0.6):
+        made.at(np.array([d, 0.4]))
+    made.settings = SimpleNamespace(find=find, state_of=lambda scene, point: point)
+    return made, made.ensemble._replace(factors=1.01 * made.ensemble.factors)
+
+
+def test_a_problem_that_begins_again_forgets_its_designs_and_counts_on():
+    made, harder = searched_by(lambda *_: SimpleNamespace(ending=int(Search.FOUND), sound=True))
+    begin, before = made.asked[0], made.evaluations
+    again = made.begin_again(begin, harder)
+    np.testing.assert_array_equal(again.u, begin.u)
+    assert made.ensemble is harder
+    assert made.asked == [again]
+    assert made.latest is again
+    # What is known of the other designs is of other members.
+    assert before.get(np.array([0.5, 0.4])) is not None
+    assert made.evaluations.get(np.array([0.5, 0.4])) is None
+    assert (before.count, made.evaluations.count) == (3, 4)
+
+
+@pytest.mark.parametrize("kind", [jb.ArgumentError, KeyboardInterrupt])
+def test_a_problem_that_cannot_begin_again_stays_as_it_was(kind):
+    def find(*_):
+        raise kind
+
+    made, harder = searched_by(find)
+    parts = lambda: [made.ensemble, made.asked, made.evaluations, made.latest]
+    before = parts()
+    with pytest.raises(kind):
+        made.begin_again(made.asked[0], harder)
+    assert all(now is then for now, then in zip(parts(), before, strict=True))
+    assert (len(made.asked), made.evaluations.count) == (3, 3)
 
 
 def test_functionals_carry_the_change_by_the_looser_solve():

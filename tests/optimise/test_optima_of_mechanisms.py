@@ -7,9 +7,10 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.gait._search_starts import default_guess
-from jaxbiped.optimise._objective_values import _weight, evaluate
+from jaxbiped.optimise._objective_values import _weight
 from jaxbiped.optimise._objectives import check_objective
 from tests.mechanisms import SEED_WITH_TORSO, scene_of, seed_walker
+from tests.optimise.evaluations import evaluated
 
 STANCE = jb.laws.StanceRotation()
 UNLIKE = dataclasses.replace(jb.seed_scene(), walker=seed_walker(first=1.02))
@@ -72,7 +73,7 @@ def test_objectives_of_the_seed_as_a_mechanism_are_the_seeds():
     told = []
     for scene in (seed, dataclasses.replace(seed, walker=seed_walker(), clearance=STANCE)):
         gait = jb.find_gait(scene, radius_sensitivities=False)
-        told.append((jb.parameter_names(scene), evaluate(scene, gait, names, "balanced")))
+        told.append((jb.parameter_names(scene), evaluated(scene, gait, names)))
     (own, seeds), (others, found) = told
     for name in names:
         bar = seeds.errors[name] + 1e-9
@@ -97,7 +98,7 @@ def test_what_is_lost_is_the_slopes_sine(scene, guess):
     """The cost of transport is what contact, friction, dampers and stops lose."""
     guess = default_guess(scene) if guess is None else scene.state(**guess)
     gait = jb.find_gait(scene, guess, radius_sensitivities=False)
-    known = evaluate(scene, gait, ("cost_of_transport",), "balanced")
+    known = evaluated(scene, gait, ("cost_of_transport",))
     name, slope = "cost_of_transport", float(scene.ground.slope)
     assert known.values[name] == pytest.approx(np.sin(slope), rel=1e-6)
     names = jb.parameter_names(scene)

@@ -9,14 +9,7 @@ import jaxbiped as jb
 from jaxbiped import ArgumentError
 from jaxbiped.optimise._cycle_functionals import Functional, weighted_sum
 from jaxbiped.optimise._design_functions import Row, conditions, radius_of, rows_of
-from jaxbiped.optimise._design_problem import (
-    Design,
-    Requirement,
-    larger_is_worse,
-    requirements_of,
-    start_of,
-    variables_of,
-)
+from jaxbiped.optimise._design_problem import Design, start_of, variables_of
 from jaxbiped.optimise._optimality import (
     _at_bounds,
     _explains,
@@ -25,6 +18,7 @@ from jaxbiped.optimise._optimality import (
     is_untried,
     smooth_weights,
 )
+from jaxbiped.optimise._requirements import Requirement, larger_is_worse, requirements_of
 from tests.optimise.drawn_designs import BOTH, FASTEST, SCENE, formula_problem
 
 WORDS = {
@@ -39,18 +33,18 @@ WORDS = {
 
 @pytest.mark.parametrize("words", WORDS)
 def test_a_requirement_in_words_is_its_bounds(words):
-    (found,) = requirements_of(SCENE, words)
+    (found,) = requirements_of(SCENE, words).each
     assert found == (words.strip().split("<")[0].split(">")[0].split("=")[0].strip(), *WORDS[words])
-    assert requirements_of(SCENE, {found.name: WORDS[words]}) == (found,)
+    assert requirements_of(SCENE, {found.name: WORDS[words]}).each == (found,)
 
 
 def test_bounds_of_one_measure_are_gathered():
     every = ["speed>0.1", "period<2", "speed<0.9", "speed>0.3", "speed<0.7"]
     speed, period = Requirement("speed", 0.3, 0.7), Requirement("period", None, 2.0)
-    assert requirements_of(SCENE, every) == (speed, period)
-    assert requirements_of(SCENE, None) == ()
+    assert requirements_of(SCENE, every).each == (speed, period)
+    assert requirements_of(SCENE, None).each == ()
     equal = {"speed": (0.5, 0.5)}
-    assert requirements_of(SCENE, equal) == (Requirement("speed", 0.5, 0.5),)
+    assert requirements_of(SCENE, equal).each == (Requirement("speed", 0.5, 0.5),)
     for wrong in (
         ["speed>0.5", "speed<0.4"], {"speed": (None, None)}, {"speed": 0.3}, {"speed": (0.1,)},
         {"speed": (np.nan, 1.0)}, "speed", "speed<", "speed<nan", "speed<2kg", 3, [3],

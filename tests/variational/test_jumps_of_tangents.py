@@ -8,11 +8,11 @@ import pytest
 from scipy.optimize import brentq
 
 import jaxbiped as jb
-from jaxbiped.hybrid import RedundantWalking, Rolling, Switch, Walking
+from jaxbiped.hybrid import Gap, RedundantWalking, Rolling, Switch, Walking
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._grazing import grazes, turns_of
 from jaxbiped.solve.controllers._step_size import step_control
-from jaxbiped.solve.controllers._switch_locator import SwitchLocator
+from jaxbiped.solve.controllers._switch_locator import MARGIN, SwitchLocator
 from jaxbiped.solve.controllers._wrapped_control import Adapted, Attempt
 from jaxbiped.solve.solvers import rms_norm
 from jaxbiped.variational._collocated_step import RADAU, KnownStep
@@ -152,6 +152,64 @@ def test_of_the_switches_within_a_step_the_first_one_ends_it(levels, corner, whi
     assert (bool(crossed.section), bool(arrives.section)) == (False, True)
 
 
+@pytest.mark.parametrize("before", [True, False])
+def test_an_arrival_counts_by_the_condition_of_the_section_itself(before):
+    """It is asked at the step's start or at its end; the switch counts where the section does not.
+
+    The second component says so: it is positive at one end of the step.
+    """
+    watch = Watch(
+        field=lambda t, y, args: (-1.0 + 0.0 * y[0], 0.0 * y[0]),
+        switches=lambda args, y: (Switch(y[0] - 0.5, y[1] < 0.0),),
+        section=lambda args, y: (0.1 - y[0], y[1] > 0.0),
+        asked_before=before,
+    )
+    locator = SwitchLocator(step_control(1e-6, 1e-8, rms_norm), watch)
+    zero, one = jnp.zeros(()), jnp.ones(())
+
+    @jax.jit
+    def arrives(at_start):
+        start, end = (one, at_start), (zero, -at_start)
+        memory = locator.init(None, zero, one, start, one, (), None, 4.0)[1]
+        later = memory._replace(accepted=jnp.asarray(1))
+        return locator._crossings(one, (), start, end, later)[0].section
+
+    assert (bool(arrives(one)), bool(arrives(-one))) == (before, not before)
+
+
+@pytest.mark.parametrize("kind", ["section", "corner"])
+def test_a_step_ends_so_little_past_a_surface_or_is_tried_again(kind):
+    """By a 10,000th of the way there, or by some margins, which are of the watch's own unit."""
+    ends_at_zero = dict(
+        section={"switches": lambda args, y: (), "section": lambda args, y: (-y[0], y[0] < 9.0)},
+        corner={"switches": lambda args, y: (Switch(y[0], True, corner=True),)},
+    )
+    unit = 2.0
+    margin = MARGIN * unit
+    fall = lambda t, y, args: (-1.0 + 0.0 * y[0],)
+    watch = Watch(field=fall, time_unit=unit, **ends_at_zero[kind])
+    locator = SwitchLocator(step_control(1e-6, 1e-8, rms_norm), watch)
+    zero = jnp.zeros(())
+
+    @jax.jit
+    def stepped(way, past):
+        start, end, span = (way,), (-past,), way + past
+        memory = locator.init(None, zero, span, start, zero, (), None, 4.0)[1]
+        later = memory._replace(accepted=jnp.asarray(1))
+        adapted = locator.adapt(Attempt(zero, span, start, end, (), (zero,), 4.0, later))
+        return adapted.keep, adapted.t0, adapted.t1
+
+    for way, past, kept in (
+        (1.0, 0.9e-4, True), (1.0, 1.1e-4, False), (1.0, 1.0, False),
+        (1e-9, 3.0 * margin, True), (1e-9, 5.0 * margin, False),
+    ):  # fmt: skip
+        keep, begin, end = stepped(jnp.asarray(way), jnp.asarray(past))
+        assert bool(keep) is kept
+        if not kept:
+            assert float(begin) == 0.0
+            assert 0.0 < float(end) - way <= 1e-4 * way + margin
+
+
 @pytest.mark.parametrize("share", [0.65, 0.9])
 def test_a_step_across_a_switch_tells_how_long_before_its_end_that_was(share):
     """So short that it is kept: 10 ps, at 1 m/s through a level."""
@@ -189,6 +247,42 @@ def test_a_step_behind_a_jump_carries_the_columns_of_the_exact_motion():
     slopes = jax.jacfwd(exact, argnums=(0, 1, 2))(start[0], start[1], level, fall + 0.01)
     np.testing.assert_allclose(ours.columns, np.stack(slopes, axis=1), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(ours.state, exact(*start, level, fall + 0.01), rtol=1e-9)
+
+
+def test_columns_of_a_step_are_its_derivatives():
+    """Against JAX's own of the step alone: of a pendulum that is damped by what it has heated.
+
+    One rate is a component; two are not, and the first one of the state is among these.
+    """
+
+    def heated(t, y, args):
+        heat, speed, angle = y
+        (pull,) = args
+        return speed**2 - pull * heat, -pull * jnp.sin(angle) - heat * speed, speed
+
+    solver, span = jb.solvers.Rodas4(), 0.2
+    start, pull = (jnp.asarray(0.3), jnp.asarray(-1.2), jnp.asarray(0.8)), jnp.asarray(0.5)
+    watch = Watch(field=heated, switches=lambda args, y: ())
+
+    @jax.jit
+    def by_columns(start):
+        args = Seeded((pull,), jnp.asarray([[0.0, 0.0, 0.0, 1.0]]), jnp.zeros(4), (0,))
+        y0, made_jump = Tangents(start, jnp.eye(3, 4)), jnp.asarray(False)
+        term = diffrax.ODETerm(VariationalField(heated))
+        return TangentSolver(watch, solver).step(term, 0.0, span, y0, args, None, made_jump)[:2]
+
+    @jax.jit
+    @jax.jacfwd
+    def derivatives(z):
+        *y, pull = z
+        ends = solver.step(diffrax.ODETerm(heated), 0.0, span, tuple(y), (pull,), None, False)[:2]
+        return jnp.stack([jnp.stack(part) for part in ends])
+
+    end, error = derivatives(jnp.stack([*start, pull]))
+    tangents, errors = by_columns(start)
+    np.testing.assert_allclose(tangents.columns, end, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(errors.columns, error, rtol=1e-9, atol=1e-14)
+    assert np.min(np.abs(end)) > 1e-3
 
 
 @pytest.mark.parametrize(("height", "moves"), [(1e-11, False), (1e-9, True)])
@@ -346,6 +440,26 @@ def test_a_foot_that_touches_down_grazes_only_if_it_is_slowed(later, slows):
     below = falls._replace(hip_z=jnp.asarray(0.395), hip_vz=jnp.asarray(later))
     old, new = (jb.hybrid.Walking().gaps(jb.seed_scene(), y) for y in (above, below))
     assert bool(grazes(old, new, jnp.asarray(0.01), jnp.asarray(10.0))) is slows
+
+
+@pytest.mark.parametrize(
+    ("deepest", "share"), [(0.01, 0.2), (-0.01, 0.2), (0.01, 0.8), (-0.01, 0.8), (0.5, 1.5)]
+)
+def test_a_gap_grazes_where_it_turns_no_deeper_than_it_is_known(deepest, share):
+    """At constant deceleration it is deepest at a share of the step, or some time behind its end.
+
+    There it has closed within the step, and slows down.
+    """
+    span, size, slowing = 0.5, 3.0, 4.0
+    times = span * np.array([0.0, 1.0]) - span * share
+    depths, rates = deepest - 0.5 * slowing * times**2, -slowing * times
+    old, new = (
+        Gap(jnp.asarray(depth), jnp.asarray(rate), None, size)
+        for depth, rate in zip(depths, rates, strict=True)
+    )
+    for known, expected in ((1.1, True), (0.9, False)):
+        rtol = jnp.asarray(known * abs(deepest) / size)
+        assert bool(grazes((old,), (new,), jnp.asarray(span), rtol)) is expected
 
 
 def test_radau_is_exact_for_polynomials_and_its_clock_runs_in_the_root_of_time():

@@ -282,7 +282,8 @@ class SwitchLocator(AbstractWrappedControl):
         peak, at_peak, jumps_at_peak = old.peak, old.at_peak, old.jumps_at_peak
         if self.watch.peak is not None:
             value = fusion_barrier(keep, functools.partial(self.watch.peak, scene, after))
-            record = keep & (value > peak)
+            # A step across the section ends behind it, where the load is none of the cycle's.
+            record = keep & (value > peak) & ~crossed.section
             peak = jnp.where(record, value, peak)
             jumps_at_peak = jnp.where(record, crossed.jump, jumps_at_peak)
             at_peak = select(record, y1, at_peak)
