@@ -17,8 +17,9 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar, as_float, by_numpy
 from jaxbiped.scene._placement import placement
 from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
-from jaxbiped.scene._state_types import SomeState, State, is_redundant
+from jaxbiped.scene._state_types import CLOCK, STRIKE_LEG, SomeState, State, is_redundant
 
+_OF_CLOCK = (CLOCK, STRIKE_LEG)
 Periods: TypeAlias = tuple[float | None, ...]
 """Period of each of some coordinates, None for one that has none; () if none of them has one."""
 
@@ -96,13 +97,16 @@ def _within_a_turn(angle: Scalar) -> Scalar:
 
 
 def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTree:
-    """`state` with every leaf a floating-point array of one shape.
+    """`state` with every leaf a floating-point array of one shape. Default of the clock: 0.
 
     Raises:
         ArgumentError: this is not a `kind`, an entry is not finite, or leaves have different
             shapes.
     """
     fields, given = getattr(kind, "_fields", ()), getattr(state, "_fields", ())
+    if CLOCK in fields and given == tuple(each for each in fields if each not in _OF_CLOCK):
+        zeros = dict.fromkeys(set(fields) & set(_OF_CLOCK), jnp.zeros_like(as_float(state[0])))
+        return check_leaves(kind(**state._asdict(), **zeros), name)
     if given and not isinstance(state, kind) and kind.__qualname__ != kind.__name__:
         raise ArgumentError(
             f"{name} has the scalars {', '.join(given)}, which is not allowed: those of this scene "
@@ -152,10 +156,10 @@ def state_for(scene: Any, state: PyTree, name: str = "state") -> PyTree:
     kind: Any = scene.state_type
     given = getattr(state, "_fields", ())
     structure = scene.mechanism.structure
-    if given and (*given, *structure.bristles) == kind._fields:
+    if given and (*given, *structure.bristles, *scene.clock) == kind._fields:
         state = without_whole_turns(scene, check_state(state, type(state), name))
         straight = jnp.zeros_like(state[0])
-        return kind(*state, **dict.fromkeys(structure.bristles, straight))
+        return kind(*state, **dict.fromkeys((*structure.bristles, *scene.clock), straight))
     if given == (*kind._fields, *structure.bristles):
         law = type(scene.minimal.friction).__name__
         raise ArgumentError(
@@ -200,6 +204,8 @@ STATE_QUANTITIES = (
         for name, each in _EACH_BODY.items()
         for leg in (1, 2)
     }
+    | {CLOCK: Quantity("time since the last strike", r"$t_\mathrm{s}$", "s")}
+    | {STRIKE_LEG: Quantity("leg that struck last")}
     | {"mode": Quantity("mode of feet and stops")}
 )
 """By the names that the fields of a state of any kind have."""

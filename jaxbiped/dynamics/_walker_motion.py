@@ -154,7 +154,7 @@ def _torques(
         drives = tuple(map(Drive, torques, now.rate))
         if getattr(part, "reaction", "swing") == "swing":
             drives = (Drive(torques[0], now.rate[0] - now.rate[1]),)
-        name = str(part.name)
+        name = part.name or type(part).__name__
         by_name[name] = by_name.get(name, ()) + drives
     mechanism = scene.mechanism
     on_angle: dict[int, dict[Angle, Scalar]] = {}

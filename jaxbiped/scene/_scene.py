@@ -8,11 +8,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias, TypeGuard
 
 import equinox as eqx
+import jax
 from equinox import AbstractVar
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped._summary import in_short, notebook_html
 from jaxbiped._types import Parameter
+from jaxbiped.caching._caches import OfObjects, OncePerVersion
 from jaxbiped.constraints._constraint_methods import Index1, method_named
 from jaxbiped.constraints._linkage import ORIENTATIONS, Linkage
 from jaxbiped.scene._clearance import AbstractClearance, AlwaysTouching, OneFoot
@@ -27,9 +29,9 @@ from jaxbiped.scene._modes import (
     rigid_modes,
     starting_mode,
 )
-from jaxbiped.scene._motor_motion import check_legs_alike
+from jaxbiped.scene._motor_motion import check_legs_alike, reads_time
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._state_types import state_type_of
+from jaxbiped.scene._state_types import CLOCK, STRIKE_LEG, state_type_of
 from jaxbiped.scene.actuation._actuators import (
     AbstractActuator,
     Actuation,
@@ -168,6 +170,17 @@ class AbstractWalkerScene(AbstractScene):
         return state_type_of(self.state_names)
 
     @property
+    def clock(self) -> tuple[str, ...]:
+        """Names of the time since the last strike, and on compliant feet of the leg that struck.
+
+        There are none where no law reads the time.
+        """
+        _, once = _READ(self, lambda: OncePerVersion(jax.tree.structure(self)))()
+        if not once(lambda: reads_time(self.mechanism, self.minimal.actuation)):
+            return ()
+        return (CLOCK, STRIKE_LEG) if self.compliant else (CLOCK,)
+
+    @property
     def bristles(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of the states of its friction."""
         return self.mechanism.structure.bristles if self.has_bristles else ()
@@ -192,6 +205,10 @@ class AbstractWalkerScene(AbstractScene):
     def has_bristles(self) -> bool:
         """Whether the friction has states of its own."""
         return isinstance(getattr(self.minimal, "friction", None), AbstractBristleLaw)
+
+
+_READ = OfObjects[OncePerVersion[bool]]()
+"""Whether laws of scenes read the time."""
 
 
 class Scene(AbstractMinimalScene, AbstractWalkerScene):
@@ -287,7 +304,7 @@ class Scene(AbstractMinimalScene, AbstractWalkerScene):
     def state_names(self) -> tuple[str, ...]:
         """Names of the scalars of a state."""
         structure = self.mechanism.structure
-        return (*structure.coordinates, *structure.rates, *self.bristles)
+        return (*structure.coordinates, *structure.rates, *self.bristles, *self.clock)
 
 
 class RigidScene(AbstractMinimalScene, AbstractWalkerScene):
@@ -368,12 +385,13 @@ class RigidScene(AbstractMinimalScene, AbstractWalkerScene):
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of the scalars of a state: place, angles, their rates, and the mode if there are
-        several.
+        """Names of the scalars of a state: place, angles, their rates, the time since the last
+        strike if a law reads it, and the mode if there are several.
         """
         structure = self.mechanism.structure
         names = (structure.coordinates[0], *structure.coordinates[2:], *structure.rates[2:])
-        return (*names, "mode") if rigid_modes(self.mechanism).any else names
+        modes = ("mode",) if rigid_modes(self.mechanism).any else ()
+        return (*names, *self.clock, *modes)
 
 
 def _of_scene(words: str, name: str = "") -> Any:
@@ -416,6 +434,11 @@ class RedundantScene(AbstractWalkerScene):
         check_type("scene", self.scene, Scene)
         check_choice("orientation", self.orientation, ORIENTATIONS)
         check_loaded_bodies(self.mechanism)
+        if self.clock:
+            raise ArgumentError(
+                "scene has a law that reads motion.time, which is not allowed in redundant "
+                "coordinates: take the Scene itself."
+            )
 
     @property
     def minimal(self) -> Scene:
