@@ -17,8 +17,9 @@ from jaxbiped.dynamics._tree import Motion
 from jaxbiped.scene._joint_parts import Motor
 from jaxbiped.scene._mechanism_pieces import named_sum
 from jaxbiped.scene._motor_motion import angle_value
+from jaxbiped.scene._state_types import CLOCK
 from jaxbiped.scene._structure import Angle
-from jaxbiped.scene.actuation._actuators import HipMotion
+from jaxbiped.scene.actuation._actuators import HipMotion, known_time
 
 
 class Drive(NamedTuple):
@@ -61,6 +62,15 @@ class WalkerMotion(NamedTuple):
     def rate(self, angle: Any) -> Scalar:
         """The rate of such an angle [rad/s]."""
         return angle_value(self._named(angle), self._bodies().rates, None)
+
+    @property
+    def time(self) -> Scalar:
+        """Time since the last strike [s].
+
+        Raises:
+            ArgumentError: no law of the scene reads it, so that its states have no clock.
+        """
+        return known_time(getattr(self.state, CLOCK, None))
 
     def motors(self) -> dict[str, tuple[Drive, ...]]:
         """The torques of every motor by its name, one for each angle on which it acts.
