@@ -210,7 +210,7 @@ def _actuator_powers(scene: Any, state: Any) -> _Driving:
         moved = preload(scene, legs[leg])
         if moved is not None and force is not None:
             pressing.append(force * moved[1])
-    hip = functools.partial(hip_motion, scene, contacts, motion.angles, motion.rates)
+    hip = functools.partial(hip_motion, scene, contacts, motion)
     return _driving(scene, motion, (legs, shares), hip, pressing)
 
 
