@@ -206,12 +206,10 @@ def hip_motion(scene: CompliantScene, found: tuple[FootMotion, ...], motion: Mot
         loads.append(sum(carried[1:], carried[0]) if carried else None)
     first, second = pair
     angles, rates = motion.angles, motion.rates
-    return HipMotion(
-        (angles[first], angles[second]),
-        (rates[first], rates[second]),
-        (loads[0], loads[1]),
-        motion.clock,
+    hip = HipMotion(
+        (angles[first], angles[second]), (rates[first], rates[second]), (loads[0], loads[1])
     )
+    return hip.timed(motion.clock)
 
 
 def limits_of(

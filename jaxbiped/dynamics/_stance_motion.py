@@ -31,16 +31,16 @@ from jaxbiped.scene.actuation._actuators import HipMotion
 def hip_motion_of(stance: Stance) -> HipMotion:
     """Gives what actuators at the hip know on rigid feet, where the leg that stands carries all."""
     motion = stance.pose.motion
-    structure = stance.tree.structure
+    structure = stance.mechanism.structure
     first, second = structure.pairs[0]
     one = jnp.ones_like(motion.angles[second])
     carries = second in structure.bodies_of_leg(stance.leg)
-    return HipMotion(
+    hip = HipMotion(
         (motion.angles[first], motion.angles[second]),
         (motion.rates[first], motion.rates[second]),
         (None, one) if carries else (one, None),
-        motion.clock,
     )
+    return hip.timed(motion.clock)
 
 
 def carriers_of(stance: Stance) -> Carriers:

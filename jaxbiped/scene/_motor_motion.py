@@ -135,7 +135,7 @@ def check_legs_alike(actuation: Any) -> None:
         if users and isinstance(part, AbstractHipActuator) and not is_traced(part):
             for load in (tuple(draw(0.0, 0.5, (2, 100))), (None, np.ones(100))):
                 angle, rate = map(tuple, draw(-1.0, 1.0, (2, 2, 100)))
-                hip = HipMotion(angle, rate, load, np.linspace(0.0, 1.0, 100))  # type: ignore[arg-type]
+                hip = HipMotion(angle, rate, load).timed(np.linspace(0.0, 1.0, 100))  # type: ignore[arg-type]
                 _check_alike([name, name], "mirror", _torques_of_legs, part, hip)
 
 
@@ -221,7 +221,7 @@ def _torques_of_legs(part: AbstractHipActuator, hip: HipMotion) -> Any:
     """Computes torques [N·m] at motions and, exchanged back, at images, shape (n, 2, 2)."""
 
     def torques(hip: HipMotion) -> Any:
-        exchanged = part.torques(hip.exchanged())[::-1]
-        return jnp.asarray([part.torques(hip), exchanged])
+        swapped = hip._replace(angle=hip.angle[::-1], rate=hip.rate[::-1], load=hip.load[::-1])
+        return jnp.asarray([part.torques(hip), part.torques(swapped)[::-1]])
 
     return jax.vmap(torques)(hip)

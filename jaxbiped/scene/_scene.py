@@ -422,6 +422,11 @@ class RedundantScene(AbstractWalkerScene):
         check_type("scene", self.scene, Scene)
         check_choice("orientation", self.orientation, ORIENTATIONS)
         check_loaded_bodies(self.mechanism)
+        if self.clock:
+            raise ArgumentError(
+                "scene has a law that reads motion.time, which is not allowed in redundant "
+                "coordinates: take the Scene itself."
+            )
 
     @property
     def minimal(self) -> Scene:

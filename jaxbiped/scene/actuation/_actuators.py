@@ -54,22 +54,34 @@ class HipMotion(NamedTuple):
         rate: rates of the angles [rad/s].
         load: share of the load that each leg carries [–], one if it stands alone; None for a leg
             that is known to carry nothing.
-        clock: time since the last strike [s]; None where no law reads it.
     """
 
     angle: tuple[Scalar, Scalar]
     rate: tuple[Scalar, Scalar]
     load: tuple[Scalar | None, Scalar | None]
-    clock: Scalar | None = None
 
     @property
     def time(self) -> Scalar:
-        """Time since the last strike [s]."""
-        return known_time(self.clock)
+        """Time since the last strike [s], of a motion that is `timed`."""
+        return known_time(None)
 
-    def exchanged(self) -> "HipMotion":
-        """The same motion with the names of the legs exchanged."""
-        return HipMotion(self.angle[::-1], self.rate[::-1], self.load[::-1], self.clock)
+    def timed(self, clock: Scalar | None) -> Any:
+        """The same with the time since the last strike [s]; as it is where that is None."""
+        return self if clock is None else TimedHipMotion(*self, clock)
+
+
+class TimedHipMotion(NamedTuple):
+    """A `HipMotion` whose time since the last strike is known.
+
+    Attributes:
+        angle, rate, load: see `HipMotion`.
+        time: time since the last strike [s].
+    """
+
+    angle: tuple[Scalar, Scalar]
+    rate: tuple[Scalar, Scalar]
+    load: tuple[Scalar | None, Scalar | None]
+    time: Scalar
 
 
 class AbstractActuator(AbstractNamedPart):
@@ -110,7 +122,7 @@ class StanceMotion(NamedTuple):
         leg: the leg that stands, 0 or 1.
     """
 
-    hip: HipMotion
+    hip: HipMotion | TimedHipMotion
     leg: int
 
     @property
