@@ -74,7 +74,7 @@ def motor_torque(
     joint = structure.joints[number]
     as_written = motor.by == "side" or leg is None or not swings_at_section(structure, leg)
     motion = motion if as_written else exchanged(structure, motion)
-    seen = MotorMotion(structure, motion.angles, motion.rates, slope, joint, line)
+    seen = MotorMotion(structure, motion.angles, motion.rates, slope, joint, line, motion.clock)
     angle = joint if as_written else joint.mirrored(exchange_of(structure))
     return MotorTorque(angle, _law_torque(motor, seen))
 
@@ -91,7 +91,7 @@ def _law_torque(motor: Motor, motion: MotorMotion) -> Scalar:
     is_one = not isinstance(torque, list | tuple) and is_number(torque)
     if not is_one and not isinstance(torque, jax.Array):
         raise ArgumentError(_not_one_torque(words, repr(torque)))
-    given = motion.angles, motion.rates, motion.slope, motor
+    given = motion.angles, motion.rates, motion.slope, motion.clock, motor
     leaves = jtu.tree_leaves(eqx.filter(given, eqx.is_array_like))
     shape, most = np.shape(torque), np.broadcast_shapes(*map(np.shape, leaves))
     if shape != most[len(most) - len(shape) :] or jnp.iscomplexobj(torque):

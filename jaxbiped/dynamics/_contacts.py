@@ -19,7 +19,7 @@ from jaxbiped.dynamics._footfalls import (
     touches,
 )
 from jaxbiped.dynamics._joint_loads import Pressed, stop_limits
-from jaxbiped.dynamics._tree import Pose, point_motion
+from jaxbiped.dynamics._tree import Motion, Pose, point_motion
 from jaxbiped.scene._ground import SteppedGround
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._scene import CompliantScene, RedundantScene, Scene
@@ -191,12 +191,7 @@ def leg_loads(structure: Structure, shares: tuple[Scalar | None, ...]) -> tuple[
     return tuple(found)
 
 
-def hip_motion(
-    scene: CompliantScene,
-    found: tuple[FootMotion, ...],
-    angles: tuple[Scalar, ...],
-    rates: tuple[Scalar, ...],
-) -> HipMotion:
+def hip_motion(scene: CompliantScene, found: tuple[FootMotion, ...], motion: Motion) -> HipMotion:
     """What actuators at the hip of a compliant walker know of it: of the mirror's first pair."""
     structure = scene.mechanism.structure
     pair = structure.pairs[0]  # there is one: else the scene has refused such actuators
@@ -210,9 +205,11 @@ def hip_motion(
         ]
         loads.append(sum(carried[1:], carried[0]) if carried else None)
     first, second = pair
-    return HipMotion(
+    angles, rates = motion.angles, motion.rates
+    hip = HipMotion(
         (angles[first], angles[second]), (rates[first], rates[second]), (loads[0], loads[1])
     )
+    return hip.timed(motion.clock)
 
 
 def limits_of(

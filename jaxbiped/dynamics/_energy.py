@@ -220,7 +220,7 @@ def in_driven_motion(scene: Any, state: Any, function: Callable[..., _Told]) -> 
         moved = preload(scene, legs[leg])
         if moved is not None and force is not None:
             pressing.append(force * moved[1])
-    hip = functools.partial(hip_motion, scene, contacts, motion.angles, motion.rates)
+    hip = functools.partial(hip_motion, scene, contacts, motion)
     return function(motion, (legs, shares), hip, pressing)
 
 

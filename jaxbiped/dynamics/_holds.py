@@ -179,7 +179,8 @@ def on_held(scene: RigidScene, state: Any) -> Any:
         now = now - along * (value + row @ (now - begun))
         rates = rates - along * (row @ rates)
         projection = projection - jnp.outer(left, along)
-    return type(state)(state[0], *now, *rates, fixed)
+    others = state[1 + 2 * len(structure.free) : -1]
+    return type(state)(state[0], *now, *rates, *others, fixed)
 
 
 def _tilt(stance: Stance) -> Scalar:

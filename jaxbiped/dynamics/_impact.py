@@ -22,6 +22,7 @@ from jaxbiped.dynamics._mode_changes import (
     grip_at_strike,
     mode_after_strike,
     settled,
+    with_clock_restarted,
     with_mode,
     with_rates,
 )
@@ -81,7 +82,7 @@ def _impact(scene: RigidScene, state: Any, old: Stance) -> Impact:
     modes, pushed = rigid_modes(mechanism), push_off_impulse(scene, old)
     found = plastic_impact(old, feet, lands, pushed, modes, grip_at_strike(scene, old))
     lifting = mean([found.stance.foot(k).vz for k in old.feet])
-    after = with_rates(state, found.stance)
+    after = with_clock_restarted(with_rates(state, found.stance))
     if not modes.any:
         return Impact(exchange_legs(scene, after), *found.impulse, lifting)
     then = with_mode(scene, exchange_legs(scene, after), mode_after_strike(scene, old, found))

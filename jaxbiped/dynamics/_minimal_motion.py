@@ -98,7 +98,7 @@ def with_torques(
         return legs_in(mechanism, poses), leg_loads(mechanism.structure, shares)
 
     def hip() -> HipMotion:
-        return hip_motion(scene, found, motion.angles, motion.rates)
+        return hip_motion(scene, found, motion)
 
     return with_driven_joints(loads, scene, motion, carriers, hip)
 

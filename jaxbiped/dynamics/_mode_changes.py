@@ -24,6 +24,7 @@ from jaxbiped.dynamics._stance_motion import (
 from jaxbiped.dynamics._surfaces import rate_unit
 from jaxbiped.scene._modes import THROUGH_STRIKE, Mode, Modes, leg_after_strike, rigid_modes
 from jaxbiped.scene._scene import RigidScene
+from jaxbiped.scene._state_types import CLOCK
 
 SLACK = 1e-9
 """Distance from a limit [rad], and of a foot from the ground in units of the walker's height, at
@@ -68,6 +69,12 @@ def with_rates(state: Any, stance: Stance) -> Any:
     structure, count = stance.mechanism.structure, len(stance.mechanism.structure.free)
     turning = (stance.pose.motion.rates[j] for j in structure.free)
     return type(state)(*state[: 1 + count], *turning, *state[1 + 2 * count :])
+
+
+def with_clock_restarted(state: Any) -> Any:
+    """A state just behind a strike: its clock, if it has one, begins again."""
+    clock = getattr(state, CLOCK, None)
+    return state if clock is None else state._replace(**{CLOCK: jnp.zeros_like(clock)})
 
 
 def grip_at_strike(scene: RigidScene, old: Stance) -> Grip:

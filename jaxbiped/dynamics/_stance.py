@@ -21,7 +21,7 @@ from jaxbiped.linalg._sparse_lu import Entry, SparseMatrix, plus
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._modes import Mode, next_leg, rigid_modes, standing_legs
 from jaxbiped.scene._scene import AbstractWalkerScene
-from jaxbiped.scene._state_types import scalars_named
+from jaxbiped.scene._state_types import CLOCK, scalars_named
 from jaxbiped.scene._structure import Indices, Structure, weighted
 
 
@@ -266,6 +266,7 @@ def stance_on(scene: AbstractWalkerScene, state: Any, leg: int) -> Stance:
         sole = either(first, sole, sole_of(mechanism, feet[1]))
     tree = standing_tree(mechanism, sole)
     whole = motion_of(mechanism, scene.ground, [zero, zero, *angles], [zero, zero, *turning])
+    whole = whole._replace(clock=getattr(state, CLOCK, None))
     return Stance(mechanism, leg, tree, pose_of(tree, _rolling(tree, whole)), mode)
 
 

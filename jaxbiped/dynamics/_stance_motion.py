@@ -23,7 +23,7 @@ from jaxbiped.linalg._sparse_lu import Entry, factorise, plus, product
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._modes import Modes, rigid_modes
 from jaxbiped.scene._scene import RigidScene
-from jaxbiped.scene._state_types import check_scalars, state_type_of
+from jaxbiped.scene._state_types import CLOCK, check_scalars, state_type_of
 from jaxbiped.scene._structure import Indices
 from jaxbiped.scene.actuation._actuators import HipMotion
 
@@ -31,15 +31,16 @@ from jaxbiped.scene.actuation._actuators import HipMotion
 def hip_motion_of(stance: Stance) -> HipMotion:
     """Gives what actuators at the hip know on rigid feet, where the leg that stands carries all."""
     motion = stance.pose.motion
-    structure = stance.tree.structure
+    structure = stance.mechanism.structure
     first, second = structure.pairs[0]
     one = jnp.ones_like(motion.angles[second])
     carries = second in structure.bodies_of_leg(stance.leg)
-    return HipMotion(
+    hip = HipMotion(
         (motion.angles[first], motion.angles[second]),
         (motion.rates[first], motion.rates[second]),
         (None, one) if carries else (one, None),
     )
+    return hip.timed(motion.clock)
 
 
 def carriers_of(stance: Stance) -> Carriers:
@@ -148,13 +149,14 @@ def rolling_field(t: Time, state: Any, scene: RigidScene) -> Any:
     """
     check_scalars(state, scene.state_names)
     _, rates = angles_and_rates(scene.mechanism.structure, state)
+    clock = [jnp.ones_like(state[0])] if CLOCK in state._fields else []
     modes = [jnp.zeros_like(state[0])] if rigid_modes(scene.mechanism).any else []
 
     def moves(stance: Stance) -> tuple[Scalar, list[Scalar]]:
         return stance.root.vx, turning_of(scene, stance).free
 
     vx, turning = of_stance(scene, state, moves)
-    return type(state)(vx, *rates, *turning, *modes)
+    return type(state)(vx, *rates, *turning, *clock, *modes)
 
 
 class Impulse(NamedTuple):

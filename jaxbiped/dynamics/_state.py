@@ -17,7 +17,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar, as_float, by_numpy
 from jaxbiped.scene._placement import placement
 from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
-from jaxbiped.scene._state_types import SomeState, State, is_redundant
+from jaxbiped.scene._state_types import CLOCK, SomeState, State, is_redundant
 
 Periods: TypeAlias = tuple[float | None, ...]
 """Period of each of some coordinates, None for one that has none; () if none of them has one."""
@@ -96,13 +96,16 @@ def _within_a_turn(angle: Scalar) -> Scalar:
 
 
 def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTree:
-    """`state` with every leaf a floating-point array of one shape.
+    """`state` with every leaf a floating-point array of one shape. Default of the clock: 0.
 
     Raises:
         ArgumentError: this is not a `kind`, an entry is not finite, or leaves have different
             shapes.
     """
     fields, given = getattr(kind, "_fields", ()), getattr(state, "_fields", ())
+    if CLOCK in fields and given == tuple(name for name in fields if name != CLOCK):
+        clock = jnp.zeros_like(as_float(state[0]))
+        return check_leaves(kind(**state._asdict(), **{CLOCK: clock}), name)
     if given and not isinstance(state, kind) and kind.__qualname__ != kind.__name__:
         raise ArgumentError(
             f"{name} has the scalars {', '.join(given)}, which is not allowed: those of this scene "
@@ -200,6 +203,7 @@ STATE_QUANTITIES = (
         for name, each in _EACH_BODY.items()
         for leg in (1, 2)
     }
+    | {CLOCK: Quantity("time since the last strike", r"$t_\mathrm{s}$", "s")}
     | {"mode": Quantity("mode of feet and stops")}
 )
 """By the names that the fields of a state of any kind have."""

@@ -54,6 +54,7 @@ class Motion(NamedTuple):
     Attributes:
         x, z: place of the root point in the slope's frame [m]. vx, vz: its velocity [m/s].
         angles, rates: of each body, those that couplings fix included [rad, rad/s].
+        clock: time since the last strike [s]; None where no law reads it.
     """
 
     x: Scalar
@@ -62,6 +63,7 @@ class Motion(NamedTuple):
     vz: Scalar
     angles: tuple[Scalar, ...]
     rates: tuple[Scalar, ...]
+    clock: Scalar | None = None
 
 
 class Pose(NamedTuple):

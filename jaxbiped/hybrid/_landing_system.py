@@ -52,7 +52,7 @@ class AbstractLandingSystem(AbstractSystem):
     def positions(self, args: PyTree) -> slice:
         """Which leaves of a state are positions.
 
-        As many behind them are their rates; all others change at resets alone.
+        As many behind them are their rates; all others change at resets alone, but for a clock.
         """
 
     @abc.abstractmethod
@@ -132,6 +132,10 @@ class AbstractLandingSystem(AbstractSystem):
         """The state with other positions, and other rates of these behind them."""
         first = self.positions(args).start
         return type(y)(*y[:first], *coordinates, *y[first + len(coordinates) :])
+
+    def later(self, args: PyTree, y: Any, time: Callable[[], Scalar]) -> Any:
+        """The state with its clock so much later. Default: as it is, without a clock."""
+        return y
 
     def course(self, args: PyTree, y: Any) -> SurfaceCourse:
         """The surfaces of the mode at a state, followed along its motion."""

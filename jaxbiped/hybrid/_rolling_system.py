@@ -39,6 +39,7 @@ from jaxbiped.hybrid._walker_starts import rolling_start
 from jaxbiped.hybrid._walker_system import AbstractWalkerSystem
 from jaxbiped.scene._modes import rigid_modes
 from jaxbiped.scene._scene import RigidScene
+from jaxbiped.scene._state_types import CLOCK
 
 _LANDED = 1e-3
 """How near a landing comes to where a load is zero, in units of the tolerance."""
@@ -153,6 +154,9 @@ class Rolling(AbstractLandingSystem, AbstractWalkerSystem):
     def arrival(self, section: AbstractSection, args: RigidScene, y: Any) -> tuple[Scalar, Scalar]:
         # The angles before the impact tell, without it.
         return -opening(args, y), lead(args, y) > 0.0
+
+    def later(self, args: RigidScene, y: Any, time: Callable[[], Scalar]) -> Any:
+        return y._replace(clock=y.clock + time()) if CLOCK in y._fields else y
 
     def reset_map(self, args: RigidScene, y: Any) -> Any:
         return impact(args, y).state

@@ -125,6 +125,7 @@ def units_of(args: PyTree, state: PyTree) -> Units:
     length, time = _length_and_time(args)
     one = length / length
     inverse: _Sizes = {(1, 0): one / length, (1, -1): time / length, (0, -1): time, (0, 0): one}
+    inverse[0, 1] = one / time
     return Units(_by_dimension(state, inverse), time)
 
 
@@ -176,6 +177,7 @@ def sizes_of(args: PyTree, states: PyTree) -> tuple[float, PyTree]:
     length, gravity = float(args.mechanism.height), float(args.ground.g)
     time = float(np.sqrt(length / gravity)) if gravity > 0.0 else 1.0
     sizes: _Sizes = {(1, 0): length, (1, -1): length / time, (0, -1): 1.0 / time, (0, 0): 1.0}
+    sizes[0, 1] = time
     return time, _by_dimension(states, sizes)
 
 

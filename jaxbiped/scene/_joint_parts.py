@@ -241,10 +241,10 @@ def law_of(law: Any) -> Any:
     return FunctionLaw(law) if callable(law) and is_leaf else law
 
 
-def _takes_the_motion(law: Any) -> bool:
+def takes_the_motion(law: Any) -> bool:
     """Whether it can be called with one argument, as far as Python can tell."""
     try:
-        inspect.signature(law).bind(None)
+        inspect.signature(law.function if isinstance(law, FunctionLaw) else law).bind(None)
     except TypeError:
         return False
     except ValueError:
@@ -278,8 +278,8 @@ class Motor(AbstractJointPart):
     name: str | None = eqx.field(static=True, default=None)
 
     def __check_init__(self) -> None:
-        given = self.law.function if isinstance(self.law, FunctionLaw) else self.law
-        if not _takes_the_motion(given):
+        if not takes_the_motion(self.law):
+            given = self.law.function if isinstance(self.law, FunctionLaw) else self.law
             raise ArgumentError(
                 f"law = {given!r} is not allowed for Motor({self.angle!r}): give a function of "
                 "the motion alone."

@@ -3,7 +3,8 @@
 import contextlib
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, NoReturn
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -12,11 +13,17 @@ import numpy as np
 from jaxbiped._checks import LIBRARIES, ArgumentError
 from jaxbiped._jax_versions import untraced
 from jaxbiped._types import Scalar, is_traced
+from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.compiler import kept_alone
 from jaxbiped.scene._joint_parts import Motor
 from jaxbiped.scene._mechanism_pieces import named_sum, with_fixed
 from jaxbiped.scene._structure import Angle, Indices, Structure
-from jaxbiped.scene.actuation._actuators import AbstractHipActuator, HipMotion
+from jaxbiped.scene.actuation._actuators import (
+    AbstractHipActuator,
+    HipMotion,
+    UnknownTimeError,
+    known_time,
+)
 
 _NUMBERS = 1000
 """Numbers in random motions, as many as NumPy runs a function of."""
@@ -39,6 +46,7 @@ class MotorMotion(NamedTuple):
         slope: angle of the vertical [rad].
         joint: the motor's angle.
         stance: line of the leg that stands; None where no leg does.
+        clock: time since the last strike [s]; None where no law reads it.
     """
 
     structure: Structure
@@ -47,6 +55,7 @@ class MotorMotion(NamedTuple):
     slope: Scalar
     joint: Angle
     stance: Any
+    clock: Scalar | None = None
 
     @property
     def angle(self) -> Scalar:
@@ -78,12 +87,9 @@ class MotorMotion(NamedTuple):
         return -self._stance().rate
 
     @property
-    def time(self) -> NoReturn:
-        """Not known to laws."""
-        raise ArgumentError(
-            "motion.time is not known, because a motor's law may not depend on time: use "
-            "motion.phase, or an angle by motion.of."
-        )
+    def time(self) -> Scalar:
+        """Time since the last strike [s]."""
+        return known_time(self.clock)
 
     def _stance(self) -> Any:
         if self.stance is None:
@@ -128,8 +134,38 @@ def check_legs_alike(actuation: Any) -> None:
         users = package not in LIBRARIES
         if users and isinstance(part, AbstractHipActuator) and not is_traced(part):
             for load in (tuple(draw(0.0, 0.5, (2, 100))), (None, np.ones(100))):
-                hip = HipMotion._make([*map(tuple, draw(-1.0, 1.0, (2, 2, 100))), load])
+                angle, rate = map(tuple, draw(-1.0, 1.0, (2, 2, 100)))
+                hip = HipMotion(angle, rate, load).timed(np.linspace(0.0, 1.0, 100))  # type: ignore[arg-type]
                 _check_alike([name, name], "mirror", _torques_of_legs, part, hip)
+
+
+def reads_time(mechanism: Any, actuation: Any) -> bool:
+    """Whether the law of a motor, or an actuator at the hip, reads the time since a strike."""
+    parts = [part for part in actuation or () if isinstance(part, AbstractHipActuator)]
+    return bool(parts or mechanism.has_motors) and _reads_time(mechanism, parts)
+
+
+@known_by_shape
+def _reads_time(mechanism: Any, parts: list[AbstractHipActuator]) -> bool:
+    s, zero = mechanism.structure, jnp.zeros(())
+    at_rest, pair = [zero] * len(s.bodies), (zero, zero)
+    torques = [lambda own=part: own.torques(HipMotion(pair, pair, pair)) for part in parts]
+    for part, joint in zip(mechanism.joints, s.joints, strict=True):
+        if isinstance(part, Motor):
+            line = None if _acts_by_side(part, s) else SimpleNamespace(angle=zero, rate=zero)
+            motion = MotorMotion(s, at_rest, at_rest, zero, joint, line)
+            torques.append(lambda own=part, motion=motion: own.law(motion))
+    return any(map(_asks_for_time, torques))
+
+
+def _asks_for_time(evaluate: Callable[[], Any]) -> bool:
+    try:
+        evaluate()
+    except UnknownTimeError:
+        return True
+    except Exception:
+        return False  # it is refused where it acts
+    return False
 
 
 def _check_alike(
@@ -170,7 +206,10 @@ def _torques_at_images(mechanism: Any, motions: Any) -> Any:
             turned[s.turn.body] += 2.0 * math.pi / s.turn.order
         images = (motors, (angles, rates)), (twins, (turned, [rates[j] for j in twin]))
         return [
-            [joints[k].law(MotorMotion(s, *seen, slope, s.joints[k], None)) for k in numbers]
+            [
+                joints[k].law(MotorMotion(s, *seen, slope, s.joints[k], None, jnp.abs(slope)))
+                for k in numbers
+            ]
             for numbers, seen in images
         ]
 
@@ -182,7 +221,7 @@ def _torques_of_legs(part: AbstractHipActuator, hip: HipMotion) -> Any:
     """Computes torques [N·m] at motions and, exchanged back, at images, shape (n, 2, 2)."""
 
     def torques(hip: HipMotion) -> Any:
-        exchanged = part.torques(HipMotion._make(pair[::-1] for pair in hip))[::-1]
-        return jnp.asarray([part.torques(hip), exchanged])
+        swapped = hip._replace(angle=hip.angle[::-1], rate=hip.rate[::-1], load=hip.load[::-1])
+        return jnp.asarray([part.torques(hip), part.torques(swapped)[::-1]])
 
     return jax.vmap(torques)(hip)

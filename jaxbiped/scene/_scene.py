@@ -27,9 +27,9 @@ from jaxbiped.scene._modes import (
     rigid_modes,
     starting_mode,
 )
-from jaxbiped.scene._motor_motion import check_legs_alike
+from jaxbiped.scene._motor_motion import check_legs_alike, reads_time
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._state_types import state_type_of
+from jaxbiped.scene._state_types import CLOCK, state_type_of
 from jaxbiped.scene.actuation._actuators import (
     AbstractActuator,
     Actuation,
@@ -166,6 +166,11 @@ class AbstractWalkerScene(AbstractScene):
     def state_type(self) -> type[Any]:
         """The type of its states."""
         return state_type_of(self.state_names)
+
+    @property
+    def clock(self) -> tuple[str, ...]:
+        """Name of the time since the last strike; none where no law reads it."""
+        return (CLOCK,) if reads_time(self.mechanism, self.minimal.actuation) else ()
 
     @property
     def bristles(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -368,12 +373,13 @@ class RigidScene(AbstractMinimalScene, AbstractWalkerScene):
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of the scalars of a state: place, angles, their rates, and the mode if there are
-        several.
+        """Names of the scalars of a state: place, angles, their rates, the time since the last
+        strike if a law reads it, and the mode if there are several.
         """
         structure = self.mechanism.structure
         names = (structure.coordinates[0], *structure.coordinates[2:], *structure.rates[2:])
-        return (*names, "mode") if rigid_modes(self.mechanism).any else names
+        modes = ("mode",) if rigid_modes(self.mechanism).any else ()
+        return (*names, *self.clock, *modes)
 
 
 def _of_scene(words: str, name: str = "") -> Any:
@@ -416,6 +422,11 @@ class RedundantScene(AbstractWalkerScene):
         check_type("scene", self.scene, Scene)
         check_choice("orientation", self.orientation, ORIENTATIONS)
         check_loaded_bodies(self.mechanism)
+        if self.clock:
+            raise ArgumentError(
+                "scene has a law that reads motion.time, which is not allowed in redundant "
+                "coordinates: take the Scene itself."
+            )
 
     @property
     def minimal(self) -> Scene:

@@ -9,6 +9,9 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, StateLeaf
 from jaxbiped.caching._caches import bounded_cache
 
+CLOCK = "clock"
+"""Name of the scalar that is the time since the last strike [s], of scenes whose laws read it."""
+
 SomeState = TypeVar("SomeState", bound=NamedTuple)
 """A state of any kind, which comes back as the same kind."""
 

@@ -79,7 +79,8 @@ def within_step(
         position, slope, _ = Quintic.of(step, old, new).derivatives(place)
         positions.append(position)
         rates.append(slope / jnp.where(step == 0.0, 1.0, step))
-    return system.with_coordinates(args, before[0], (*positions, *rates))
+    state = system.with_coordinates(args, before[0], (*positions, *rates))
+    return system.later(args, state, lambda: place * step)
 
 
 def advance(
@@ -93,7 +94,8 @@ def advance(
     system, args = motion
     old = sum(system.coordinates(args, state), ())
     new = tuple(x + step * _weighted(weights, stages, i) for i, x in enumerate(old))
-    return system.with_coordinates(args, state, new)
+    moved = system.with_coordinates(args, state, new)
+    return system.later(args, moved, lambda: step * sum(weights))
 
 
 def _weighted(weights: Sequence[Any] | np.ndarray, stages: list[Rates], i: int) -> Scalar:

@@ -8,6 +8,7 @@ from jaxbiped.scene.actuation._actuators import ACTUATORS as ACTUATORS
 from jaxbiped.scene.actuation._actuators import AbstractActuator as AbstractActuator
 from jaxbiped.scene.actuation._actuators import AbstractHipActuator as AbstractHipActuator
 from jaxbiped.scene.actuation._actuators import AbstractPhaseTorque as AbstractPhaseTorque
+from jaxbiped.scene.actuation._actuators import AbstractStanceTorque as AbstractStanceTorque
 from jaxbiped.scene.actuation._actuators import HipMotion as HipMotion
 
 # At the hip.
@@ -15,6 +16,11 @@ from jaxbiped.scene.actuation._actuators import HipSpring as HipSpring
 from jaxbiped.scene.actuation._actuators import HipTorque as HipTorque
 from jaxbiped.scene.actuation._actuators import HipPulse as HipPulse
 from jaxbiped.scene.actuation._actuators import HipSpline as HipSpline
+
+# At the hip, and for motors: laws of the time since the last strike, and a limit for any law.
+from jaxbiped.scene.actuation._time_laws import TimePolynomial as TimePolynomial
+from jaxbiped.scene.actuation._time_laws import TimeSpline as TimeSpline
+from jaxbiped.scene.actuation._time_laws import Limited as Limited
 
 # At the feet: rigid ones, compliant ones.
 from jaxbiped.scene.actuation._actuators import PushOff as PushOff

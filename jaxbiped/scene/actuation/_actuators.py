@@ -23,6 +23,25 @@ LegTorques: TypeAlias = tuple[Scalar, Scalar]
 
 REACTIONS = ("swing", "trunk")
 
+
+class UnknownTimeError(ArgumentError):
+    """A law reads the time since the last strike where none is known."""
+
+
+def known_time(clock: Scalar | None) -> Scalar:
+    """The time since the last strike [s].
+
+    Raises:
+        UnknownTimeError: none is known.
+    """
+    if clock is None:
+        raise UnknownTimeError(
+            "motion.time is not known here, which is not allowed for a law that reads it: give a "
+            "state of a Scene or a RigidScene that has the law."
+        )
+    return clock
+
+
 ACTUATORS: dict[str, type["AbstractActuator"]] = {}
 """Each actuator by name."""
 
@@ -40,6 +59,29 @@ class HipMotion(NamedTuple):
     angle: tuple[Scalar, Scalar]
     rate: tuple[Scalar, Scalar]
     load: tuple[Scalar | None, Scalar | None]
+
+    @property
+    def time(self) -> Scalar:
+        """Time since the last strike [s], of a motion that is `timed`."""
+        return known_time(None)
+
+    def timed(self, clock: Scalar | None) -> Any:
+        """The same with the time since the last strike [s]; as it is where that is None."""
+        return self if clock is None else TimedHipMotion(*self, clock)
+
+
+class TimedHipMotion(NamedTuple):
+    """A `HipMotion` whose time since the last strike is known.
+
+    Attributes:
+        angle, rate, load: see `HipMotion`.
+        time: time since the last strike [s].
+    """
+
+    angle: tuple[Scalar, Scalar]
+    rate: tuple[Scalar, Scalar]
+    load: tuple[Scalar | None, Scalar | None]
+    time: Scalar
 
 
 class AbstractActuator(AbstractNamedPart):
@@ -69,17 +111,63 @@ class AbstractHipActuator(AbstractActuator):
         """Torques of a motor alone, without springs and dampers [N·m]; None without a motor."""
 
 
-class AbstractPhaseTorque(AbstractHipActuator):
-    """A torque at the hip that is a function of the phase: how far the stance leg has turned.
+class StanceMotion(NamedTuple):
+    """What the law of a torque at the hip knows while a leg stands.
 
-    The phase is minus the stance leg's angle [rad], which grows as the walker rolls over that leg.
-    The torque does not depend on time, so the system stays autonomous. A positive torque drives the
-    walker downhill: it turns the stance leg back. In double support, the torque of each leg is
-    weighted by the load that it carries.
+    It is what a motor's law knows, of the angle of the other leg from the one that stands; it
+    reads no other angles.
+
+    Attributes:
+        hip: the motion.
+        leg: the leg that stands, 0 or 1.
+    """
+
+    hip: HipMotion | TimedHipMotion
+    leg: int
+
+    @property
+    def angle(self) -> Scalar:
+        """Angle of the other leg from this one [rad]."""
+        return self.hip.angle[1 - self.leg] - self.hip.angle[self.leg]
+
+    @property
+    def rate(self) -> Scalar:
+        """Its rate [rad/s]."""
+        return self.hip.rate[1 - self.leg] - self.hip.rate[self.leg]
+
+    @property
+    def phase(self) -> Scalar:
+        """Minus the angle of the leg that stands [rad]."""
+        return -self.hip.angle[self.leg]
+
+    @property
+    def phase_rate(self) -> Scalar:
+        """Its rate [rad/s]."""
+        return -self.hip.rate[self.leg]
+
+    @property
+    def time(self) -> Scalar:
+        """Time since the last strike [s]."""
+        return self.hip.time
+
+    def of(self, angle: Any) -> tuple[Scalar, Scalar]:
+        """Not known at the hip; raises `ArgumentError`."""
+        raise ArgumentError(
+            f"motion.of({angle!r}) is not allowed for an actuator at the hip, which knows only the "
+            "legs: give the law to a Motor of a mechanism."
+        )
+
+
+class AbstractStanceTorque(AbstractHipActuator):
+    """A torque at the hip that is a law of the motion while a leg stands; a law for a `Motor`, too.
+
+    A positive torque drives the walker downhill: it turns the stance leg back. In double support,
+    the torque of each leg is weighted by the load that it carries.
 
     Attributes:
         reaction: part that takes the opposite torque: "swing", the other leg, which it swings
-            forward; or "trunk", an upright trunk that is not modelled.
+            forward; or "trunk", an upright trunk that is not modelled. A motor's own angle tells
+            it instead.
     """
 
     reaction: AbstractVar[str]
@@ -88,13 +176,13 @@ class AbstractPhaseTorque(AbstractHipActuator):
         check_choice("reaction", self.reaction, REACTIONS)
 
     @abc.abstractmethod
-    def torque_at(self, phase: Scalar) -> Scalar:
-        """Torque at a phase [rad], positive if it drives the walker downhill [N·m]."""
+    def __call__(self, motion: Any) -> Scalar:
+        """Torque while a leg stands, from what is known of the motion then [N·m]."""
 
     def torques(self, hip: HipMotion) -> LegTorques:
         driving = [
-            None if load is None else load * self.torque_at(-angle)
-            for load, angle in zip(hip.load, hip.angle, strict=True)
+            None if load is None else load * self(StanceMotion(hip, leg))
+            for leg, load in enumerate(hip.load)
         ]
         legs = []
         for own, other in (driving, driving[::-1]):
@@ -105,6 +193,24 @@ class AbstractPhaseTorque(AbstractHipActuator):
 
     def motor_torques(self, hip: HipMotion) -> LegTorques:
         return self.torques(hip)
+
+
+class AbstractPhaseTorque(AbstractStanceTorque):
+    """A torque at the hip that is a function of the phase: how far the stance leg has turned.
+
+    The phase is minus the stance leg's angle [rad], which grows as the walker rolls over that leg.
+    The torque does not depend on time, so the system stays autonomous.
+
+    Attributes:
+        reaction: see `AbstractStanceTorque`.
+    """
+
+    def __call__(self, motion: Any) -> Scalar:
+        return self.torque_at(motion.phase)
+
+    @abc.abstractmethod
+    def torque_at(self, phase: Scalar) -> Scalar:
+        """Torque at a phase [rad], positive if it drives the walker downhill [N·m]."""
 
 
 Actuation: TypeAlias = Any
