@@ -20,6 +20,8 @@ from jaxbiped.dynamics._tree import Motion, Pose, point_motion, pose_of
 from jaxbiped.scene._linkages import loaded_bodies
 from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, is_rigid
 from jaxbiped.scene._state_types import (
+    CLOCK,
+    STRIKE_LEG,
     MinimalState,
     SomeState,
     is_redundant,
@@ -77,7 +79,8 @@ def motion_in(scene: AbstractWalkerScene, state: CompliantState) -> Motion:
         x, z, vx, vz = (mean(values) for values in each)
         return told[0]._replace(x=x, z=z, vx=vx, vz=vz)
     places, rates = (scalars_named(state, n) for n in (structure.coordinates, structure.rates))
-    return motion_of(scene.mechanism, scene.ground, list(places), list(rates))
+    motion = motion_of(scene.mechanism, scene.ground, list(places), list(rates))
+    return motion._replace(clock=getattr(state, CLOCK, None))
 
 
 def poses_of(scene: AbstractWalkerScene, state: CompliantState) -> tuple[Pose, ...]:
@@ -193,7 +196,23 @@ def exchange_legs(scene: AbstractWalkerScene, state: SomeState, times: int = 1) 
             motion = motion_in(scene, state) if rolls is None else rolls
             for name, angle, rate in zip(bodies, motion.angles, motion.rates, strict=True):
                 values |= {f"theta_{name}": angle, f"omega_{name}": rate}
+    if STRIKE_LEG in values:
+        values = values | {STRIKE_LEG: _strike_leg_renamed(structure, values[STRIKE_LEG], times)}
     return state._replace(**{name: values[names.get(name, name)] for name in state._fields})
+
+
+def strike_leg_of(structure: Structure, leg: int) -> float:
+    """The scalar of states that tells that a leg struck last."""
+    return float((leg - structure.stance_leg) % len(structure.legs))
+
+
+def _strike_leg_renamed(structure: Structure, value: Scalar, times: int) -> Scalar:
+    renamed, image = structure.feet_renamed(times), value
+    for leg, feet in enumerate(structure.feet_of_leg):
+        now = strike_leg_of(structure, structure.leg_of_foot[renamed[feet[0]]])
+        struck = jnp.abs(value - strike_leg_of(structure, leg)) < 0.5
+        image = jnp.where(struck, now, image)
+    return image
 
 
 def _turned(structure: Structure, state: SomeState, times: int) -> dict[str, Any]:

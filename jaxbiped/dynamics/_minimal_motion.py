@@ -2,6 +2,8 @@
 
 from typing import Any, NamedTuple
 
+import jax.numpy as jnp
+
 from jaxbiped._types import Scalar, Time
 from jaxbiped.compiler import kept_alone
 from jaxbiped.dynamics._actuation import Carriers, load_shares, with_driven_joints
@@ -25,7 +27,7 @@ from jaxbiped.linalg._sparse_lu import SparseMatrix, times
 from jaxbiped.scene._ground import gravity_on
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._scene import CompliantScene, Scene
-from jaxbiped.scene._state_types import check_scalars, state_type_of
+from jaxbiped.scene._state_types import CLOCK, STRIKE_LEG, check_scalars, state_type_of
 from jaxbiped.scene._structure import Structure
 from jaxbiped.scene.actuation._actuators import HipMotion
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
@@ -138,7 +140,14 @@ def vector_field(t: Time, state: Any, scene: Scene) -> Any:
         for place, rate in zip(structure.coordinates, structure.rates, strict=True)
     }
     second = dict(zip(structure.rates, accelerated, strict=True))
-    return type(state)(**places, **second, **bristle_rates(scene, state))
+    others = bristle_rates(scene, state) | _clock_rates(state)
+    return type(state)(**places, **second, **others)
+
+
+def _clock_rates(state: CompliantState) -> dict[str, Scalar]:
+    """Rates of the time since the last strike, and of the leg that struck, by their names."""
+    rates = {CLOCK: jnp.ones_like(state[0]), STRIKE_LEG: jnp.zeros_like(state[0])}
+    return rates if CLOCK in state._fields else {}
 
 
 def mass_matrix(scene: Scene, state: CompliantState) -> SparseMatrix:
@@ -158,7 +167,7 @@ def force_residual(scene: Scene, state: CompliantState, rates: CompliantState) -
     loads = _with_applied_loads(Loads.none(structure), scene, at)
     balance = force_balance(structure, at.known, at.pose, loads, given)
     residual = dict(zip(_places(structure, state), balance, strict=True))
-    for name, rate in bristle_rates(scene, state).items():
+    for name, rate in (bristle_rates(scene, state) | _clock_rates(state)).items():
         residual[state._fields.index(name)] = rate - getattr(rates, name)
     return residual
 

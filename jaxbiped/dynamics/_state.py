@@ -17,8 +17,9 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar, as_float, by_numpy
 from jaxbiped.scene._placement import placement
 from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
-from jaxbiped.scene._state_types import CLOCK, SomeState, State, is_redundant
+from jaxbiped.scene._state_types import CLOCK, STRIKE_LEG, SomeState, State, is_redundant
 
+_OF_CLOCK = (CLOCK, STRIKE_LEG)
 Periods: TypeAlias = tuple[float | None, ...]
 """Period of each of some coordinates, None for one that has none; () if none of them has one."""
 
@@ -103,9 +104,9 @@ def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTre
             shapes.
     """
     fields, given = getattr(kind, "_fields", ()), getattr(state, "_fields", ())
-    if CLOCK in fields and given == tuple(name for name in fields if name != CLOCK):
-        clock = jnp.zeros_like(as_float(state[0]))
-        return check_leaves(kind(**state._asdict(), **{CLOCK: clock}), name)
+    if CLOCK in fields and given == tuple(each for each in fields if each not in _OF_CLOCK):
+        zeros = dict.fromkeys(set(fields) & set(_OF_CLOCK), jnp.zeros_like(as_float(state[0])))
+        return check_leaves(kind(**state._asdict(), **zeros), name)
     if given and not isinstance(state, kind) and kind.__qualname__ != kind.__name__:
         raise ArgumentError(
             f"{name} has the scalars {', '.join(given)}, which is not allowed: those of this scene "
@@ -155,10 +156,10 @@ def state_for(scene: Any, state: PyTree, name: str = "state") -> PyTree:
     kind: Any = scene.state_type
     given = getattr(state, "_fields", ())
     structure = scene.mechanism.structure
-    if given and (*given, *structure.bristles) == kind._fields:
+    if given and (*given, *structure.bristles, *scene.clock) == kind._fields:
         state = without_whole_turns(scene, check_state(state, type(state), name))
         straight = jnp.zeros_like(state[0])
-        return kind(*state, **dict.fromkeys(structure.bristles, straight))
+        return kind(*state, **dict.fromkeys((*structure.bristles, *scene.clock), straight))
     if given == (*kind._fields, *structure.bristles):
         law = type(scene.minimal.friction).__name__
         raise ArgumentError(
@@ -204,6 +205,7 @@ STATE_QUANTITIES = (
         for leg in (1, 2)
     }
     | {CLOCK: Quantity("time since the last strike", r"$t_\mathrm{s}$", "s")}
+    | {STRIKE_LEG: Quantity("leg that struck last")}
     | {"mode": Quantity("mode of feet and stops")}
 )
 """By the names that the fields of a state of any kind have."""

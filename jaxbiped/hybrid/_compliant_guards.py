@@ -8,8 +8,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._contacts import feet, foot_force, legs_at, limits_of
-from jaxbiped.dynamics._equivalent_states import CompliantState
-from jaxbiped.dynamics._footfalls import FootMotion, touches
+from jaxbiped.dynamics._equivalent_states import CompliantState, strike_leg_of
+from jaxbiped.dynamics._footfalls import FootMotion, carrier_place, leg_places, touches
 from jaxbiped.hybrid._guards import Gap, Switch
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
@@ -66,6 +66,41 @@ def _foot_switches(scene: CompliantScene, foot: FootMotion, rate: Scalar) -> lis
         pressed = below & (scene.normal.force(foot.penetration, foot.penetration_rate) > 0.0)
         found.append(Switch(rate, pressed, force_jumps=True))
     return found
+
+
+def strikes(scene: CompliantScene, state: CompliantState) -> tuple[Switch, ...]:
+    """The surface at which each leg strikes: it comes to touch, ahead of who carries.
+
+    It is a footstep, as `landings` tells them, where another leg made the last one; the clock of
+    the state restarts there.
+
+    Args:
+        scene: the walker, whose states have a clock.
+        state: scalar leaves, SI units.
+
+    Returns:
+        The switches of the legs, in their order.
+    """
+    structure, found = scene.mechanism.structure, feet(scene, state)
+    height, legs = scene.mechanism.height, legs_at(scene, state)
+    pace, places = jnp.sqrt(height / scene.ground.g), leg_places(structure, found)
+    switches = []
+    for leg, own in enumerate(structure.feet_of_leg):
+        value = jnp.ones_like(height)
+        for foot in (found[k] for k in own if found[k].admitted is not False):
+            off = -foot.penetration / height
+            if foot.admitted is not None:
+                turns = jnp.abs(legs[leg].rate) * pace
+                off = jnp.maximum(off, jnp.where(foot.admitted, -turns, turns))
+            value = jnp.minimum(value, off)
+        live: Scalar | bool = True
+        if (carrier := carrier_place(structure, found, places, leg)) is not None:
+            value = jnp.maximum(value, (carrier - places[leg]) / height)
+            live = jnp.abs(state.strike_leg - strike_leg_of(structure, leg)) > 0.5
+        switches.append(
+            Switch(value, live, force_jumps=True, resets=True, first_only=True, rises=True)
+        )
+    return tuple(switches)
 
 
 def gaps(scene: CompliantScene, state: CompliantState) -> tuple[Gap, ...]:

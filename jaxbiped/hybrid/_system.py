@@ -37,8 +37,9 @@ class AbstractSystem(eqx.Module):
             may depend on them.
         time_unit: size of the times in which the motion changes [s]: events are located to a share
             of it. A property of the class.
-        lands: whether every solve ends a step on each switch; else only those with derivatives do,
-            and others weigh the errors of steps across. A property of the class.
+        lands: whether every solve ends a step on each of the `landed_switches`; else only those
+            with derivatives do, and others weigh the errors of steps across. A property of the
+            class.
         resets: whether a plain solve resets the state at switches. A property of the class.
         watches: names of the failures that may be watched for. A property of the class.
         footsteps_end_on_section: whether a footstep ends where a cycle's section is met; else
@@ -63,6 +64,10 @@ class AbstractSystem(eqx.Module):
         """
         return y, None
 
+    def begun(self, args: PyTree, y: PyTree) -> PyTree:
+        """A start with what the motion would tell of its past. Default: as it is."""
+        return y
+
     def check_start(self, args: PyTree, y: PyTree, given: PyTree) -> None:
         """Raises `ArgumentError` for a start that cannot be simulated well.
 
@@ -86,6 +91,10 @@ class AbstractSystem(eqx.Module):
     @abc.abstractmethod
     def switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
         """Surfaces across which the vector field is not smooth."""
+
+    def landed_switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
+        """The first switches, those on which steps without derivatives end. Default: all."""
+        return self.switches(args, y)
 
     def reset_at_switch(self, args: PyTree, y: PyTree, which: Scalar) -> PyTree:
         """The state after the switch of a number, from 1 on, that resets it. Default: as it is."""

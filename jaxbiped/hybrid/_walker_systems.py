@@ -13,12 +13,12 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._constrained_motion import consistent_state, project
 from jaxbiped.dynamics._contacts import feet, foot_force
-from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state
+from jaxbiped.dynamics._equivalent_states import exchange_legs, minimal_state, strike_leg_of
 from jaxbiped.dynamics._footfalls import landings, leg_depth, standing_leg
 from jaxbiped.dynamics._minimal_motion import force_residual, mass_matrix, vector_field
 from jaxbiped.dynamics._redundant_motion import redundant_field
 from jaxbiped.dynamics._state import cyclic_names
-from jaxbiped.hybrid._compliant_guards import contact_changes, gaps, switches
+from jaxbiped.hybrid._compliant_guards import contact_changes, gaps, strikes, switches
 from jaxbiped.hybrid._endings import ending_events, ending_surface
 from jaxbiped.hybrid._footsteps import places_of_landings, stands_too_deep
 from jaxbiped.hybrid._guards import Gap, Switch
@@ -134,6 +134,41 @@ class Walking(AbstractWalking):
         return sizes_of(args, y)[1]._replace(**{structure.coordinates[1]: height})
 
 
+class ClockedWalking(Walking):
+    """The walker whose laws read the time since the last strike; each strike restarts its clock.
+
+    A step ends on each strike. A foot that bounces has struck once: its leg strikes again only
+    when another one has struck.
+    """
+
+    lands: ClassVar[bool] = True
+    resets: ClassVar[bool] = True
+    refuses: ClassVar[tuple[str, ...]] = ("adjoint",)
+
+    def begun(self, args: Scene, y: PyTree) -> PyTree:
+        """The leg that stands alone struck last."""
+        structure = args.mechanism.structure
+        stands, struck = self.standing_leg(args, y), y.strike_leg
+        for leg in range(len(structure.legs)):
+            struck = jnp.where(stands == 1 + leg, strike_leg_of(structure, leg), struck)
+        return y._replace(strike_leg=struck)
+
+    def landed_switches(self, args: Scene, y: PyTree) -> tuple[Switch, ...]:
+        return strikes(args, y)
+
+    def switches(self, args: Scene, y: PyTree) -> tuple[Switch, ...]:
+        return (*strikes(args, y), *switches(args, y))
+
+    def reset_at_switch(self, args: Scene, y: PyTree, which: Scalar) -> PyTree:
+        structure = args.mechanism.structure
+        clock, struck = y.clock, y.strike_leg
+        for leg in range(len(structure.legs)):
+            strikes_now = which == 1 + leg
+            clock = jnp.where(strikes_now, 0.0, clock)
+            struck = jnp.where(strikes_now, strike_leg_of(structure, leg), struck)
+        return y._replace(clock=clock, strike_leg=struck)
+
+
 class RedundantWalking(AbstractWalking):
     """The walker in coordinates of each leg. Its constraints leave fewer directions than leaves.
 
@@ -160,12 +195,12 @@ class RedundantWalking(AbstractWalking):
 
 
 # The same each time: to form one costs more than what a warm call asks of it.
-_WALKING, _REDUNDANT_WALKING = Walking(), RedundantWalking()
+_WALKING, _CLOCKED_WALKING, _REDUNDANT_WALKING = Walking(), ClockedWalking(), RedundantWalking()
 
 
 @system_of.register
 def _(scene: Scene) -> AbstractSystem:
-    return _WALKING
+    return _CLOCKED_WALKING if scene.clock else _WALKING
 
 
 @system_of.register

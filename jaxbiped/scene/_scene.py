@@ -29,7 +29,7 @@ from jaxbiped.scene._modes import (
 )
 from jaxbiped.scene._motor_motion import check_legs_alike, reads_time
 from jaxbiped.scene._placement import placement
-from jaxbiped.scene._state_types import CLOCK, state_type_of
+from jaxbiped.scene._state_types import CLOCK, STRIKE_LEG, state_type_of
 from jaxbiped.scene.actuation._actuators import (
     AbstractActuator,
     Actuation,
@@ -169,8 +169,13 @@ class AbstractWalkerScene(AbstractScene):
 
     @property
     def clock(self) -> tuple[str, ...]:
-        """Name of the time since the last strike; none where no law reads it."""
-        return (CLOCK,) if reads_time(self.mechanism, self.minimal.actuation) else ()
+        """Names of the time since the last strike, and on compliant feet of the leg that struck.
+
+        There are none where no law reads the time.
+        """
+        if not reads_time(self.mechanism, self.minimal.actuation):
+            return ()
+        return (CLOCK, STRIKE_LEG) if self.compliant else (CLOCK,)
 
     @property
     def bristles(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -292,7 +297,7 @@ class Scene(AbstractMinimalScene, AbstractWalkerScene):
     def state_names(self) -> tuple[str, ...]:
         """Names of the scalars of a state."""
         structure = self.mechanism.structure
-        return (*structure.coordinates, *structure.rates, *self.bristles)
+        return (*structure.coordinates, *structure.rates, *self.bristles, *self.clock)
 
 
 class RigidScene(AbstractMinimalScene, AbstractWalkerScene):

@@ -11,6 +11,9 @@ from jaxbiped.caching._caches import bounded_cache
 
 CLOCK = "clock"
 """Name of the scalar that is the time since the last strike [s], of scenes whose laws read it."""
+STRIKE_LEG = "strike_leg"
+"""Name of the scalar that tells on compliant feet which leg struck last: 0 for the one that stands
+where a cycle begins, and so on in the order of the legs."""
 
 SomeState = TypeVar("SomeState", bound=NamedTuple)
 """A state of any kind, which comes back as the same kind."""

@@ -102,6 +102,7 @@ class AbstractSimulation(eqx.Module):
             check_steps(method, dt, most_steps=asked.max_solver_steps, duration=time)
         if scene.redundant:  # outside: what it compiles makes parts of its own, none of them given
             state, correction = system.start(scene, state)
+        state = system.begun(scene, state)
         # Of a lane that is not allowed nothing is known from the start.
         state, time = where_allowed(rules, state), where_allowed(rules, time, 1.0)
         watch = watched_by(scene, asked.watch)

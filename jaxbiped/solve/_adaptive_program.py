@@ -223,7 +223,8 @@ class AdaptiveSolve(AbstractSolve):
     @property
     def _switches(self) -> Watch:
         """What steps end on; for a system that lands."""
-        return Watch.of(self.system, resets=self.system.resets)
+        watch = Watch.of(self.system, resets=self.system.resets)
+        return dataclasses.replace(watch, switches=self.system.landed_switches)
 
     def _landed(self, control: PyTree) -> SwitchLocatorState:
         """What the switch locator knows; for a system that lands."""
