@@ -54,7 +54,8 @@ class Runs:
     def best(self) -> Design:
         return min(self.problem.asked, key=functools.partial(rank_of, self.problem))
 
-    def run(self, begin: Design) -> None:
+    def run(self, begin: Design, ended: RunEnding | None = None) -> None:
+        """Runs the optimiser from a design; only where it is no optimum if a search `ended` there."""
         self.problem.latest = begin
         self.note(begin.u)
         before = self.best
@@ -63,9 +64,14 @@ class Runs:
             optimise = BY_NAME[self.optimiser]
         else:
             optimise = functools.partial(run_optax, transformation=self.optimiser)
-        ended = optimise(functions, begin.u, self.iterations, self.note)
-        balanced = optimality_of(self.problem, self.best).residual <= OPTIMAL
-        if ended.converged and optimise is not run_trust_region and not balanced:
+        runs_on = optimise is not run_trust_region
+        if ended is None or not ended.converged:
+            ended = optimise(functions, begin.u, self.iterations, self.note)
+        else:
+            runs_on = True
+        best = self.best
+        balanced = optimality_of(self.problem, best).residual <= OPTIMAL
+        if ended.converged and runs_on and not balanced:
             # It may have stopped on a ridge of the objective, along which designs get better.
             self.problem.latest = self.best
             on = run_trust_region(functions, self.best.u, self.iterations, self.note)
