@@ -1,4 +1,4 @@
-"""The clock on compliant feet: who strikes restarts it, and columns jump there."""
+"""The clock on compliant feet, which strikes restart, against SciPy and differences."""
 
 import dataclasses
 
