@@ -129,7 +129,7 @@ class Limited(AbstractStanceTorque):
                 "Spline, HipSpline or TimeSpline."
             )
 
-    @property
+    @property  # type: ignore[misc]
     def reaction(self) -> str:  # type: ignore[override]
         """The law's own, or "swing"."""
         return getattr(self.law, "reaction", "swing")
