@@ -2,6 +2,7 @@
 
 import functools
 import operator
+from typing import Any
 
 import jax.numpy as jnp
 from jaxtyping import PyTree
@@ -68,7 +69,7 @@ def _foot_switches(scene: CompliantScene, foot: FootMotion, rate: Scalar) -> lis
     return found
 
 
-def strikes(scene: CompliantScene, state: CompliantState) -> tuple[Switch, ...]:
+def strikes(scene: CompliantScene, state: Any) -> tuple[Switch, ...]:
     """The surface at which each leg strikes: it comes to touch, ahead of who carries.
 
     It is a footstep, as `landings` tells them, where another leg made the last one; the clock of

@@ -145,7 +145,7 @@ class ClockedWalking(Walking):
     resets: ClassVar[bool] = True
     refuses: ClassVar[tuple[str, ...]] = ("adjoint",)
 
-    def begun(self, args: Scene, y: PyTree) -> PyTree:
+    def begun(self, args: CompliantScene, y: PyTree) -> PyTree:
         """The leg that stands alone struck last."""
         structure = args.mechanism.structure
         stands, struck = self.standing_leg(args, y), y.strike_leg
@@ -153,13 +153,13 @@ class ClockedWalking(Walking):
             struck = jnp.where(stands == 1 + leg, strike_leg_of(structure, leg), struck)
         return y._replace(strike_leg=struck)
 
-    def landed_switches(self, args: Scene, y: PyTree) -> tuple[Switch, ...]:
+    def landed_switches(self, args: CompliantScene, y: PyTree) -> tuple[Switch, ...]:
         return strikes(args, y)
 
-    def switches(self, args: Scene, y: PyTree) -> tuple[Switch, ...]:
+    def switches(self, args: CompliantScene, y: PyTree) -> tuple[Switch, ...]:
         return (*strikes(args, y), *switches(args, y))
 
-    def reset_at_switch(self, args: Scene, y: PyTree, which: Scalar) -> PyTree:
+    def reset_at_switch(self, args: CompliantScene, y: PyTree, which: Scalar) -> PyTree:
         structure = args.mechanism.structure
         clock, struck = y.clock, y.strike_leg
         for leg in range(len(structure.legs)):

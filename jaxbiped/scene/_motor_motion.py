@@ -1,6 +1,7 @@
 """Motion that a motor's law sees, and what laws must not tell apart: the images of a motion."""
 
 import contextlib
+import functools
 import math
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
@@ -149,12 +150,13 @@ def reads_time(mechanism: Any, actuation: Any) -> bool:
 def _reads_time(mechanism: Any, parts: list[AbstractHipActuator]) -> bool:
     s, zero = mechanism.structure, jnp.zeros(())
     at_rest, pair = [zero] * len(s.bodies), (zero, zero)
-    torques = [lambda own=part: own.torques(HipMotion(pair, pair, pair)) for part in parts]
+    hip = HipMotion(pair, pair, pair)
+    torques: list[Callable[[], Any]] = [functools.partial(part.torques, hip) for part in parts]
     for part, joint in zip(mechanism.joints, s.joints, strict=True):
         if isinstance(part, Motor):
             line = None if _acts_by_side(part, s) else SimpleNamespace(angle=zero, rate=zero)
             motion = MotorMotion(s, at_rest, at_rest, zero, joint, line)
-            torques.append(lambda own=part, motion=motion: own.law(motion))
+            torques.append(functools.partial(part.law, motion))
     return any(map(_asks_for_time, torques))
 
 

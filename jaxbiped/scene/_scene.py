@@ -8,11 +8,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias, TypeGuard
 
 import equinox as eqx
+import jax
 from equinox import AbstractVar
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped._summary import in_short, notebook_html
 from jaxbiped._types import Parameter
+from jaxbiped.caching._caches import OfObjects, OncePerVersion
 from jaxbiped.constraints._constraint_methods import Index1, method_named
 from jaxbiped.constraints._linkage import ORIENTATIONS, Linkage
 from jaxbiped.scene._clearance import AbstractClearance, AlwaysTouching, OneFoot
@@ -173,7 +175,8 @@ class AbstractWalkerScene(AbstractScene):
 
         There are none where no law reads the time.
         """
-        if not reads_time(self.mechanism, self.minimal.actuation):
+        _, once = _READ(self, lambda: OncePerVersion(jax.tree.structure(self)))()
+        if not once(lambda: reads_time(self.mechanism, self.minimal.actuation)):
             return ()
         return (CLOCK, STRIKE_LEG) if self.compliant else (CLOCK,)
 
@@ -202,6 +205,10 @@ class AbstractWalkerScene(AbstractScene):
     def has_bristles(self) -> bool:
         """Whether the friction has states of its own."""
         return isinstance(getattr(self.minimal, "friction", None), AbstractBristleLaw)
+
+
+_READ = OfObjects[OncePerVersion[bool]]()
+"""Whether laws of scenes read the time."""
 
 
 class Scene(AbstractMinimalScene, AbstractWalkerScene):

@@ -282,15 +282,18 @@ _compiled = cached_jit(by_lanes)
 
 def _step_by_step(run: "Simulation", request: Request) -> tuple[Solved, np.ndarray]:
     """One simulation, not traced, and the records of its steps, (n, numbers)."""
-    one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], request.inputs)
-    room = min(run.max_solver_steps, _ROOM)
+    engine, room = BY_NAME[run.engine], min(run.max_solver_steps, _ROOM)
+    if lanes := isinstance(engine, LaneEngine):
+        one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], request.inputs)
+        request = request._replace(inputs=one, batch=True)
     while True:
-        asked = request._replace(inputs=one, room=room, batch=True)
-        outputs, recorded, _ = BY_NAME[run.engine].run(asked)
+        found = engine.run(request._replace(room=room))
+        outputs, recorded = found.outputs, found.records
         assert recorded is not None
-        steps = int(recorded.counts[0])
+        if lanes:
+            outputs, recorded = jtu.tree_map(lambda leaf: leaf[0], (outputs, recorded))
+        steps = int(recorded.counts)
         if steps <= room:
-            ended = jax.device_put(jtu.tree_map(lambda leaf: leaf[0], outputs))
-            return ended, recorded.values[0, :steps]
+            return jax.device_put(outputs), np.array(recorded.values[:steps])
         # Memory is asked for by what a solve takes, not by what it might.
         room = steps

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Numbers, Scalar
+from jaxbiped._types import Numbers, Scalar, any_of
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._switch_locator import SwitchLocatorState
 
@@ -65,11 +65,16 @@ def reset_at_switch(
     """Time, state, columns and resets at a step's end, behind the reset if a switch was passed.
 
     The state that is reset is that on the switch: the little time past it is taken back, along the
-    rates. `reset` gives state and columns behind those on the switch of a number; None: the watch's
-    own, which knows no columns.
+    rates. Behind a switch that resets nothing that would only lead to it once more. `reset` gives
+    state and columns behind those on the switch of a number; None: the watch's own, which knows no
+    columns.
     """
     which, past, repeats = landed.crossed_field, landed.past, watch.repeats
     met = keep & (which > 0)
+    switches = watch.switches(args, state)
+    if not all(switch.resets or switch.corner for switch in switches):
+        numbers = [number for number, switch in enumerate(switches, 1) if switch.resets]
+        met = met & any_of([which == number for number in numbers])
 
     def behind() -> tuple[PyTree, Any, Scalar | None]:
         rates = watch.field(t, state, args)

@@ -32,3 +32,4 @@ from jaxbiped.scene.actuation._motor_laws import Constant as Constant
 from jaxbiped.scene.actuation._motor_laws import PD as PD
 from jaxbiped.scene.actuation._motor_laws import Pulse as Pulse
 from jaxbiped.scene.actuation._motor_laws import Spline as Spline
+from jaxbiped.scene.actuation._motor_laws import VirtualConstraint as VirtualConstraint

@@ -263,11 +263,22 @@ def check_spline(coefficients: tuple[Scalar, ...], first: Scalar, last: Scalar) 
 
     The coefficients are those of a field `torque`.
     """
-    if len(coefficients) < 2:
+    check_coefficients("torque", coefficients, 2)
+    check_places(first, last)
+
+
+def check_coefficients(name: str, coefficients: tuple[Scalar, ...], least: int) -> None:
+    """Raises `ArgumentError` for fewer coefficients of this name than are needed."""
+    if len(coefficients) < least:
+        number = {1: "one", 2: "two", 4: "four"}[least]
         raise ArgumentError(
-            f"torque has length {len(coefficients)}, which is not allowed: give two or more "
+            f"{name} has length {len(coefficients)}, which is not allowed: give {number} or more "
             "coefficients."
         )
+
+
+def check_places(first: Scalar, last: Scalar) -> None:
+    """Raises `ArgumentError` for a last place that is not above the first."""
     check_finite("first", first)
     check_finite("last", last)
     if holds_somewhere(last <= first):
@@ -291,6 +302,17 @@ def cubic_spline(
         sum(weight * cubes[i + j] for j, weight in enumerate(_DIFFERENCE)) for i in range(count)
     )
     return jnp.asarray(sum(a * b for a, b in zip(coefficients, splines, strict=True)))
+
+
+def spline_between(
+    coefficients: tuple[Scalar, ...], first: Scalar, last: Scalar, place: Scalar
+) -> Scalar:
+    """The cubic spline of n coefficients on n − 3 equal intervals from the first place to the last.
+
+    They are those of cubic B-splines on equidistant knots, whose sum there is 1.
+    """
+    interval = (last - first) / (len(coefficients) - 3)
+    return cubic_spline(coefficients, first - interval, last + interval, place)
 
 
 class HipSpring(AbstractHipActuator):

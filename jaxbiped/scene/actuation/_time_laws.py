@@ -15,7 +15,11 @@ from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene._joint_parts import law_of, takes_the_motion
-from jaxbiped.scene.actuation._actuators import AbstractStanceTorque, cubic_spline
+from jaxbiped.scene.actuation._actuators import (
+    AbstractStanceTorque,
+    check_coefficients,
+    spline_between,
+)
 
 
 class AbstractTimeTorque(AbstractStanceTorque):
@@ -34,11 +38,7 @@ class AbstractTimeTorque(AbstractStanceTorque):
     span: AbstractVar[Parameter]
 
     def __check_init__(self) -> None:
-        if len(self.torque) < self.least:
-            raise ArgumentError(
-                f"torque has length {len(self.torque)}, which is not allowed: give {self.least} or "
-                "more coefficients."
-            )
+        check_coefficients("torque", self.torque, self.least)
 
     def __call__(self, motion: Any) -> Scalar:
         time = motion.time
@@ -102,8 +102,7 @@ class TimeSpline(AbstractTimeTorque):
     reaction: str = eqx.field(static=True, default="swing")
 
     def torque_after(self, time: Scalar) -> Scalar:
-        interval = self.span / (len(self.torque) - 3)
-        return cubic_spline(self.torque, -interval, self.span + interval, time)
+        return spline_between(self.torque, 0.0 * self.span, self.span, time)
 
 
 class Limited(AbstractStanceTorque):
@@ -130,7 +129,7 @@ class Limited(AbstractStanceTorque):
                 "Spline, HipSpline or TimeSpline."
             )
 
-    @property
+    @property  # type: ignore[misc]
     def reaction(self) -> str:  # type: ignore[override]
         """The law's own, or "swing"."""
         return getattr(self.law, "reaction", "swing")
