@@ -92,6 +92,11 @@ def run_newton(
         if here.violation <= _KEPT and gain <= _GAIN * size:
             return z, RunEnding(True, "No better cycle is expected nearby.")
         better = _along(program, z, here, step, passed)
+        if better is None and here.violation > _KEPT:
+            # Nothing but the equations, and the filter begins again.
+            flat, passed = here._replace(gradient=np.zeros_like(z)), []
+            onto = best_step(program, z, flat, np.eye(len(z))).step
+            better = _along(program, z, flat, onto, [(here.violation, -np.inf)])
         if better is None:
             ends = here.violation <= 10.0 * _KEPT and gain <= _NOISE * size
             return z, RunEnding(ends, "No better cycle was found nearby.")
