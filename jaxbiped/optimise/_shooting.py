@@ -88,7 +88,7 @@ def linearise_segments(
     def one(starts: Scalar, duration: Scalar, values: Scalar) -> Segments:
         seeded = Seeded(scene, seeds, jnp.zeros(m + 1 + p), active)
         own = with_active(seeded, list(values))
-        seeded = Seeded(own, *(seeded.seeds, seeded.floors, active))
+        seeded = Seeded(own, seeds, seeded.floors, active)
         watch = Watch.of(system, resets=False)
         how = SectionSolve(watch, spec.solver, precision, duration, spec.max_solver_steps)
 

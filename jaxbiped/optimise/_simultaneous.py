@@ -382,10 +382,13 @@ def begin_together(
 
     z, ended = min(ends, key=rank)
     starts, _, u = whole.parts(z)
-    u, sizes = np.clip(u, 0.0, 1.0), np.abs(starts[0]) + recurring_sizes(scene, pose)
-    if problem.from_guess(u, starts[0], _FROM_CYCLE * sizes if ended.converged else np.inf) is None:
+    u, farthest = np.clip(u, 0.0, 1.0), np.inf
+    if ended.converged:
+        farthest = _FROM_CYCLE * (np.abs(starts[0]) + recurring_sizes(scene, pose))
+    if problem.from_guess(u, starts[0], farthest) is None:
+        told = "it ends otherwise" if ended.converged else ended.message[:-1].lower()
         raise ArgumentError(
-            f'formulation = "together" came to a cycle that is no gait ({ended.message[:-1]}): give '
-            "another guess, further requirements or restarts."
+            'formulation = "together" came to a cycle that is no gait of the walker, for '
+            f"{told}: give another guess, further requirements or restarts."
         )
     return problem.begin(u), ended
