@@ -12,7 +12,7 @@ PLAIN = {"str", "bool", "int", "type", "None", "tuple", "..."}
 """Words of annotations of what JAX cannot trace."""
 NUMBERS = {"Scalar", "Array", "PyTree", "RealScalarLike", "Parameter", "Numbers", "Time", "Integer"}
 """Of what it traces."""
-FUNCTIONS = {"Callable", "VectorField", "Arrival"}
+FUNCTIONS = {"Callable", "VectorField", "Arrival", "MotionFunction"}
 MODULES_TOO = {"AbstractLinearisation.run", "Motor.law", "VariationalField.field"}
 """Functions that may be modules with numbers of their own."""
 WORDS_OR_SHAPES = {
@@ -22,6 +22,9 @@ WORDS_OR_SHAPES = {
     "Modes",
     "Structure",
     "Effort",
+    "Extreme",
+    "Integral",
+    "StepIntegrals",
     "ExplicitMethod",
     "PyTreeDef",
 }

@@ -88,7 +88,9 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         for option, texts in (goals | {"subject_to": self.subject_to}).items():
             for measure in (_MEASURE.match(text or "fatal_push") for text in texts):
                 if measure and measure[1] != "fatal_push":  # the search says why it cannot be one
-                    check_choice(option, measure[1], names("optimise.OBJECTIVES"))
+                    base = measure[1].removesuffix("_per_length").removesuffix("_per_time")
+                    allowed = names("optimise.OBJECTIVES") + names("optimise.NAMED_COSTS")
+                    check_choice(option, base, allowed)
 
     def run(self) -> int:
         from jaxbiped.continuation._critical_values import range_of
@@ -163,7 +165,7 @@ def _optimum_numbers(
             "sense": sense,
             "value": optimum.objective,
             "error": optimum.error,
-            "unit": jb.optimise.OBJECTIVES[goal].quantity.unit,
+            "unit": optimum.quantities[goal].unit,
         },
         "measures": {
             name: {
@@ -215,7 +217,7 @@ def _print(
         "began": "{0[1]}",
         "best": "{0[2]}",
         "error": "{0[3]}",
-        "unit": "{0[4].quantity.unit_in_text}",
+        "unit": "{0[4].unit_in_text}",
     }
     report.say(columns(variables, rows), "", columns(measures, _measures(optimum)), "")
     report.say(
@@ -228,12 +230,12 @@ def _measures(optimum: "jb.optimise.Optimum") -> Iterator[tuple[object, ...]]:
     """Each measure, its first value, its best one and the error, or more than a range holds."""
     first = optimum.history[0].measures if optimum.history else {}
     for name, value in optimum.known.values.items():
-        if name in jb.optimise.OBJECTIVES:
+        if name in optimum.quantities:
             began = f"{first[name]:.6g}" if name in first else "–"
             best, error = f"{value:.6g}", f"{optimum.known.errors[name]:.1e}"
             if name in optimum.known.beyond_range:
                 best, error = f"> {best}", "–"
-            yield name, began, best, error, jb.optimise.OBJECTIVES[name]
+            yield name, began, best, error, optimum.quantities[name]
 
 
 def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:

@@ -22,7 +22,12 @@ from jaxbiped.scene.actuation._actuators import HipMotion
 
 
 class Drive(NamedTuple):
-    """A torque of a motor on an angle [N·m], and the rate of the angle [rad/s]."""
+    """A torque of a motor on an angle.
+
+    Attributes:
+        torque: the torque [N·m], positive where it increases the angle.
+        rate: the rate of the angle [rad/s].
+    """
 
     torque: Scalar
     rate: Scalar
@@ -146,11 +151,11 @@ def _torques(
         torques = part.motor_torques(now := hip())
         if torques is None:
             continue
+        drives = tuple(map(Drive, torques, now.rate))
         if getattr(part, "reaction", "swing") == "swing":
-            between = Drive(torques[0], now.rate[0] - now.rate[1])
-            by_name[part.name] = (between,)
-        else:
-            by_name[part.name] = tuple(map(Drive, torques, now.rate))
+            drives = (Drive(torques[0], now.rate[0] - now.rate[1]),)
+        name = str(part.name)
+        by_name[name] = by_name.get(name, ()) + drives
     mechanism = scene.mechanism
     on_angle: dict[int, dict[Angle, Scalar]] = {}
     for number, angle, torque in motor_torques(mechanism, motion, scene.ground.slope, *carriers):

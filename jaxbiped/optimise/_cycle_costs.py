@@ -1,30 +1,25 @@
 """Costs of a cycle as functionals of a periodic orbit: integrals together, extremes one by one."""
 
-from collections.abc import Callable, Mapping
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
-import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, is_number
 from jaxbiped._types import Scalar, Time
 from jaxbiped.caching._cached_jit import note_code
-from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._walker_motion import WalkerMotion
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.hybrid._guards import Switch
+from jaxbiped.hybrid._motion_costs import Cost, Extreme, Integral
 from jaxbiped.hybrid._sections import section_of
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.optimise._augmented_system import (
     AbstractAugmentedSystem,
     MotionSection,
-    integrals_of,
     join,
     motion_of,
 )
@@ -37,7 +32,6 @@ from jaxbiped.optimise._cycle_functionals import (
     totals_of_advance,
     with_errors,
 )
-from jaxbiped.optimise._integrals import Cost, Extreme, Integral
 from jaxbiped.scene._scene import WalkerScene
 from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import Precision
@@ -154,7 +148,7 @@ def cost_functionals(
         rows |= {cost: [part[k] for part in told[:4]] for k, cost in enumerate(own)}
         codes.append(told.code)
     columns = zip(*(rows[cost] for cost in costs), strict=True)
-    return Functionals(*map(jnp.stack, columns), jnp.max(jnp.stack(codes)))
+    return Functionals._make([*map(jnp.stack, columns), jnp.max(jnp.stack(codes))])
 
 
 @host_jit(runs_by_lanes)
@@ -169,48 +163,3 @@ def _functionals(
     else:
         values, slopes = jax.vmap(totals_of_advance)(orbits.returns, orbits.points)
     return with_errors(values, slopes / orbits.sizes, orbits.returns.code)
-
-
-def check_cost(cost: Cost, scene: Any) -> None:
-    """Raises `ArgumentError` for a cost that the scene cannot have, before anything is compiled."""
-    if integrals_of(scene) is None:
-        raise ArgumentError(
-            f"{cost.name} is not allowed for a {type(scene).__name__}: costs are functions of a "
-            "walker's motion; add a coordinate of its own to the system instead."
-        )
-    functions: Mapping[str, Any] = (
-        {"rate": cost.rate, "at_strike": cost.at_strike}
-        if isinstance(cost, Integral)
-        else {"value": cost.value}
-    )
-    if functions.get("at_strike") is not None and not system_of(scene).footsteps_end_on_section:
-        raise ArgumentError(
-            f"at_strike of {cost.name} is not allowed for compliant feet, which press into the "
-            "ground for a while: give a rate."
-        )
-    for name, function in functions.items():
-        if function is not None:
-            _check_number(f"{name} of {cost.name}", function, scene)
-
-
-def _check_number(words: str, function: Callable[..., Any], scene: Any) -> None:
-    state = scene.state_type(*[np.zeros(())] * len(scene.state_names))
-    leaf = jtu.tree_leaves(state)[0]
-    try:
-        told = _shape_of(function, scene, state)
-    except (jax.errors.ConcretizationTypeError, jax.errors.TracerArrayConversionError) as error:
-        raise ArgumentError(
-            f"{words} takes the motion for plain numbers, which is not allowed: write it with "
-            "jax.numpy, and a choice with jax.numpy.where."
-        ) from error
-    if told != (np.shape(leaf), "f"):
-        raise ArgumentError(f"{words} returns {told[0]}, which is not allowed: return one number.")
-
-
-@known_by_shape
-def _shape_of(function: Callable[..., Any], scene: Any, state: Any) -> Any:
-    value = function(WalkerMotion(scene, state))
-    if not isinstance(value, jax.Array) and not is_number(value):
-        return repr(value), ""
-    value = jnp.asarray(value)
-    return jnp.shape(value), "f" if jnp.issubdtype(value.dtype, jnp.floating) else "other"

@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from jaxbiped.optimise._design_problem import DesignProblem, scale_of
+from jaxbiped.optimise._design_problem import Design, DesignProblem, scale_of
 from jaxbiped.optimise._jacobian_functionals import SYMMETRIC
 from jaxbiped.optimise._objective_values import Evaluation
 
@@ -32,6 +32,11 @@ multiplier moves by the third root of an error."""
 CONJUGATE = 1e-10 * np.array([1.0, 0.0, 0.0, 1.0, 0.0])
 """Margins that keep meeting multipliers conjugate by a little: real ones part by a root."""
 _BISECTIONS = 50
+_RESTORATIONS, _RESTORED = 3, 1e-10
+"""Newton steps onto the requirements that hold a design, and by what part of a bound they may then
+be missed."""
+_INDEPENDENT = 1e-8
+"""Size of a requirement's own direction, as a share of the largest, below which it has none."""
 _ONE, _TWO, _THREE = 1e-4, 2e-2, 1e-1
 """Up to which the conditions of one, two and three multipliers at ±ρ are active: third roots of
 errors are a per cent."""
@@ -206,6 +211,29 @@ def rows_of(problem: DesignProblem) -> tuple[AnyRow, ...]:
             else:
                 rows.append(Row(each.name, each.high, -1.0, False))
     return tuple(rows)
+
+
+def restored(problem: DesignProblem, design: Design) -> Design:
+    """A design that keeps what holds it to rounding, by the least moves; the same where none does.
+
+    An optimiser may miss requirements by what counts as kept, and gains by it.
+    """
+    for _ in range(_RESTORATIONS):
+        rows = [row for row in rows_of(problem) if isinstance(row, Row)]
+        missed = {row: row.value(design.known) for row in rows}
+        held = [row for row in rows if row.equality or missed[row] < 0.0]
+        if max((abs(missed[row]) for row in held), default=0.0) <= _RESTORED:
+            break
+        slopes = np.stack([problem.gradient(design.u, row.slopes(design.known)) for row in held])
+        free = (design.u > 0.0) & (design.u < 1.0)
+        off = np.array([missed[row] for row in held])
+        move, *_ = np.linalg.lstsq(slopes * free, -off, rcond=_INDEPENDENT)
+        u = np.clip(design.u + move * free, 0.0, 1.0)
+        known = problem.beside(u)
+        if known is None or problem.excess(known) >= problem.excess(design.known):
+            break
+        design = Design(u, known)
+    return design
 
 
 def cluster_rows(problem: DesignProblem, bound: float) -> list[AnyRow]:

@@ -41,7 +41,7 @@ from jaxbiped.optimise._jacobian_functionals import (
     SYMMETRIC,
     jacobian_functionals,
 )
-from jaxbiped.optimise._objectives import Measures, costs_of, with_divided
+from jaxbiped.optimise._objectives import Combined, Measures, costs_of, with_parts
 from jaxbiped.scene._parameter_access import parameter_names, select_parameters
 from jaxbiped.scene._scene import AbstractScene, WalkerScene
 
@@ -94,7 +94,7 @@ def functionals_of(
         first = jacobian_functionals(scene, state, of_jacobian, **how)
     if of_cycle:
         second = cycle_functionals(scene, state, **how)
-    if costs := costs_of(with_divided(wanted)):
+    if costs := costs_of(with_parts(wanted)):
         third = cost_functionals(scene, state, costs, **how)
     return first, second, third
 
@@ -106,8 +106,8 @@ def functional_names(scene: AbstractScene, measures: Measures) -> tuple[tuple[st
     """
     if integrals_of(scene) is None:
         return (), False
-    every = with_divided(measures)
-    wanted = [name for name, each in every.items() if not (each.costs or each.quotient)]
+    every = with_parts(measures)
+    wanted = [name for name, each in every.items() if not (each.costs or each.combined)]
     needed = {*wanted, *(_WHOLE if "whole_sensitivity" in wanted else ())}
     of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
     if "spectral_radius" in wanted:
@@ -162,7 +162,7 @@ def evaluate(
         if told.outcome is Sought.NONE_IN_RANGE:
             rows[name] = Functional(told.distance, 0.0, *[np.zeros_like(told.slopes)] * 2)
             beyond_range.append(name)
-    needed = dict.fromkeys((*wanted, *of_jacobian, *of_gait))
+    needed = dict.fromkeys((*with_parts(wanted), *of_jacobian, *of_gait))
     kept = {name: _row(*rows[name]) for name in needed}
     state, slopes = gait.measures.state, gait.sensitivities.state
     columns: Any = zip(*kept.values(), strict=True)
@@ -186,8 +186,8 @@ def _rows_of(found: Functionals) -> list[Functional]:
 def with_costs(
     wanted: Measures, rows: Mapping[str, Functional], costs: Functionals | None
 ) -> dict[str, Functional]:
-    """Adds the measures that are sums of costs, or quotients, to those that are known by name."""
-    every, rows = with_divided(wanted), dict(rows)
+    """Adds the measures that are sums of costs or functions of others to those known by name."""
+    every, rows = with_parts(wanted), dict(rows)
     if costs is not None:
         parts = dict(zip(costs_of(every), _rows_of(costs), strict=True))
         for name, each in every.items():
@@ -195,20 +195,19 @@ def with_costs(
                 terms = [parts[cost] for _, cost in each.costs]
                 count = costs.slopes.shape[1]
                 rows[name] = weighted_sum([weight for weight, _ in each.costs], terms, count)
-    for name, each in wanted.items():
-        if each.quotient is not None:
-            rows[name] = quotient_of(*(rows[part] for part in each.quotient))
+    for name, each in every.items():
+        if each.combined is not None:
+            rows[name] = _combination(each.combined, rows)
     return rows
 
 
-def quotient_of(dividend: Functional, divisor: Functional) -> Functional:
-    """One functional over another that is positive."""
-    value = dividend.value / divisor.value
-    return Functional(
-        value=value,
-        error=(dividend.error + abs(value) * divisor.error) / divisor.value,
-        slopes=(dividend.slopes - value * divisor.slopes) / divisor.value,
-        slope_errors=(dividend.slope_errors + abs(value) * divisor.slope_errors) / divisor.value,
+def _combination(combined: Combined, rows: dict[str, Functional]) -> Functional:
+    """A function of functionals, to first order in their errors."""
+    parts = [rows[name] for name in combined.of]
+    values = [jnp.asarray(part.value) for part in parts]
+    value, by_part = jax.value_and_grad(combined.function, tuple(range(len(parts))))(*values)
+    return weighted_sum(map(float, by_part), parts, len(parts[0].slopes))._replace(
+        value=float(value)
     )
 
 

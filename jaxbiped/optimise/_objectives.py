@@ -1,22 +1,24 @@
 """Objectives: measures of a periodic gait by name, and which scenes have them."""
 
-import re
+import functools
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple, TypeAlias
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_choice, check_type
+from jaxbiped._checks import ArgumentError, check_choice, check_function, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._state import cyclic_names
 from jaxbiped.gait._gait import Gait
+from jaxbiped.hybrid._motion_costs import Cost, Extreme, Integral, check_cost, name_of
+from jaxbiped.hybrid._named_costs import NAMED_COSTS, cost_named, part_of
 from jaxbiped.optimise._augmented_system import integrals_of
-from jaxbiped.optimise._cycle_costs import check_cost
-from jaxbiped.optimise._integrals import Cost, Extreme, Integral
-from jaxbiped.optimise._named_costs import NAMED_COSTS
 from jaxbiped.scene._modes import rigid_modes
+from jaxbiped.scene._parameter_access import parameter_names, parameter_values
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
@@ -72,6 +74,22 @@ def _of_swing(scene: Any) -> str | None:
     return f"its clearance rule is {type(rule).__name__}, which lets no foot pass"
 
 
+class Combined(NamedTuple):
+    """A function of measures.
+
+    Attributes:
+        function: of their values, in the order of their names; JAX differentiates it.
+        of: their names.
+    """
+
+    function: Callable[..., Any]
+    of: tuple[str, ...]
+
+
+def _divide(dividend: Any, divisor: Any) -> Any:
+    return dividend / divisor
+
+
 class Objective(NamedTuple):
     """A measure that can be optimised or bounded. Add one of your own to `OBJECTIVES`.
 
@@ -85,14 +103,14 @@ class Objective(NamedTuple):
             value, its error, the derivatives with respect to the p parameters, shape (p,), and
             their errors.
         costs: integrals and extremes with their weights, whose sum it is; none for others.
-        quotient: names of the measures whose quotient it is; none for others.
+        combined: a function of other measures, and their names; None for others.
     """
 
     quantity: Quantity
     lacks: Callable[[Any], str | None] = lambda _: None
     measured: Callable[[Any, Gait], tuple[Any, Any, Any, Any]] | None = None
     costs: tuple[tuple[float, Cost], ...] = ()
-    quotient: tuple[str, str] | None = None
+    combined: Combined | None = None
 
 
 OBJECTIVES = {
@@ -150,8 +168,6 @@ _PER = {"_per_length": ("step_length", "length", "m"), "_per_time": ("period", "
 """What a cost by name may be divided by: the measure, its words and its unit."""
 _DIVIDED = ("slip_distance", "friction_loss", "impact_loss", "motor_work")
 """Objectives that are integrals along the cycle."""
-_OF_PART = re.compile(r"(\w+)\[(\w+)\]")
-
 Measures: TypeAlias = Mapping[str, Objective]
 """Objectives by the names that an optimisation tells them by."""
 
@@ -168,24 +184,14 @@ def objective_named(name: str, what: str = "objective") -> Objective:
         return OBJECTIVES[name]
     for suffix, (divisor, words, unit) in _PER.items():
         base = name.removesuffix(suffix)
-        if base != name and (base in _DIVIDED or _part_of(base)[0] in NAMED_COSTS):
+        if base != name and (base in _DIVIDED or part_of(base)[0] in NAMED_COSTS):
             known = objective_named(base, what)
             per = Quantity(
                 f"{known.quantity.words} per {words}", "", f"({known.quantity.unit})/{unit}"
             )
-            return Objective(per, known.lacks, quotient=(base, divisor))
-    base, part = _part_of(name)
-    if base not in NAMED_COSTS or (part is not None and not NAMED_COSTS[base].part):
-        check_choice(what, name, (*OBJECTIVES, *NAMED_COSTS))
-    cost = NAMED_COSTS[base]
-    if part is None and cost.part == "angle":
-        raise ArgumentError(f"{what} = {name!r} is not allowed: name an angle, {name}[BODY].")
+            return Objective(per, known.lacks, combined=Combined(_divide, (base, divisor)))
+    cost, part = cost_named(name, what, tuple(OBJECTIVES))
     return Objective(cost.quantity, cost.lacks, costs=cost.costs(part))
-
-
-def _part_of(name: str) -> tuple[str, str | None]:
-    match = _OF_PART.fullmatch(name)
-    return (match[1], match[2]) if match else (name, None)
 
 
 def measures_named(names: Iterable[str]) -> dict[str, Objective]:
@@ -193,12 +199,18 @@ def measures_named(names: Iterable[str]) -> dict[str, Objective]:
     return {name: objective_named(name) for name in names}
 
 
-def with_divided(measures: Measures) -> dict[str, Objective]:
-    """The measures, and those of which they are quotients."""
-    every = dict(measures)
-    for objective in measures.values():
-        for name in objective.quotient or ():
-            every.setdefault(name, objective_named(name))
+def with_parts(measures: Measures) -> dict[str, Objective]:
+    """The measures, each behind those of which it is a function."""
+    every: dict[str, Objective] = {}
+
+    def add(name: str, objective: Objective) -> None:
+        for part in objective.combined.of if objective.combined else ():
+            if part not in every:
+                add(part, measures.get(part) or objective_named(part))
+        every[name] = objective
+
+    for name, objective in measures.items():
+        add(name, objective)
     return every
 
 
@@ -216,23 +228,125 @@ def _of_ground(name: str, scene: AbstractScene) -> str | None:
 
 
 def check_objective(
-    given: str | Cost, scene: Any, what: str = "objective"
+    given: "str | Measure", scene: Any, what: str = "objective"
 ) -> tuple[str, Objective]:
-    """The name of a measure that is asked for by name or as a cost, and the objective.
+    """The name of a measure that is asked for by name or as an object, and the objective.
 
     Raises:
         ArgumentError: an unknown name, what is neither, or an objective that the scene lacks.
     """
-    if isinstance(given, Integral | Extreme):
-        check_cost(given, scene)
-        return given.name, Objective(given.quantity, costs=((1.0, given),))
-    check_type(what, given, str, Integral, Extreme)
-    objective, lacks = objective_named(given, what), None
-    if objective.measured is None and not objective.costs:
-        lacks = _of_ground(objective.quotient[0] if objective.quotient else given, scene)
+    check_type(what, given, str, Integral, Extreme, FunctionOf, Linear)
+    objective, lacks = objective_of(given, scene, what), None
+    name = given if isinstance(given, str) else given.name
+    if objective.combined is not None:
+        for part in objective.combined.of:
+            check_objective(part, scene, what)
+    elif objective.measured is None and not objective.costs:
+        lacks = _of_ground(name, scene)
     lacks = lacks or objective.lacks(scene)
     if lacks is not None:
-        raise ArgumentError(f"{what} = {given!r} is not allowed for this scene: {lacks}.")
+        raise ArgumentError(f"{what} = {name!r} is not allowed for this scene: {lacks}.")
     for _, cost in objective.costs:
         check_cost(cost, scene)
-    return given, objective
+    return name, objective
+
+
+def objective_of(given: "str | Measure", scene: Any, what: str) -> Objective:
+    """The objective that a name or an object asks for.
+
+    Raises:
+        ArgumentError: an unknown name of a measure or of a parameter.
+    """
+    if isinstance(given, str):
+        return objective_named(given, what)
+    if isinstance(given, FunctionOf):
+        return Objective(given.quantity, combined=Combined(given.function, given.of))
+    if isinstance(given, Linear):
+        for name in given.weights:
+            check_choice(what, name, parameter_names(scene))
+        sums = functools.partial(_linear, tuple(given.weights.items()))
+        return Objective(Quantity(given.name), measured=sums)
+    return Objective(given.quantity, costs=((1.0, given),))
+
+
+class FunctionOf(eqx.Module):
+    """A function of a gait's measures, as a measure.
+
+    Attributes:
+        function: of the values of the measures, one argument each; JAX differentiates it.
+        of: names of the measures.
+        quantity: words, symbol and unit. The words, with underscores, are its name.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> froude = jb.optimise.FunctionOf(
+        ...     lambda speed: speed**2 / (9.81 * 0.4), ("speed",), jb.optimise.Quantity("froude")
+        ... )
+        >>> froude.name
+        'froude'
+    """
+
+    function: Callable[..., Any] = eqx.field(static=True)
+    of: tuple[str, ...] = eqx.field(static=True)
+    quantity: Quantity = eqx.field(static=True)
+
+    def __check_init__(self) -> None:
+        check_function("function", self.function)
+        check_type("of", self.of, tuple)
+        check_type("quantity", self.quantity, Quantity)
+
+    @property
+    def name(self) -> str:
+        """What it is called where measures are told by name."""
+        return name_of(self.quantity)
+
+
+class Linear(NamedTuple):
+    """A weighted sum of parameters that is held: parameters that are tied, or bounded together.
+
+    Attributes:
+        weights: weights by parameter.
+        equals: what the sum must be; None for bounds.
+        low, high: bounds of the sum; None for none.
+        name: what it is called in `Optimum.measures`.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> tied = jb.optimise.Linear({"d": 1.0, "r": -2.0}, equals=0.0)
+        >>> tied.bounds
+        (0.0, 0.0)
+    """
+
+    weights: Mapping[str, float]
+    equals: float | None = None
+    low: float | None = None
+    high: float | None = None
+    name: str = "linear"
+
+    @property
+    def bounds(self) -> tuple[float | None, float | None]:
+        """Its bounds, equal ones for an equality."""
+        return (self.low, self.high) if self.equals is None else (self.equals, self.equals)
+
+
+Measure: TypeAlias = Cost | FunctionOf | Linear
+"""A measure that is asked for as an object."""
+
+
+def weights_of_parameters(objective: Objective) -> dict[str, float] | None:
+    """The weights of a measure that is a `Linear` sum of parameters; None for any other."""
+    measured = objective.measured
+    if isinstance(measured, functools.partial) and measured.func is _linear:
+        return dict(measured.args[0])
+    return None
+
+
+def _linear(
+    weights: tuple[tuple[str, float], ...], scene: Any, gait: Gait
+) -> tuple[float, float, np.ndarray, np.ndarray]:
+    own, names = parameter_values(scene), parameter_names(scene)
+    slopes = np.zeros(len(names))
+    for name, weight in weights:
+        slopes[names.index(name)] = weight
+    value = sum(weight * float(own[name]) for name, weight in weights)
+    return value, 0.0, slopes, np.zeros(len(names))

@@ -1,11 +1,12 @@
 """Optimality conditions of Karush, Kuhn and Tucker at a design: residual and multipliers."""
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
 import scipy  # its submodules are imported where they are first used
 
-from jaxbiped.optimise._design_functions import AnyRow, cluster_rows, rows_of
+from jaxbiped.optimise._design_functions import AnyRow, Row, cluster_rows, rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem, scale_of
 
 OPTIMAL = 1e-3
@@ -18,6 +19,8 @@ _NEARER = 0.05
 explain the whole one."""
 _AT_BOUND = 1e-6
 """Distance in u at which a variable is at its bound."""
+_ASIDE = 1e-3
+"""How far beside a design, in u, gradients are compared for its curvature."""
 _VANISHING = 1e-3
 """Size of a normal, as a share of the largest, below which it counts as none."""
 _FLAT = 1e-6
@@ -83,6 +86,7 @@ class _Balance(NamedTuple):
         errors: of that, from all error bars, of its shape.
         active: rows that hold it, of requirements first, then of the radius in the sum.
         multipliers, spreads: of these, then of the variables at a bound; and their errors.
+        normals: gradients of all these, (k, q), or (k + 1, q).
     """
 
     left: np.ndarray
@@ -90,6 +94,7 @@ class _Balance(NamedTuple):
     active: list[tuple[AnyRow, bool]]
     multipliers: np.ndarray
     spreads: np.ndarray
+    normals: np.ndarray
 
 
 def _smooth_gradient(problem: DesignProblem, design: Design) -> np.ndarray:
@@ -133,22 +138,71 @@ def _balance(problem: DesignProblem, design: Design, scale: float) -> _Balance:
     across = np.eye(len(gradient)) - sure @ np.linalg.pinv(sure)
     with np.errstate(invalid="ignore"):  # of errors without bound
         errors = np.abs(across) @ errors
-    return _Balance(gradient - matrix @ multipliers, errors, rows, multipliers, spreads)
+    return _Balance(gradient - matrix @ multipliers, errors, rows, multipliers, spreads, matrix)
 
 
 def lagrangian_change(
     problem: DesignProblem, here: Design, there: Design, scale: float
 ) -> np.ndarray:
     """How the gradient of the scaled Lagrangian changes, with the multipliers of `there`."""
-    balance = _balance(problem, there, scale)
-
-    def gradient(design: Design) -> np.ndarray:
-        total = _smooth_gradient(problem, design) / scale
-        for (row, _), multiplier in zip(balance.active, balance.multipliers, strict=False):
-            total = total - multiplier * problem.gradient(design.u, row.slopes(design.known))
-        return total
-
+    gradient = functools.partial(
+        _lagrangian_gradient, problem, _balance(problem, there, scale), scale
+    )
     return gradient(there) - gradient(here)
+
+
+def _lagrangian_gradient(
+    problem: DesignProblem, balance: _Balance, scale: float, design: Design
+) -> np.ndarray:
+    """The gradient of the scaled Lagrangian with these multipliers, but for the radius's part."""
+    total = _smooth_gradient(problem, design) / scale
+    for (row, _), multiplier in zip(balance.active, balance.multipliers, strict=False):
+        total = total - multiplier * problem.gradient(design.u, row.slopes(design.known))
+    return total
+
+
+class Curvature(NamedTuple):
+    """The reduced Hessian of an optimum: that of the Lagrangian where what holds it is kept.
+
+    It is for one whole range between a variable's bounds, relative to the objective's own size.
+
+    Attributes:
+        values: its eigenvalues in increasing order, one for each direction that is left; none
+            where multipliers of the gait play a part, beside which it is not smooth.
+        error: what they are known to.
+    """
+
+    values: np.ndarray
+    error: float
+
+
+def curvature_of(problem: DesignProblem, design: Design) -> Curvature:
+    """The reduced Hessian by differences of gradients of designs beside it."""
+    scale = max(abs(problem.objective(design.known).value), 1e-300)
+    balance = _balance(problem, design, scale)
+    is_smooth = len(balance.left) == len(design.u)
+    if not is_smooth or not all(isinstance(row, Row) for row, _ in balance.active):
+        return Curvature(np.zeros(0), 0.0)
+    holds = np.abs(balance.multipliers) > balance.spreads
+    holds[: len(balance.active)] |= np.array([row.equality for row, _ in balance.active], bool)
+    directions = scipy.linalg.null_space(balance.normals[:, holds].T)
+    gradient = functools.partial(_lagrangian_gradient, problem, balance, scale)
+    total, error = np.zeros((directions.shape[1],) * 2), 0.0
+    for k, direction in enumerate(directions.T):
+        ends = [design.u + side * _ASIDE * direction for side in (1.0, -1.0)]
+        within = [u for u in ends if np.all((u >= 0.0) & (u <= 1.0))]
+        both = [(u, problem.beside(u)) for u in within]
+        sides = [Design(u, known) for u, known in both if known is not None]
+        sides = sides if len(sides) == 2 else [*sides, design][:2]
+        if len(sides) < 2:
+            return Curvature(np.full(len(total), np.nan), np.inf)
+        one, other = sides
+        length = (one.u - other.u) @ direction
+        total[k] = directions.T @ (gradient(one) - gradient(other)) / length
+        bars = (problem.gradient(design.u, problem.objective(d.known).slope_errors) for d in sides)
+        error = max(error, float(np.sum(np.abs(list(bars))) / scale / abs(length)))
+    error += float(np.max(np.abs(total - total.T), initial=0.0))
+    return Curvature(np.linalg.eigvalsh(0.5 * (total + total.T)), error)
 
 
 def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
@@ -209,6 +263,10 @@ def doubt_of(problem: DesignProblem, design: Design) -> str:
     near = [other for other in problem.asked if is_near(design, other)]
     if not all(_explains(problem, design, e) or _explains_nearer(problem, design, e) for e in near):
         return "Designs tried nearby differ from it by other amounts than the derivatives say."
+    curvature = curvature_of(problem, design)
+    least = np.min(curvature.values, initial=np.inf)
+    if least < -curvature.error:
+        return f"The objective curves down in a direction that nothing holds: {least:.1e}."
     return ""
 
 

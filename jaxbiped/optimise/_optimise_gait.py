@@ -24,26 +24,24 @@ from jaxbiped.gait._search_starts import state_of_guess
 from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
 from jaxbiped.hybrid._sections import AbstractSection, chosen_section
 from jaxbiped.optimise._design_gaits import CRITERIA, Ensemble, GaitSettings, ensemble_of
-from jaxbiped.optimise._design_problem import (
-    DesignProblem,
-    SubjectTo,
-    add_measure,
-    larger_is_worse,
-    requirements_of,
-    start_of,
-    variables_of,
-)
-from jaxbiped.optimise._integrals import Cost
+from jaxbiped.optimise._design_problem import DesignProblem, start_of, variables_of
 from jaxbiped.optimise._objective_values import Evaluations, functional_names
 from jaxbiped.optimise._objectives import (
+    Measure,
     Measures,
     Objective,
     check_objective,
     costs_of,
-    with_divided,
+    with_parts,
 )
 from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
 from jaxbiped.optimise._optimum import Optimum
+from jaxbiped.optimise._requirements import (
+    SubjectTo,
+    add_measure,
+    larger_is_worse,
+    requirements_of,
+)
 from jaxbiped.optimise._runs import Runs, optimum_of, scattered_designs
 from jaxbiped.optimise._simultaneous import begin_together, check_simultaneous
 from jaxbiped.scene._parameter_access import scene_identity
@@ -58,7 +56,7 @@ if TYPE_CHECKING:
 FORMULATIONS = ("gait by gait", "together")
 _ROUNDS = 3
 """Searches for worse members than an ensemble has, each with another run, at most."""
-Goal: TypeAlias = str | Cost | Mapping[str | Cost, float] | None
+Goal: TypeAlias = str | Measure | Mapping[str | Measure, float] | None
 """A measure by name or a cost, or weights of several."""
 
 
@@ -98,11 +96,11 @@ def optimise_gait(
         vary: bounds (low, high) by the name of each parameter (see `parameter_names`), SI units.
             Positive parameters are varied through their logarithm.
         maximise, minimise: give one of the two: the name of a measure of the gait (see
-            `OBJECTIVES` and `NAMED_COSTS`), an `Integral` or `Extreme` of its motion, or weights of
-            several.
+            `OBJECTIVES` and `NAMED_COSTS`), an `Integral` or `Extreme` of its motion, a
+            `FunctionOf` measures, or weights of several.
         subject_to: bounds (low, high) by measure, with None for no bound and equal bounds for an
-            equality; or requirements as text, such as "spectral_radius<0.4", and constraints
-            `Along` the cycle, one or several.
+            equality; or requirements as text, such as "spectral_radius<0.4", constraints
+            `Along` the cycle and `Linear` ones among parameters, one or several.
         guess: a gait or a start near the gait of the first design. Default: the gait that
             `find_gait` finds; a hybrid system needs one.
         section: section on which the cycles of a hybrid system begin. Default: as of `find_gait`.
@@ -230,7 +228,7 @@ def _goal(
             'give either maximise or minimise: a measure of the gait, such as "speed".'
         )
     what, goal = ("minimise", minimise) if maximise is None else ("maximise", maximise)
-    given = goal if isinstance(goal, Mapping) else {goal: 1.0}
+    given: Mapping[Any, float] = goal if isinstance(goal, Mapping) else {goal: 1.0}
     if not given:
         raise ArgumentError(f"{what} = {goal!r} is not allowed: give a name, or weights by name.")
     weights: dict[str, float] = {}
@@ -260,7 +258,7 @@ def _problem_settings(
         "model": own["model"],
         "vary": {name: [float(x) for x in bounds] for name, bounds in vary.items()},
         "measures": sorted(measures),
-        "costs": {each.name: identity(each) for each in costs_of(with_divided(measures))},
+        "costs": {each.name: identity(each) for each in costs_of(with_parts(measures))},
         "settings": settings._asdict() | {"section": identity(section) if chosen else None},
         "ensemble": None if ensemble is None else ensemble._asdict(),
         "writer": {name: writer[name] for name in DECISIVE},
@@ -287,7 +285,7 @@ def pareto_front(
     scene: AbstractScene,
     *,
     vary: Mapping[str, tuple[float, float]],
-    against: str | Cost,
+    against: str | Measure,
     bounds: Sequence[float] | np.ndarray,
     upper: bool = True,
     maximise: Goal = None,

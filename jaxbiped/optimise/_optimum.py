@@ -10,7 +10,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._objective_values import Evaluation
-from jaxbiped.optimise._optimality import Optimality
+from jaxbiped.optimise._optimality import Curvature, Optimality
 from jaxbiped.scene._parameter_access import parameter_quantities
 from jaxbiped.scene._scene import WalkerScene
 
@@ -79,6 +79,7 @@ class Optimum(Tabular):
         known: measures in the objective and the requirements, with gradients and errors.
         quantities: words, symbol and unit of these by name, of those that have some.
         optimality: the optimality conditions.
+        curvature: the reduced Hessian of an optimum that converged; None of others.
         history: every iterate, of all runs one after the other.
         evaluations: number of designs whose gait was found.
         lost: number of evaluations in which no gait was found or a measure of the gait was not
@@ -97,6 +98,7 @@ class Optimum(Tabular):
     known: Evaluation
     quantities: dict[str, Quantity]
     optimality: Optimality
+    curvature: Curvature | None
     history: list[Iteration]
     evaluations: int
     lost: int

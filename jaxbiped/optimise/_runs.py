@@ -12,11 +12,18 @@ from jaxbiped.continuation._critical_values import allows, range_of
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.optimise._design_functions import Functions
+from jaxbiped.optimise._design_functions import Functions, restored
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem, Variables
-from jaxbiped.optimise._objectives import OBJECTIVES
-from jaxbiped.optimise._optimality import OPTIMAL, doubt_of, is_flat, is_near, optimality_of
+from jaxbiped.optimise._objectives import OBJECTIVES, with_parts
+from jaxbiped.optimise._optimality import (
+    OPTIMAL,
+    curvature_of,
+    doubt_of,
+    is_flat,
+    is_near,
+    optimality_of,
+)
 from jaxbiped.optimise._optimisers import BY_NAME, RunEnding, run_optax, run_trust_region
 from jaxbiped.optimise._optimum import Iteration, Optimum, Outcome
 
@@ -55,7 +62,7 @@ class Runs:
         return min(self.problem.asked, key=functools.partial(rank_of, self.problem))
 
     def run(self, begin: Design, ended: RunEnding | None = None) -> None:
-        """Runs the optimiser from a design; only where it is no optimum if a search `ended` there."""
+        """Runs the optimiser from a design, or only where it is none if a search `ended` there."""
         self.problem.latest = begin
         self.note(begin.u)
         before = self.best
@@ -64,14 +71,13 @@ class Runs:
             optimise = BY_NAME[self.optimiser]
         else:
             optimise = functools.partial(run_optax, transformation=self.optimiser)
-        runs_on = optimise is not run_trust_region
+        polishes = optimise is not run_trust_region
         if ended is None or not ended.converged:
             ended = optimise(functions, begin.u, self.iterations, self.note)
         else:
-            runs_on = True
-        best = self.best
-        balanced = optimality_of(self.problem, best).residual <= OPTIMAL
-        if ended.converged and runs_on and not balanced:
+            polishes = True
+        balanced = optimality_of(self.problem, self.best).residual <= OPTIMAL
+        if ended.converged and polishes and not balanced:
             # It may have stopped on a ridge of the objective, along which designs get better.
             self.problem.latest = self.best
             on = run_trust_region(functions, self.best.u, self.iterations, self.note)
@@ -87,13 +93,17 @@ class Runs:
         if not self.ended.message or better:
             self.ended = ended
 
-    def outcome(self) -> Outcome:
-        """How it ended: converged only where the design is certified as an optimum, too."""
+    def outcome(self, best: Design | None = None) -> Outcome:
+        """How it ended: converged only where the design is certified as an optimum, too.
+
+        It is the best one, or one that keeps what holds it better.
+        """
         if self.interrupted:
             return Outcome.INTERRUPTED
-        doubt = functools.partial(doubt_of, self.problem, self.best)
+        best = self.best if best is None else best
+        doubt = functools.partial(doubt_of, self.problem, best)
         flat = functools.partial(is_flat, self.problem)
-        return outcome_of(self.problem, self.best, self.ended.converged, doubt, flat)
+        return outcome_of(self.problem, best, self.ended.converged, doubt, flat)
 
     def note(self, u: np.ndarray) -> None:
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
@@ -156,10 +166,10 @@ def doubt_of_gait(search: Search, critical: Bifurcation) -> str:
 
 def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     """The best of the designs that runs came to."""
-    best = runs.best
+    best = restored(problem, runs.best)
     found, scene = problem.objective(best.known), problem.scene_at(best.u)
-    gait, outcome = problem.settings.find_near(scene, best.known.state), runs.outcome()
-    objectives = {**OBJECTIVES, **problem.wanted}
+    gait, outcome = problem.settings.find_near(scene, best.known.state), runs.outcome(best)
+    objectives = {**OBJECTIVES, **with_parts(problem.wanted)}
     named = [name for name in best.known.values if name in objectives]
     doubt = doubt_of(problem, best) if outcome is Outcome.CORNER else ""
     if outcome in (Outcome.CONVERGED, Outcome.FLAT):
@@ -174,6 +184,7 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
         objective=problem.sense * found.value,
         error=found.error,
         known=best.known,
+        curvature=curvature_of(problem, best) if outcome is Outcome.CONVERGED else None,
         quantities={name: objectives[name].quantity for name in named},
         optimality=optimality_of(problem, best),
         history=runs.history,

@@ -18,8 +18,8 @@ from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._walker_motion import WalkerMotion
 from jaxbiped.gait._poincare_map import recurring_indices, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
+from jaxbiped.hybrid._motion_costs import Extreme
 from jaxbiped.optimise._augmented_system import motion_of
-from jaxbiped.optimise._integrals import Extreme
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._watch import Watch
 from jaxbiped.variational._tangents import (

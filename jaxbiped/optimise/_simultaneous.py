@@ -5,6 +5,7 @@ design needs a gait of its own on the way: folds and violent multipliers are no 
 Plitt, A multiple shooting algorithm for direct solution of optimal control problems (IFAC 1984).
 """
 
+import functools
 from typing import Any, NamedTuple
 
 import jax.tree_util as jtu
@@ -18,6 +19,8 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
+from jaxbiped.hybrid._landing_system import AbstractLandingSystem
+from jaxbiped.hybrid._motion_costs import Extreme, Integral
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.hybrid._sections import section_of
 from jaxbiped.hybrid._walker_systems import system_of
@@ -28,16 +31,16 @@ from jaxbiped.optimise._cycle_functionals import (
     Functionals,
     cycle_spec,
     functional_precision,
+    weighted_sum,
 )
 from jaxbiped.optimise._design_functions import AnyRow, rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem, start_of
-from jaxbiped.optimise._integrals import Extreme, Integral
-from jaxbiped.optimise._objective_values import Evaluation, quotient_of, with_costs
-from jaxbiped.optimise._objectives import costs_of, with_divided
+from jaxbiped.optimise._objective_values import Evaluation, with_costs
+from jaxbiped.optimise._objectives import costs_of, weights_of_parameters, with_parts
 from jaxbiped.optimise._optimisers import RunEnding
 from jaxbiped.optimise._sequential_programming import Conditions, run_newton
 from jaxbiped.optimise._shooting import Linearised, Segments, linearise_segments
-from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.scene._parameter_access import parameter_values, select_parameters
 
 _LEAST_PERIOD, _PERIOD, _MOST_PERIOD = 0.3, 2.2, 20.0
 """Periods of a footstep in units of √(l/g): the least, the first that is tried, the largest."""
@@ -52,12 +55,12 @@ _OF_CYCLE = ("period", "step_length", "speed")
 
 
 class _Known(NamedTuple):
-    """What is known at a point: its conditions, and how they depend on sums over segments.
+    """What is known at a point: its conditions, and how they depend on the numbers of measures.
 
     Attributes:
         conditions: of the problem.
-        by_sums: derivatives with respect to the sums of the objective, (f,), of the requirements
-            among the equations, and of what must be at least zero, (r, f).
+        by_sums: derivatives with respect to these of the objective, (f,), of the requirements among
+            the equations, and of what must be at least zero, (r, f).
     """
 
     conditions: Conditions
@@ -67,8 +70,8 @@ class _Known(NamedTuple):
 class Simultaneous:
     """A design problem in z: starts of n segments, the period, and u.
 
-    Starts and period are in units of the scene. Measures are functions of f sums over segments: of
-    the period, of what cyclic coordinates gain, and of functions at nodes.
+    Starts and period are in units of the scene. Measures are functions of f numbers: the period,
+    the parameters, what cyclic coordinates gain, and functions at nodes.
 
     Attributes:
         problem: what is designed.
@@ -80,10 +83,10 @@ class Simultaneous:
     def __init__(self, problem: DesignProblem, count: int) -> None:
         scene, settings = problem.scene.minimal, problem.settings
         self.problem, self.count, self.evaluations = problem, count, 0
-        costs = costs_of(with_divided(problem.wanted))
+        costs = costs_of(with_parts(problem.wanted))
         self._integrals = tuple(cost for cost in costs if isinstance(cost, Integral))
         self._path = tuple(cost for cost in costs if isinstance(cost, Extreme))
-        self._scene, self._walker = scene, system_of(scene)
+        self._scene, self._walker = scene, _landing_system(scene)
         system = IntegratedCycle.of(self._walker, self._integrals)
         pose = default_guess(scene)
         self._like = system.begin(pose)
@@ -122,7 +125,7 @@ class Simultaneous:
         for time in period * np.arange(self.count) / self.count:
             angles = [a + time * rate for a, rate in zip(before, rates, strict=True)]
             state = walker.with_coordinates(scene, pose, (*angles, *rates))
-            state = walker.later(scene, state, lambda time=time: time)
+            state = walker.later(scene, state, functools.partial(float, time))
             starts.append(np.asarray(recurring_components(self._walker, state)))
         return self._point(np.array(starts), period, u)
 
@@ -160,10 +163,9 @@ class Simultaneous:
         self.evaluations += 1
         variables = self.problem.variables
         note_code(self._spec, self._scene)
-        given = starts, periods / self.count, variables.values(u)
-        found = linearise_segments(
-            self._spec, self._scene, self._like, *given, self._active, self._path, self._precision
-        )
+        given: Any = starts, periods / self.count, variables.values(u)
+        how = self._active, self._path, self._precision
+        found = linearise_segments(self._spec, self._scene, self._like, *given, *how)
         units = np.append(self._sizes, self._time / self.count)
         scales = np.concatenate([np.tile(units, (len(u), 1)), variables.rates(u)], axis=1)
 
@@ -175,7 +177,7 @@ class Simultaneous:
         return Segments(*map(scaled, found))
 
     def _formed(self, z: np.ndarray, segments: Segments) -> _Known:
-        starts, period, _ = self.parts(z)
+        starts, period, u = self.parts(z)
         n, m, place = self.count, starts.shape[1], starts.size
 
         def by_unknowns(slopes: np.ndarray, i: int) -> np.ndarray:
@@ -195,9 +197,13 @@ class Simultaneous:
         by_period = np.zeros((1, len(z)))
         by_period[0, place] = self._time
         gains, path = every(segments.gains).sum(axis=0), every(segments.path)
-        chain = np.concatenate([by_period, gains, path.reshape(-1, len(z))])
+        by_design = np.zeros((len(z) - place - 1, len(z)))
+        by_design[:, place + 1 :] = np.diag(self.problem.variables.rates(u))
+        chain = np.concatenate([by_period, by_design, gains, path.reshape(-1, len(z))])
         gained = segments.gains.values.sum(axis=0)
-        known = self._measures(np.array([period, *gained, *segments.path.values.ravel()]))
+        values = self.problem.variables.values(u)
+        sums = [[period], values, gained, segments.path.values.ravel()]
+        known = self._measures(np.concatenate(sums))
         total, step = self.problem.objective(known), known.functional("step_length")
         rows = [(row.equality, row.value(known), row.slopes(known)) for row in self._rows]
         rows.append((False, step.value / self._height - _LEAST_STEP, step.slopes / self._height))
@@ -225,29 +231,48 @@ class Simultaneous:
         return _Known(conditions, (total.slopes, by_equal, by_spare))
 
     def _measures(self, sums: np.ndarray) -> Evaluation:
-        """All measures as functions of the sums, without errors; of extremes those at nodes, too."""
-        none = np.zeros(len(sums))
+        """All measures as functions of their numbers; of extremes those at each node, too."""
+        none, names = np.zeros(len(sums)), self.problem.variables.names
         parts = [
-            Functional(*each, none) for each in zip(sums, none, np.eye(len(sums)), strict=True)
+            Functional(value, 0.0, row, none)
+            for value, row in zip(sums, np.eye(len(sums)), strict=True)
         ]
-        d, r = 2 + len(self._integrals), len(self._path)
-        rows = {"period": parts[0], "step_length": parts[1]}
-        rows["speed"] = quotient_of(rows["step_length"], rows["period"])
-        costs: dict[Any, Functional] = dict(zip(self._integrals, parts[2:d], strict=True))
+        length = parts[1 + len(names)]
+        value = length.value / parts[0].value
+        by_both = (length.slopes - value * parts[0].slopes) / parts[0].value
+        rows = {"period": parts[0], "step_length": length}
+        rows["speed"] = Functional(value, 0.0, by_both, none)
+        own = parameter_values(self.problem.scene)
+        for name, objective in self.problem.wanted.items():
+            if (weights := weights_of_parameters(objective)) is not None:
+                moved = [each for each in weights if each in names]
+                total = weighted_sum(
+                    [weights[each] for each in moved],
+                    [parts[1 + names.index(each)] for each in moved],
+                    len(sums),
+                )
+                fixed = sum(
+                    weights[each] * float(own[each]) for each in weights if each not in names
+                )
+                rows[name] = total._replace(value=total.value + fixed)
+        begin, r = 2 + len(names), len(self._path)
+        d = begin + len(self._integrals)
+        costs: dict[Any, Functional] = dict(zip(self._integrals, parts[begin:d], strict=True))
         for k, extreme in enumerate(self._path):
             nodes = parts[d + k :: r]
-            costs[extreme] = max(nodes, key=lambda node, sign=extreme.sign: sign * node.value)
+            costs[extreme] = nodes[int(np.argmax([extreme.sign * node.value for node in nodes]))]
             for name, objective in self.problem.wanted.items():
                 if objective.costs == ((1.0, extreme),):
                     rows |= {f"{name} at {i}": node for i, node in enumerate(nodes)}
         told = None
         if costs:
-            chosen = (costs[cost] for cost in costs_of(with_divided(self.problem.wanted)))
-            told = Functionals(*map(np.array, zip(*chosen, strict=True)), code=np.zeros(()))
+            chosen = (costs[cost] for cost in costs_of(with_parts(self.problem.wanted)))
+            columns: Any = map(np.array, zip(*chosen, strict=True))
+            told = Functionals(*columns, np.zeros(()))  # type: ignore[arg-type]
         rows = with_costs(self.problem.wanted, rows, told)
-        named = [dict(zip(rows, part, strict=True)) for part in zip(*rows.values(), strict=True)]
-        empty = np.zeros((1, len(sums)))
-        return Evaluation(*named, state=empty[:, 0], state_slopes=empty)  # type: ignore[arg-type]
+        fields: Any = zip(*rows.values(), strict=True)
+        named: Any = [dict(zip(rows, part, strict=True)) for part in fields]
+        return Evaluation(*named, none[:1], np.zeros((1, len(sums))))
 
     def curvature(self, z: np.ndarray, of_equal: np.ndarray, of_spare: np.ndarray) -> np.ndarray:
         """Second derivatives of the objective less multipliers times conditions, shape (n, n).
@@ -260,7 +285,7 @@ class Simultaneous:
         objective, by_equal, by_spare = self._known(z).by_sums
         joints, arrival, required = np.split(of_equal, [place, place + 1])
         of_sums = objective - required @ by_equal - of_spare @ by_spare
-        gains, path = np.split(of_sums[1:], [1 + len(self._integrals)])
+        gains, path = np.split(of_sums[1 + len(u) :], [1 + len(self._integrals)])
         steps = _APART * np.vstack([np.zeros(m + 1 + len(u)), np.eye(m + 1 + len(u))])
         steps[:, m + 1 :] *= np.where(u > 0.5, -1.0, 1.0)
         segments = self._segments(
@@ -285,6 +310,12 @@ class Simultaneous:
 
 def _is_along_path(problem: DesignProblem, name: str) -> bool:
     return any(isinstance(cost, Extreme) for _, cost in problem.wanted[name].costs)
+
+
+def _landing_system(scene: Any) -> AbstractLandingSystem:
+    system = system_of(scene)
+    assert isinstance(system, AbstractLandingSystem)
+    return system
 
 
 def _spec_of(scene: Any, engine: str) -> Any:
@@ -313,23 +344,22 @@ def check_simultaneous(problem: DesignProblem, count: int) -> None:
         raise refuse("for a cycle of several footsteps")
     if problem.ensemble is not None:
         raise refuse("with scatter")
-    for name, objective in with_divided(problem.wanted).items():
+    every = with_parts(problem.wanted)
+    parts = {name for each in every.values() if each.combined for name in each.combined.of}
+    for name, objective in every.items():
         bounded = [each for each in problem.requirements if each.name == name]
-        extremes = [cost for _, cost in objective.costs if isinstance(cost, Extreme)]
-        if extremes:
-            (weight, cost), *others = objective.costs
-            sides = (each.low if cost.sign > 0.0 else each.high for each in bounded)
-            if (
-                name in problem.weights
-                or others
-                or weight != 1.0
-                or any(side is not None for side in sides)
-            ):
+        for weight, cost in objective.costs:
+            if not isinstance(cost, Extreme):
+                continue
+            sides = [each.low if cost.sign > 0.0 else each.high for each in bounded]
+            is_path = weight == 1.0 and len(objective.costs) == 1 and set(sides) == {None}
+            if not is_path or name in (*problem.weights, *parts):
                 raise refuse(
                     f"for {name}, an extreme, except as the upper bound of a largest value or the "
                     "lower bound of a smallest one"
                 )
-        elif not (objective.costs or objective.quotient or name in _OF_CYCLE):
+        is_linear = weights_of_parameters(objective) is not None
+        if not (objective.costs or objective.combined or is_linear or name in _OF_CYCLE):
             raise refuse(f"for {name}, which is no integral along the cycle")
 
 

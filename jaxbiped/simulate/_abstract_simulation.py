@@ -31,12 +31,14 @@ from jaxbiped.simulate._start import (
     check_limits,
     check_steps,
     check_times,
+    integrals_asked,
     longest_time,
     watched_by,
 )
 from jaxbiped.simulate._trajectory import Trajectory, scene_key
 from jaxbiped.solve._accuracy import tolerances
 from jaxbiped.solve._solvers import check_adjoint
+from jaxbiped.solve._step_integrals import StepIntegrals
 
 _OF_STEPS = (
     "adjoint = … differentiates the steps that were taken, which were chosen for the state alone: "
@@ -50,7 +52,8 @@ class AbstractSimulation(eqx.Module):
     Attributes:
         scene, state, duration, rtol, atol, dt, adjoint: as in `simulate`, checked and converted to
             one precision.
-        footsteps, watch, max_solver_steps, section, max_arrivals, extremes: as in `simulate`.
+        footsteps, watch, max_solver_steps, section, max_arrivals, extremes, integrals: as in
+            `simulate`.
         correction: how a start was moved onto its constraints, or None.
         times: times at which to save [s], shape (n,), or None.
         save_steps: whether every step is saved.
@@ -79,6 +82,7 @@ class AbstractSimulation(eqx.Module):
     section: AbstractSection | None = eqx.field(static=True)
     max_arrivals: int = eqx.field(static=True)
     extremes: Callable[..., PyTree] | None = eqx.field(static=True)
+    integrals: StepIntegrals | None = eqx.field(static=True)
 
     @classmethod
     def of(cls, scene: Any, state: PyTree, asked: Options) -> Self:
@@ -139,6 +143,7 @@ class AbstractSimulation(eqx.Module):
             section=section,
             max_arrivals=int(asked.max_arrivals),
             extremes=asked.extremes,
+            integrals=integrals_asked(scene, asked.integrals),
         )
         return cls.completed(fields, scene, asked, method)
 

@@ -123,7 +123,8 @@ def _at_least_a_share(scene: PyTree, bars: PyTree) -> PyTree:
 
 
 def _outputs(walk: Trajectory[Any]) -> dict[str, Any]:
-    found = {name: getattr(walk, name) for name in ("t", "state", "arrivals", "lowest", "highest")}
+    told = ("t", "state", "arrivals", "lowest", "highest", "integrals")
+    found = {name: getattr(walk, name) for name in told}
     return jtu.tree_map(np.asarray, {k: v for k, v in found.items() if v is not None})
 
 

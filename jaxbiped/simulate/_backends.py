@@ -243,6 +243,7 @@ def lane_request(run: "Simulation") -> Request:
         counting=run.footsteps is not None,
         recorder=recorder_for(run),
         extremes=run.extremes,
+        integrals=run.integrals,
         located=run.dt is None,
         fenced=run.engine == "xla",
     )

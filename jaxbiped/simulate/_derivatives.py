@@ -386,6 +386,7 @@ def check_derivatives(run: Any) -> None:
     refused = {
         'save = "steps"': (run.save_steps, 'ask for save="end", an array of times or a section'),
         "extremes": (run.extremes is not None, "only times and states have derivatives"),
+        "integrals": (run.integrals is not None, "only times and states have derivatives"),
     }
     for argument, (is_so, instead) in refused.items():
         if is_so:

@@ -127,7 +127,7 @@ class RigidSimulation(AbstractSimulation):
     def saving_strikes(self, room: int) -> "RigidSimulation":
         """The same, of which so many heel strikes are saved and nothing else."""
         section = HeelStrike() if room else None
-        saved: dict[str, Any] = dict(times=None, save_steps=False, extremes=None)
+        saved: dict[str, Any] = dict(times=None, save_steps=False, extremes=None, integrals=None)
         return dataclasses.replace(self, section=section, max_arrivals=room, **saved)
 
     def by_other_method(self) -> tuple["RigidSimulation", float, float]:
@@ -239,6 +239,7 @@ class RigidSimulation(AbstractSimulation):
             system=ROLLING,
             recorder=recorder,
             extremes=self.extremes,
+            integrals=self.integrals,
             waits=self.waits,
             method=self.method,
             endings=endings,

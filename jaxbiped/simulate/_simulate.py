@@ -1,7 +1,7 @@
 """Simulation of a scene from a start: the door for every kind of scene, and its short names."""
 
-from collections.abc import Callable
-from typing import Any, Literal
+from collections.abc import Callable, Mapping, Sequence, Set
+from typing import Any, Literal, TypeAlias
 
 import diffrax
 from jaxtyping import Array, PyTree
@@ -17,6 +17,7 @@ from jaxbiped._checks import (
 from jaxbiped._jax_versions import without_switches
 from jaxbiped._types import Parameter
 from jaxbiped.hybrid._endings import WATCHES
+from jaxbiped.hybrid._motion_costs import Integral
 from jaxbiped.hybrid._scales import is_stiff, unresolved_slip
 from jaxbiped.hybrid._sections import AbstractSection, HeelStrike
 from jaxbiped.scene._linkage_scene import LinkageScene, LinkageState
@@ -34,6 +35,12 @@ from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.simulate._start import Options, last_time
 from jaxbiped.simulate._trajectory import Trajectory
 
+AnyIntegral: TypeAlias = Integral | str
+Integrals: TypeAlias = (
+    AnyIntegral | Mapping[str, AnyIntegral] | Set[AnyIntegral] | Sequence[AnyIntegral]
+)
+"""Integrals by name, or as many as are asked for."""
+
 
 @without_switches
 def simulate(
@@ -50,6 +57,7 @@ def simulate(
     save: Literal["steps", "end"] | Array | AbstractSection | None = None,
     max_arrivals: int = 64,
     extremes: Callable[..., PyTree] | None = None,
+    integrals: Integrals | None = None,
     watch: tuple[str, ...] = WATCHES,
     max_solver_steps: int = 65536,
     adjoint: diffrax.AbstractAdjoint | None = None,
@@ -106,6 +114,9 @@ def simulate(
         max_arrivals: maximum number of arrivals at a section to save.
         extremes: a function of (scene, state); the result has the smallest and largest value of
             each number that it returns, over the ends of all steps, and on both sides of an impact.
+        integrals: integrals along the motion, which the result has by name: names of integrals (see
+            `jaxbiped.optimise.NAMED_COSTS`) and `jaxbiped.optimise.Integral` objects, or these by
+            names of your own. They have no derivatives here; those of a gait's cycle do.
         watch: failures that end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: maximum number of attempted solver steps.
         adjoint: an adjoint of diffrax, to differentiate the steps that were taken instead of the
@@ -146,6 +157,7 @@ def simulate(
         save=usual if save is None else save,
         max_arrivals=max_arrivals,
         extremes=extremes,
+        integrals=integrals,
         watch=watch,
         max_solver_steps=max_solver_steps,
         adjoint=adjoint,

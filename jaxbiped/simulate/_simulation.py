@@ -92,7 +92,7 @@ class Simulation(AbstractSimulation):
             units=jtu.tree_map(known, units),
             solver=method,
             engine=choose_engine(asked, method, (fields["scene"], state, fields["duration"])),
-            replaceable=asked.engine == "auto" and asked.section is None,
+            replaceable=asked.engine == "auto" and asked.section is None and not asked.integrals,
         )
 
     def solved(self) -> Trajectory:
@@ -129,7 +129,8 @@ class Simulation(AbstractSimulation):
 
     def lane_request(self) -> Request | None:
         """The program that runs it; None where diffrax does, also for what lanes lack."""
-        if self.engine == "xla" and self.section is None and not system_of(self.scene).lands:
+        by_program = self.section is not None or self.integrals is not None
+        if self.engine == "xla" and not by_program and not system_of(self.scene).lands:
             return None
         request = lane_request(self)
         hindered = self.replaceable and BY_NAME[self.engine].can(request) is not None

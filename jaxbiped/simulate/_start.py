@@ -1,10 +1,11 @@
 """Start of a simulation, and what else is asked of it, checked."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any, NamedTuple
 
 import diffrax
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, PyTree
 
@@ -18,9 +19,13 @@ from jaxbiped._checks import (
     holds_somewhere,
 )
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._walker_motion import WalkerMotion
 from jaxbiped.hybrid._endings import WATCHES
+from jaxbiped.hybrid._motion_costs import Integral, check_cost
+from jaxbiped.hybrid._named_costs import cost_named
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.solve._step_integrals import StepIntegrals
 from jaxbiped.solve.controllers._event_steps import PATIENCE
 
 
@@ -37,6 +42,7 @@ class Options(NamedTuple):
     save: Any = "steps"
     max_arrivals: int = 64
     extremes: Callable[..., PyTree] | None = None
+    integrals: Any = None
     watch: tuple[str, ...] = WATCHES
     max_solver_steps: int = 65536
     adjoint: diffrax.AbstractAdjoint | None = None
@@ -165,3 +171,63 @@ def _numbers(times: ArrayLike) -> np.ndarray:
         raise ArgumentError(
             f'save = {times!r} is not allowed: give "steps", "end", a section or increasing times.'
         ) from None
+
+
+class WalkIntegrals(NamedTuple):
+    """Integrals of a walker's motion by name. Hashable; called for their rates.
+
+    Attributes:
+        names: of the integrals, as they are told.
+        integrals: what is summed.
+    """
+
+    names: tuple[str, ...]
+    integrals: tuple[Integral, ...]
+
+    def rates(self, scene: Any, state: PyTree) -> dict[str, Scalar]:
+        """The rates at a state."""
+        return self._told(scene, state, lambda integral: integral.rate)
+
+    def at_strike(self, scene: Any, state: PyTree) -> dict[str, Scalar]:
+        """What a heel strike adds, at the state just before it."""
+        return self._told(scene, state, lambda integral: integral.at_strike)
+
+    def _told(
+        self, scene: Any, state: PyTree, part: Callable[[Integral], Any]
+    ) -> dict[str, Scalar]:
+        motion, told = WalkerMotion(scene, state), {}
+        for name, integral in zip(self.names, self.integrals, strict=True):
+            function = part(integral)
+            value = jnp.zeros_like(state[0]) if function is None else function(motion)
+            told[name] = jnp.asarray(value, dtype=jnp.float64)
+        return told
+
+
+def integrals_asked(scene: Any, given: Any) -> StepIntegrals | None:
+    """The integrals that a simulation is asked for: names and objects, or objects by name.
+
+    Raises:
+        ArgumentError: what is neither, or an integral that the scene cannot have.
+    """
+    if given is None:
+        return None
+    given = (given,) if isinstance(given, str | Integral) else given
+    check_type("integrals", given, Mapping, Set, Sequence)
+    named = isinstance(given, Mapping)
+    integrals: dict[str, Integral] = {}
+    for each in given:
+        asked: Any = given[each] if named else each
+        if isinstance(asked, str):
+            cost, part = cost_named(asked, "integrals")
+            if (lacks := cost.lacks(scene)) is not None:
+                raise ArgumentError(
+                    f"integrals = {asked!r} is not allowed for this scene: {lacks}."
+                )
+            asked, name = cost.costs(part)[0][1], asked
+        else:
+            name = getattr(asked, "name", "")
+        check_type("integrals", asked, Integral)
+        check_cost(asked, scene)
+        integrals[each if named else name] = asked
+    own = WalkIntegrals(tuple(integrals), tuple(integrals.values()))
+    return StepIntegrals(own.rates, own.at_strike)

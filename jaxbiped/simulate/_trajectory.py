@@ -72,6 +72,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
         arrivals: arrivals at a section, if requested; for a rigid walker, its heel strikes, just
             after the impact.
         lowest, highest: extremes over the ends of the steps, if requested.
+        integrals: integrals along the motion by name, if requested.
         correction: how a redundant start was moved onto its constraints, a `Consistent`; for a
             linkage, the violation ‖Φ‖ [m] of the start.
         violation: distance of a linkage from its constraints, ‖Φ‖ at the saved times [m], shape
@@ -102,6 +103,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     arrivals: Arrivals[SomeState] | None = None
     lowest: PyTree = None
     highest: PyTree = None
+    integrals: PyTree = None
     correction: PyTree = None
     violation: PyTree = None
     error: ErrorEstimate | None = None

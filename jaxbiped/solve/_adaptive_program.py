@@ -20,9 +20,11 @@ from jaxbiped._types import Numbers, Scalar, as_float, select
 from jaxbiped.compiler import without_barriers
 from jaxbiped.hybrid._endings import ending_code
 from jaxbiped.hybrid._scales import Units, units_of
-from jaxbiped.solve._recorders import AbstractSolve, LastStep, Moment, Step
+from jaxbiped.solve._recorders import AbstractSolve
 from jaxbiped.solve._solved import Solved
+from jaxbiped.solve._step_integrals import Summed
 from jaxbiped.solve._stepper import Stepper, Tolerance
+from jaxbiped.solve._steps import LastStep, Moment, Step
 from jaxbiped.solve._switch_resets import Gathering, reset_at_switch
 from jaxbiped.solve._watch import Watch
 from jaxbiped.solve.controllers._event_steps import (
@@ -84,6 +86,7 @@ class _Now(NamedTuple):
     counted: Scalar
     memory: PyTree
     extremes: tuple[PyTree, PyTree] | None
+    summed: Summed | None
     resets: Gathering | None = None
 
 
@@ -168,12 +171,13 @@ class AdaptiveSolve(AbstractSolve):
             )
             dense, ends = (*dense, y1), [*ends, state]
         counted = jnp.asarray(result != diffrax.RESULTS.successful)
-        memory = now.memory
-        if self.recorder is not None:
+        memory, taken = now.memory, None
+        if self.observes:
             strikes = control[-1] > now.control[-1] if self.counting else None
             taken = Step(now.t, now.state, t, state, keep, lambda _: dense, strikes=strikes)
             if self.system.lands:
                 taken = taken._replace(grazes=self._landed(control).grazes)
+        if self.recorder is not None and taken is not None:
             memory = self.recorder.follow(self, solve, memory, taken)
         after = _Now(
             t=t,
@@ -185,6 +189,7 @@ class AdaptiveSolve(AbstractSolve):
             counted=counted,
             memory=memory,
             extremes=self.widened(solve, now, lambda: (keep, ends)),
+            summed=self.summed(solve, now, taken),
             resets=resets,
         )
         attempts = (after.accepted + after.rejected).astype(solve.max_attempts.dtype)
@@ -214,7 +219,8 @@ class AdaptiveSolve(AbstractSolve):
             code = jnp.where(now.resets.chatters, int(Ending.CHATTERS), code)
         low, high = (None, None) if now.extremes is None else now.extremes
         steps = (now.accepted, now.rejected)
-        solved = Solved(now.t, now.state, code, None, *steps, lowest=low, highest=high)
+        told = {} if now.summed is None else {"integrals": now.summed.totals}
+        solved = Solved(now.t, now.state, code, None, *steps, lowest=low, highest=high, **told)
         if solve.steps is not None:
             _, missed = self._landed(now.control).inner if self.system.lands else control
             solved = solved._replace(missed_contacts=missed)

@@ -23,8 +23,10 @@ from jaxbiped.solve._landing_steps import (
     ending_of,
     initial_progress,
 )
-from jaxbiped.solve._recorders import AbstractSolve, LastStep, Moment, Step
+from jaxbiped.solve._recorders import AbstractSolve
 from jaxbiped.solve._solved import Solved
+from jaxbiped.solve._step_integrals import Summed
+from jaxbiped.solve._steps import LastStep, Moment, Step
 
 
 class _Now(NamedTuple):
@@ -33,6 +35,7 @@ class _Now(NamedTuple):
     progress: LandingProgress
     memory: PyTree
     extremes: tuple[PyTree, PyTree] | None
+    summed: Summed | None
 
 
 class LandingCourse(diffrax.AbstractLocalInterpolation):
@@ -95,9 +98,9 @@ class LandingSolve(AbstractSolve):
         if self.counts_pulls:
             pulled = (after.accepted > before.accepted) & self._pulls(solve, after)
             after = after._replace(pulls=after.pulls + jnp.where(pulled, 1, 0))
-        memory = now.memory
-        if self.recorder is not None:
-            memory = self.recorder.follow(self, solve, memory, self._step(solve, before, tried))
+        memory, step = now.memory, self._step(solve, before, tried) if self.observes else None
+        if self.recorder is not None and step is not None:
+            memory = self.recorder.follow(self, solve, memory, step)
             if (decided := self.recorder.decides(memory)) is not None:
                 over = over | decided
 
@@ -105,7 +108,9 @@ class LandingSolve(AbstractSolve):
             states = [system.completed(solve.scene, y) for y in (tried.end(), after.state)]
             return self._end_is_known(tried), states
 
-        return _Now(after, memory, self.widened(solve, now, ends)), over
+        return _Now(
+            after, memory, self.widened(solve, now, ends), self.summed(solve, now, step)
+        ), over
 
     def solved(self, solve: Landing, now: _Now) -> tuple[Solved, Scalar]:
         done = now.progress
@@ -114,7 +119,8 @@ class LandingSolve(AbstractSolve):
         begin = getattr(solve.state, "mode", None) if done.modes is None else done.modes.begin
         low, high = (None, None) if now.extremes is None else now.extremes
         state = self.system.completed(solve.scene, done.state)
-        return Solved(done.t, state, code, *counts, begin, low, high), done.footsteps
+        told = {} if now.summed is None else {"integrals": now.summed.totals}
+        return Solved(done.t, state, code, *counts, begin, low, high, **told), done.footsteps
 
     def moment(self, solve: Landing, now: _Now) -> Moment:
         here, changes = now.progress, None

@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 from collections.abc import Callable, Iterable
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import diffrax
 import jax
@@ -16,7 +16,9 @@ from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import Program
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
+from jaxbiped.solve._step_integrals import StepIntegrals, Summed
 from jaxbiped.solve._step_polynomials import StepCubic
+from jaxbiped.solve._steps import LastStep, Moment, Rise, Step
 from jaxbiped.solve.controllers._wrapped_control import widened_extremes
 
 NO_RESET, STRIKE, CHANGE = 0.0, 1.0, 2.0
@@ -24,82 +26,6 @@ NO_RESET, STRIKE, CHANGE = 0.0, 1.0, 2.0
 _BISECTIONS = 50
 _SECANTS = 8
 """By which `arrival_time` is located, to rounding."""
-
-
-class Rise(NamedTuple):
-    """Where a section's value rises through zero within a step.
-
-    Attributes:
-        happens: whether it does, and it is an arrival.
-        since, until: times before and after [s].
-    """
-
-    happens: Scalar
-    since: Scalar
-    until: Scalar
-
-
-class Step(NamedTuple):
-    """An attempted step, as a recorder sees it.
-
-    Attributes:
-        t0, y0: time [s] and state where it began.
-        t1, y1: where the next one begins: its end where it was accepted.
-        keep: whether it was accepted, and its end is known.
-        coefficients: gives those of its continuous solution (True), or only those from which a
-            state within it is made (False).
-        end: gives the state at its end before a reset; None where there are no resets.
-        strikes: whether a footstep ends it; None where footsteps are not counted.
-        continues: whether it only tells the end of the step before; None: it never does.
-        grazes: number of steps so far in which a switch was grazed; None where no step ends on one.
-    """
-
-    t0: Scalar
-    y0: PyTree
-    t1: Scalar
-    y1: PyTree
-    keep: Scalar
-    coefficients: Callable[[bool], tuple[PyTree, ...]]
-    end: Callable[[], PyTree] | None = None
-    strikes: Scalar | None = None
-    continues: Scalar | None = None
-    grazes: Scalar | None = None
-
-
-class Moment(NamedTuple):
-    """Where a solve is behind an attempt.
-
-    Attributes:
-        t, state: time [s] and state, as they are told.
-        strikes: whether a footstep has just come; None where this is not asked.
-        changes: whether the mode has just changed; None where there is only one.
-    """
-
-    t: Scalar
-    state: PyTree
-    strikes: Scalar | None = None
-    changes: Scalar | None = None
-
-
-class LastStep(NamedTuple):
-    """The last attempt: when it began, its coefficients, and whether it is of note.
-
-    It is where it was accepted, or where there is a section, where there is an arrival within it.
-
-    Attributes:
-        leg: number of the last arrival's, from 1 on; at the start that which stands alone, 0 for
-            none. None without a section, as is `rise`.
-        rise: where the arrival lies.
-        end: the state at its end before a reset; None where this is not asked.
-    """
-
-    noted: Scalar
-    t: Scalar
-    state: PyTree
-    coefficients: tuple[PyTree, ...]
-    leg: Scalar | None = None
-    rise: Rise | None = None
-    end: PyTree = None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -114,6 +40,7 @@ class AbstractSolve(abc.ABC):
         recorder: what is saved; None: the end alone.
         extremes: a function of (scene, state) whose extremes over the steps' ends are wanted, on
             both sides of a reset, or None.
+        integrals: what is summed along the steps, or None.
         resets: whether recorders ask which steps end in a reset. A property of the class.
     """
 
@@ -121,6 +48,12 @@ class AbstractSolve(abc.ABC):
     system: AbstractSystem
     recorder: "AbstractRecorder | None" = None
     extremes: Callable[[PyTree, PyTree], PyTree] | None = None
+    integrals: StepIntegrals | None = None
+
+    @property
+    def observes(self) -> bool:
+        """Whether a step is asked for more than its end."""
+        return self.recorder is not None or self.integrals is not None
 
     @abc.abstractmethod
     def start(self, solve: Any) -> Any:
@@ -175,13 +108,38 @@ class AbstractSolve(abc.ABC):
         assert self.recorder is not None
         return self.recorder.record(self, solve, now.memory, self.moment(solve, now), time)
 
-    def observed_start(self, solve: Any) -> tuple[PyTree, tuple[PyTree, PyTree] | None]:
-        """The recorder's memory and the extremes before the first attempt."""
+    def observed_start(
+        self, solve: Any
+    ) -> tuple[PyTree, tuple[PyTree, PyTree] | None, Summed | None]:
+        """The recorder's memory, the extremes and the integrals before the first attempt."""
         memory = None if self.recorder is None else self.recorder.begin(self, solve)
-        if self.extremes is None:
-            return memory, None
-        values = _numbers(self.extremes(solve.scene, solve.state))
-        return memory, (values, values)
+        extremes = summed = None
+        if self.extremes is not None:
+            values = _numbers(self.extremes(solve.scene, solve.state))
+            extremes = values, values
+        if self.integrals is not None:
+            rates = _numbers(self.integrals.rates(solve.scene, solve.state))
+            nothing = jtu.tree_map(jnp.zeros_like, rates)
+            summed = Summed(no_step(self, solve, course=True), nothing)
+        return memory, extremes, summed
+
+    def summed(self, solve: Any, now: Any, step: Step | None) -> Summed | None:
+        """The integrals behind a step."""
+        before: Summed | None = now.summed
+        if self.integrals is None or before is None or step is None:
+            return None
+        last = last_step(step, before.last, course=True)
+        course = self.course(solve, last, step.t1, step.y1)
+        gained = self.integrals.over(solve.scene, course.evaluate, last.t, step.t1)
+        # A reset's own term; of other systems than those that land nothing resets the state.
+        if self.resets and step.strikes is not None and step.end is not None:
+            struck = step.strikes
+            terms = self.integrals.at_strike(solve.scene, step.end())
+            gained = jtu.tree_map(lambda a, b: a + jnp.where(struck, b, 0.0), gained, terms)
+        totals = jtu.tree_map(
+            lambda total, more: total + jnp.where(last.noted, more, 0.0), before.totals, gained
+        )
+        return Summed(last, totals)
 
     def widened(
         self, solve: Any, now: Any, ends: Callable[[], tuple[Scalar, Iterable[PyTree]]]

@@ -18,6 +18,7 @@ class Solved(NamedTuple):
         begin: the first mode.
         lowest, highest: extremes of what was asked for.
         missed_contacts: number of contacts between steps of one size.
+        integrals: of what was asked for, along the solve.
     """
 
     t: Scalar
@@ -32,9 +33,10 @@ class Solved(NamedTuple):
     lowest: PyTree = None
     highest: PyTree = None
     missed_contacts: Scalar | None = None
+    integrals: PyTree = None
 
     @property
     def outcome(self) -> dict[str, Any]:
         """What a trajectory tells of it, whatever it saves."""
         told = ("ending", "accepted", "rejected", "grazes", "pulls", "lowest", "highest")
-        return {name: getattr(self, name) for name in (*told, "missed_contacts")}
+        return {name: getattr(self, name) for name in (*told, "missed_contacts", "integrals")}

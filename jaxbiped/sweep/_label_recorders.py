@@ -25,14 +25,13 @@ from jaxbiped.solve._landing_steps import Landing
 from jaxbiped.solve._recorders import (
     AbstractRecorder,
     AbstractSolve,
-    LastStep,
-    Step,
     arrival_time,
     last_step,
     no_step,
     rise_within,
 )
 from jaxbiped.solve._solved import Solved
+from jaxbiped.solve._steps import LastStep, Step
 from jaxbiped.solve.controllers._grazing import grazes
 from jaxbiped.sweep._convergence_test import (
     DEPTH,

@@ -8,9 +8,10 @@ import jaxbiped as jb
 from jaxbiped._progress import stage
 from jaxbiped.optimise import Evaluation
 from jaxbiped.optimise._design_gaits import GaitSettings
-from jaxbiped.optimise._design_problem import DesignProblem, requirements_of, variables_of
+from jaxbiped.optimise._design_problem import DesignProblem, variables_of
 from jaxbiped.optimise._objective_values import Evaluations
 from jaxbiped.optimise._objectives import measures_named
+from jaxbiped.optimise._requirements import requirements_of
 from jaxbiped.optimise._runs import Runs
 
 SCENE = jb.ladder()["rigid"]

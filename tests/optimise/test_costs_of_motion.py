@@ -1,4 +1,4 @@
-"""Costs of a gait's motion: integrals, extremes and constraints along the cycle."""
+"""Costs of a gait's motion, against those of its walk: integrals, extremes, bounds along it."""
 
 import dataclasses
 
@@ -201,3 +201,64 @@ def test_the_ground_carries_the_weight_of_one_that_stands():
     held = jb.dynamics.rolling(DRIVEN, state).force
     assert float(force.normal) == float(held.normal)
     assert jnp.isfinite(force.tangential)
+
+
+def test_parameters_may_be_tied_and_measures_combined():
+    """The optimum under a tie is that of the tied parameter alone."""
+    vary = {"leg.hip.kp": (20.0, 80.0), "leg.hip.kd": (0.5, 5.0), "leg.hip.target": (0.5, 1.0)}
+    tied = jb.optimise.Linear({"leg.hip.kp": 1.0, "leg.hip.kd": -20.0}, equals=0.0, name="tie")
+    rate = jb.optimise.FunctionOf(
+        lambda effort, period: effort / period,
+        ("torque_squared", "period"),
+        jb.optimise.Quantity("effort rate", unit="N^2 m^2"),
+    )
+    how = dict(vary=vary, guess=START)
+    best = jb.optimise_gait(DRIVEN, minimise=rate, subject_to=["step_length==0.4", tied], **how)
+    own = best.measures
+    assert best.variables["leg.hip.kp"] == pytest.approx(20.0 * best.variables["leg.hip.kd"])
+    assert own["effort_rate"] == pytest.approx(own["torque_squared"] / own["period"], rel=1e-12)
+    named = evaluated(best.scene, best.gait, ("torque_squared_per_time",))
+    assert own["effort_rate"] == pytest.approx(named.values["torque_squared_per_time"], rel=1e-9)
+    np.testing.assert_allclose(
+        best.known.slopes["effort_rate"], named.slopes["torque_squared_per_time"], rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize("how", [dict(), dict(engine="xla"), dict(dt=2e-4)])
+def test_a_walk_sums_what_its_cycles_cost(gait, how):
+    """Also with terms at strikes, from a start and to an end within a footstep."""
+    period = float(gait.measures.period)
+    asked = {"effort": "torque_squared", "own": SQUARE_AT_STRIKE}
+    walk = jb.simulate(
+        DRIVEN, gait.measures.state, duration=2.0 * period + 1e-9, integrals=asked,
+        **({"accuracy": "tight"} if "dt" not in how else {}), **how,
+    )  # fmt: skip
+    effort = evaluated(DRIVEN, gait, ("torque_squared",)).values["torque_squared"]
+    (own,) = evaluated_costs(DRIVEN, gait, SQUARE_AT_STRIKE)[0]
+    assert float(walk.integrals["effort"]) == pytest.approx(2.0 * effort, rel=2e-6)
+    assert float(walk.integrals["own"]) == pytest.approx(2.0 * own, rel=2e-6)
+
+
+def test_a_number_as_accuracy_gives_integrals_their_bars(gait):
+    names = ("torque_squared", "torque_squared[hip]")
+    how = dict(footsteps=1, accuracy=1e-7, integrals=names)
+    walk = jb.simulate(DRIVEN, gait.measures.state, **how)
+    effort = evaluated(DRIVEN, gait, ("torque_squared",), "tight").values["torque_squared"]
+    bars = walk.error.bars["integrals"]
+    for name in names:
+        assert abs(float(walk.integrals[name]) - effort) < bars[name] < 1e-5 * effort
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (3.0, "integrals = 3.0 is not allowed: it must be a"),
+        (["speed"], "integrals = 'speed' is not known"),
+        (["peak_torque"], "must be an Integral"),
+        (["push_off_squared"], "it has no push-off"),
+        ([3.0], "must be an Integral"),
+    ],
+)
+def test_what_is_no_integral_of_a_walk_is_refused(asked, words):
+    with pytest.raises(jb.ArgumentError, match=words):
+        jb.simulate(DRIVEN, START, footsteps=1, integrals=asked)

@@ -6,8 +6,9 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.gait import Bifurcation, Search
 from jaxbiped.optimise import Outcome
-from jaxbiped.optimise._design_problem import variables_of
-from jaxbiped.optimise._optimality import OPTIMAL, _balance, doubt_of, optimality_of
+from jaxbiped.optimise._design_functions import restored
+from jaxbiped.optimise._design_problem import Design, variables_of
+from jaxbiped.optimise._optimality import OPTIMAL, _balance, curvature_of, doubt_of, optimality_of
 from jaxbiped.optimise._runs import doubt_of_gait
 from tests.optimise.drawn_designs import (
     BOTH,
@@ -272,3 +273,43 @@ def test_a_slope_that_is_badly_known_leaves_its_own_variable_open_beside_the_rad
     made = drawn(function, BOTH, {"speed": 1.0, "spectral_radius": 1.0})
     errors = _balance(made, made.latest, 2.0).errors
     np.testing.assert_allclose(errors, [0.005, 0.0, 0.0], atol=1e-12)
+
+
+def form(least):
+    """A quadratic form about u = 0.5, and the sum of u."""
+    hessian = np.array([[2.0, 0.5], [0.5, least]])
+
+    def function(u):
+        away = u - 0.5
+        value = 2.0 + 0.5 * away @ hessian @ away
+        return {"speed": (value, hessian @ away), "period": (u.sum(), np.ones(2))}
+
+    return function
+
+
+@pytest.mark.parametrize("least", [1.0, 4.0])
+def test_the_curvature_of_an_optimum_is_that_along_what_holds_it(least):
+    """By the Hessian's closed form; without a requirement both of its eigenvalues are told."""
+    runs = best_of(2, form(least), subject_to="period=1", begin=0.2)
+    known = curvature_of(runs.problem, runs.best)
+    assert runs.outcome() is Outcome.CONVERGED
+    np.testing.assert_allclose(known.values, [(2.0 + least - 1.0) / 2.0 / 2.0], rtol=1e-6)
+    free = best_of(2, form(least), begin=0.2)
+    expected = np.linalg.eigvalsh([[2.0, 0.5], [0.5, least]]) / 2.0
+    np.testing.assert_allclose(curvature_of(free.problem, free.best).values, expected, rtol=1e-6)
+
+
+def test_no_saddle_counts_as_an_optimum():
+    runs = best_of(2, form(-4.0), subject_to="period=1", begin=0.5, iterations=2)
+    known = curvature_of(runs.problem, runs.problem.asked[0])
+    np.testing.assert_allclose(known.values, [-1.5 / 2.0], rtol=1e-6)
+    assert "curves down" in doubt_of(runs.problem, runs.problem.asked[0])
+
+
+def test_requirements_are_kept_to_rounding():
+    """By a design that misses one by far more than what counts as kept."""
+    problem = formula_problem(BOTH, *FASTEST, "step_length=0.21")
+    u = np.array([0.55, 0.5])
+    design = restored(problem, Design(u, problem.at(u)))
+    assert abs(design.known.values["step_length"] - 0.21) < 1e-10
+    assert np.max(np.abs(design.u - u)) < 0.2

@@ -9,14 +9,7 @@ import jaxbiped as jb
 from jaxbiped import ArgumentError
 from jaxbiped.optimise._cycle_functionals import Functional, weighted_sum
 from jaxbiped.optimise._design_functions import Row, conditions, radius_of, rows_of
-from jaxbiped.optimise._design_problem import (
-    Design,
-    Requirement,
-    larger_is_worse,
-    requirements_of,
-    start_of,
-    variables_of,
-)
+from jaxbiped.optimise._design_problem import Design, start_of, variables_of
 from jaxbiped.optimise._optimality import (
     _at_bounds,
     _explains,
@@ -25,6 +18,7 @@ from jaxbiped.optimise._optimality import (
     is_untried,
     smooth_weights,
 )
+from jaxbiped.optimise._requirements import Requirement, larger_is_worse, requirements_of
 from tests.optimise.drawn_designs import BOTH, FASTEST, SCENE, formula_problem
 
 WORDS = {

@@ -142,6 +142,7 @@ def _optimum(history=5, excess=(0.1, 0.0, 0.0, 0.0, 0.0), bound=0.19, scene=None
         known=Evaluation(last, errors, none, none, np.zeros(0), np.zeros(0)),
         quantities={name: jb.optimise.OBJECTIVES[name].quantity for name in last},
         optimality=Optimality(0.0, 0.0, 0.0, (held,), (free,)),
+        curvature=None,
         history=iterates,
         evaluations=history,
         lost=0,

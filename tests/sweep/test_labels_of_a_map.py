@@ -12,7 +12,7 @@ import jaxbiped as jb
 from jaxbiped.basins import Label
 from jaxbiped.dynamics._contacts import contact_places, slip_distances
 from jaxbiped.dynamics._state import recurring_periods, turned_difference
-from jaxbiped.solve._recorders import LastStep, Step
+from jaxbiped.solve._steps import LastStep, Step
 from jaxbiped.sweep._convergence_test import NO_GAIT, UNDECIDED, Goals, after_arrival, empty_history
 from jaxbiped.sweep._label_recorders import LabelMemory, LabelRecorder, Pursuit, _outcome
 

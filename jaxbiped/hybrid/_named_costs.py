@@ -1,19 +1,21 @@
 """Named costs of driven walkers: squares of torques, absolute work, peaks, ranges of joints."""
 
 import functools
+import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
+from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._walker_motion import Drive, WalkerMotion
+from jaxbiped.hybrid._motion_costs import Cost, Extreme, Integral
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.optimise._integrals import Cost, Extreme, Integral
 from jaxbiped.scene.actuation._actuators import PushOff
 
 _PARTS = 64
@@ -188,3 +190,26 @@ NAMED_COSTS = {
 - peak torque, peak power: the largest |u| and |u φ̇| of any motor along the cycle.
 - joint range: largest minus smallest value of an angle, `joint_range[knee_1]`.
 """
+
+_OF_PART = re.compile(r"(\w+)\[(\w+)\]")
+
+
+def part_of(name: str) -> tuple[str, str | None]:
+    """The name of a cost and its part; None where it is one of the whole walker."""
+    match = _OF_PART.fullmatch(name)
+    return (match[1], match[2]) if match else (name, None)
+
+
+def cost_named(name: str, what: str, others: tuple[str, ...] = ()) -> tuple[NamedCost, str | None]:
+    """A cost by its name, or of a part as `NAME[part]`, and this part.
+
+    Raises:
+        ArgumentError: an unknown name, which `what` asks for; `others` are known besides.
+    """
+    base, part = part_of(name)
+    if base not in NAMED_COSTS or (part is not None and not NAMED_COSTS[base].part):
+        check_choice(what, name, (*others, *NAMED_COSTS))
+    cost = NAMED_COSTS[base]
+    if part is None and cost.part == "angle":
+        raise ArgumentError(f"{what} = {name!r} is not allowed: name an angle, {name}[BODY].")
+    return cost, part

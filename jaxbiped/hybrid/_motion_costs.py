@@ -4,15 +4,28 @@ They are objectives and requirements like any other: a cost given to `optimise_g
 its derivatives and their error bars from a solve of the cycle.
 """
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_finite, check_function, check_type
+from jaxbiped._checks import (
+    ArgumentError,
+    check_finite,
+    check_function,
+    check_type,
+    is_number,
+)
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
+from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.dynamics._walker_motion import WalkerMotion
+from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.scene._scene import AbstractWalkerScene
 
 MotionFunction: TypeAlias = Callable[[WalkerMotion], Scalar]
 """A number that a motion has."""
@@ -146,3 +159,48 @@ def name_of(quantity: Quantity) -> str:
 
 Cost: TypeAlias = Integral | Extreme
 """What a solve of the cycle gives."""
+
+
+def check_cost(cost: Cost, scene: Any) -> None:
+    """Raises `ArgumentError` for a cost that the scene cannot have, before anything is compiled."""
+    if not isinstance(scene, AbstractWalkerScene):
+        raise ArgumentError(
+            f"{cost.name} is not allowed for a {type(scene).__name__}: costs are functions of a "
+            "walker's motion; add a coordinate of its own to the system instead."
+        )
+    functions: Mapping[str, Any] = (
+        {"rate": cost.rate, "at_strike": cost.at_strike}
+        if isinstance(cost, Integral)
+        else {"value": cost.value}
+    )
+    if functions.get("at_strike") is not None and not system_of(scene).footsteps_end_on_section:
+        raise ArgumentError(
+            f"at_strike of {cost.name} is not allowed for compliant feet, which press into the "
+            "ground for a while: give a rate."
+        )
+    for name, function in functions.items():
+        if function is not None:
+            _check_number(f"{name} of {cost.name}", function, scene)
+
+
+def _check_number(words: str, function: Callable[..., Any], scene: Any) -> None:
+    state = scene.state_type(*[np.zeros(())] * len(scene.state_names))
+    leaf = jtu.tree_leaves(state)[0]
+    try:
+        told = _shape_of(function, scene, state)
+    except (jax.errors.ConcretizationTypeError, jax.errors.TracerArrayConversionError) as error:
+        raise ArgumentError(
+            f"{words} takes the motion for plain numbers, which is not allowed: write it with "
+            "jax.numpy, and a choice with jax.numpy.where."
+        ) from error
+    if told != (np.shape(leaf), "f"):
+        raise ArgumentError(f"{words} returns {told[0]}, which is not allowed: return one number.")
+
+
+@known_by_shape
+def _shape_of(function: Callable[..., Any], scene: Any, state: Any) -> Any:
+    value = function(WalkerMotion(scene, state))
+    if not isinstance(value, jax.Array) and not is_number(value):
+        return repr(value), ""
+    value = jnp.asarray(value)
+    return jnp.shape(value), "f" if jnp.issubdtype(value.dtype, jnp.floating) else "other"
