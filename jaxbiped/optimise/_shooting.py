@@ -68,18 +68,21 @@ def linearise_segments(
     spec: ReturnMapSpec,
     scene: PyTree,
     like: PyTree,
-    starts: Scalar,
-    durations: Scalar,
-    parameters: Scalar,
+    cycles: tuple[Scalar, Scalar, Scalar],
     active: tuple[int, ...],
     path: tuple[Extreme, ...],
     precision: Precision,
 ) -> Segments:
-    """Follows the segments of b cycles from their starts, shape (b, n, m).
+    """Follows the segments of b cycles; derivatives that are not determined are NaN.
 
-    All segments of a cycle last as long [s]. `like` is a state of the system, and `active` are the
-    places of the parameters, shape (b, k), among the leaves of the scene. Derivatives that are not
-    determined are NaN.
+    Args:
+        spec: whose cycles they are, and how they are solved; `precision` how exactly.
+        scene: the arguments but for the active parameters.
+        like: a state of the system.
+        cycles: of each its starts, shape (b, n, m), the duration of its segments [s], shape (b,),
+            and its parameters, shape (b, k).
+        active: places of these among the leaves of the scene.
+        path: extremes whose functions are told at nodes.
     """
     system, places = spec.system, tuple(recurring_indices(spec.system, like))
     m, p = len(places), len(active)
@@ -117,7 +120,7 @@ def linearise_segments(
             _rows(whole, places), _rows(whole, system.cyclic_coordinates), arrival, along
         )
 
-    return jax.vmap(one)(starts, durations, parameters)
+    return jax.vmap(one)(*cycles)
 
 
 def _with_duration(at: Tangents, rate: Scalar, m: int) -> Tangents:

@@ -8,6 +8,7 @@ Plitt, A multiple shooting algorithm for direct solution of optimal control prob
 import functools
 from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
@@ -125,7 +126,7 @@ class Simultaneous:
         for time in period * np.arange(self.count) / self.count:
             angles = [a + time * rate for a, rate in zip(before, rates, strict=True)]
             state = walker.with_coordinates(scene, pose, (*angles, *rates))
-            state = walker.later(scene, state, functools.partial(float, time))
+            state = walker.later(scene, state, functools.partial(jnp.asarray, time))
             starts.append(np.asarray(recurring_components(self._walker, state)))
         return self._point(np.array(starts), period, u)
 
@@ -163,9 +164,10 @@ class Simultaneous:
         self.evaluations += 1
         variables = self.problem.variables
         note_code(self._spec, self._scene)
-        given: Any = starts, periods / self.count, variables.values(u)
-        how = self._active, self._path, self._precision
-        found = linearise_segments(self._spec, self._scene, self._like, *given, *how)
+        cycles: Any = starts, periods / self.count, variables.values(u)
+        found = linearise_segments(
+            self._spec, self._scene, self._like, cycles, self._active, self._path, self._precision
+        )
         units = np.append(self._sizes, self._time / self.count)
         scales = np.concatenate([np.tile(units, (len(u), 1)), variables.rates(u)], axis=1)
 
@@ -267,12 +269,12 @@ class Simultaneous:
         told = None
         if costs:
             chosen = (costs[cost] for cost in costs_of(with_parts(self.problem.wanted)))
-            columns: Any = map(np.array, zip(*chosen, strict=True))
-            told = Functionals(*columns, np.zeros(()))  # type: ignore[arg-type]
+            columns: list[Any] = [*map(np.array, zip(*chosen, strict=True)), np.zeros(())]
+            told = Functionals(*columns)
         rows = with_costs(self.problem.wanted, rows, told)
         fields: Any = zip(*rows.values(), strict=True)
-        named: Any = [dict(zip(rows, part, strict=True)) for part in fields]
-        return Evaluation(*named, none[:1], np.zeros((1, len(sums))))
+        named: list[Any] = [dict(zip(rows, part, strict=True)) for part in fields]
+        return Evaluation(*[*named, none[:1], np.zeros((1, len(sums)))])
 
     def curvature(self, z: np.ndarray, of_equal: np.ndarray, of_spare: np.ndarray) -> np.ndarray:
         """Second derivatives of the objective less multipliers times conditions, shape (n, n).
@@ -410,15 +412,14 @@ def begin_together(
         here = whole.at(end[0])
         return not end[1].converged, here.objective if end[1].converged else here.violation
 
-    z, ended = min(ends, key=rank)
-    starts, _, u = whole.parts(z)
-    u, farthest = np.clip(u, 0.0, 1.0), np.inf
-    if ended.converged:
-        farthest = _FROM_CYCLE * (np.abs(starts[0]) + recurring_sizes(scene, pose))
-    if problem.from_guess(u, starts[0], farthest) is None:
-        told = "it ends otherwise" if ended.converged else ended.message[:-1].lower()
-        raise ArgumentError(
-            'formulation = "together" came to a cycle that is no gait of the walker, for '
-            f"{told}: give another guess, further requirements or restarts."
-        )
-    return problem.begin(u), ended
+    for z, ended in sorted(ends, key=rank):
+        starts, _, u = whole.parts(z)
+        sizes = np.abs(starts[0]) + recurring_sizes(scene, pose)
+        farthest = _FROM_CYCLE * sizes if ended.converged else np.inf
+        if problem.from_guess(u, starts[0], farthest) is not None:
+            return problem.begin(u), ended
+    raise ArgumentError(
+        'formulation = "together" came to no gait: the search ended with "'
+        f'{min(ends, key=rank)[1].message[:-1]}", and from there a foot comes down at another time '
+        "or no walk returns; give another guess, further requirements or restarts."
+    )
