@@ -51,6 +51,8 @@ _APART = 1e-4
 """Distance of points whose first derivatives tell second ones, in units of the unknowns."""
 _FROM_CYCLE = 1e-3
 """Largest relative distance of the gait that is found near a cycle that solves all equations."""
+_MORE = 5
+"""Further searches from drawn poses and designs while none has come to a gait."""
 _OF_CYCLE = ("period", "step_length", "speed")
 """Measures that a cycle has beside its costs."""
 
@@ -78,12 +80,11 @@ class Simultaneous:
         problem: what is designed.
         count: n.
         least, most: bounds on z.
-        evaluations: how often cycles were followed.
     """
 
     def __init__(self, problem: DesignProblem, count: int) -> None:
         scene, settings = problem.scene.minimal, problem.settings
-        self.problem, self.count, self.evaluations = problem, count, 0
+        self.problem, self.count = problem, count
         costs = costs_of(with_parts(problem.wanted))
         self._integrals = tuple(cost for cost in costs if isinstance(cost, Integral))
         self._path = tuple(cost for cost in costs if isinstance(cost, Extreme))
@@ -161,7 +162,6 @@ class Simultaneous:
 
     def _segments(self, starts: np.ndarray, periods: np.ndarray, u: np.ndarray) -> Segments:
         """Segments of b cycles and designs, with derivatives with respect to parts of z."""
-        self.evaluations += 1
         variables = self.problem.variables
         note_code(self._spec, self._scene)
         cycles: Any = starts, periods / self.count, variables.values(u)
@@ -263,9 +263,10 @@ class Simultaneous:
         for k, extreme in enumerate(self._path):
             nodes = parts[d + k :: r]
             costs[extreme] = nodes[int(np.argmax([extreme.sign * node.value for node in nodes]))]
-            for name, objective in self.problem.wanted.items():
-                if objective.costs == ((1.0, extreme),):
-                    rows |= {f"{name} at {i}": node for i, node in enumerate(nodes)}
+            wanted = self.problem.wanted.items()
+            names_of = [name for name, each in wanted if each.costs == ((1.0, extreme),)]
+            for name in names_of:
+                rows |= {f"{name} at {i}": node for i, node in enumerate(nodes)}
         told = None
         if costs:
             chosen = (costs[cost] for cost in costs_of(with_parts(self.problem.wanted)))
@@ -387,39 +388,47 @@ def begin_together(
     Raises:
         ArgumentError: no search came to a gait.
     """
-    from scipy.stats import qmc
-
     whole, (count, seed) = Simultaneous(problem, segments), drawn
     u, scene = start_of(problem.scene, problem.variables), problem.scene.minimal
-    pose = default_guess(scene) if near is None else near
-    if isinstance(guess, Gait):
-        points = [whole.followed_cycle(u, pose, float(guess.measures.period))]
-    else:
-        points = [whole.rough_cycle(u, pose)]
-    if count:
-        poses = rolling_starts(scene, count + 1, seed=seed)
-        for k, each in enumerate(qmc.Sobol(len(u), seed=seed).random(count), 1):
-            points.append(whole.rough_cycle(each, jtu.tree_map(lambda leaf, k=k: leaf[k], poses)))
+    pose, most = default_guess(scene) if near is None else near, count + 1 + _MORE
+    poses = rolling_starts(scene, most, seed=seed)
+    designs = np.random.default_rng(seed).random((most, len(u)))
 
     def report(z: np.ndarray) -> None:
         here = whole.at(z)
         missed = f", conditions missed by {here.violation:.1e}" if here.violation > 0.0 else ""
         now.update(found=f"objective {problem.sense * here.objective:.6g}{missed}")
 
-    ends = [run_newton(whole, point, iterations, report) for point in points]
+    def gait_of(z: np.ndarray, farthest: float) -> np.ndarray | None:
+        """The u of a point with a gait near its cycle."""
+        starts, _, there = whole.parts(z)
+        sizes = farthest * (np.abs(starts[0]) + recurring_sizes(scene, pose))
+        return None if problem.from_guess(there, starts[0], sizes) is None else there
 
-    def rank(end: tuple[np.ndarray, RunEnding]) -> tuple[bool, float]:
-        here = whole.at(end[0])
-        return not end[1].converged, here.objective if end[1].converged else here.violation
-
-    for z, ended in sorted(ends, key=rank):
-        starts, _, u = whole.parts(z)
-        sizes = np.abs(starts[0]) + recurring_sizes(scene, pose)
-        farthest = _FROM_CYCLE * sizes if ended.converged else np.inf
-        if problem.from_guess(u, starts[0], farthest) is not None:
-            return problem.begin(u), ended
+    best: tuple[float, np.ndarray, RunEnding] | None = None
+    others: list[tuple[float, np.ndarray, RunEnding]] = []
+    for k in range(most):
+        if k > count and best is not None:
+            break
+        if k == 0 and isinstance(guess, Gait):
+            point = whole.followed_cycle(u, pose, float(guess.measures.period))
+        else:
+            state = jtu.tree_map(lambda leaf, k=k: leaf[k], poses)
+            point = whole.rough_cycle(designs[k], state) if k else whole.rough_cycle(u, pose)
+        z, ended = run_newton(whole, point, iterations, report)
+        here = whole.at(z)
+        if not ended.converged:
+            others.append((here.violation, z, ended))
+        elif best is None or here.objective < best[0]:
+            there = gait_of(z, _FROM_CYCLE)
+            best = best if there is None else (here.objective, there, ended)
+    if best is not None:
+        return problem.begin(best[1]), best[2]
+    for _, z, ended in sorted(others, key=lambda other: other[0]):
+        there = gait_of(z, np.inf)
+        if there is not None:
+            return problem.begin(there), ended
     raise ArgumentError(
-        'formulation = "together" came to no gait: the search ended with "'
-        f'{min(ends, key=rank)[1].message[:-1]}", and from there a foot comes down at another time '
-        "or no walk returns; give another guess, further requirements or restarts."
+        'formulation = "together" came to no gait: no cycle was found, or in each a foot comes '
+        "down before its end; give another guess, further requirements or restarts."
     )

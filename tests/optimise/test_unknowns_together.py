@@ -104,7 +104,7 @@ def test_a_search_begins_at_a_gait_and_divides_costs():
 
 @pytest.mark.slow
 def test_a_cycle_whose_foot_comes_down_before_its_end_is_no_gait():
-    with pytest.raises(jb.ArgumentError, match="a foot comes down at another time"):
+    with pytest.raises(jb.ArgumentError, match="a foot comes down before its end"):
         together(spline(24, 0.8), coefficients(24), ("step_length==0.5", "period==0.8"))
 
 
