@@ -333,12 +333,9 @@ Measure: TypeAlias = Cost | FunctionOf | Linear
 """A measure that is asked for as an object."""
 
 
-def weights_of_parameters(objective: Objective) -> dict[str, float] | None:
-    """The weights of a measure that is a `Linear` sum of parameters; None for any other."""
-    measured = objective.measured
-    if isinstance(measured, functools.partial) and measured.func is _linear:
-        return dict(measured.args[0])
-    return None
+def is_sum_of_parameters(objective: Objective) -> bool:
+    """Whether a measure is one that `Linear` describes."""
+    return getattr(objective.measured, "func", None) is _linear
 
 
 def _linear(

@@ -90,17 +90,17 @@ def linearise_segments(
 
     def one(starts: Scalar, duration: Scalar, values: Scalar) -> Segments:
         seeded = Seeded(scene, seeds, jnp.zeros(m + 1 + p), active)
-        own = with_active(seeded, list(values))
-        seeded = Seeded(own, seeds, seeded.floors, active)
+        args = with_active(seeded, list(values))
+        seeded = Seeded(args, seeds, seeded.floors, active)
         watch = Watch.of(system, resets=False)
         how = SectionSolve(watch, spec.solver, precision, duration, spec.max_solver_steps)
 
         def follow(start: Scalar) -> tuple[Tangents, Tangents]:
             """A segment's start and its end, whose columns are those of `Linearised`."""
             state = state_with(system, like, start)
-            at, directions = seeded_directions(own, state, places, active)
+            at, directions = seeded_directions(args, state, places, active)
             end = tangents_after(how, at, directions, duration, spec.programs)
-            rates = system.vector_field(jnp.zeros(()), end.state, own)
+            rates = system.vector_field(jnp.zeros(()), end.state, args)
             rate = jnp.stack(jtu.tree_leaves(rates))
             return _with_duration(at, 0.0 * rate, m), _with_duration(end, rate, m)
 
@@ -135,7 +135,7 @@ def _components(y: PyTree, _: PyTree) -> Scalar:
 
 def _along(path: tuple[Extreme, ...], y: PyTree, scene: PyTree) -> Scalar:
     motion = WalkerMotion(scene, motion_of(y))
-    values = [jnp.asarray(each.value(motion)) for each in path]
+    values = [jnp.asarray(extreme.value(motion)) for extreme in path]
     return jnp.stack(values) if values else jnp.zeros(0)
 
 

@@ -6,7 +6,7 @@ Plitt, A multiple shooting algorithm for direct solution of optimal control prob
 """
 
 import functools
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -32,16 +32,15 @@ from jaxbiped.optimise._cycle_functionals import (
     Functionals,
     cycle_spec,
     functional_precision,
-    weighted_sum,
 )
 from jaxbiped.optimise._design_functions import AnyRow, rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem, start_of
 from jaxbiped.optimise._objective_values import Evaluation, with_costs
-from jaxbiped.optimise._objectives import costs_of, weights_of_parameters, with_parts
+from jaxbiped.optimise._objectives import costs_of, is_sum_of_parameters, with_parts
 from jaxbiped.optimise._optimisers import RunEnding
 from jaxbiped.optimise._sequential_programming import Conditions, run_newton
 from jaxbiped.optimise._shooting import Linearised, Segments, linearise_segments
-from jaxbiped.scene._parameter_access import parameter_values, select_parameters
+from jaxbiped.scene._parameter_access import select_parameters
 
 _LEAST_PERIOD, _PERIOD, _MOST_PERIOD = 0.3, 2.2, 20.0
 """Periods of a footstep in units of √(l/g): the least, the first that is tried, the largest."""
@@ -53,6 +52,8 @@ _FROM_CYCLE = 1e-3
 """Largest relative distance of the gait that is found near a cycle that solves all equations."""
 _MORE = 5
 """Further searches from drawn poses and designs while none has come to a gait."""
+_NO_GAIT = cast(Gait, None)
+"""What a sum of parameters needs of a gait."""
 _OF_CYCLE = ("period", "step_length", "speed")
 """Measures that a cycle has beside its costs."""
 
@@ -88,7 +89,7 @@ class Simultaneous:
         costs = costs_of(with_parts(problem.wanted))
         self._integrals = tuple(cost for cost in costs if isinstance(cost, Integral))
         self._path = tuple(cost for cost in costs if isinstance(cost, Extreme))
-        self._scene, self._walker = scene, _landing_system(scene)
+        self._scene, self._walker = scene, cast(AbstractLandingSystem, system_of(scene))
         system = IntegratedCycle.of(self._walker, self._integrals)
         pose = default_guess(scene)
         self._like = system.begin(pose)
@@ -103,15 +104,16 @@ class Simultaneous:
         # Of the starts, then the period and u.
         open_ = np.full(count * len(self._sizes), np.inf)
         low, high = _LEAST_PERIOD, _MOST_PERIOD
-        for each in (each for each in problem.requirements if each.name == "period"):
-            low = low if each.low is None else min(each.low / self._time, high)
-            high = high if each.high is None else max(each.high / self._time, low)
+        for _, least, most in (r for r in problem.requirements if r.name == "period"):
+            low = low if least is None else min(least / self._time, high)
+            high = high if most is None else max(most / self._time, low)
         k = len(problem.variables.names)
         self.least = np.concatenate([-open_, [low], np.zeros(k)])
         self.most = np.concatenate([open_, [high], np.ones(k)])
         self._rows: list[AnyRow] = []
         for row in rows_of(problem):
-            nodes = range(count + 1) if _is_along_path(problem, row.name) else ()
+            along = any(isinstance(cost, Extreme) for _, cost in problem.wanted[row.name].costs)
+            nodes = range(count + 1) if along else ()
             at_nodes = [row._replace(name=f"{row.name} at {i}") for i in nodes]
             self._rows += at_nodes or [row]
         self._last: tuple[bytes, _Known] | None = None
@@ -165,7 +167,7 @@ class Simultaneous:
         variables = self.problem.variables
         note_code(self._spec, self._scene)
         cycles: Any = starts, periods / self.count, variables.values(u)
-        found = linearise_segments(
+        segments = linearise_segments(
             self._spec, self._scene, self._like, cycles, self._active, self._path, self._precision
         )
         units = np.append(self._sizes, self._time / self.count)
@@ -176,7 +178,7 @@ class Simultaneous:
             steps = scales.reshape(len(u), *[1] * (slopes.ndim - 2), -1)
             return Linearised(np.asarray(part.values), slopes * steps)
 
-        return Segments(*map(scaled, found))
+        return Segments(*map(scaled, segments))
 
     def _formed(self, z: np.ndarray, segments: Segments) -> _Known:
         starts, period, u = self.parts(z)
@@ -205,7 +207,7 @@ class Simultaneous:
         gained = segments.gains.values.sum(axis=0)
         values = self.problem.variables.values(u)
         sums = [[period], values, gained, segments.path.values.ravel()]
-        known = self._measures(np.concatenate(sums))
+        known = self._measures(np.concatenate(sums), u)
         total, step = self.problem.objective(known), known.functional("step_length")
         rows = [(row.equality, row.value(known), row.slopes(known)) for row in self._rows]
         rows.append((False, step.value / self._height - _LEAST_STEP, step.slopes / self._height))
@@ -232,47 +234,39 @@ class Simultaneous:
         )
         return _Known(conditions, (total.slopes, by_equal, by_spare))
 
-    def _measures(self, sums: np.ndarray) -> Evaluation:
+    def _measures(self, sums: np.ndarray, u: np.ndarray) -> Evaluation:
         """All measures as functions of their numbers; of extremes those at each node, too."""
-        none, names = np.zeros(len(sums)), self.problem.variables.names
+        none = np.zeros(len(sums))
         parts = [
             Functional(value, 0.0, row, none)
             for value, row in zip(sums, np.eye(len(sums)), strict=True)
         ]
-        length = parts[1 + len(names)]
+        length = parts[1 + len(u)]
         value = length.value / parts[0].value
         by_both = (length.slopes - value * parts[0].slopes) / parts[0].value
         rows = {"period": parts[0], "step_length": length}
         rows["speed"] = Functional(value, 0.0, by_both, none)
-        own = parameter_values(self.problem.scene)
         for name, objective in self.problem.wanted.items():
-            if (weights := weights_of_parameters(objective)) is not None:
-                moved = [each for each in weights if each in names]
-                total = weighted_sum(
-                    [weights[each] for each in moved],
-                    [parts[1 + names.index(each)] for each in moved],
-                    len(sums),
-                )
-                fixed = sum(
-                    weights[each] * float(own[each]) for each in weights if each not in names
-                )
-                rows[name] = total._replace(value=total.value + fixed)
-        begin, r = 2 + len(names), len(self._path)
+            if objective.measured is not None:
+                total, _, by_parameter, _ = objective.measured(self.problem.scene_at(u), _NO_GAIT)
+                row = none.copy()
+                row[1 : 1 + len(u)] = by_parameter[self.problem.variables.places]
+                rows[name] = Functional(total, 0.0, row, none)
+        begin, r = 2 + len(u), len(self._path)
         d = begin + len(self._integrals)
         costs: dict[Any, Functional] = dict(zip(self._integrals, parts[begin:d], strict=True))
         for k, extreme in enumerate(self._path):
             nodes = parts[d + k :: r]
             costs[extreme] = nodes[int(np.argmax([extreme.sign * node.value for node in nodes]))]
             wanted = self.problem.wanted.items()
-            names_of = [name for name, each in wanted if each.costs == ((1.0, extreme),)]
-            for name in names_of:
+            for name in (name for name, measure in wanted if measure.costs == ((1.0, extreme),)):
                 rows |= {f"{name} at {i}": node for i, node in enumerate(nodes)}
-        told = None
+        functionals = None
         if costs:
             chosen = (costs[cost] for cost in costs_of(with_parts(self.problem.wanted)))
             columns: list[Any] = [*map(np.array, zip(*chosen, strict=True)), np.zeros(())]
-            told = Functionals(*columns)
-        rows = with_costs(self.problem.wanted, rows, told)
+            functionals = Functionals(*columns)
+        rows = with_costs(self.problem.wanted, rows, functionals)
         fields: Any = zip(*rows.values(), strict=True)
         named: list[Any] = [dict(zip(rows, part, strict=True)) for part in fields]
         return Evaluation(*[*named, none[:1], np.zeros((1, len(sums)))])
@@ -311,16 +305,6 @@ class Simultaneous:
         return whole
 
 
-def _is_along_path(problem: DesignProblem, name: str) -> bool:
-    return any(isinstance(cost, Extreme) for _, cost in problem.wanted[name].costs)
-
-
-def _landing_system(scene: Any) -> AbstractLandingSystem:
-    system = system_of(scene)
-    assert isinstance(system, AbstractLandingSystem)
-    return system
-
-
 def _spec_of(scene: Any, engine: str) -> Any:
     """The return map of a walker's scene, by an engine that can."""
     start = default_guess(scene)
@@ -348,21 +332,22 @@ def check_simultaneous(problem: DesignProblem, count: int) -> None:
     if problem.ensemble is not None:
         raise refuse("with scatter")
     every = with_parts(problem.wanted)
-    parts = {name for each in every.values() if each.combined for name in each.combined.of}
+    combined = [measure.combined for measure in every.values() if measure.combined]
+    parts = {name for combination in combined for name in combination.of}
     for name, objective in every.items():
-        bounded = [each for each in problem.requirements if each.name == name]
+        bounded = [requirement for requirement in problem.requirements if requirement.name == name]
         for weight, cost in objective.costs:
             if not isinstance(cost, Extreme):
                 continue
-            sides = [each.low if cost.sign > 0.0 else each.high for each in bounded]
+            sides = [low if cost.sign > 0.0 else high for _, low, high in bounded]
             is_path = weight == 1.0 and len(objective.costs) == 1 and set(sides) == {None}
             if not is_path or name in (*problem.weights, *parts):
                 raise refuse(
                     f"for {name}, an extreme, except as the upper bound of a largest value or the "
                     "lower bound of a smallest one"
                 )
-        is_linear = weights_of_parameters(objective) is not None
-        if not (objective.costs or objective.combined or is_linear or name in _OF_CYCLE):
+        is_sum = objective.costs or is_sum_of_parameters(objective)
+        if not (is_sum or objective.combined or name in _OF_CYCLE):
             raise refuse(f"for {name}, which is no integral along the cycle")
 
 
