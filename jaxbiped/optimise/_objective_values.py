@@ -7,7 +7,7 @@ on where it was.
 
 import contextlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -154,11 +154,7 @@ def evaluate(
     if second is not None:
         rows |= dict(zip(integral_names(scene), _rows_of(second), strict=True))
         rows["cost_of_transport"] = _cost_of_transport(scene, rows)
-    if third is not None:
-        rows |= _sums_of_costs(with_parts(wanted), third)
-    for name, objective in with_parts(wanted).items():
-        if objective.combined is not None:
-            rows[name] = _combination(objective.combined, rows)
+    rows = with_costs(wanted, rows, third)
     beyond_range = []
     for name in (name for name in wanted if name in _DISTANCES):
         told = bifurcation_distance(scene, gait, _DISTANCES[name], accuracy=accuracy)
@@ -187,15 +183,22 @@ def _rows_of(found: Functionals) -> list[Functional]:
     return [_row(*each) for each in zip(*map(np.asarray, found[:4]), strict=True)]
 
 
-def _sums_of_costs(measures: Measures, found: Functionals) -> dict[str, Functional]:
-    """The measures that are weighted sums of costs, by name."""
-    rows = dict(zip(costs_of(measures), _rows_of(found), strict=True))
-    count = found.slopes.shape[1]
-    return {
-        name: weighted_sum([w for w, _ in each.costs], [rows[c] for _, c in each.costs], count)
-        for name, each in measures.items()
-        if each.costs
-    }
+def with_costs(
+    wanted: Measures, rows: Mapping[str, Functional], costs: Functionals | None
+) -> dict[str, Functional]:
+    """Adds the measures that are sums of costs or functions of others to those known by name."""
+    every, rows = with_parts(wanted), dict(rows)
+    if costs is not None:
+        parts = dict(zip(costs_of(every), _rows_of(costs), strict=True))
+        for name, each in every.items():
+            if each.costs:
+                terms = [parts[cost] for _, cost in each.costs]
+                count = costs.slopes.shape[1]
+                rows[name] = weighted_sum([weight for weight, _ in each.costs], terms, count)
+    for name, each in every.items():
+        if each.combined is not None:
+            rows[name] = _combination(each.combined, rows)
+    return rows
 
 
 def _combination(combined: Combined, rows: dict[str, Functional]) -> Functional:

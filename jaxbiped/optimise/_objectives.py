@@ -333,6 +333,11 @@ Measure: TypeAlias = Cost | FunctionOf | Linear
 """A measure that is asked for as an object."""
 
 
+def is_sum_of_parameters(objective: Objective) -> bool:
+    """Whether a measure is one that `Linear` describes."""
+    return getattr(objective.measured, "func", None) is _linear
+
+
 def _linear(
     weights: tuple[tuple[str, float], ...], scene: Any, gait: Gait
 ) -> tuple[float, float, np.ndarray, np.ndarray]:

@@ -43,6 +43,7 @@ from jaxbiped.optimise._requirements import (
     requirements_of,
 )
 from jaxbiped.optimise._runs import Runs, optimum_of, scattered_designs
+from jaxbiped.optimise._simultaneous import begin_together, check_simultaneous
 from jaxbiped.scene._parameter_access import scene_identity
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._scene_checks import check_scene
@@ -52,6 +53,7 @@ from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 if TYPE_CHECKING:
     import optax
 
+FORMULATIONS = ("gait by gait", "together")
 _ROUNDS = 3
 """Searches for worse members than an ensemble has, each with another run, at most."""
 Goal: TypeAlias = str | Measure | Mapping[str | Measure, float] | None
@@ -75,6 +77,8 @@ def optimise_gait(
     criterion: str = "mean",
     seed: int = 0,
     footsteps: int | None = None,
+    formulation: str = "gait by gait",
+    segments: int = 7,
     accuracy: str = "balanced",
     engine: str = "auto",
     progress: bool | None = None,
@@ -114,6 +118,10 @@ def optimise_gait(
         seed: random seed of scattered designs and of members.
         footsteps: number of footsteps of a cycle. Default: one for a mirrored walker, those of a
             stride for unequal legs.
+        formulation: "gait by gait" finds the gait of each design; "together" seeks the cycle, its
+            period and the design as unknowns of one problem, for rigid feet of one mode. That needs
+            no gait to begin with, only a rough pose (`guess`), and ends with a certified gait, too.
+        segments: number of segments of the cycle that are sought "together".
         accuracy: "balanced" or "tight".
         engine: as for `find_gait`.
         progress: whether to show on stderr what is being done, how far it is and what was found; by
@@ -159,6 +167,7 @@ def optimise_gait(
     check_count("members", members)
     if scatter is not None:
         check_type("scatter", scatter, Mapping)
+    check_choice("formulation", formulation, FORMULATIONS)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     if requirements and optimiser not in OPTIMISERS[:3]:
         raise ArgumentError(
@@ -180,12 +189,18 @@ def optimise_gait(
     problem = DesignProblem(
         scene, variables, told, sense, requirements, measures, settings, evaluations, ensemble
     )
+    if formulation == "together":
+        check_simultaneous(problem, segments)
     with stage("optimising the gait", unit="iterations", show=progress) as now:
-        begin = problem.begin(start_of(scene, variables), near)
-        runs = Runs(problem, iterations, optimiser, now)
+        ended, runs = None, Runs(problem, iterations, optimiser, now)
+        if formulation == "together":
+            drawn = int(restarts), int(seed)
+            begin, ended = begin_together(problem, guess, near, segments, iterations, drawn, now)
+        else:
+            begin = problem.begin(start_of(scene, variables), near)
         try:
-            runs.run(begin)
-            if restarts:
+            runs.run(begin, ended)
+            if restarts and formulation != "together":
                 for each in scattered_designs(problem, begin, int(restarts), int(seed)):
                     runs.run(each)
             for _ in range(_ROUNDS):

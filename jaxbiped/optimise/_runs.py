@@ -61,7 +61,8 @@ class Runs:
     def best(self) -> Design:
         return min(self.problem.asked, key=functools.partial(rank_of, self.problem))
 
-    def run(self, begin: Design) -> None:
+    def run(self, begin: Design, ended: RunEnding | None = None) -> None:
+        """Runs the optimiser from a design, or only where it is none if a search `ended` there."""
         self.problem.latest = begin
         self.note(begin.u)
         before = self.best
@@ -70,9 +71,13 @@ class Runs:
             optimise = BY_NAME[self.optimiser]
         else:
             optimise = functools.partial(run_optax, transformation=self.optimiser)
-        ended = optimise(functions, begin.u, self.iterations, self.note)
+        polishes = optimise is not run_trust_region
+        if ended is None or not ended.converged:
+            ended = optimise(functions, begin.u, self.iterations, self.note)
+        else:
+            polishes = True
         balanced = optimality_of(self.problem, self.best).residual <= OPTIMAL
-        if ended.converged and optimise is not run_trust_region and not balanced:
+        if ended.converged and polishes and not balanced:
             # It may have stopped on a ridge of the objective, along which designs get better.
             self.problem.latest = self.best
             on = run_trust_region(functions, self.best.u, self.iterations, self.note)

@@ -2,12 +2,16 @@
 
 import numpy as np
 
+from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.optimise._cycle_costs import cost_functionals
 from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
 from jaxbiped.optimise._design_gaits import GaitSettings, ensemble_of, evaluate_ensemble
+from jaxbiped.optimise._design_problem import DesignProblem, start_of, variables_of
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
-from jaxbiped.optimise._objective_values import evaluate
+from jaxbiped.optimise._objective_values import Evaluations, evaluate
 from jaxbiped.optimise._objectives import measures_named
+from jaxbiped.optimise._requirements import requirements_of
+from jaxbiped.optimise._simultaneous import Simultaneous
 
 
 def evaluated(scene, gait, names, accuracy="balanced"):
@@ -38,3 +42,21 @@ def evaluated_costs(scene, gait, *costs, accuracy="balanced"):
     """Values of costs of a gait's motion, their derivatives, and the errors of these."""
     found = cost_functionals(scene, gait.measures.state, costs, accuracy=accuracy)
     return np.asarray(found.values), np.asarray(found.slopes), np.asarray(found.slope_errors)
+
+
+def simultaneous_problem(scene, vary, subject_to):
+    """The problem whose unknowns are a cycle's segments, its period and a design; and a point."""
+    requirements = requirements_of(scene, subject_to)
+    measures = measures_named(["torque_squared"]) | requirements.measures
+    problem = DesignProblem(
+        scene,
+        variables_of(scene, vary),
+        {"torque_squared": 1.0},
+        1.0,
+        requirements.each,
+        measures,
+        GaitSettings(accuracy="tight"),
+        Evaluations(),
+    )
+    whole = Simultaneous(problem, 7)
+    return whole, whole.rough_cycle(start_of(scene, problem.variables), default_guess(scene))

@@ -1,0 +1,419 @@
+"""Simultaneous search: a cycle's segments, its period and the design as unknowns of one problem.
+
+That segments join, that the cycle returns and that it ends on the section are equations, so no
+design needs a gait of its own on the way: folds and violent multipliers are no obstacles. Bock and
+Plitt, A multiple shooting algorithm for direct solution of optimal control problems (IFAC 1984).
+"""
+
+import functools
+from typing import Any, NamedTuple, cast
+
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_count
+from jaxbiped._progress import Stage
+from jaxbiped.caching._cached_jit import note_code
+from jaxbiped.dynamics._equivalent_states import exchange_legs
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._poincare_map import recurring_components
+from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
+from jaxbiped.gait._search_starts import default_guess, rolling_starts
+from jaxbiped.hybrid._landing_system import AbstractLandingSystem
+from jaxbiped.hybrid._motion_costs import Extreme, Integral
+from jaxbiped.hybrid._scales import recurring_sizes
+from jaxbiped.hybrid._sections import section_of
+from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.optimise._augmented_system import MotionSection, integrals_of
+from jaxbiped.optimise._cycle_costs import IntegratedCycle
+from jaxbiped.optimise._cycle_functionals import (
+    Functional,
+    Functionals,
+    cycle_spec,
+    functional_precision,
+)
+from jaxbiped.optimise._design_functions import AnyRow, rows_of
+from jaxbiped.optimise._design_problem import Design, DesignProblem, start_of
+from jaxbiped.optimise._objective_values import Evaluation, with_costs
+from jaxbiped.optimise._objectives import costs_of, is_sum_of_parameters, with_parts
+from jaxbiped.optimise._optimisers import RunEnding
+from jaxbiped.optimise._sequential_programming import Conditions, run_newton
+from jaxbiped.optimise._shooting import Linearised, Segments, linearise_segments
+from jaxbiped.scene._parameter_access import select_parameters
+
+_LEAST_PERIOD, _PERIOD, _MOST_PERIOD = 0.3, 2.2, 20.0
+"""Periods of a footstep in units of √(l/g): the least, the first that is tried, the largest."""
+_LEAST_STEP = 0.02
+"""Least step in units of the walker's height: to stand still is a cycle, too."""
+_APART = 1e-4
+"""Distance of points whose first derivatives tell second ones, in units of the unknowns."""
+_FROM_CYCLE = 1e-3
+"""Largest relative distance of the gait that is found near a cycle that solves all equations."""
+_MORE = 5
+"""Further searches from drawn poses and designs while none has come to a gait."""
+_NO_GAIT = cast(Gait, None)
+"""What a sum of parameters needs of a gait."""
+_OF_CYCLE = ("period", "step_length", "speed")
+"""Measures that a cycle has beside its costs."""
+
+
+class _Known(NamedTuple):
+    """What is known at a point: its conditions, and how they depend on the numbers of measures.
+
+    Attributes:
+        conditions: of the problem.
+        by_sums: derivatives with respect to these of the objective, (f,), of the requirements among
+            the equations, and of what must be at least zero, (r, f).
+    """
+
+    conditions: Conditions
+    by_sums: tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+class Simultaneous:
+    """A design problem in z: starts of n segments, the period, and u.
+
+    Starts and period are in units of the scene. Measures are functions of f numbers: the period,
+    the parameters, what cyclic coordinates gain, and functions at nodes.
+
+    Attributes:
+        problem: what is designed.
+        count: n.
+        least, most: bounds on z.
+    """
+
+    def __init__(self, problem: DesignProblem, count: int) -> None:
+        scene, settings = problem.scene.minimal, problem.settings
+        self.problem, self.count = problem, count
+        costs = costs_of(with_parts(problem.wanted))
+        self._integrals = tuple(cost for cost in costs if isinstance(cost, Integral))
+        self._path = tuple(cost for cost in costs if isinstance(cost, Extreme))
+        self._scene, self._walker = scene, cast(AbstractLandingSystem, system_of(scene))
+        system = IntegratedCycle.of(self._walker, self._integrals)
+        pose = default_guess(scene)
+        self._like = system.begin(pose)
+        engine = _spec_of(scene, settings.engine).engine
+        self._spec = cycle_spec(scene, system, MotionSection(section_of(scene, None)), 1, engine)
+        self._precision = functional_precision(settings.accuracy, scene)
+        _, self._active = select_parameters(scene, problem.variables.names)
+        self._sizes = recurring_sizes(scene, pose)
+        self._time, self._height = map(
+            float, (self._walker.time_scale(scene), scene.mechanism.height)
+        )
+        # Of the starts, then the period and u.
+        open_ = np.full(count * len(self._sizes), np.inf)
+        low, high = _LEAST_PERIOD, _MOST_PERIOD
+        for _, least, most in (r for r in problem.requirements if r.name == "period"):
+            low = low if least is None else min(least / self._time, high)
+            high = high if most is None else max(most / self._time, low)
+        k = len(problem.variables.names)
+        self.least = np.concatenate([-open_, [low], np.zeros(k)])
+        self.most = np.concatenate([open_, [high], np.ones(k)])
+        self._rows: list[AnyRow] = []
+        for row in rows_of(problem):
+            along = any(isinstance(cost, Extreme) for _, cost in problem.wanted[row.name].costs)
+            nodes = range(count + 1) if along else ()
+            at_nodes = [row._replace(name=f"{row.name} at {i}") for i in nodes]
+            self._rows += at_nodes or [row]
+        self._last: tuple[bytes, _Known] | None = None
+
+    def rough_cycle(self, u: np.ndarray, pose: Any) -> np.ndarray:
+        """The point z of straight lines in the angles, from a pose to that with legs exchanged."""
+        scene, walker, place = self._scene, self._walker, len(self.least) - len(u) - 1
+        period = self._time * float(np.clip(_PERIOD, self.least[place], self.most[place]))
+        before, _ = walker.coordinates(scene, pose)
+        after, _ = walker.coordinates(scene, exchange_legs(scene, pose))
+        rates = [(b - a) / period for a, b in zip(before, after, strict=True)]
+        starts = []
+        for time in period * np.arange(self.count) / self.count:
+            angles = [a + time * rate for a, rate in zip(before, rates, strict=True)]
+            state = walker.with_coordinates(scene, pose, (*angles, *rates))
+            state = walker.later(scene, state, functools.partial(jnp.asarray, time))
+            starts.append(np.asarray(recurring_components(self._walker, state)))
+        return self._point(np.array(starts), period, u)
+
+    def followed_cycle(self, u: np.ndarray, start: Any, period: float) -> np.ndarray:
+        """The point z of a gait of the first design, from its state."""
+        first = np.asarray(recurring_components(self._walker, start))
+        starts = np.tile(first, (self.count, 1))
+        for i in range(1, self.count):
+            segments = self._segments(starts[None], np.array([period]), u[None])
+            starts[i:] = segments.ends.values[0, i - 1]
+        return self._point(starts, period, u)
+
+    def _point(self, starts: np.ndarray, period: float, u: np.ndarray) -> np.ndarray:
+        return np.concatenate([(starts / self._sizes).ravel(), [period / self._time], u])
+
+    def parts(self, z: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+        """Starts of the segments, shape (n, m), the period [s], and u."""
+        place = self.count * len(self._sizes)
+        starts = z[:place].reshape(self.count, -1) * self._sizes
+        return starts, float(z[place]) * self._time, z[place + 1 :]
+
+    def at(self, z: np.ndarray) -> Conditions:
+        return self._known(z).conditions
+
+    def _known(self, z: np.ndarray) -> _Known:
+        if self._last is None or self._last[0] != z.tobytes():
+            starts, period, u = self.parts(z)
+            segments = self._segments(starts[None], np.array([period]), u[None])
+            only = jtu.tree_map(lambda leaf: leaf[0], segments)
+            self._last = z.tobytes(), self._formed(z, only)
+        return self._last[1]
+
+    def _segments(self, starts: np.ndarray, periods: np.ndarray, u: np.ndarray) -> Segments:
+        """Segments of b cycles and designs, with derivatives with respect to parts of z."""
+        variables = self.problem.variables
+        note_code(self._spec, self._scene)
+        cycles: Any = starts, periods / self.count, variables.values(u)
+        segments = linearise_segments(
+            self._spec, self._scene, self._like, cycles, self._active, self._path, self._precision
+        )
+        units = np.append(self._sizes, self._time / self.count)
+        scales = np.concatenate([np.tile(units, (len(u), 1)), variables.rates(u)], axis=1)
+
+        def scaled(part: Linearised) -> Linearised:
+            slopes = np.asarray(part.slopes)
+            steps = scales.reshape(len(u), *[1] * (slopes.ndim - 2), -1)
+            return Linearised(np.asarray(part.values), slopes * steps)
+
+        return Segments(*map(scaled, segments))
+
+    def _formed(self, z: np.ndarray, segments: Segments) -> _Known:
+        starts, period, u = self.parts(z)
+        n, m, place = self.count, starts.shape[1], starts.size
+
+        def by_unknowns(slopes: np.ndarray, i: int) -> np.ndarray:
+            """Derivatives with respect to z of functions of segment i."""
+            whole = np.zeros((len(slopes), len(z)))
+            whole[:, i * m : (i + 1) * m], whole[:, place:] = slopes[:, :m], slopes[:, m:]
+            return whole
+
+        def every(part: Linearised) -> np.ndarray:
+            return np.stack([by_unknowns(x, min(i, n - 1)) for i, x in enumerate(part.slopes)])
+
+        gaps = (segments.ends.values - np.roll(starts, -1, axis=0)) / self._sizes
+        joints = every(segments.ends) / self._sizes[:, None]
+        for i in range(n):
+            behind = (i + 1) % n * m
+            joints[i][:, behind : behind + m] -= np.eye(m)
+        by_period = np.zeros((1, len(z)))
+        by_period[0, place] = self._time
+        gains, path = every(segments.gains).sum(axis=0), every(segments.path)
+        by_design = np.zeros((len(z) - place - 1, len(z)))
+        by_design[:, place + 1 :] = np.diag(self.problem.variables.rates(u))
+        chain = np.concatenate([by_period, by_design, gains, path.reshape(-1, len(z))])
+        gained = segments.gains.values.sum(axis=0)
+        values = self.problem.variables.values(u)
+        sums = [[period], values, gained, segments.path.values.ravel()]
+        known = self._measures(np.concatenate(sums), u)
+        total, step = self.problem.objective(known), known.functional("step_length")
+        rows = [(row.equality, row.value(known), row.slopes(known)) for row in self._rows]
+        rows.append((False, step.value / self._height - _LEAST_STEP, step.slopes / self._height))
+        (equal, by_equal), (spare, by_spare) = (
+            (
+                np.array([value for kind, value, _ in rows if kind is equality]),
+                np.reshape([x for kind, _, x in rows if kind is equality], (-1, len(chain))),
+            )
+            for equality in (True, False)
+        )
+        conditions = Conditions(
+            total.value,
+            total.slopes @ chain,
+            np.concatenate([gaps.ravel(), segments.arrival.values, equal]),
+            np.vstack(
+                [
+                    joints.reshape(-1, len(z)),
+                    by_unknowns(segments.arrival.slopes, n - 1),
+                    by_equal @ chain,
+                ]
+            ),
+            spare,
+            by_spare @ chain,
+        )
+        return _Known(conditions, (total.slopes, by_equal, by_spare))
+
+    def _measures(self, sums: np.ndarray, u: np.ndarray) -> Evaluation:
+        """All measures as functions of their numbers; of extremes those at each node, too."""
+        none = np.zeros(len(sums))
+        parts = [
+            Functional(value, 0.0, row, none)
+            for value, row in zip(sums, np.eye(len(sums)), strict=True)
+        ]
+        length = parts[1 + len(u)]
+        value = length.value / parts[0].value
+        by_both = (length.slopes - value * parts[0].slopes) / parts[0].value
+        rows = {"period": parts[0], "step_length": length}
+        rows["speed"] = Functional(value, 0.0, by_both, none)
+        for name, objective in self.problem.wanted.items():
+            if objective.measured is not None:
+                total, _, by_parameter, _ = objective.measured(self.problem.scene_at(u), _NO_GAIT)
+                row = none.copy()
+                row[1 : 1 + len(u)] = by_parameter[self.problem.variables.places]
+                rows[name] = Functional(total, 0.0, row, none)
+        begin, r = 2 + len(u), len(self._path)
+        d = begin + len(self._integrals)
+        costs: dict[Any, Functional] = dict(zip(self._integrals, parts[begin:d], strict=True))
+        for k, extreme in enumerate(self._path):
+            nodes = parts[d + k :: r]
+            costs[extreme] = nodes[int(np.argmax([extreme.sign * node.value for node in nodes]))]
+            wanted = self.problem.wanted.items()
+            for name in (name for name, measure in wanted if measure.costs == ((1.0, extreme),)):
+                rows |= {f"{name} at {i}": node for i, node in enumerate(nodes)}
+        functionals = None
+        if costs:
+            chosen = (costs[cost] for cost in costs_of(with_parts(self.problem.wanted)))
+            columns: list[Any] = [*map(np.array, zip(*chosen, strict=True)), np.zeros(())]
+            functionals = Functionals(*columns)
+        rows = with_costs(self.problem.wanted, rows, functionals)
+        fields: Any = zip(*rows.values(), strict=True)
+        named: list[Any] = [dict(zip(rows, part, strict=True)) for part in fields]
+        return Evaluation(*[*named, none[:1], np.zeros((1, len(sums)))])
+
+    def curvature(self, z: np.ndarray, of_equal: np.ndarray, of_spare: np.ndarray) -> np.ndarray:
+        """Second derivatives of the objective less multipliers times conditions, shape (n, n).
+
+        They are differences of first derivatives. Those of a segment depend on its start, the
+        period and u alone, so that m + 1 + k points tell all. Quotients count as linear.
+        """
+        starts, period, u = self.parts(z)
+        n, m, place = self.count, len(self._sizes), starts.size
+        objective, by_equal, by_spare = self._known(z).by_sums
+        joints, arrival, required = np.split(of_equal, [place, place + 1])
+        of_sums = objective - required @ by_equal - of_spare @ by_spare
+        gains, path = np.split(of_sums[1 + len(u) :], [1 + len(self._integrals)])
+        steps = _APART * np.vstack([np.zeros(m + 1 + len(u)), np.eye(m + 1 + len(u))])
+        steps[:, m + 1 :] *= np.where(u > 0.5, -1.0, 1.0)
+        segments = self._segments(
+            starts + steps[:, None, :m] * self._sizes,
+            period + steps[:, m] * self._time,
+            u + steps[:, m + 1 :],
+        )
+        joints = joints.reshape(n, m) / self._sizes
+        slopes = np.einsum("d,bndj->bnj", gains, segments.gains.slopes)
+        slopes -= np.einsum("nm,bnmj->bnj", joints, segments.ends.slopes)
+        slopes[:, -1] -= arrival @ segments.arrival.slopes
+        nodes = np.einsum("nr,bnrj->bnj", path.reshape(n + 1, -1), segments.path.slopes)
+        slopes += nodes[:, :-1]
+        slopes[:, -1] += nodes[:, -1]
+        blocks = (slopes[1:] - slopes[0]) / np.sum(steps[1:], axis=1)[:, None, None]
+        whole = np.zeros((len(z), len(z)))
+        for i in range(n):
+            where = np.r_[i * m : (i + 1) * m, place : len(z)]
+            whole[np.ix_(where, where)] += 0.5 * (blocks[:, i] + blocks[:, i].T)
+        return whole
+
+
+def _spec_of(scene: Any, engine: str) -> Any:
+    """The return map of a walker's scene, by an engine that can."""
+    start = default_guess(scene)
+    return return_map_spec(scene, start, solver=None, engine=engine, max_solver_steps=1)
+
+
+def check_simultaneous(problem: DesignProblem, count: int) -> None:
+    """Raises `ArgumentError` for a problem that has no simultaneous search."""
+    check_count("segments", count)
+    scene, settings = problem.scene, problem.settings
+
+    def refuse(what: str) -> ArgumentError:
+        return ArgumentError(
+            f'formulation = "together" is not allowed {what}: choose "gait by gait".'
+        )
+
+    if integrals_of(scene.minimal) is None:
+        raise refuse(f"for a {type(scene).__name__}, which is no walker")
+    if not system_of(scene.minimal).footsteps_end_on_section:
+        raise refuse("for compliant feet, which press into the ground for a while")
+    if _spec_of(scene.minimal, settings.engine).resets:
+        raise refuse("for a walker whose modes change between strikes")
+    if arrivals_of(scene, settings.footsteps) != 1:
+        raise refuse("for a cycle of several footsteps")
+    if problem.ensemble is not None:
+        raise refuse("with scatter")
+    every = with_parts(problem.wanted)
+    combined = [measure.combined for measure in every.values() if measure.combined]
+    parts = {name for combination in combined for name in combination.of}
+    for name, objective in every.items():
+        bounded = [requirement for requirement in problem.requirements if requirement.name == name]
+        for weight, cost in objective.costs:
+            if not isinstance(cost, Extreme):
+                continue
+            sides = [low if cost.sign > 0.0 else high for _, low, high in bounded]
+            is_path = weight == 1.0 and len(objective.costs) == 1 and set(sides) == {None}
+            if not is_path or name in (*problem.weights, *parts):
+                raise refuse(
+                    f"for {name}, an extreme, except as the upper bound of a largest value or the "
+                    "lower bound of a smallest one"
+                )
+        is_sum = objective.costs or is_sum_of_parameters(objective)
+        if not (is_sum or objective.combined or name in _OF_CYCLE):
+            raise refuse(f"for {name}, which is no integral along the cycle")
+
+
+def begin_together(
+    problem: DesignProblem,
+    guess: Any,
+    near: Any,
+    segments: int,
+    iterations: int,
+    drawn: tuple[int, int],
+    now: Stage,
+) -> tuple[Design, RunEnding]:
+    """The design that simultaneous searches come to, with its gait, and how the best one ended.
+
+    Args:
+        problem: what is designed.
+        guess, near: a gait from which the first search begins, or None; and its state, or that of a
+            rough pose, or None for the default one.
+        segments, iterations: of each search.
+        drawn: how many further searches begin at drawn poses and designs, and the seed.
+        now: counts iterates.
+
+    Raises:
+        ArgumentError: no search came to a gait.
+    """
+    whole, (count, seed) = Simultaneous(problem, segments), drawn
+    u, scene = start_of(problem.scene, problem.variables), problem.scene.minimal
+    pose, most = default_guess(scene) if near is None else near, count + 1 + _MORE
+    poses = rolling_starts(scene, most, seed=seed)
+    designs = np.random.default_rng(seed).random((most, len(u)))
+
+    def report(z: np.ndarray) -> None:
+        here = whole.at(z)
+        missed = f", conditions missed by {here.violation:.1e}" if here.violation > 0.0 else ""
+        now.update(found=f"objective {problem.sense * here.objective:.6g}{missed}")
+
+    def gait_of(z: np.ndarray, farthest: float) -> np.ndarray | None:
+        """The u of a point with a gait near its cycle."""
+        starts, _, there = whole.parts(z)
+        sizes = farthest * (np.abs(starts[0]) + recurring_sizes(scene, pose))
+        return None if problem.from_guess(there, starts[0], sizes) is None else there
+
+    best: tuple[float, np.ndarray, RunEnding] | None = None
+    others: list[tuple[float, np.ndarray, RunEnding]] = []
+    for k in range(most):
+        if k > count and best is not None:
+            break
+        if k == 0 and isinstance(guess, Gait):
+            point = whole.followed_cycle(u, pose, float(guess.measures.period))
+        else:
+            state = jtu.tree_map(lambda leaf, k=k: leaf[k], poses)
+            point = whole.rough_cycle(designs[k], state) if k else whole.rough_cycle(u, pose)
+        z, ended = run_newton(whole, point, iterations, report)
+        here = whole.at(z)
+        if not ended.converged:
+            others.append((here.violation, z, ended))
+        elif best is None or here.objective < best[0]:
+            there = gait_of(z, _FROM_CYCLE)
+            best = best if there is None else (here.objective, there, ended)
+    if best is not None:
+        return problem.begin(best[1]), best[2]
+    for _, z, ended in sorted(others, key=lambda other: other[0]):
+        there = gait_of(z, np.inf)
+        if there is not None:
+            return problem.begin(there), ended
+    raise ArgumentError(
+        'formulation = "together" came to no gait: no cycle was found, or in each a foot comes '
+        "down before its end; give another guess, further requirements or restarts."
+    )

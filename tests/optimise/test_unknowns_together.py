@@ -1,0 +1,261 @@
+"""State, period and design as unknowns of one problem, against known optima and differences."""
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from tests.optimise.evaluations import simultaneous_problem
+from tests.optimise.test_costs_of_motion import START, compass
+
+A = jb.actuation
+STEP = ("step_length==0.4", "period==0.7")
+CUBIC = compass(A.TimePolynomial((0.0,) * 4, 0.7))
+PD = compass(A.PD(20.0, 1.0, 0.4))
+GAINS = {"leg.hip.kp": (1.0, 200.0), "leg.hip.kd": (0.01, 20.0), "leg.hip.target": (0.05, 1.0)}
+FREE = 203.6052460122
+"""The least ∫u² of any torque in a step of .4 m in .7 s, by collocation [N²·m²·s]."""
+
+
+def coefficients(count, name="leg.hip", most=400.0):
+    return {f"{name}.torque_{k}": (-most, most) for k in range(1, count + 1)}
+
+
+def together(scene, vary, subject_to=STEP, minimise="torque_squared", **options):
+    return jb.optimise_gait(
+        scene,
+        vary=vary,
+        minimise=minimise,
+        subject_to=list(subject_to),
+        formulation="together",
+        **options,
+    )
+
+
+def spline(count, span=0.7):
+    return compass(A.TimeSpline((0.0,) * count, span))
+
+
+@pytest.mark.parametrize(
+    ("scene", "count", "least"),
+    [
+        (CUBIC, 4, 203.8089592361),
+        pytest.param(spline(6), 6, 203.6108822849, marks=pytest.mark.slow),
+        pytest.param(spline(24), 24, FREE, marks=pytest.mark.nightly),
+    ],
+)
+def test_laws_of_time_are_optimal_from_zero_torque(scene, count, least):
+    best = together(scene, coefficients(count))
+    assert best.outcome is jb.optimise.Outcome.CONVERGED
+    assert best.objective == pytest.approx(least, rel=1e-8)
+    assert best.objective > FREE - 1e-5
+    assert best.measures["step_length"] == pytest.approx(0.4, rel=1e-8)
+    assert best.measures["period"] == pytest.approx(0.7, rel=1e-8)
+    assert best.optimality.residual < 1e-6
+    walk = jb.rigid_walk(best.scene, best.gait.measures.state, footsteps=1, max_arrivals=1)
+    assert float(walk.arrivals.t[0]) == pytest.approx(0.7, rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kp", [5.0, 120.0])
+def test_gains_are_those_that_are_found_gait_by_gait(kp):
+    """From gains that walk nowhere near the step that is asked for."""
+    found = together(jb.with_parameters(PD, {"leg.hip.kp": kp}), GAINS)
+    near = jb.with_parameters(
+        PD, {"leg.hip.kp": 40.6634, "leg.hip.kd": 2.18539, "leg.hip.target": 0.738931}
+    )
+    single = jb.optimise_gait(
+        near, vary=GAINS, minimise="torque_squared", subject_to=list(STEP), guess=START
+    )
+    assert found.outcome is jb.optimise.Outcome.CONVERGED
+    assert found.objective == pytest.approx(single.objective, rel=1e-7)
+    for name in GAINS:
+        assert found.variables[name] == pytest.approx(single.variables[name], rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_path_is_bounded_and_parameters_are_tied():
+    """At nodes in the search; the optimum keeps the bound along the whole cycle."""
+    tied = jb.optimise.Linear({"leg.hip.torque_1": 1.0, "leg.hip.torque_4": -0.4}, equals=1.0)
+    swing = lambda motion: motion.angle("leg_1")
+    best = together(CUBIC, coefficients(4), (*STEP, tied))
+    one, other = (best.variables[f"leg.hip.torque_{k}"] for k in (1, 4))
+    assert one - 0.4 * other == pytest.approx(1.0, abs=1e-6)
+    loose, tight = (
+        together(CUBIC, coefficients(4), (*STEP, jb.optimise.Along(swing, high=most, name="swing")))
+        for most in (2.0, 0.6)
+    )
+    assert loose.measures["swing_highest"] > 0.61
+    assert tight.outcome is jb.optimise.Outcome.CONVERGED
+    assert tight.measures["swing_highest"] == pytest.approx(0.6, rel=1e-6)
+    assert tight.objective == pytest.approx(254.254212, rel=1e-6)
+    with pytest.raises(jb.ArgumentError, match="a foot comes down before its end"):
+        together(CUBIC, coefficients(4), (*STEP, jb.optimise.Along(swing, high=0.5)))
+
+
+@pytest.mark.slow
+def test_a_search_begins_at_a_gait_and_divides_costs():
+    per = together(PD, GAINS, ("speed==0.5", "step_length==0.4"), "torque_squared_per_length")
+    again = together(
+        per.scene,
+        GAINS,
+        ("speed==0.5", "step_length==0.4"),
+        "torque_squared_per_length",
+        guess=per.gait,
+        segments=3,
+    )
+    assert again.objective == pytest.approx(per.objective, rel=1e-7)
+    assert per.measures["period"] == pytest.approx(0.8, rel=1e-8)
+
+
+def test_derivatives_of_the_conditions_are_differences():
+    along = jb.optimise.Along(lambda motion: motion.angle("leg_1"), high=0.3, name="swing")
+    problem, z = simultaneous_problem(CUBIC, coefficients(4), [*STEP, "speed<0.6", along])
+    random = np.random.default_rng(0)
+    z = z + 0.01 * random.standard_normal(len(z))
+    here = problem.at(z)
+    of_equal = random.standard_normal(len(here.equal))
+    of_spare = np.zeros(len(here.spare))  # quotients count as linear
+    of_spare[1:] = random.random(len(of_spare) - 1)
+
+    def values(z):
+        there = problem.at(z)
+        return np.concatenate([[there.objective], there.equal, there.spare])
+
+    def gradient(z):
+        there = problem.at(z)
+        return there.gradient - of_equal @ there.equal_slopes - of_spare @ there.spare_slopes
+
+    def quotients(function, step):
+        moves = step * np.eye(len(z))
+        return np.transpose([(function(z + e) - function(z - e)) / (2.0 * step) for e in moves])
+
+    slopes = np.vstack([here.gradient, here.equal_slopes, here.spare_slopes])
+    expected = quotients(values, 1e-5)
+    # At the span, where the law's slope jumps, differences see both sides.
+    smooth = np.ones(len(z), dtype=bool)
+    smooth[-5], smooth[problem.count * 5 - 1] = False, False
+    np.testing.assert_allclose(slopes[:, smooth], expected[:, smooth], rtol=1e-5, atol=1e-4)
+    whole = problem.curvature(z, of_equal, of_spare)
+    bends = quotients(gradient, 1e-4)
+    size = np.max(np.abs(bends))
+    chosen = np.ix_(smooth, smooth)
+    np.testing.assert_allclose(whole[chosen], bends[chosen], atol=1e-4 * size)
+
+
+@pytest.mark.nightly
+def test_further_starts_find_better_gains_of_three_links():
+    """Of several local optima, with gaits of multipliers that the search does not mind."""
+    scene = three_links()
+    vary = {
+        "torso.lean.kp": (0.0, 400.0),
+        "torso.lean.kd": (0.0, 40.0),
+        "torso.lean.target": (-0.5, 0.5),
+        "leg.swing.kp": (0.0, 200.0),
+        "leg.swing.kd": (-10.0, 20.0),
+        "leg.swing.target": (-0.2, 1.0),
+    }
+    one, best = (together(scene, vary, restarts=count) for count in (0, 4))
+    assert one.objective == pytest.approx(55.0716314, rel=1e-6)
+    assert best.objective == pytest.approx(34.0915362, rel=1e-6)
+
+
+def three_links():
+    """The compass with a torso, which is held against the leg that stands."""
+    legs = ("leg_1", "leg_2")
+    lean = A.PD(50.0, 5.0, 0.05, of={"torso": 1.0, "vertical": -1.0})
+    swing = A.PD(20.0, 1.0, 0.4, of={"leg_1": 1.0, "leg_2": -1.0})
+    mechanism = jb.Mechanism(
+        root="hip",
+        root_mass=15.0,
+        bodies=(
+            *(jb.Body(leg, mass=5.0, inertia=0.0, centre=0.5) for leg in legs),
+            jb.Body("torso", mass=10.0, inertia=0.0, centre=-0.5),
+        ),
+        feet=tuple(jb.Foot(leg, centre=1.0) for leg in legs),
+        mirror=(legs,),
+        joints=(
+            jb.Motor({"torso": 1.0, "leg_2": -1.0}, lean, name="lean"),
+            jb.Motor({"leg_1": 1.0, "torso": -1.0}, swing, name="swing"),
+        ),
+    )
+    return jb.RigidScene(mechanism, jb.Ground(slope=0.0, g=9.81))
+
+
+def five_links():
+    """RABBIT's numbers: Chevallereau et al., IEEE Control Systems Magazine 23 (2003)."""
+    bodies, numbers = [], (1, 2)
+    for i in numbers:
+        bodies.append(jb.Body(f"thigh_{i}", mass=6.8, inertia=1.08, centre=0.163))
+        shank = dict(mass=3.2, inertia=0.93, centre=0.128, parent=f"thigh_{i}", at=0.4)
+        bodies.append(jb.Body(f"shank_{i}", **shank))
+    bodies.append(jb.Body("torso", mass=20.0, inertia=2.22, centre=-0.2))
+    angles = {
+        "stance_hip": {"torso": 1.0, "thigh_2": -1.0},
+        "swing_hip": {"thigh_1": 1.0, "torso": -1.0},
+        "stance_knee": {"shank_2": 1.0, "thigh_2": -1.0},
+        "swing_knee": {"shank_1": 1.0, "thigh_1": -1.0},
+    }
+    law = A.TimeSpline((0.0,) * 6, 0.7)
+    mechanism = jb.Mechanism(
+        root="hip",
+        root_mass=0.0,
+        bodies=tuple(bodies),
+        feet=tuple(jb.Foot(f"shank_{i}", centre=0.4) for i in numbers),
+        mirror=(("thigh_1", "thigh_2"), ("shank_1", "shank_2")),
+        joints=tuple(jb.Motor(angle, law, name=name) for name, angle in angles.items()),
+    )
+    return jb.RigidScene(mechanism, jb.Ground(slope=0.0, g=9.81))
+
+
+@pytest.mark.nightly
+def test_five_links_walk_from_zero_torque_and_their_knees_bend_one_way():
+    scene = five_links()
+    names = [name for name in jb.parameter_names(scene) if ".torque_" in name]
+    assert len(names) == 24
+    knees = [
+        jb.optimise.Along(
+            lambda motion, i=i: motion.angle(f"shank_{i}"), high=0.0, name=f"knee {i}", unit="rad"
+        )
+        for i in (1, 2)
+    ]
+    step = ("step_length==0.5", "period==0.7", *knees)
+    best = together(scene, dict.fromkeys(names, (-300.0, 300.0)), step)
+    assert best.objective == pytest.approx(390.808117, rel=1e-6)
+    assert abs(best.gait.multipliers[0]) > 30.0
+    for i in (1, 2):
+        assert best.measures[f"knee_{i}_highest"] <= 0.0
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        (dict(formulation="all at once"), "formulation = 'all at once' is not"),
+        (dict(segments=0), "segments = 0 is not allowed"),
+        (dict(minimise="spectral_radius"), "spectral_radius, which is no integral along the cycle"),
+        (dict(subject_to="motor_work<1"), "motor_work, which is no integral along the cycle"),
+        (dict(minimise="peak_torque"), "peak_torque, an extreme, except as the upper bound"),
+        (dict(subject_to="peak_torque>3"), "peak_torque, an extreme, except as the upper bound"),
+        (dict(subject_to="joint_range[leg_1]<1"), r"joint_range\[leg_1\], an extreme"),
+        (dict(footsteps=2), "a cycle of several footsteps"),
+        (dict(scatter={"slope": 0.1}, scene=dict(slope=0.01)), "with scatter"),
+    ],
+)
+def test_what_has_no_such_search_is_refused(how, words):
+    how = dict(minimise="torque_squared", formulation="together") | how
+    scene = jb.with_parameters(PD, how.pop("scene", {}))
+    with pytest.raises(jb.ArgumentError, match=words):
+        jb.optimise_gait(scene, vary=GAINS, **how)
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (jb.seed_scene, "for compliant feet, which press into the ground"),
+        (jb.models.hsu_chen, "for a walker whose modes change"),
+    ],
+)
+def test_scenes_that_have_no_such_search_are_refused(scene, words):
+    with pytest.raises(jb.ArgumentError, match=words):
+        jb.optimise_gait(
+            scene(), vary={"slope": (0.01, 0.05)}, maximise="speed", formulation="together"
+        )
