@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -71,7 +72,7 @@ def reset_at_switch(
     """
     which, past, repeats = landed.crossed_field, landed.past, watch.repeats
     met = keep & (which > 0)
-    switches = watch.switches(args, state)
+    switches = eqx.filter_eval_shape(watch.switches, args, state)
     if not all(switch.resets or switch.corner for switch in switches):
         numbers = [number for number, switch in enumerate(switches, 1) if switch.resets]
         met = met & any_of([which == number for number in numbers])

@@ -17,14 +17,14 @@ from jaxbiped.scene.actuation._actuators import HipTorque as HipTorque
 from jaxbiped.scene.actuation._actuators import HipPulse as HipPulse
 from jaxbiped.scene.actuation._actuators import HipSpline as HipSpline
 
+# At the feet: rigid ones, compliant ones.
+from jaxbiped.scene.actuation._actuators import PushOff as PushOff
+from jaxbiped.scene.actuation._actuators import FootPreload as FootPreload
+
 # At the hip, and for motors: laws of the time since the last strike, and a limit for any law.
 from jaxbiped.scene.actuation._time_laws import TimePolynomial as TimePolynomial
 from jaxbiped.scene.actuation._time_laws import TimeSpline as TimeSpline
 from jaxbiped.scene.actuation._time_laws import Limited as Limited
-
-# At the feet: rigid ones, compliant ones.
-from jaxbiped.scene.actuation._actuators import PushOff as PushOff
-from jaxbiped.scene.actuation._actuators import FootPreload as FootPreload
 
 # Laws of motors at the joints of a mechanism.
 from jaxbiped.scene.actuation._motor_laws import AbstractMotorLaw as AbstractMotorLaw
