@@ -97,6 +97,13 @@ def of_level_ground(numbers: dict[str, Any]) -> Iterator[str]:
         )
 
 
+def of_driven_compass(numbers: dict[str, Any]) -> Iterator[str]:
+    """The cheapest steps of the compass walker by law, and how far above the free torque's."""
+    for each in numbers["rows"]:
+        above = small(each["above_free"], 2)
+        yield row(each["law"], each["formulation"], each["outcome"], *fixed(each, 6, "cost"), above)
+
+
 def of_optimise_speed(numbers: dict[str, Any]) -> Iterator[str]:
     """Optimisers on one problem, designs at no loss of speed, and what descents took."""
     for name, each in numbers["fastest"].items():

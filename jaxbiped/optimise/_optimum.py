@@ -75,7 +75,8 @@ class Optimum(Tabular):
         gait: its gait, with the sensitivities to all parameters.
         variables: its parameters by name.
         objective: the requested sum of measures.
-        error: estimated error of the objective.
+        error: estimated error of the objective, with what the errors of the measures that are held
+            are worth.
         known: measures in the objective and the requirements, with gradients and errors.
         quantities: words, symbol and unit of these by name, of those that have some.
         optimality: the optimality conditions.

@@ -169,6 +169,7 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     best = restored(problem, runs.best)
     found, scene = problem.objective(best.known), problem.scene_at(best.u)
     gait, outcome = problem.settings.find_near(scene, best.known.state), runs.outcome(best)
+    known = optimality_of(problem, best)
     objectives = {**OBJECTIVES, **with_parts(problem.wanted)}
     named = [name for name in best.known.values if name in objectives]
     doubt = doubt_of(problem, best) if outcome is Outcome.CORNER else ""
@@ -182,11 +183,12 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
         gait=gait,
         variables=problem.variables.by_name(best.u),
         objective=problem.sense * found.value,
-        error=found.error,
+        # What holds it is known to an error, too, which the objective would gain by.
+        error=found.error + sum(abs(held.multiplier) * held.error for held in known.requirements),
         known=best.known,
         curvature=curvature_of(problem, best) if outcome is Outcome.CONVERGED else None,
         quantities={name: objectives[name].quantity for name in named},
-        optimality=optimality_of(problem, best),
+        optimality=known,
         history=runs.history,
         evaluations=problem.evaluations.count,
         lost=problem.lost,

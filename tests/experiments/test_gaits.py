@@ -97,6 +97,18 @@ def test_costs_on_level_ground(tmp_path):
     assert star[:, 1].tolist() == [design["cost_of_transport"]]
 
 
+def test_costs_of_a_driven_step_fall_towards_the_free_torques(tmp_path):
+    numbers, figures = drawn_run("driven_compass", tmp_path)
+    by_law = {(row["law"], row["formulation"]): row for row in numbers["rows"]}
+    assert all(row["outcome"] == "converged" for row in by_law.values())
+    one, other = by_law["PD", "gait by gait"], by_law["PD", "together"]
+    assert abs(one["cost"] - other["cost"]) < one["error"] + other["error"]
+    cubic, spline = by_law["cubic", "together"], by_law["spline of 6", "together"]
+    assert one["above_free"] > cubic["above_free"] > spline["above_free"] > 0.0
+    shown = points_of(figures["driven_compass.png"].axes[1], "spline in time")[0]
+    np.testing.assert_array_equal(shown, [[6, spline["above_free"]]])
+
+
 def test_footsteps_stay_on_the_gait_and_repeat(tmp_path):
     numbers, _ = drawn_run("long_walks", tmp_path, unitless={"footstep"})
     assert numbers["outcome"] == "walking"

@@ -47,6 +47,7 @@ def test_laws_of_time_are_optimal_from_zero_torque(scene, count, least):
     best = together(scene, coefficients(count))
     assert best.outcome is jb.optimise.Outcome.CONVERGED
     assert best.objective == pytest.approx(least, rel=1e-8)
+    assert abs(best.objective - least) < best.error + 1e-8 < 1e-5
     assert best.objective > FREE - 1e-5
     assert best.measures["step_length"] == pytest.approx(0.4, rel=1e-8)
     assert best.measures["period"] == pytest.approx(0.7, rel=1e-8)
