@@ -28,6 +28,8 @@ _FARTHER, _FARTHEST = 4.0, 0.1
 _KEPT, _GAIN, _NOISE = 1e-9, 1e-10, 1e-7
 """Violation that counts as none; expected gain, as a share of the objective, from which a point
 counts as best, and one that may be lost in errors of the motion."""
+_VANISHING = 1e-6
+"""Share of the largest objective so far below which one counts as of that size."""
 _MOVED = 1e-9
 """Norm of a row that no step along the equations moves, and what is left where rows contradict."""
 
@@ -85,10 +87,12 @@ def run_newton(
     if not np.isfinite(here.violation):
         return z, RunEnding(False, "The motion is lost within a segment of the first cycle.")
     of_equal, of_spare = np.zeros_like(here.equal), np.zeros_like(here.spare)
+    largest = 0.0
     for _ in range(iterations):
         curvature = program.curvature(z, of_equal, of_spare)
         step, of_equal, of_spare, gain = best_step(program, z, here, curvature)
-        size = abs(here.objective)
+        largest = max(largest, abs(here.objective))
+        size = max(abs(here.objective), _VANISHING * largest)
         if here.violation <= _KEPT and gain <= _GAIN * size:
             return z, RunEnding(True, "No better cycle is expected nearby.")
         better = _along(program, z, here, step, passed)

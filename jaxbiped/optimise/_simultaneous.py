@@ -6,6 +6,8 @@ Plitt, A multiple shooting algorithm for direct solution of optimal control prob
 """
 
 import functools
+import operator
+from collections.abc import Iterator
 from typing import Any, NamedTuple, cast
 
 import jax.numpy as jnp
@@ -81,6 +83,7 @@ class Simultaneous:
         problem: what is designed.
         count: n.
         least, most: bounds on z.
+        sizes: of the m components of a start, SI units, shape (m,).
     """
 
     def __init__(self, problem: DesignProblem, count: int) -> None:
@@ -97,12 +100,12 @@ class Simultaneous:
         self._spec = cycle_spec(scene, system, MotionSection(section_of(scene, None)), 1, engine)
         self._precision = functional_precision(settings.accuracy, scene)
         _, self._active = select_parameters(scene, problem.variables.names)
-        self._sizes = recurring_sizes(scene, pose)
+        self.sizes = recurring_sizes(scene, pose)
         self._time, self._height = map(
             float, (self._walker.time_scale(scene), scene.mechanism.height)
         )
         # Of the starts, then the period and u.
-        open_ = np.full(count * len(self._sizes), np.inf)
+        open_ = np.full(count * len(self.sizes), np.inf)
         low, high = _LEAST_PERIOD, _MOST_PERIOD
         for _, least, most in (r for r in problem.requirements if r.name == "period"):
             low = low if least is None else min(least / self._time, high)
@@ -143,12 +146,12 @@ class Simultaneous:
         return self._point(starts, period, u)
 
     def _point(self, starts: np.ndarray, period: float, u: np.ndarray) -> np.ndarray:
-        return np.concatenate([(starts / self._sizes).ravel(), [period / self._time], u])
+        return np.concatenate([(starts / self.sizes).ravel(), [period / self._time], u])
 
     def parts(self, z: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         """Starts of the segments, shape (n, m), the period [s], and u."""
-        place = self.count * len(self._sizes)
-        starts = z[:place].reshape(self.count, -1) * self._sizes
+        place = self.count * len(self.sizes)
+        starts = z[:place].reshape(self.count, -1) * self.sizes
         return starts, float(z[place]) * self._time, z[place + 1 :]
 
     def at(self, z: np.ndarray) -> Conditions:
@@ -170,7 +173,7 @@ class Simultaneous:
         segments = linearise_segments(
             self._spec, self._scene, self._like, cycles, self._active, self._path, self._precision
         )
-        units = np.append(self._sizes, self._time / self.count)
+        units = np.append(self.sizes, self._time / self.count)
         scales = np.concatenate([np.tile(units, (len(u), 1)), variables.rates(u)], axis=1)
 
         def scaled(part: Linearised) -> Linearised:
@@ -193,8 +196,8 @@ class Simultaneous:
         def every(part: Linearised) -> np.ndarray:
             return np.stack([by_unknowns(x, min(i, n - 1)) for i, x in enumerate(part.slopes)])
 
-        gaps = (segments.ends.values - np.roll(starts, -1, axis=0)) / self._sizes
-        joints = every(segments.ends) / self._sizes[:, None]
+        gaps = (segments.ends.values - np.roll(starts, -1, axis=0)) / self.sizes
+        joints = every(segments.ends) / self.sizes[:, None]
         for i in range(n):
             behind = (i + 1) % n * m
             joints[i][:, behind : behind + m] -= np.eye(m)
@@ -278,7 +281,7 @@ class Simultaneous:
         period and u alone, so that m + 1 + k points tell all. Quotients count as linear.
         """
         starts, period, u = self.parts(z)
-        n, m, place = self.count, len(self._sizes), starts.size
+        n, m, place = self.count, len(self.sizes), starts.size
         objective, by_equal, by_spare = self._known(z).by_sums
         joints, arrival, required = np.split(of_equal, [place, place + 1])
         of_sums = objective - required @ by_equal - of_spare @ by_spare
@@ -286,11 +289,11 @@ class Simultaneous:
         steps = _APART * np.vstack([np.zeros(m + 1 + len(u)), np.eye(m + 1 + len(u))])
         steps[:, m + 1 :] *= np.where(u > 0.5, -1.0, 1.0)
         segments = self._segments(
-            starts + steps[:, None, :m] * self._sizes,
+            starts + steps[:, None, :m] * self.sizes,
             period + steps[:, m] * self._time,
             u + steps[:, m + 1 :],
         )
-        joints = joints.reshape(n, m) / self._sizes
+        joints = joints.reshape(n, m) / self.sizes
         slopes = np.einsum("d,bndj->bnj", gains, segments.gains.slopes)
         slopes -= np.einsum("nm,bnmj->bnj", joints, segments.ends.slopes)
         slopes[:, -1] -= arrival @ segments.arrival.slopes
@@ -351,6 +354,24 @@ def check_simultaneous(problem: DesignProblem, count: int) -> None:
             raise refuse(f"for {name}, which is no integral along the cycle")
 
 
+def _beginnings(
+    whole: Simultaneous, guess: Any, pose: Any, more: int, seed: int
+) -> Iterator[np.ndarray]:
+    """Points from which searches begin: the scene's own design, then drawn designs and poses."""
+    from scipy.stats import qmc
+
+    scene = whole.problem.scene
+    u = start_of(scene, whole.problem.variables)
+    if isinstance(guess, Gait):
+        yield whole.followed_cycle(u, pose, float(guess.measures.period))
+    else:
+        yield whole.rough_cycle(u, pose)
+    poses = rolling_starts(scene.minimal, more + 1, seed=seed)
+    designs = qmc.Sobol(len(u), seed=seed).random_base2(more.bit_length())
+    for k in range(1, more + 1):
+        yield whole.rough_cycle(designs[k], jtu.tree_map(operator.itemgetter(k), poses))
+
+
 def begin_together(
     problem: DesignProblem,
     guess: Any,
@@ -374,10 +395,7 @@ def begin_together(
         ArgumentError: no search came to a gait.
     """
     whole, (count, seed) = Simultaneous(problem, segments), drawn
-    u, scene = start_of(problem.scene, problem.variables), problem.scene.minimal
-    pose, most = default_guess(scene) if near is None else near, count + 1 + _MORE
-    poses = rolling_starts(scene, most, seed=seed)
-    designs = np.random.default_rng(seed).random((most, len(u)))
+    pose = default_guess(problem.scene.minimal) if near is None else near
 
     def report(z: np.ndarray) -> None:
         here = whole.at(z)
@@ -387,19 +405,14 @@ def begin_together(
     def gait_of(z: np.ndarray, farthest: float) -> np.ndarray | None:
         """The u of a point with a gait near its cycle."""
         starts, _, there = whole.parts(z)
-        sizes = farthest * (np.abs(starts[0]) + recurring_sizes(scene, pose))
+        sizes = farthest * (np.abs(starts[0]) + whole.sizes)
         return None if problem.from_guess(there, starts[0], sizes) is None else there
 
     best: tuple[float, np.ndarray, RunEnding] | None = None
     others: list[tuple[float, np.ndarray, RunEnding]] = []
-    for k in range(most):
+    for k, point in enumerate(_beginnings(whole, guess, pose, count + _MORE, seed)):
         if k > count and best is not None:
             break
-        if k == 0 and isinstance(guess, Gait):
-            point = whole.followed_cycle(u, pose, float(guess.measures.period))
-        else:
-            state = jtu.tree_map(lambda leaf, k=k: leaf[k], poses)
-            point = whole.rough_cycle(designs[k], state) if k else whole.rough_cycle(u, pose)
         z, ended = run_newton(whole, point, iterations, report)
         here = whole.at(z)
         if not ended.converged:
