@@ -3,6 +3,7 @@
 They are torques at the hip, and laws of motors at the joints of a mechanism.
 """
 
+import abc
 import dataclasses
 from typing import Any, ClassVar, Self
 
@@ -20,6 +21,9 @@ from jaxbiped.scene.actuation._actuators import (
     check_coefficients,
     spline_between,
 )
+
+_IDLE = 1e-6
+"""Share of its limit that a law without a strength of its own keeps where it is idle."""
 
 
 class AbstractTimeTorque(AbstractStanceTorque):
@@ -44,9 +48,9 @@ class AbstractTimeTorque(AbstractStanceTorque):
         time = motion.time
         return self.torque_after(jnp.where(time < self.span, time, self.span))
 
+    @abc.abstractmethod
     def torque_after(self, time: Scalar) -> Scalar:
         """Torque at a time up to the span [N·m]."""
-        raise NotImplementedError
 
     def idle(self) -> Self:
         return dataclasses.replace(self, torque=tuple(0.0 * number for number in self.torque))
@@ -141,7 +145,3 @@ class Limited(AbstractStanceTorque):
         if isinstance(self.law, AbstractStanceTorque):
             return dataclasses.replace(self, law=self.law.idle())
         return dataclasses.replace(self, most=_IDLE * self.most)
-
-
-_IDLE = 1e-6
-"""Share of its limit that a law without a strength of its own keeps where it is idle."""
