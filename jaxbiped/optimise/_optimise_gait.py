@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 from jaxtyping import PyTree
@@ -31,7 +31,6 @@ from jaxbiped.optimise._objectives import (
     Measures,
     Objective,
     check_objective,
-    costs_of,
     with_parts,
 )
 from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
@@ -163,6 +162,7 @@ def optimise_gait(
     arrivals_of(scene, footsteps)  # refused where they are no whole cycles
     check_count("restarts", restarts, 0)
     check_count("seed", seed, 0)
+    check_count("segments", segments)
     check_choice("criterion", criterion, CRITERIA)
     check_count("members", members)
     if scatter is not None:
@@ -190,7 +190,7 @@ def optimise_gait(
         scene, variables, told, sense, requirements, measures, settings, evaluations, ensemble
     )
     if formulation == "together":
-        check_simultaneous(problem, segments)
+        check_simultaneous(problem)
     with stage("optimising the gait", unit="iterations", show=progress) as now:
         ended, runs = None, Runs(problem, iterations, optimiser, now)
         if formulation == "together":
@@ -228,13 +228,13 @@ def _goal(
             'give either maximise or minimise: a measure of the gait, such as "speed".'
         )
     what, goal = ("minimise", minimise) if maximise is None else ("maximise", maximise)
-    given: Mapping[Any, float] = goal if isinstance(goal, Mapping) else {goal: 1.0}
+    given = list(goal.items()) if isinstance(goal, Mapping) else [(goal, 1.0)]
     if not given:
         raise ArgumentError(f"{what} = {goal!r} is not allowed: give a name, or weights by name.")
     weights: dict[str, float] = {}
     measures: dict[str, Objective] = {}
-    for each, weight in given.items():
-        name, objective = check_objective(each, scene, what)
+    for each, weight in given:
+        name, objective = check_objective(cast("str | Measure", each), scene, what)
         check_finite(f"{what}[{name!r}]", weight)
         add_measure(measures, name, objective)
         weights[name] = float(weight)
@@ -252,13 +252,17 @@ def _problem_settings(
     own, section = scene_identity(scene), settings.section
     chosen = section is not None and not section.names_legs  # of walkers there is no choice
     kept = {name: value for name, value in own["scene"].items() if name not in vary}
-    writer = provenance(scene)
+    functions = {
+        name: [each.costs, each.combined, each.measured]
+        for name, each in with_parts(measures).items()
+    }
+    writer = provenance(scene, *functions.values())
     return {
         "scene": kept,
         "model": own["model"],
         "vary": {name: [float(x) for x in bounds] for name, bounds in vary.items()},
         "measures": sorted(measures),
-        "costs": {each.name: identity(each) for each in costs_of(with_parts(measures))},
+        "functions": identity(functions),
         "settings": settings._asdict() | {"section": identity(section) if chosen else None},
         "ensemble": None if ensemble is None else ensemble._asdict(),
         "writer": {name: writer[name] for name in DECISIVE},

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_count
+from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage
 from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.dynamics._equivalent_states import exchange_legs
@@ -314,9 +314,8 @@ def _spec_of(scene: Any, engine: str) -> Any:
     return return_map_spec(scene, start, solver=None, engine=engine, max_solver_steps=1)
 
 
-def check_simultaneous(problem: DesignProblem, count: int) -> None:
+def check_simultaneous(problem: DesignProblem) -> None:
     """Raises `ArgumentError` for a problem that has no simultaneous search."""
-    check_count("segments", count)
     scene, settings = problem.scene, problem.settings
 
     def refuse(what: str) -> ArgumentError:

@@ -262,3 +262,21 @@ def test_a_number_as_accuracy_gives_integrals_their_bars(gait):
 def test_what_is_no_integral_of_a_walk_is_refused(asked, words):
     with pytest.raises(jb.ArgumentError, match=words):
         jb.simulate(DRIVEN, START, footsteps=1, integrals=asked)
+
+
+def test_a_store_belongs_to_the_functions_of_its_costs(tmp_path):
+    """Also where these have no names of their own."""
+    vary, store = {"leg.hip.kp": (20.0, 80.0)}, tmp_path / "designs"
+    how = dict(vary=vary, guess=START, iterations=1, store=store)
+    costs = [
+        jb.optimise.Integral(rate, jb.optimise.Quantity("turning"))
+        for rate in (
+            lambda motion: motion.rate("leg_1") ** 2,
+            lambda motion: motion.rate("leg_2") ** 2,
+        )
+    ]
+    first = jb.optimise_gait(DRIVEN, minimise=costs[0], **how)
+    again = jb.optimise_gait(DRIVEN, minimise=costs[0], **how)
+    assert first.objective == again.objective
+    with pytest.raises(jb.ArgumentError, match="belongs to another problem"):
+        jb.optimise_gait(DRIVEN, minimise=costs[1], **how)
