@@ -48,7 +48,7 @@ class Integral(eqx.Module):
 
     Examples:
         >>> import jaxbiped as jb
-        >>> quantity = jb.optimise.Quantity("turning", "$R$", "rad^2/s")
+        >>> quantity = jb.laws.Quantity("turning", "$R$", "rad^2/s")
         >>> turned = jb.optimise.Integral(lambda motion: motion.rate("leg_1") ** 2, quantity)
         >>> turned.name
         'turning'

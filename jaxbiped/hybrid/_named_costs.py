@@ -184,10 +184,10 @@ NAMED_COSTS = {
 """By name; `NAME[part]` is that of one motor, or of one angle.
 
 - torque squared: Σ ∫ u² over all torques of motors, see `WalkerMotion.motors`.
-- absolute work: Σ ∫ |u φ̇|, work of braking too.
+- absolute work: Σ ∫ of the size of u φ̇, work of braking too.
 - push off squared: ½ P² of each push-off's impulse P.
 - jerk: Σ ∫ (dα/dt)² over the angular accelerations of all free angles.
-- peak torque, peak power: the largest |u| and |u φ̇| of any motor along the cycle.
+- peak torque, peak power: the largest size of u and of u φ̇ of any motor along the cycle.
 - joint range: largest minus smallest value of an angle, `joint_range[knee_1]`.
 """
 

@@ -1,6 +1,5 @@
 """Optimisation of gaits: objectives, optimisers, certificates of an optimum."""
 
-from jaxbiped._quantity import Quantity as Quantity
 from jaxbiped.hybrid._motion_costs import Along as Along
 from jaxbiped.hybrid._motion_costs import Extreme as Extreme
 from jaxbiped.hybrid._motion_costs import Integral as Integral

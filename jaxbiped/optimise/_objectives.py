@@ -280,7 +280,7 @@ class FunctionOf(eqx.Module):
     Examples:
         >>> import jaxbiped as jb
         >>> froude = jb.optimise.FunctionOf(
-        ...     lambda speed: speed**2 / (9.81 * 0.4), ("speed",), jb.optimise.Quantity("froude")
+        ...     lambda speed: speed**2 / (9.81 * 0.4), ("speed",), jb.laws.Quantity("froude")
         ... )
         >>> froude.name
         'froude'

@@ -31,11 +31,11 @@ DRIVEN = compass(jb.actuation.PD(KP, KD, TARGET))
 START = DRIVEN.state(theta_leg_1=-0.2, theta_leg_2=0.2, omega_leg_1=-0.5, omega_leg_2=-1.2)
 SQUARE_AT_STRIKE = jb.optimise.Integral(
     lambda motion: motion.rate("leg_2") ** 2,
-    jb.optimise.Quantity("turning and landing"),
+    jb.laws.Quantity("turning and landing"),
     at_strike=lambda motion: motion.angle("leg_1") ** 2,
 )
 LOWEST = jb.optimise.Extreme(
-    lambda motion: motion.angle("leg_2"), jb.optimise.Quantity("lowest"), smallest=True
+    lambda motion: motion.angle("leg_2"), jb.laws.Quantity("lowest"), smallest=True
 )
 
 
@@ -125,7 +125,7 @@ def test_a_motor_of_compliant_feet_drives_and_brakes():
     gait = jb.find_gait(scene, radius_sensitivities=False)
     known = evaluated(scene, gait, ("absolute_work", "motor_work", "torque_squared")).values
     net = jb.optimise.Integral(
-        lambda motion: motion.power("hip-spring"), jb.optimise.Quantity("net work")
+        lambda motion: motion.power("hip-spring"), jb.laws.Quantity("net work")
     )
     (given,) = evaluated_costs(scene, gait, net)[0]
     assert known["absolute_work"] == pytest.approx(2.0 * known["motor_work"] - given, rel=1e-6)
@@ -136,7 +136,7 @@ def test_a_path_that_is_bounded_holds_the_optimum_back():
     box = ("leg.hip.kp", (20.0, 80.0)), ("leg.hip.kd", (0.5, 5.0)), ("leg.hip.target", (0.5, 1.0))
     how = dict(vary=dict(box), minimise="torque_squared", guess=START)
     free = jb.optimise_gait(DRIVEN, subject_to="step_length==0.4", **how)
-    swing = jb.optimise.Extreme(lambda motion: motion.angle("leg_1"), jb.optimise.Quantity("most"))
+    swing = jb.optimise.Extreme(lambda motion: motion.angle("leg_1"), jb.laws.Quantity("most"))
     most = evaluated_costs(free.scene, free.gait, swing)[0][0] - 0.02
     along = jb.optimise.Along(swing.value, high=most, name="swing", unit="rad")
     held = jb.optimise_gait(DRIVEN, subject_to=["step_length==0.4", along], **how)
@@ -165,15 +165,11 @@ def test_a_path_that_is_bounded_holds_the_optimum_back():
             "contradict each other",
         ),
         (
-            dict(
-                minimise=jb.optimise.Integral(
-                    lambda motion: (1.0, 2.0), jb.optimise.Quantity("two")
-                )
-            ),
+            dict(minimise=jb.optimise.Integral(lambda motion: (1.0, 2.0), jb.laws.Quantity("two"))),
             "rate of two returns",
         ),
         (
-            dict(minimise=jb.optimise.Integral(lambda motion: 1.0, jb.optimise.Quantity("speed"))),
+            dict(minimise=jb.optimise.Integral(lambda motion: 1.0, jb.laws.Quantity("speed"))),
             "two measures are called 'speed'",
         ),
     ],
@@ -190,7 +186,7 @@ def test_terms_at_strikes_are_those_of_rigid_feet():
 
 def test_a_rate_that_compares_numbers_is_told_how():
     rate = lambda motion: 1.0 if motion.rate("leg_1") > 0.0 else 0.0
-    cost = jb.optimise.Integral(rate, jb.optimise.Quantity("time forward"))
+    cost = jb.optimise.Integral(rate, jb.laws.Quantity("time forward"))
     with pytest.raises(jb.ArgumentError, match=r"rate of time_forward .* jax.numpy.where"):
         jb.optimise_gait(DRIVEN, vary={"leg.hip.kp": (20.0, 80.0)}, minimise=cost)
 
@@ -210,7 +206,7 @@ def test_parameters_may_be_tied_and_measures_combined():
     rate = jb.optimise.FunctionOf(
         lambda effort, period: effort / period,
         ("torque_squared", "period"),
-        jb.optimise.Quantity("effort rate", unit="N^2 m^2"),
+        jb.laws.Quantity("effort rate", unit="N^2 m^2"),
     )
     how = dict(vary=vary, guess=START)
     best = jb.optimise_gait(DRIVEN, minimise=rate, subject_to=["step_length==0.4", tied], **how)
@@ -269,7 +265,7 @@ def test_a_store_belongs_to_the_functions_of_its_costs(tmp_path):
     vary, store = {"leg.hip.kp": (20.0, 80.0)}, tmp_path / "designs"
     how = dict(vary=vary, guess=START, iterations=1, store=store)
     costs = [
-        jb.optimise.Integral(rate, jb.optimise.Quantity("turning"))
+        jb.optimise.Integral(rate, jb.laws.Quantity("turning"))
         for rate in (
             lambda motion: motion.rate("leg_1") ** 2,
             lambda motion: motion.rate("leg_2") ** 2,
