@@ -18,7 +18,7 @@ from jaxbiped._checks import (
     check_unbatched,
     holds_somewhere,
 )
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.dynamics._walker_motion import WalkerMotion
 from jaxbiped.hybrid._endings import WATCHES
 from jaxbiped.hybrid._motion_costs import Integral, check_cost
@@ -97,7 +97,9 @@ def longest_time(scene: Any, asked: Options) -> Scalar | float:
         return asked.duration
     if scene.stiff:
         return PATIENCE * (asked.footsteps or 0)
-    return (asked.footsteps or 0) * system_of(scene).longest_wait(scene)
+    wait = system_of(scene).longest_wait(scene)
+    longest: Scalar = by_numpy(lambda _, wait: (asked.footsteps or 0) * wait, wait)
+    return longest
 
 
 def watched_by(scene: Any, watch: Any) -> tuple[str, ...]:
