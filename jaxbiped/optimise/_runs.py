@@ -71,13 +71,12 @@ class Runs:
             optimise = BY_NAME[self.optimiser]
         else:
             optimise = functools.partial(run_optax, transformation=self.optimiser)
-        polishes = optimise is not run_trust_region
+        is_polished = False
         if ended is None or not ended.converged:
             ended = optimise(functions, begin.u, self.iterations, self.note)
-        else:
-            polishes = True
+            is_polished = optimise is run_trust_region
         balanced = optimality_of(self.problem, self.best).residual <= OPTIMAL
-        if ended.converged and polishes and not balanced:
+        if ended.converged and not is_polished and not balanced:
             # It may have stopped on a ridge of the objective, along which designs get better.
             self.problem.latest = self.best
             on = run_trust_region(functions, self.best.u, self.iterations, self.note)

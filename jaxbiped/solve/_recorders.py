@@ -130,8 +130,9 @@ class AbstractSolve(abc.ABC):
             return None
         last = last_step(step, before.last, course=True)
         course = self.course(solve, last, step.t1, step.y1)
-        gained = self.integrals.over(solve.scene, course.evaluate, last.t, step.t1)
-        # A reset's own term; of other systems than those that land nothing resets the state.
+        nothing = jtu.tree_map(jnp.zeros_like, before.totals)
+        gained = self.integrals.over(solve.scene, course.evaluate, last.t, step.t1, nothing)
+        # Only where steps land on strikes is the state just before one known.
         if self.resets and step.strikes is not None and step.end is not None:
             struck = step.strikes
             terms = self.integrals.at_strike(solve.scene, step.end())

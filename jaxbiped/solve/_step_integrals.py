@@ -30,9 +30,12 @@ class StepIntegrals:
     at_strike: Callable[[Any, PyTree], PyTree]
 
     def over(
-        self, scene: Any, course: Callable[[Scalar], PyTree], t0: Scalar, t1: Scalar
+        self, scene: Any, course: Callable[[Any], PyTree], t0: Scalar, t1: Scalar, nothing: PyTree
     ) -> PyTree:
-        """The integrals between two times [s] of the states that a course has."""
+        """The integrals between two times [s] of the states that a course has.
+
+        `nothing` has the shape of the rates, and zeros.
+        """
         half, middle = 0.5 * (t1 - t0), 0.5 * (t1 + t0)
 
         def add(total: PyTree, point: tuple[Scalar, Scalar]) -> tuple[PyTree, None]:
@@ -40,9 +43,8 @@ class StepIntegrals:
             rates = self.rates(scene, course(middle + half * node))
             return jtu.tree_map(lambda sum_, rate: sum_ + half * weight * rate, total, rates), None
 
-        zero = jtu.tree_map(jnp.zeros_like, self.rates(scene, course(t0)))
         points = jnp.asarray(_NODES), jnp.asarray(_WEIGHTS)
-        return jax.lax.scan(add, zero, points)[0]
+        return jax.lax.scan(add, nothing, points)[0]
 
 
 class Summed(NamedTuple):
