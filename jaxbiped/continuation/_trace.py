@@ -222,9 +222,9 @@ def trace(
             if attempt.found is None:
                 return stopped(*reason_of(attempt.code))
             there = attempt.found
-            closes = len(points) > 3 and _closes(begin, here, there)
-            if closes:  # beyond its beginning everything is known
-                there = begin
+            closing = _closing(curve, begin, passed, points, there)
+            if closing is not None:  # beyond its beginning everything is known
+                there = closing
             elif (cosine := passed_before(curve, [*passed, *points], there)) is not None:
                 if cosine > 0.0:
                     return stopped(BranchEnd.CLOSED, "the branch is closed")
@@ -247,7 +247,7 @@ def trace(
                 return stopped(BranchEnd.BREAKS_OFF, NOT_SMOOTH)
             if is_bound(there):
                 return stopped(BranchEnd.REACHED, BOUND)
-            if closes:
+            if closing is not None:
                 return stopped(BranchEnd.CLOSED, "the branch is closed")
             here = there
     except KeyboardInterrupt:
@@ -275,10 +275,21 @@ def leaves_range(point: CurvePoint) -> bool:
     return is_bound(point) and bool((point.place[-1] > 0.5) == (point.tangent[-1] > 0.0))
 
 
-def _closes(begin: CurvePoint, here: CurvePoint, there: CurvePoint) -> bool:
-    """Whether a branch passes its own beginning between two points."""
-    step, back = there.place - here.place, begin.place - here.place
+def _closing(
+    curve: Curve,
+    begin: CurvePoint,
+    passed: Sequence[BranchPoint],
+    points: Sequence[BranchPoint],
+    there: CurvePoint,
+) -> CurvePoint | None:
+    """The first gait of a branch if the step from the last of its points passes it, else None."""
+    if len(passed) + len(points) <= 3:
+        return None
+    first, here = passed[0] if passed else begin, points[-1]
+    step, back = there.place - here.place, first.place - here.place
     share = float(back @ step / (step @ step))
     aside = np.linalg.norm(back - share * step)
     near = 0.0 < share <= 1.0 and aside < 0.1 * np.linalg.norm(step)
-    return bool(near and begin.tangent @ there.tangent > _SAME_WAY)
+    if not (near and first.tangent @ there.tangent > _SAME_WAY):
+        return None
+    return correct(curve, first.place, first.tangent).found if passed else begin
