@@ -183,7 +183,7 @@ def draw(options: Options, drawn: list[tuple[str, Case, Any]]) -> str:
         begin = [np.asarray(getattr(gait.state, coordinate)) for coordinate in (case.x, case.y)]
         ax.plot(*begin, "o", label="on the section")
         units = getattr(type(gait.state), "own_units", {})
-        words = [f"{each} ({units[each]})" if each in units else each for each in (case.x, case.y)]
+        words = [f"{each} ({units.get(each, '–')})" for each in (case.x, case.y)]
         label(ax, *words, name)
     axes[0].legend()
     return options.save(figure, "hybrid_systems.png")
