@@ -5,7 +5,7 @@ import re
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.optimise import OBJECTIVES
+from jaxbiped.optimise import NAMED_COSTS, OBJECTIVES
 from tests.drawn import labels_of
 from tests.plot.test_parameter_charts import POINTS, make_branch
 from tests.sweep.walkers import ByFormula, as_kind, gaitless
@@ -36,6 +36,9 @@ BY_DIMENSION = {
     "period": "s", "time": "s", "step_length": "m", "distance": "m", "slip_distance": "m",
     "foot_clearance": "m", "speed": "m/s", "peak_normal": "N", "impact_loss": "J",
     "friction_loss": "J", "motor_work": "J", "fold_distance": "rad", "doubling_distance": "rad",
+    "weight": "N", "slope": "rad", "torque_squared": "N^2 m^2 s", "absolute_work": "J",
+    "push_off_squared": "N^2 s^2", "jerk": "rad^2/s^5", "peak_torque": "N m", "peak_power": "W",
+    "joint_range": "rad",
 }  # fmt: skip
 
 
@@ -63,7 +66,7 @@ def branch_units():
 @pytest.mark.parametrize(
     "table",
     [
-        {name: each.quantity.unit for name, each in OBJECTIVES.items()},
+        {name: each.quantity.unit for name, each in (OBJECTIVES | NAMED_COSTS).items()},
         swept_units(),
         branch_units(),
     ],

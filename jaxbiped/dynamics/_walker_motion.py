@@ -4,6 +4,8 @@ import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+import jax.numpy as jnp
+
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._actuation import Carriers, hip_actuators, motor_torques
@@ -13,6 +15,7 @@ from jaxbiped.dynamics._equivalent_states import poses_of, whole_state
 from jaxbiped.dynamics._impact import push_off_impulse
 from jaxbiped.dynamics._stance import of_stance
 from jaxbiped.dynamics._stance_motion import rolling
+from jaxbiped.dynamics._surfaces import clearance
 from jaxbiped.dynamics._tree import Motion
 from jaxbiped.scene._joint_parts import Motor
 from jaxbiped.scene._mechanism_pieces import named_sum
@@ -127,6 +130,21 @@ class WalkerMotion(NamedTuple):
             if force.tangential is not None:
                 tangential = tangential + force.tangential
         return FootForce(normal, tangential)
+
+    def clearance(self) -> Scalar:
+        """Height of the swinging foot above the ground [m], negative where it passes underground.
+
+        Of compliant feet it is the lowest of those that the clearance rule lets pass, and the
+        walker's height where it lets none.
+        """
+        if not self.scene.compliant:
+            return clearance(self.scene, self.state)
+        lowest = none = self.scene.mechanism.height + 0.0 * self.state[0]
+        for foot in feet(self.scene, self.state):
+            if foot.admitted is not None and foot.admitted is not False:
+                admitted = jnp.asarray(foot.admitted)
+                lowest = jnp.minimum(lowest, jnp.where(admitted, none, -foot.penetration))
+        return lowest
 
     def push_off(self) -> Scalar:
         """The push-off's impulse at a heel strike [N·s]; zero without one."""

@@ -4,7 +4,7 @@ They are objectives and requirements like any other: a cost given to `optimise_g
 its derivatives and their error bars from a solve of the cycle.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
@@ -24,6 +24,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
 from jaxbiped.caching._known_by_shape import known_by_shape
 from jaxbiped.dynamics._walker_motion import WalkerMotion
+from jaxbiped.hybrid._guards import Switch
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._scene import AbstractWalkerScene
 
@@ -42,6 +43,9 @@ class Integral(eqx.Module):
             feet alone, for compliant ones press into the ground for a while. None for no such term.
         corners: a function of the motion that returns numbers where the rate is not smooth at a
             change of their signs: steps end there. None where it is smooth.
+        at_reset: a function of the motions before and behind a reset, `at_reset(before, after)`,
+            that is added at heel strikes of rigid feet and wherever else the state jumps, as where
+            a knee comes to its stop. None for no such term.
 
     Raises:
         ArgumentError: an argument has the wrong type.
@@ -57,14 +61,17 @@ class Integral(eqx.Module):
     rate: MotionFunction = eqx.field(static=True)
     quantity: Quantity = eqx.field(static=True)
     at_strike: MotionFunction | None = eqx.field(static=True, default=None)
-    corners: Callable[[WalkerMotion], Sequence[Scalar]] | None = eqx.field(
+    corners: Callable[[WalkerMotion], Sequence[Scalar | Switch]] | None = eqx.field(
+        static=True, default=None
+    )
+    at_reset: Callable[[WalkerMotion, WalkerMotion], Scalar] | None = eqx.field(
         static=True, default=None
     )
 
     def __check_init__(self) -> None:
         check_function("rate", self.rate)
         check_type("quantity", self.quantity, Quantity)
-        for name in ("at_strike", "corners"):
+        for name in ("at_strike", "corners", "at_reset"):
             if getattr(self, name) is not None:
                 check_function(name, getattr(self, name))
 
@@ -161,33 +168,44 @@ Cost: TypeAlias = Integral | Extreme
 """What a solve of the cycle gives."""
 
 
-def check_cost(cost: Cost, scene: Any) -> None:
-    """Raises `ArgumentError` for a cost that the scene cannot have, before anything is compiled."""
-    if not isinstance(scene, AbstractWalkerScene):
+def has_motion_costs(scene: Any) -> bool:
+    """Whether costs are functions of a scene's motion, as of a walker's."""
+    return isinstance(scene, AbstractWalkerScene)
+
+
+def check_has_costs(name: str, scene: Any) -> None:
+    """Raises `ArgumentError` for a cost of this name of a scene that has none."""
+    if not has_motion_costs(scene):
         raise ArgumentError(
-            f"{cost.name} is not allowed for a {type(scene).__name__}: costs are functions of a "
+            f"{name} is not allowed for a {type(scene).__name__}: costs are functions of a "
             "walker's motion; add a coordinate of its own to the system instead."
         )
-    functions: Mapping[str, Any] = (
-        {"rate": cost.rate, "at_strike": cost.at_strike}
-        if isinstance(cost, Integral)
-        else {"value": cost.value}
-    )
-    if functions.get("at_strike") is not None and not system_of(scene).footsteps_end_on_section:
+
+
+def check_cost(cost: Cost, scene: Any) -> None:
+    """Raises `ArgumentError` for a cost that the scene cannot have, before anything is compiled."""
+    check_has_costs(cost.name, scene)
+    if isinstance(cost, Extreme):
+        _check_number(f"value of {cost.name}", cost.value, scene, 1)
+        return
+    if cost.at_strike is not None and not system_of(scene).footsteps_end_on_section:
         raise ArgumentError(
             f"at_strike of {cost.name} is not allowed for compliant feet, which press into the "
             "ground for a while: give a rate."
         )
-    for name, function in functions.items():
-        if function is not None:
-            _check_number(f"{name} of {cost.name}", function, scene)
+    _check_number(f"rate of {cost.name}", cost.rate, scene, 1)
+    if cost.at_strike is not None:
+        _check_number(f"at_strike of {cost.name}", cost.at_strike, scene, 1)
+    if cost.at_reset is not None:
+        _check_number(f"at_reset of {cost.name}", cost.at_reset, scene, 2)
 
 
-def _check_number(words: str, function: Callable[..., Any], scene: Any) -> None:
+def _check_number(words: str, function: Callable[..., Any], scene: Any, count: int) -> None:
+    """Checks that a function of so many motions returns one number."""
     state = scene.state_type(*[np.zeros(())] * len(scene.state_names))
     leaf = jtu.tree_leaves(state)[0]
     try:
-        told = _shape_of(function, scene, state)
+        told = _shape_of(function, scene, state, count)
     except (jax.errors.ConcretizationTypeError, jax.errors.TracerArrayConversionError) as error:
         raise ArgumentError(
             f"{words} takes the motion for plain numbers, which is not allowed: write it with "
@@ -198,8 +216,8 @@ def _check_number(words: str, function: Callable[..., Any], scene: Any) -> None:
 
 
 @known_by_shape
-def _shape_of(function: Callable[..., Any], scene: Any, state: Any) -> Any:
-    value = function(WalkerMotion(scene, state))
+def _shape_of(function: Callable[..., Any], scene: Any, state: Any, count: int) -> Any:
+    value = function(*[WalkerMotion(scene, state)] * count)
     if not isinstance(value, jax.Array) and not is_number(value):
         return repr(value), ""
     value = jnp.asarray(value)

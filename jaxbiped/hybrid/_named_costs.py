@@ -1,4 +1,4 @@
-"""Named costs of driven walkers: squares of torques, absolute work, peaks, ranges of joints."""
+"""Named costs of a motion: squares of torques, work, losses, slip, peaks, ranges, clearance."""
 
 import functools
 import re
@@ -12,11 +12,16 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
 from jaxbiped.caching._caches import bounded_cache
-from jaxbiped.dynamics._energy import is_driven
+from jaxbiped.dynamics._contacts import feet
+from jaxbiped.dynamics._energy import energies, is_driven, powers
+from jaxbiped.dynamics._footfalls import touches
+from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._walker_motion import Drive, WalkerMotion
+from jaxbiped.hybrid._guards import Switch
 from jaxbiped.hybrid._motion_costs import Cost, Extreme, Integral
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene.actuation._actuators import PushOff
+from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
 _PARTS = 64
 """Parts of which a cost is kept: it is the same object each time, or all would compile again."""
@@ -27,16 +32,48 @@ class NamedCost(NamedTuple):
 
     Attributes:
         quantity: words, symbol and unit.
-        costs: the costs of the part of a name, None for all, with their weights in the sum.
+        terms: the costs that are summed, with their weights, from the quantity and the part of a
+            name, None for all.
         part: what has such a cost by itself, as `NAME[part]`: "motor" or "angle"; empty for
             nothing.
         lacks: why a scene does not have the cost, or None if it has.
     """
 
     quantity: Quantity
-    costs: Callable[[str | None], tuple[tuple[float, Cost], ...]]
+    terms: Callable[[Quantity, str | None], tuple[tuple[float, Cost], ...]]
     part: str
     lacks: Callable[[Any], str | None]
+
+    def costs(self, part: str | None) -> tuple[tuple[float, Cost], ...]:
+        """The costs of the part of a name, None for all, with their weights in the sum."""
+        return _costs_of_part(self, part)
+
+
+@bounded_cache(_PARTS)
+def _costs_of_part(cost: NamedCost, part: str | None) -> tuple[tuple[float, Cost], ...]:
+    return cost.terms(cost.quantity, part)
+
+
+def _integral(rate: Callable[..., Scalar], **others: Any) -> Any:
+    """Terms of a cost that is the integral of `rate(part, motion)`."""
+
+    def terms(quantity: Quantity, part: str | None) -> tuple[tuple[float, Cost], ...]:
+        corners = others.get("corners")
+        own = others | {"corners": corners and functools.partial(corners, part)}
+        return ((1.0, Integral(functools.partial(rate, part), quantity, **own)),)
+
+    return terms
+
+
+def _extremes(value: Callable[..., Scalar], *weights: float) -> Any:
+    """Terms of extremes of `value(part, motion)`: of the largest, and of the smallest one."""
+
+    def terms(quantity: Quantity, part: str | None) -> tuple[tuple[float, Cost], ...]:
+        of_part = functools.partial(value, part)
+        both = zip(weights, (False, True), strict=False)
+        return tuple((weight, Extreme(of_part, quantity, low)) for weight, low in both if weight)
+
+    return terms
 
 
 def _torques(part: str | None, motion: WalkerMotion) -> list[Drive]:
@@ -70,7 +107,23 @@ def _powers(part: str | None, motion: WalkerMotion) -> list[Scalar]:
     return [torque.power for torque in _torques(part, motion)]
 
 
-def _nothing(motion: WalkerMotion) -> Scalar:
+def _largest_torque(part: str | None, motion: WalkerMotion) -> Scalar:
+    return _largest(part, _absolute_torque, motion)
+
+
+def _largest_power(part: str | None, motion: WalkerMotion) -> Scalar:
+    return _largest(part, _absolute_power, motion)
+
+
+def _squares_of_torques(part: str | None, motion: WalkerMotion) -> Scalar:
+    return _sum(part, _square, motion)
+
+
+def _absolute_powers(part: str | None, motion: WalkerMotion) -> Scalar:
+    return _sum(part, _absolute_power, motion)
+
+
+def _nothing(_: str | None, motion: WalkerMotion) -> Scalar:
     return jnp.zeros_like(motion.state[0])
 
 
@@ -79,7 +132,7 @@ def _half_square_of_push_off(motion: WalkerMotion) -> Scalar:
     return 0.5 * impulse * impulse
 
 
-def _square_of_jerk(motion: WalkerMotion) -> Scalar:
+def _square_of_jerk(_: str | None, motion: WalkerMotion) -> Scalar:
     """The sum of squares of the time derivatives of all angular accelerations [rad²/s⁶]."""
     system, scene = system_of(motion.scene), motion.scene
     accelerations = [name for name in motion.state._fields if name.startswith("omega_")]
@@ -97,46 +150,61 @@ def _value_of_angle(part: str | None, motion: WalkerMotion) -> Scalar:
     return motion.angle(part)
 
 
-@bounded_cache(_PARTS)
-def _torque_squared(part: str | None) -> tuple[tuple[float, Cost], ...]:
-    rate = functools.partial(_sum, part, _square)
-    return ((1.0, Integral(rate, Quantity("torque squared", r"$\int u^2$", "N^2 m^2 s"))),)
+def _driving_power(_: str | None, motion: WalkerMotion) -> Scalar:
+    """Power of the motors that drive, added up [W]: none gains energy by braking."""
+    power = jnp.zeros_like(motion.state[0])
+    for motor in _motor_powers(None, motion):
+        power = power + jnp.maximum(motor, 0.0)
+    return power
 
 
-@bounded_cache(_PARTS)
-def _absolute_work(part: str | None) -> tuple[tuple[float, Cost], ...]:
-    rate = functools.partial(_sum, part, _absolute_power)
-    quantity = Quantity("absolute work", "$W_a$", "J")
-    return ((1.0, Integral(rate, quantity, corners=functools.partial(_powers, part))),)
+def _motor_powers(_: str | None, motion: WalkerMotion) -> tuple[Scalar, ...]:
+    return powers(motion.scene, motion.state).motors or ()
 
 
-@bounded_cache(_PARTS)
-def _push_off_squared(part: str | None) -> tuple[tuple[float, Cost], ...]:
-    quantity = Quantity("push off squared", r"$\frac{1}{2} P^2$", "N^2 s^2")
-    return ((1.0, Integral(_nothing, quantity, at_strike=_half_square_of_push_off)),)
+def _driving_push_off(motion: WalkerMotion) -> Scalar:
+    return jnp.maximum(_push_off_work(motion), 0.0)
 
 
-@bounded_cache(_PARTS)
-def _jerk(part: str | None) -> tuple[tuple[float, Cost], ...]:
-    return ((1.0, Integral(_square_of_jerk, Quantity("jerk", "$j$", "rad^2/s^5"))),)
+def _power_of_impacts(_: str | None, motion: WalkerMotion) -> Scalar:
+    return powers(motion.scene, motion.state).indentation
 
 
-@bounded_cache(_PARTS)
-def _peak_torque(part: str | None) -> tuple[tuple[float, Cost], ...]:
-    value = functools.partial(_largest, part, _absolute_torque)
-    return ((1.0, Extreme(value, Quantity("peak torque", "$u$", "N m"))),)
+def _kinetic_energy(motion: WalkerMotion) -> Scalar:
+    return energies(motion.scene, motion.state).kinetic
 
 
-@bounded_cache(_PARTS)
-def _peak_power(part: str | None) -> tuple[tuple[float, Cost], ...]:
-    value = functools.partial(_largest, part, _absolute_power)
-    return ((1.0, Extreme(value, Quantity("peak power", "$P$", "W"))),)
+def _lost_at_reset(before: WalkerMotion, after: WalkerMotion) -> Scalar:
+    return _kinetic_energy(before) - _kinetic_energy(after)
 
 
-@bounded_cache(_PARTS)
-def _joint_range(part: str | None) -> tuple[tuple[float, Cost], ...]:
-    value, quantity = functools.partial(_value_of_angle, part), Quantity("angle", "", "rad")
-    return (1.0, Extreme(value, quantity)), (-1.0, Extreme(value, quantity, smallest=True))
+def _push_off_work(motion: WalkerMotion) -> Scalar:
+    return push_off_work(motion.scene, motion.state)
+
+
+def _power_of_friction(_: str | None, motion: WalkerMotion) -> Scalar:
+    return powers(motion.scene, motion.state).friction
+
+
+def _slip_speed(_: str | None, motion: WalkerMotion) -> Scalar:
+    slip = jnp.zeros_like(motion.state[0])
+    for foot in feet(motion.scene, motion.state):
+        slip = slip + jnp.where(touches(foot), jnp.abs(foot.slip_speed), 0.0)
+    return slip
+
+
+def _corners_of_slip(_: str | None, motion: WalkerMotion) -> list[Switch]:
+    """Touchdown, where the rate of slip jumps, and changes of its sign."""
+    corners = []
+    for foot in feet(motion.scene, motion.state):
+        admitted = True if foot.admitted is None else foot.admitted
+        corners.append(Switch(foot.penetration, admitted, force_jumps=True))
+        corners.append(Switch(foot.slip_speed, touches(foot)))
+    return corners
+
+
+def _clearance(_: str | None, motion: WalkerMotion) -> Scalar:
+    return motion.clearance()
 
 
 def _of_motors(scene: Any) -> str | None:
@@ -152,43 +220,112 @@ def _of_all(scene: Any) -> str | None:
     return None
 
 
+def _of_slip(scene: Any) -> str | None:
+    return None if hasattr(scene, "friction") else "a rigid walker's feet roll without slip"
+
+
+def _of_friction(scene: Any) -> str | None:
+    if isinstance(getattr(scene, "friction", None), Frictionless):
+        return "its friction is Frictionless"
+    return _of_slip(scene)
+
+
+def lacks_swing(scene: Any) -> str | None:
+    """Why no foot of a scene swings past the ground, or None if one does."""
+    rule = getattr(scene, "clearance", None)
+    if rule is None or isinstance(
+        rule.admits(scene.mechanism.structure.legs[0], jnp.ones(())), jax.Array
+    ):
+        return None
+    return f"its clearance rule is {type(rule).__name__}, which lets no foot pass"
+
+
+_OF_MOTORS = ("motor", _of_motors)
 NAMED_COSTS = {
     "torque_squared": NamedCost(
         Quantity("integral of the squared torques", r"$\int u^2$", "N^2 m^2 s"),
-        _torque_squared,
-        "motor",
-        _of_motors,
+        _integral(_squares_of_torques),
+        *_OF_MOTORS,
     ),
     "absolute_work": NamedCost(
-        Quantity("absolute work of the motors", "$W_a$", "J"), _absolute_work, "motor", _of_motors
+        Quantity("absolute work of the motors", "$W_a$", "J"),
+        _integral(_absolute_powers, corners=_powers),
+        *_OF_MOTORS,
+    ),
+    "motor_work": NamedCost(
+        Quantity("work of the motors", "$W$", "J"),
+        _integral(_driving_power, corners=_motor_powers, at_strike=_driving_push_off),
+        "",
+        _of_motors,
     ),
     "push_off_squared": NamedCost(
         Quantity("half of the squared push-off", r"$\frac{1}{2} P^2$", "N^2 s^2"),
-        _push_off_squared,
+        _integral(_nothing, at_strike=_half_square_of_push_off),
         "",
         _of_push_off,
     ),
+    "impact_loss": NamedCost(
+        Quantity("energy lost in impacts", "$E_i$", "J"),
+        _integral(_power_of_impacts, at_strike=_push_off_work, at_reset=_lost_at_reset),
+        "",
+        _of_all,
+    ),
+    "friction_loss": NamedCost(
+        Quantity("energy lost to friction", "$E_f$", "J"),
+        _integral(_power_of_friction),
+        "",
+        _of_friction,
+    ),
+    "slip_distance": NamedCost(
+        Quantity("slip distance", "$s$", "m"),
+        _integral(_slip_speed, corners=_corners_of_slip),
+        "",
+        _of_slip,
+    ),
     "jerk": NamedCost(
-        Quantity("integral of the squared angular jerk", "$j$", "rad^2/s^5"), _jerk, "", _of_all
+        Quantity("integral of the squared angular jerk", "$j$", "rad^2/s^5"),
+        _integral(_square_of_jerk),
+        "",
+        _of_all,
     ),
     "peak_torque": NamedCost(
-        Quantity("largest torque of a motor", "$u$", "N m"), _peak_torque, "motor", _of_motors
+        Quantity("largest torque of a motor", "$u$", "N m"),
+        _extremes(_largest_torque, 1.0),
+        *_OF_MOTORS,
     ),
     "peak_power": NamedCost(
-        Quantity("largest power of a motor", "$P$", "W"), _peak_power, "motor", _of_motors
+        Quantity("largest power of a motor", "$P$", "W"),
+        _extremes(_largest_power, 1.0),
+        *_OF_MOTORS,
     ),
     "joint_range": NamedCost(
-        Quantity("range of an angle", r"$\Delta\varphi$", "rad"), _joint_range, "angle", _of_all
+        Quantity("range of an angle", r"$\Delta\varphi$", "rad"),
+        _extremes(_value_of_angle, 1.0, -1.0),
+        "angle",
+        _of_all,
+    ),
+    "foot_clearance": NamedCost(
+        Quantity("foot clearance", "$h$", "m"),
+        _extremes(_clearance, 0.0, 1.0),
+        "",
+        lacks_swing,
     ),
 }
-"""By name; `NAME[part]` is that of one motor, or of one angle.
+"""By name; `NAME[part]` is that of one motor, or of one angle. Those of a cycle are sums over its
+footsteps.
 
 - torque squared: Σ ∫ u² over all torques of motors, see `WalkerMotion.motors`.
 - absolute work: Σ ∫ of the size of u φ̇, work of braking too.
+- motor work: of each motor where its power is positive, added up, and the push-off's.
 - push off squared: ½ P² of each push-off's impulse P.
+- impact loss: work of the normal reactions, and what springs, stops and latches lose; a rigid
+  walker's kinetic energy lost in its impacts, after its push-off, and what its joints lose.
+- friction loss: work against friction.
+- slip distance: path of the feet that touch, along the ground.
 - jerk: Σ ∫ (dα/dt)² over the angular accelerations of all free angles.
 - peak torque, peak power: the largest size of u and of u φ̇ of any motor along the cycle.
 - joint range: largest minus smallest value of an angle, `joint_range[knee_1]`.
+- foot clearance: least height of the swinging foot, negative where it passes underground.
 """
 
 _OF_PART = re.compile(r"(\w+)\[(\w+)\]")

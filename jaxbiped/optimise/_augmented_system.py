@@ -21,23 +21,17 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, by_numpy, select
 from jaxbiped.dynamics._contacts import feet
-from jaxbiped.dynamics._energy import is_driven, kinetic_energy, powers
 from jaxbiped.dynamics._equivalent_states import exchange_legs
-from jaxbiped.dynamics._footfalls import touches
-from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._surfaces import clearance, clearance_rate, distance_ahead
 from jaxbiped.hybrid._guards import Switch
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.scene._ground import Ground, SteppedGround
-from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene
 from jaxbiped.scene._state_types import WalkerState
 
 _KINDS: dict[tuple[type, tuple[str, ...]], Any] = {}
 """Of each walker's state the augmented ones: always the same types, or all would compile again."""
-MOTOR_WORK = "motor_work"
-"""An integral of driven walkers."""
 _APART = 1e-2
 """How far ahead a rigid walker's foot is that can come down, as a share of the walker's height."""
 PUSH, DROP = "push", "drop"
@@ -153,122 +147,6 @@ class MotionSection(AbstractSection):
 
     def counts(self, args: PyTree, y: PyTree) -> Scalar:
         return self.section.counts(args, motion_of(y))
-
-
-def _driving(motors: tuple[Scalar, ...], like: Scalar) -> Scalar:
-    """Power of the motors that drive, added up [W]: none gains energy by braking."""
-    power = jnp.zeros_like(like)
-    for motor in motors:
-        power = power + jnp.maximum(motor, 0.0)
-    return power
-
-
-class WalkingIntegrals(AbstractAugmentedSystem):
-    """`Walking` with its integrals; its load is the depth of a foot that swings [m]."""
-
-    def vector_field(self, t: Time, y: PyTree, args: Scene) -> PyTree:
-        state = motion_of(y)
-        power = powers(args, state)
-        slip = jnp.zeros_like(state[0])
-        for foot in feet(args, state):
-            slip = slip + jnp.where(touches(foot), jnp.abs(foot.slip_speed), 0.0)
-        rates = {
-            "slip_distance": slip,
-            "friction_loss": power.friction,
-            "impact_loss": power.indentation,
-        }
-        if power.motors is not None:
-            rates[MOTOR_WORK] = _driving(power.motors, slip)
-        return join(y, self.walker.vector_field(t, state, args), rates)
-
-    def switches(self, args: Scene, y: PyTree) -> tuple[Switch, ...]:
-        """The walker's, touchdown as a jump of the rate of slip, and changes of sign.
-
-        Those of slip, and of each motor's power.
-        """
-        state = motion_of(y)
-        own = self.walker.switches(args, state)
-        for foot in feet(args, state):
-            admitted = True if foot.admitted is None else foot.admitted
-            own += (Switch(foot.penetration, admitted, force_jumps=True),)
-            own += (Switch(foot.slip_speed, touches(foot)),)
-        motors = powers(args, state).motors or ()
-        return own + tuple(Switch(power, True) for power in motors)
-
-    def reset_map(self, args: Scene, y: PyTree) -> PyTree:
-        return self.with_motion(y, self.walker.reset_map(args, motion_of(y)))
-
-    def load(self, args: Scene, y: PyTree) -> Scalar:
-        """How deep a foot is underground that the clearance rule lets pass [m]."""
-        none = -args.mechanism.height
-        found = none
-        for foot in feet(args, motion_of(y)):
-            if foot.admitted is not None and foot.admitted is not False:
-                admitted = jnp.asarray(foot.admitted)
-                found = jnp.maximum(found, jnp.where(admitted, none, foot.penetration))
-        return found
-
-
-class RollingIntegrals(AbstractAugmentedSystem):
-    """`Rolling` with the energy that impacts and joints take; its load is the swing foot's depth.
-
-    Impacts are also those of stops and soles. The work of motors includes that of the push-off.
-    """
-
-    def vector_field(self, t: Time, y: PyTree, args: RigidScene) -> PyTree:
-        state = motion_of(y)
-        power = powers(args, state)
-        rates = {"impact_loss": power.indentation}
-        if power.motors is not None:
-            rates[MOTOR_WORK] = _driving(power.motors, state[0])
-        return join(y, self.walker.vector_field(t, state, args), rates)
-
-    def switches(self, args: RigidScene, y: PyTree) -> tuple[Switch, ...]:
-        """The walker's, and each motor's change of sign."""
-        state = motion_of(y)
-        motors = powers(args, state).motors or ()
-        return self.walker.switches(args, state) + tuple(Switch(power, True) for power in motors)
-
-    def reset_at_switch(self, args: RigidScene, y: PyTree, which: Scalar) -> PyTree:
-        state = motion_of(y)
-        after = self.walker.reset_at_switch(args, state, which)
-        lost = kinetic_energy(args, state) - kinetic_energy(args, after)
-        return self.with_motion(y._replace(impact_loss=y.impact_loss + lost), after)
-
-    def reset_map(self, args: RigidScene, y: PyTree) -> PyTree:
-        state = motion_of(y)
-        after = impact(args, state).state
-        push = push_off_work(args, state)
-        lost = kinetic_energy(args, state) + push - kinetic_energy(args, after)
-        gained = {"impact_loss": y.impact_loss + lost}
-        if MOTOR_WORK in self.coordinates:
-            gained[MOTOR_WORK] = y.motor_work + jnp.maximum(push, 0.0)
-        return join(y, after, gained)
-
-    def load(self, args: RigidScene, y: PyTree) -> Scalar:
-        """How deep the swing foot is underground [m]."""
-        return -clearance(args, motion_of(y))
-
-
-@functools.singledispatch
-def integrals_of(scene: Any) -> Any:
-    """The system of a scene with the integrals along its cycle; None where it has no others."""
-    return None
-
-
-@integrals_of.register
-def _(scene: Scene) -> WalkingIntegrals:
-    names = ("slip_distance", "friction_loss", "impact_loss")
-    return WalkingIntegrals(system_of(scene), (*names, *_of_motors(scene)))
-
-
-@integrals_of.register
-def _(scene: RigidScene) -> RollingIntegrals:
-    return RollingIntegrals(system_of(scene), ("impact_loss", *_of_motors(scene)))
-
-
-def _of_motors(scene: AbstractWalkerScene) -> tuple[str, ...]:
-    return (MOTOR_WORK,) if is_driven(scene) else ()
 
 
 class DisturbedCycle(AbstractAugmentedSystem):

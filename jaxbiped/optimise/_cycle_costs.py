@@ -1,6 +1,6 @@
 """Costs of a cycle as functionals of a periodic orbit: integrals together, extremes one by one."""
 
-from typing import Any
+from typing import cast
 
 import equinox as eqx
 import jax
@@ -37,20 +37,26 @@ from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import Precision
 
 
-class IntegratedCycle(AbstractAugmentedSystem):
-    """A walker with integrals as coordinates, in their order.
+class CostedCycle(AbstractAugmentedSystem):
+    """A walker with integrals as coordinates, in their order, whose load is a function of it.
 
     Attributes:
         walker: the walker without them.
         coordinates: their names.
-        integrals: whose rates and terms at strikes they gain.
+        integrals: whose rates and terms at resets they gain.
+        extreme: what is looked for; the load is its value, with the opposite sign for a smallest.
+            None for no load.
     """
 
     integrals: tuple[Integral, ...] = eqx.field(static=True)
+    extreme: Extreme | None = eqx.field(static=True)
 
     @classmethod
-    def of(cls, walker: AbstractSystem, integrals: tuple[Integral, ...]) -> "IntegratedCycle":
-        return cls(walker, tuple(f"integral_{k}" for k in range(len(integrals))), integrals)
+    def of(
+        cls, walker: AbstractSystem, integrals: tuple[Integral, ...], extreme: Extreme | None = None
+    ) -> "CostedCycle":
+        names = tuple(f"integral_{k}" for k in range(len(integrals)))
+        return cls(walker, names, integrals, extreme)
 
     def vector_field(self, t: Time, y: PyTree, args: PyTree) -> PyTree:
         state = motion_of(y)
@@ -65,7 +71,7 @@ class IntegratedCycle(AbstractAugmentedSystem):
         state = motion_of(y)
         motion = WalkerMotion(args, state)
         corners = [
-            Switch(value, True)
+            value if isinstance(value, Switch) else Switch(value, True)
             for integral in self.integrals
             if integral.corners is not None
             for value in integral.corners(motion)
@@ -74,38 +80,34 @@ class IntegratedCycle(AbstractAugmentedSystem):
 
     def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
         state = motion_of(y)
-        motion, gained = WalkerMotion(args, state), {}
+        after = self.walker.reset_map(args, state)
+        if not self.walker.footsteps_end_on_section:
+            return self.with_motion(y, after)
+        struck = join(y, after, self._with_terms(args, y, after))
         for name, integral in zip(self.coordinates, self.integrals, strict=True):
-            gained[name] = getattr(y, name)
             if integral.at_strike is not None:
-                gained[name] = gained[name] + integral.at_strike(motion)
-        return join(y, self.walker.reset_map(args, state), gained)
+                more = getattr(struck, name) + integral.at_strike(WalkerMotion(args, state))
+                struck = struck._replace(**{name: more})
+        return struck
 
+    def reset_at_switch(self, args: PyTree, y: PyTree, which: Scalar) -> PyTree:
+        after = self.walker.reset_at_switch(args, motion_of(y), which)
+        return join(y, after, self._with_terms(args, y, after))
 
-class ExtremeCycle(AbstractAugmentedSystem):
-    """A walker whose load is a function of the motion.
+    def _with_terms(self, args: PyTree, y: PyTree, after: PyTree) -> dict[str, Scalar]:
+        """The coordinates behind a reset, with what every reset adds."""
+        gained = {name: getattr(y, name) for name in self.coordinates}
+        both = WalkerMotion(args, motion_of(y)), WalkerMotion(args, after)
+        for name, integral in zip(self.coordinates, self.integrals, strict=True):
+            if integral.at_reset is not None:
+                gained[name] = gained[name] + integral.at_reset(*both)
+        return gained
 
-    Attributes:
-        walker: the walker with its own load.
-        coordinates: none.
-        extreme: what is looked for; the load is its value, with the opposite sign for a smallest.
-    """
-
-    extreme: Extreme = eqx.field(static=True)
-
-    @classmethod
-    def of(cls, walker: AbstractSystem, extreme: Extreme) -> "ExtremeCycle":
-        return cls(walker, (), extreme)
-
-    def vector_field(self, t: Time, y: PyTree, args: PyTree) -> PyTree:
-        return join(y, self.walker.vector_field(t, motion_of(y), args), {})
-
-    def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
-        return join(y, self.walker.reset_map(args, motion_of(y)), {})
-
-    def load(self, args: PyTree, y: PyTree) -> Scalar:
-        motion = WalkerMotion(args, motion_of(y))
-        return jnp.asarray(self.extreme.sign * self.extreme.value(motion))
+    def load(self, args: PyTree, y: PyTree) -> Scalar | None:
+        if self.extreme is None:
+            return None
+        value = self.extreme.value(WalkerMotion(args, motion_of(y)))
+        return jnp.asarray(self.extreme.sign * value)
 
 
 def cost_functionals(
@@ -133,19 +135,19 @@ def cost_functionals(
     walker, section = system_of(scene.minimal), MotionSection(section_of(scene, None))
     precision = functional_precision(accuracy, scene)
     integrals = tuple(cost for cost in costs if isinstance(cost, Integral))
-    systems: dict[tuple[Cost, ...], Any] = {}
-    if integrals:
-        systems[integrals] = IntegratedCycle.of(walker, integrals)
-    for cost in costs:
-        if isinstance(cost, Extreme):
-            systems[cost,] = ExtremeCycle.of(walker, cost)
+    extremes = [cost for cost in costs if isinstance(cost, Extreme)]
+    first = extremes[0] if extremes else None
+    # All integrals are coordinates of one solve; each solve looks for one extreme.
+    groups = [(integrals, first), *(((), extreme) for extreme in extremes[1:])]
     rows: dict[Cost, list[Scalar]] = {}
     codes = []
-    for own, system in systems.items():
+    for summed, extreme in groups:
+        system = CostedCycle.of(walker, summed, extreme)
         spec = cycle_spec(scene, system, section, arrivals, engine)
         note_code(spec, scene)
         told = _functionals(spec, scene, system.begin(state), precision)
-        rows |= {cost: [part[k] for part in told[:4]] for k, cost in enumerate(own)}
+        group: tuple[Cost, ...] = summed if extreme is None else (*summed, extreme)
+        rows |= {cost: [part[k] for part in told[:4]] for k, cost in enumerate(group)}
         codes.append(told.code)
     columns = zip(*(rows[cost] for cost in costs), strict=True)
     return Functionals._make([*map(jnp.stack, columns), jnp.max(jnp.stack(codes))])
@@ -156,10 +158,11 @@ def _functionals(
     spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precision
 ) -> Functionals:
     orbits = orbits_near(spec, scene, y, fine)
-    if isinstance(spec.system, ExtremeCycle):
-        sign = spec.system.extreme.sign
-        peaks, slopes = jax.vmap(total_of_peak)(orbits.returns, orbits.points)
-        values, slopes = sign * peaks[:, None], sign * slopes[:, None]
-    else:
-        values, slopes = jax.vmap(totals_of_advance)(orbits.returns, orbits.points)
+    both = orbits.returns, orbits.points
+    values, slopes = jax.vmap(totals_of_advance)(*both)
+    extreme = cast(CostedCycle, spec.system).extreme
+    if extreme is not None:
+        peaks, by_peak = jax.vmap(total_of_peak)(*both)
+        values = jnp.concatenate([values, extreme.sign * peaks[:, None]], axis=1)
+        slopes = jnp.concatenate([slopes, extreme.sign * by_peak[:, None]], axis=1)
     return with_errors(values, slopes / orbits.sizes, orbits.returns.code)

@@ -10,7 +10,6 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.gait._fixed_point_search import with_looser
 from jaxbiped.gait._orbit_derivatives import slopes_of
@@ -24,16 +23,13 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import (
     ReturnMapSpec,
     orbit_solver,
-    runs_by_lanes,
 )
-from jaxbiped.hybrid._sections import AbstractSection, section_of
+from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._system import AbstractSystem
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.linalg._small_matrices import solve
-from jaxbiped.optimise._augmented_system import MotionSection, integrals_of
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import WalkerScene
-from jaxbiped.scene._state_types import WalkerState
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, precision_of
 from jaxbiped.variational._tangents import Seeded
 
@@ -85,37 +81,6 @@ class Functionals(NamedTuple):
     slopes: Scalar
     slope_errors: Scalar
     code: Scalar
-
-
-def cycle_functionals(
-    scene: WalkerScene,
-    state: WalkerState,
-    *,
-    arrivals: int = 1,
-    accuracy: str = "balanced",
-    engine: str = "lanes",
-) -> Functionals:
-    """The integrals over the cycle of the gait with this state, and its swing foot's clearance.
-
-    Args:
-        scene: the walker.
-        state: of its gait, on the section.
-        arrivals: how often a cycle comes to the section.
-        accuracy: "balanced" or "tight".
-        engine: "xla" or "lanes".
-
-    Returns:
-        Of each integral in the order of `integral_names`, then of the foot's clearance [m]; with
-        respect to all parameters in the order of `parameter_names`.
-    """
-    system, section = integrals_of(scene), MotionSection(section_of(scene, None))
-    spec = cycle_spec(scene, system, section, arrivals, engine)
-    return _functionals(spec, scene, system.begin(state), functional_precision(accuracy, scene))
-
-
-def integral_names(scene: WalkerScene) -> tuple[str, ...]:
-    """What `cycle_functionals` tells of a scene."""
-    return (*integrals_of(scene).coordinates, "foot_clearance")
 
 
 def cycle_spec(
@@ -187,15 +152,6 @@ def orbits_near(spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precis
     return Orbits(seeds, sizes, *jax.vmap(once)(with_looser(fine)))
 
 
-@host_jit(runs_by_lanes)
-def _functionals(
-    spec: ReturnMapSpec, scene: WalkerScene, y: PyTree, fine: Precision
-) -> Functionals:
-    found = orbits_near(spec, scene, y, fine)
-    values, slopes = jax.vmap(_totals)(found.returns, found.points)
-    return with_errors(values, slopes / found.sizes, found.returns.code)
-
-
 def with_errors(values: Scalar, slopes: Scalar, code: Scalar) -> Functionals:
     """Functionals from a fine solve and a looser one, leaves (2, …); NaN unless both returned."""
     known = jnp.where(jnp.all(code == 0), 1.0, jnp.nan)
@@ -227,9 +183,3 @@ def total_of_peak(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar
     """The largest load at that fixed point, and total derivatives."""
     row = once.peak_row[: len(point)]
     return once.peak + row @ _newton_step(once, point), slopes_of(once).peak
-
-
-def _totals(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:
-    """The integrals, and the swing foot's clearance, which is minus the load."""
-    (gained, slopes), (depth, slope) = (f(once, point) for f in (totals_of_advance, total_of_peak))
-    return jnp.append(gained, -depth), jnp.concatenate([slopes, -slope[None]])

@@ -27,7 +27,7 @@ from jaxbiped.optimise._objective_values import (
     Evaluation,
     Evaluations,
     evaluate,
-    functional_names,
+    jacobian_names,
 )
 from jaxbiped.optimise._objectives import (
     Measures,
@@ -178,7 +178,7 @@ class DesignProblem:
     def has_cluster(self) -> bool:
         """Whether functionals of multipliers are of one gait, not means over an ensemble."""
         of_one = self.ensemble is None or self.ensemble.criterion != "mean"
-        return of_one and bool(functional_names(self.scene, measures_named(CLUSTER[:1]))[0])
+        return of_one and bool(jacobian_names(self.scene, measures_named(CLUSTER[:1])))
 
     def begin(self, u: np.ndarray, guess: WalkerState | None = None) -> Design:
         """The first design; its gait is found near a guess, or from nothing.

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
@@ -24,14 +23,12 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._augmented_system import MOTOR_WORK, integrals_of
+from jaxbiped.hybrid._motion_costs import has_motion_costs
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_costs import cost_functionals
 from jaxbiped.optimise._cycle_functionals import (
     Functional,
     Functionals,
-    cycle_functionals,
-    integral_names,
     weighted_sum,
 )
 from jaxbiped.optimise._jacobian_functionals import (
@@ -41,8 +38,7 @@ from jaxbiped.optimise._jacobian_functionals import (
     SYMMETRIC,
     jacobian_functionals,
 )
-from jaxbiped.optimise._objectives import Combined, Measures, costs_of, with_parts
-from jaxbiped.scene._parameter_access import parameter_names, select_parameters
+from jaxbiped.optimise._objectives import OBJECTIVES, Combined, Measures, costs_of, with_parts
 from jaxbiped.scene._scene import AbstractScene, WalkerScene
 
 _OF_THE_GAIT = ("speed", "step_length", "period", "peak_normal")
@@ -52,8 +48,8 @@ _DISTANCES = {
 }
 _WHOLE = ("sensitivity_norm", "floor_sensitivity", *CLEARANCE_NORMS)
 """What the whole sensitivity is made of: step length, step time and clearance, by both."""
-AllFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None, Functionals | None]
-"""Those of a gait's Jacobian, of its cycle and its costs; None where no measure needs them."""
+AllFunctionals: TypeAlias = tuple[Functionals | None, Functionals | None]
+"""Those of a gait's Jacobian and of its costs; None where no measure needs them."""
 
 
 class Evaluation(NamedTuple):
@@ -87,38 +83,26 @@ def functionals_of(
     scene: WalkerScene, gait: Gait, wanted: Measures, accuracy: str
 ) -> AllFunctionals:
     """What measures need beside the gait itself."""
-    of_jacobian, of_cycle = functional_names(scene, wanted)
+    names, costs = jacobian_names(scene, wanted), costs_of(with_parts(wanted), scene)
     how: Any = {"arrivals": len(gait.orbit[0]), "accuracy": accuracy, "engine": gait.engine}
-    state, first, second, third = gait.measures.state, None, None, None
-    if of_jacobian:
-        first = jacobian_functionals(scene, state, of_jacobian, **how)
-    if of_cycle:
-        second = cycle_functionals(scene, state, **how)
-    if costs := costs_of(with_parts(wanted)):
-        third = cost_functionals(scene, state, costs, **how)
-    return first, second, third
+    state, of_jacobian, of_costs = gait.measures.state, None, None
+    if names:
+        of_jacobian = jacobian_functionals(scene, state, names, **how)
+    if costs:
+        of_costs = cost_functionals(scene, state, costs, **how)
+    return of_jacobian, of_costs
 
 
-def functional_names(scene: AbstractScene, measures: Measures) -> tuple[tuple[str, ...], bool]:
-    """Which functionals of the Jacobian these measures need, and whether those of the cycle.
-
-    Where a cycle has no integrals all measures are known with the gait.
-    """
-    if integrals_of(scene) is None:
-        return (), False
-    every = with_parts(measures)
-    wanted = [name for name, each in every.items() if not (each.costs or each.combined)]
+def jacobian_names(scene: AbstractScene, measures: Measures) -> tuple[str, ...]:
+    """Which functionals of the Jacobian these measures need; none where a scene is no walker."""
+    if not has_motion_costs(scene):
+        return ()
+    wanted = {name for name, each in with_parts(measures).items() if name in OBJECTIVES}
     needed = {*wanted, *(_WHOLE if "whole_sensitivity" in wanted else ())}
-    of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
+    names = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
     if "spectral_radius" in wanted:
-        of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
-    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity", *_own(every)}
-    return of_jacobian, bool(set(wanted) - others)
-
-
-def _own(wanted: Measures) -> dict[str, Callable[[Any, Gait], tuple[Any, Any, Any, Any]]]:
-    """Those of a user's own among these measures, by name."""
-    return {name: each.measured for name, each in wanted.items() if each.measured is not None}
+        names = (*CLUSTER, *(name for name in names if name not in CLUSTER))
+    return names
 
 
 def evaluate(
@@ -133,28 +117,27 @@ def evaluate(
     `functionals` are those of `functionals_of`, where they are known.
     """
     both = (gait.measures, gait.measure_errors, gait.sensitivities, gait.sensitivity_errors)
-    of_jacobian, _ = functional_names(scene, wanted)
+    of_jacobian = jacobian_names(scene, wanted)
     of_gait = tuple(name for name in _OF_THE_GAIT if name in gait.measured)
     if "spectral_radius" in {*wanted} - {*of_jacobian}:
         of_gait = (*of_gait, "spectral_radius")
     rows = {name: _row(*(getattr(each, name) for each in both)) for name in of_gait}
-    rows |= {name: Functional(*measured(scene, gait)) for name, measured in _own(wanted).items()}
+    for name, each in with_parts(wanted).items():
+        if each.measured is not None:
+            rows[name] = Functional(*each.measured(scene, gait))
     if functionals is None:
         functionals = functionals_of(scene, gait, wanted, accuracy)
-    first, second, third = functionals
-    if first is not None:
+    of_derivatives, of_costs = functionals
+    if of_derivatives is not None:
         # The orbit's own error moves the Jacobian, too, as its multipliers tell.
         shares = np.asarray(gait.multiplier_errors) / float(gait.measures.spectral_radius)
-        for name, row in zip(of_jacobian, _rows_of(first), strict=True):
+        for name, row in zip(of_jacobian, _rows_of(of_derivatives), strict=True):
             # Symmetric functions do not move as multipliers that meet do.
             moved = 0.0 if name in SYMMETRIC else abs(row.value) * float(shares[0])
             rows[name] = row._replace(error=max(row.error, moved))
     if "whole_sensitivity" in wanted:
         rows["whole_sensitivity"] = _root_of_squares([rows[name] for name in _WHOLE])
-    if second is not None:
-        rows |= dict(zip(integral_names(scene), _rows_of(second), strict=True))
-        rows["cost_of_transport"] = _cost_of_transport(scene, rows)
-    rows = with_costs(wanted, rows, third)
+    rows = with_costs(wanted, rows, of_costs, scene)
     beyond_range = []
     for name in (name for name in wanted if name in _DISTANCES):
         told = bifurcation_distance(scene, gait, _DISTANCES[name], accuracy=accuracy)
@@ -184,17 +167,20 @@ def _rows_of(found: Functionals) -> list[Functional]:
 
 
 def with_costs(
-    wanted: Measures, rows: Mapping[str, Functional], costs: Functionals | None
+    wanted: Measures, rows: Mapping[str, Functional], costs: Functionals | None, scene: Any
 ) -> dict[str, Functional]:
-    """Adds the measures that are sums of costs or functions of others to those known by name."""
+    """Adds the measures that are sums of costs or functions of others to those known by name.
+
+    Costs that the scene lacks are zero.
+    """
     every, rows = with_parts(wanted), dict(rows)
-    if costs is not None:
-        parts = dict(zip(costs_of(every), _rows_of(costs), strict=True))
-        for name, each in every.items():
-            if each.costs:
-                terms = [parts[cost] for _, cost in each.costs]
-                count = costs.slopes.shape[1]
-                rows[name] = weighted_sum([weight for weight, _ in each.costs], terms, count)
+    known = () if costs is None else _rows_of(costs)
+    parts = dict(zip(costs_of(every, scene), known, strict=True))
+    for name, each in every.items():
+        if each.costs:
+            terms = [(weight, parts[cost]) for weight, cost in each.costs if cost in parts]
+            weights, summed = zip(*terms, strict=True) if terms else ((), ())
+            rows[name] = weighted_sum(weights, summed, len(rows["period"].slopes))
     for name, each in every.items():
         if each.combined is not None:
             rows[name] = _combination(each.combined, rows)
@@ -204,48 +190,22 @@ def with_costs(
 def _combination(combined: Combined, rows: dict[str, Functional]) -> Functional:
     """A function of functionals, to first order in their errors."""
     parts = [rows[name] for name in combined.of]
-    values = [jnp.asarray(part.value) for part in parts]
-    value, by_part = jax.value_and_grad(combined.function, tuple(range(len(parts))))(*values)
+    values = tuple(jnp.asarray(part.value) for part in parts)
+    value, by_part = _value_and_slopes(combined.function, values)
     return weighted_sum(map(float, by_part), parts, len(parts[0].slopes))._replace(
         value=float(value)
     )
+
+
+@cached_jit
+def _value_and_slopes(function: Callable[..., Any], values: tuple[Scalar, ...]) -> Any:
+    return jax.value_and_grad(function, tuple(range(len(values))))(*values)
 
 
 def _root_of_squares(rows: list[Functional]) -> Functional:
     value = float(np.sqrt(sum(row.value**2 for row in rows)))
     shares = [row.value / value for row in rows]
     return weighted_sum(shares, rows, len(rows[0].slopes))._replace(value=value)
-
-
-def _cost_of_transport(scene: WalkerScene, rows: dict[str, Functional]) -> Functional:
-    """Work of the motors over weight times length, and gravity's share, exact over a cycle."""
-    slope, length = float(scene.ground.slope), rows["step_length"]
-    by_slope = np.zeros(len(length.slopes))
-    by_slope[parameter_names(scene).index("slope")] = np.cos(slope)
-    if MOTOR_WORK not in rows:
-        return Functional(np.sin(slope), 0.0, by_slope, np.zeros(len(by_slope)))
-    work, (weight, by_parameters) = rows[MOTOR_WORK], map(np.asarray, _weight(scene))
-    own = length.slopes / length.value + by_parameters / weight
-    divisor = float(weight) * length.value
-    cost = work.value / divisor
-    return Functional(
-        value=cost + np.sin(slope),
-        error=work.error / divisor + cost * length.error / length.value,
-        slopes=work.slopes / divisor - cost * own + by_slope,
-        slope_errors=work.slope_errors / divisor + cost * length.slope_errors / length.value,
-    )
-
-
-@cached_jit
-def _weight(scene: WalkerScene) -> tuple[Scalar, Scalar]:
-    """The walker's weight [N], and its derivatives with respect to all parameters, shape (p,)."""
-
-    def of(there: Any) -> Scalar:
-        return there.mechanism.total_mass * there.ground.g
-
-    value, slopes = jax.value_and_grad(of)(scene)
-    (_, places), leaves = select_parameters(scene, None), jtu.tree_leaves(slopes)
-    return value, jnp.stack([leaves[k] for k in places])
 
 
 class Evaluations:

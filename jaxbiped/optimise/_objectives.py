@@ -7,40 +7,35 @@ from typing import Any, NamedTuple, TypeAlias
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice, check_function, check_type
 from jaxbiped._quantity import Quantity
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._energy import is_driven
 from jaxbiped.dynamics._state import cyclic_names
 from jaxbiped.gait._gait import Gait
-from jaxbiped.hybrid._motion_costs import Cost, Extreme, Integral, check_cost, name_of
-from jaxbiped.hybrid._named_costs import NAMED_COSTS, cost_named, part_of
-from jaxbiped.optimise._augmented_system import integrals_of
+from jaxbiped.hybrid._motion_costs import (
+    Cost,
+    Extreme,
+    Integral,
+    check_cost,
+    check_has_costs,
+    has_motion_costs,
+    name_of,
+)
+from jaxbiped.hybrid._named_costs import NAMED_COSTS, cost_named, lacks_swing, part_of
 from jaxbiped.scene._modes import rigid_modes
-from jaxbiped.scene._parameter_access import parameter_names, parameter_values
+from jaxbiped.scene._parameter_access import parameter_names, parameter_values, select_parameters
 from jaxbiped.scene._scene import AbstractScene
-from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
 _SEARCHED = {
     "fatal_push": "it is the nearest point of a basin's boundary, found by a search that has no "
     "derivatives; jb.basins.minimal_fatal_shock tells it of a gait that was found",
 }
 """What a gait has that is none of a smooth function's values."""
-
-
-def _of_driven(scene: Any) -> str | None:
-    return None if is_driven(scene) else "it has no actuators"
-
-
-def _of_slip(scene: Any) -> str | None:
-    return None if hasattr(scene, "friction") else "a rigid walker's feet roll without slip"
-
-
-def _of_friction(scene: Any) -> str | None:
-    if isinstance(getattr(scene, "friction", None), Frictionless):
-        return "its friction is Frictionless"
-    return _of_slip(scene)
 
 
 def _of_strike(scene: Any) -> str | None:
@@ -62,16 +57,7 @@ def _of_steps(scene: Any) -> str | None:
 
 
 def _of_clearance(scene: Any) -> str | None:
-    return _of_swing(scene) or _of_steps(scene)
-
-
-def _of_swing(scene: Any) -> str | None:
-    rule = getattr(scene, "clearance", None)
-    if rule is None or isinstance(
-        rule.admits(scene.mechanism.structure.legs[0], jnp.ones(())), jax.Array
-    ):
-        return None
-    return f"its clearance rule is {type(rule).__name__}, which lets no foot pass"
+    return lacks_swing(scene) or _of_steps(scene)
 
 
 class Combined(NamedTuple):
@@ -88,6 +74,41 @@ class Combined(NamedTuple):
 
 def _divide(dividend: Any, divisor: Any) -> Any:
     return dividend / divisor
+
+
+def _cost_of_transport(work: Any, length: Any, weight: Any, slope: Any) -> Any:
+    """Work of the motors over weight times length, and gravity's share, exact over a cycle."""
+    return work / (weight * length) + jnp.sin(slope)
+
+
+class ParameterFunction(eqx.Module):
+    """A measure that is a function of the scene's parameters alone.
+
+    Attributes:
+        function: of a scene; JAX differentiates it.
+    """
+
+    function: Callable[[Any], Any] = eqx.field(static=True)
+
+    def __call__(self, scene: Any, gait: Gait) -> tuple[Any, Any, Any, Any]:
+        """The value, its error, the derivatives with respect to the p parameters, their errors."""
+        value, slopes = _value_and_slopes(self.function, jtu.tree_map(as_float, scene))
+        return float(value), 0.0, np.asarray(slopes), np.zeros(len(slopes))
+
+
+@cached_jit
+def _value_and_slopes(function: Callable[[Any], Any], scene: Any) -> tuple[Scalar, Scalar]:
+    value, slopes = jax.value_and_grad(function)(scene)
+    (_, places), leaves = select_parameters(scene, None), jtu.tree_leaves(slopes)
+    return value, jnp.stack([leaves[k] for k in places])
+
+
+def _weight(scene: Any) -> Any:
+    return scene.mechanism.total_mass * scene.ground.g
+
+
+def _slope(scene: Any) -> Any:
+    return scene.ground.slope
 
 
 class Objective(NamedTuple):
@@ -136,24 +157,19 @@ OBJECTIVES = {
     "strike_divergence": Objective(
         Quantity("divergence of foot strike", "$\\ln|\\det S|$"), _of_strike
     ),
-    "cost_of_transport": Objective(Quantity("cost of transport", "$C$")),
-    "impact_loss": Objective(Quantity("energy lost in impacts", "$E_i$", "J")),
-    "friction_loss": Objective(Quantity("energy lost to friction", "$E_f$", "J"), _of_friction),
-    "slip_distance": Objective(Quantity("slip distance", "$s$", "m"), _of_slip),
-    "motor_work": Objective(Quantity("work of the motors", "$W$", "J"), _of_driven),
-    "foot_clearance": Objective(Quantity("foot clearance", "$h$", "m"), _of_swing),
+    "cost_of_transport": Objective(
+        Quantity("cost of transport", "$C$"),
+        combined=Combined(_cost_of_transport, ("motor_work", "step_length", "weight", "slope")),
+    ),
+    "weight": Objective(Quantity("weight", "$m g$", "N"), measured=ParameterFunction(_weight)),
+    "slope": Objective(Quantity("slope", "$\\gamma$", "rad"), measured=ParameterFunction(_slope)),
     "fold_distance": Objective(Quantity("distance to the fold in slope", "$D_f$", "rad")),
     "doubling_distance": Objective(Quantity("distance to the doubling in slope", "$D_d$", "rad")),
 }
-"""By name. Those of a cycle: losses and slip are sums over its footsteps.
+"""By name; see `NAMED_COSTS` for what is summed along a cycle.
 
 - cost of transport: work of gravity and of the motors over weight times way, as
   `measure.cost_of_transport` has it; sin(slope) for a passive walker.
-- impact loss: work of the normal reactions, and what springs, stops and latches lose; a rigid
-  walker's kinetic energy lost in its impacts, after its push-off, and what its joints lose.
-- motor work: of each motor where its power is positive, added up, and the push-off's.
-- slip distance: path of the feet that touch, along the ground.
-- foot clearance: least height of the swinging foot, negative where it passes underground.
 - radius bound: never below the spectral radius, and smooth also where multipliers meet or have
   equal moduli, where that has corners; see `jacobian_functionals`.
 - sensitivity norm, floor sensitivity, their norms of clearance, strike divergence: see
@@ -166,8 +182,6 @@ OBJECTIVES = {
 
 _PER = {"_per_length": ("step_length", "length", "m"), "_per_time": ("period", "time", "s")}
 """What a cost by name may be divided by: the measure, its words and its unit."""
-_DIVIDED = ("slip_distance", "friction_loss", "impact_loss", "motor_work")
-"""Objectives that are integrals along the cycle."""
 Measures: TypeAlias = Mapping[str, Objective]
 """Objectives by the names that an optimisation tells them by."""
 
@@ -184,7 +198,7 @@ def objective_named(name: str, what: str = "objective") -> Objective:
         return OBJECTIVES[name]
     for suffix, (divisor, words, unit) in _PER.items():
         base = name.removesuffix(suffix)
-        if base != name and (base in _DIVIDED or part_of(base)[0] in NAMED_COSTS):
+        if base != name and part_of(base)[0] in NAMED_COSTS:
             known = objective_named(base, what)
             per = Quantity(
                 f"{known.quantity.words} per {words}", "", f"({known.quantity.unit})/{unit}"
@@ -214,13 +228,16 @@ def with_parts(measures: Measures) -> dict[str, Objective]:
     return every
 
 
-def costs_of(measures: Measures) -> tuple[Cost, ...]:
-    """All integrals and extremes in measures, each once."""
-    return tuple(dict.fromkeys(cost for each in measures.values() for _, cost in each.costs))
+def costs_of(measures: Measures, scene: Any) -> tuple[Cost, ...]:
+    """All integrals and extremes in measures, each once; what a scene lacks is zero and not among
+    them.
+    """
+    known = (each.costs for each in measures.values() if each.costs and not each.lacks(scene))
+    return tuple(dict.fromkeys(cost for costs in known for _, cost in costs))
 
 
 def _of_ground(name: str, scene: AbstractScene) -> str | None:
-    if integrals_of(scene) is not None:
+    if has_motion_costs(scene):
         return None
     advances = bool(cyclic_names(scene.state_type))
     own = ("period", "spectral_radius", *(("speed", "step_length") if advances else ()))
@@ -238,16 +255,18 @@ def check_objective(
     check_type(what, given, str, Integral, Extreme, FunctionOf, Linear)
     objective, lacks = objective_of(given, scene, what), None
     name = given if isinstance(given, str) else given.name
-    if objective.combined is not None:
-        for part in objective.combined.of:
+    if isinstance(given, FunctionOf):
+        for part in given.of:
             check_objective(part, scene, what)
-    elif objective.measured is None and not objective.costs:
-        lacks = _of_ground(name, scene)
+    elif isinstance(given, str) and name in OBJECTIVES:
+        lacks = _of_ground(name, scene) if objective.measured is None else None
+    elif objective.costs or objective.combined:
+        check_has_costs(name, scene)
     lacks = lacks or objective.lacks(scene)
     if lacks is not None:
         raise ArgumentError(f"{what} = {name!r} is not allowed for this scene: {lacks}.")
-    for _, cost in objective.costs:
-        check_cost(cost, scene)
+    if isinstance(given, Integral | Extreme):
+        check_cost(given, scene)
     return name, objective
 
 
@@ -265,7 +284,7 @@ def objective_of(given: "str | Measure", scene: Any, what: str) -> Objective:
         for name in given.weights:
             check_choice(what, name, parameter_names(scene))
         sums = functools.partial(_linear, tuple(given.weights.items()))
-        return Objective(Quantity(given.name), measured=sums)
+        return Objective(Quantity(given.name), measured=ParameterFunction(sums))
     return Objective(given.quantity, costs=((1.0, given),))
 
 
@@ -333,17 +352,6 @@ Measure: TypeAlias = Cost | FunctionOf | Linear
 """A measure that is asked for as an object."""
 
 
-def is_sum_of_parameters(objective: Objective) -> bool:
-    """Whether a measure is one that `Linear` describes."""
-    return getattr(objective.measured, "func", None) is _linear
-
-
-def _linear(
-    weights: tuple[tuple[str, float], ...], scene: Any, gait: Gait
-) -> tuple[float, float, np.ndarray, np.ndarray]:
-    own, names = parameter_values(scene), parameter_names(scene)
-    slopes = np.zeros(len(names))
-    for name, weight in weights:
-        slopes[names.index(name)] = weight
-    value = sum(weight * float(own[name]) for name, weight in weights)
-    return value, 0.0, slopes, np.zeros(len(names))
+def _linear(weights: tuple[tuple[str, float], ...], scene: Any) -> Any:
+    values = parameter_values(scene)
+    return sum(weight * values[name] for name, weight in weights)

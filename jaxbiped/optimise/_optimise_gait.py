@@ -25,7 +25,7 @@ from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
 from jaxbiped.hybrid._sections import AbstractSection, chosen_section
 from jaxbiped.optimise._design_gaits import CRITERIA, Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._design_problem import DesignProblem, start_of, variables_of
-from jaxbiped.optimise._objective_values import Evaluations, functional_names
+from jaxbiped.optimise._objective_values import Evaluations, jacobian_names
 from jaxbiped.optimise._objectives import (
     Measure,
     Measures,
@@ -177,7 +177,7 @@ def optimise_gait(
     if scatter:
         worse = larger_is_worse(told, sense, requirements) if criterion == "worst" else {}
         ensemble = ensemble_of(scene, scatter, members, criterion, worse, seed)
-    radius = "spectral_radius" in measures and not functional_names(scene, measures)[0]
+    radius = "spectral_radius" in measures and not jacobian_names(scene, measures)
     settings = GaitSettings(footsteps, accuracy, engine, section, radius)
     evaluations = Evaluations()
     if store is not None:

@@ -23,12 +23,12 @@ from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
 from jaxbiped.hybrid._landing_system import AbstractLandingSystem
-from jaxbiped.hybrid._motion_costs import Extreme, Integral
+from jaxbiped.hybrid._motion_costs import Extreme, Integral, has_motion_costs
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.hybrid._sections import section_of
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.optimise._augmented_system import MotionSection, integrals_of
-from jaxbiped.optimise._cycle_costs import IntegratedCycle
+from jaxbiped.optimise._augmented_system import MotionSection
+from jaxbiped.optimise._cycle_costs import CostedCycle
 from jaxbiped.optimise._cycle_functionals import (
     Functional,
     Functionals,
@@ -38,7 +38,7 @@ from jaxbiped.optimise._cycle_functionals import (
 from jaxbiped.optimise._design_functions import AnyRow, rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem, start_of
 from jaxbiped.optimise._objective_values import Evaluation, with_costs
-from jaxbiped.optimise._objectives import costs_of, is_sum_of_parameters, with_parts
+from jaxbiped.optimise._objectives import ParameterFunction, costs_of, with_parts
 from jaxbiped.optimise._optimisers import RunEnding
 from jaxbiped.optimise._sequential_programming import Conditions, run_newton
 from jaxbiped.optimise._shooting import Linearised, Segments, linearise_segments
@@ -89,11 +89,11 @@ class Simultaneous:
     def __init__(self, problem: DesignProblem, count: int) -> None:
         scene, settings = problem.scene.minimal, problem.settings
         self.problem, self.count = problem, count
-        costs = costs_of(with_parts(problem.wanted))
+        costs = costs_of(with_parts(problem.wanted), scene)
         self._integrals = tuple(cost for cost in costs if isinstance(cost, Integral))
         self._path = tuple(cost for cost in costs if isinstance(cost, Extreme))
         self._scene, self._walker = scene, cast(AbstractLandingSystem, system_of(scene))
-        system = IntegratedCycle.of(self._walker, self._integrals)
+        system = CostedCycle.of(self._walker, self._integrals)
         pose = default_guess(scene)
         self._like = system.begin(pose)
         engine = _spec_of(scene, settings.engine).engine
@@ -249,7 +249,8 @@ class Simultaneous:
         by_both = (length.slopes - value * parts[0].slopes) / parts[0].value
         rows = {"period": parts[0], "step_length": length}
         rows["speed"] = Functional(value, 0.0, by_both, none)
-        for name, objective in self.problem.wanted.items():
+        every = with_parts(self.problem.wanted)
+        for name, objective in every.items():
             if objective.measured is not None:
                 total, _, by_parameter, _ = objective.measured(self.problem.scene_at(u), _NO_GAIT)
                 row = none.copy()
@@ -266,10 +267,10 @@ class Simultaneous:
                 rows |= {f"{name} at {i}": node for i, node in enumerate(nodes)}
         functionals = None
         if costs:
-            chosen = (costs[cost] for cost in costs_of(with_parts(self.problem.wanted)))
+            chosen = (costs[cost] for cost in costs_of(every, self._scene))
             columns: list[Any] = [*map(np.array, zip(*chosen, strict=True)), np.zeros(())]
             functionals = Functionals(*columns)
-        rows = with_costs(self.problem.wanted, rows, functionals)
+        rows = with_costs(every, rows, functionals, self._scene)
         fields: Any = zip(*rows.values(), strict=True)
         named: list[Any] = [dict(zip(rows, part, strict=True)) for part in fields]
         return Evaluation(*[*named, none[:1], np.zeros((1, len(sums)))])
@@ -323,7 +324,7 @@ def check_simultaneous(problem: DesignProblem) -> None:
             f'formulation = "together" is not allowed {what}: choose "gait by gait".'
         )
 
-    if integrals_of(scene.minimal) is None:
+    if not has_motion_costs(scene.minimal):
         raise refuse(f"for a {type(scene).__name__}, which is no walker")
     if not system_of(scene.minimal).footsteps_end_on_section:
         raise refuse("for compliant feet, which press into the ground for a while")
@@ -348,7 +349,7 @@ def check_simultaneous(problem: DesignProblem) -> None:
                     f"for {name}, an extreme, except as the upper bound of a largest value or the "
                     "lower bound of a smallest one"
                 )
-        is_sum = objective.costs or is_sum_of_parameters(objective)
+        is_sum = objective.costs or isinstance(objective.measured, ParameterFunction)
         if not (is_sum or objective.combined or name in _OF_CYCLE):
             raise refuse(f"for {name}, which is no integral along the cycle")
 

@@ -21,7 +21,7 @@ from jaxbiped._checks import (
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.dynamics._walker_motion import WalkerMotion
 from jaxbiped.hybrid._endings import WATCHES
-from jaxbiped.hybrid._motion_costs import Integral, check_cost
+from jaxbiped.hybrid._motion_costs import Integral, check_cost, check_has_costs
 from jaxbiped.hybrid._named_costs import cost_named
 from jaxbiped.hybrid._sections import AbstractSection
 from jaxbiped.hybrid._walker_systems import system_of
@@ -188,19 +188,23 @@ class WalkIntegrals(NamedTuple):
 
     def rates(self, scene: Any, state: PyTree) -> dict[str, Scalar]:
         """The rates at a state."""
-        return self._told(scene, state, lambda integral: integral.rate)
+        return self._told(scene, lambda integral: integral.rate, state)
 
     def at_strike(self, scene: Any, state: PyTree) -> dict[str, Scalar]:
         """What a heel strike adds, at the state just before it."""
-        return self._told(scene, state, lambda integral: integral.at_strike)
+        return self._told(scene, lambda integral: integral.at_strike, state)
+
+    def at_reset(self, scene: Any, before: PyTree, after: PyTree) -> dict[str, Scalar]:
+        """What a reset adds, from the states before and behind it."""
+        return self._told(scene, lambda integral: integral.at_reset, before, after)
 
     def _told(
-        self, scene: Any, state: PyTree, part: Callable[[Integral], Any]
+        self, scene: Any, part: Callable[[Integral], Any], *states: PyTree
     ) -> dict[str, Scalar]:
-        motion, told = WalkerMotion(scene, state), {}
+        motions, told = [WalkerMotion(scene, state) for state in states], {}
         for name, integral in zip(self.names, self.integrals, strict=True):
             function = part(integral)
-            value = jnp.zeros_like(state[0]) if function is None else function(motion)
+            value = jnp.zeros_like(states[0][0]) if function is None else function(*motions)
             told[name] = jnp.asarray(value, dtype=jnp.float64)
         return told
 
@@ -221,15 +225,17 @@ def integrals_asked(scene: Any, given: Any) -> StepIntegrals | None:
         asked: Any = given[each] if named else each
         if isinstance(asked, str):
             cost, part = cost_named(asked, "integrals")
+            check_has_costs(asked, scene)
             if (lacks := cost.lacks(scene)) is not None:
                 raise ArgumentError(
                     f"integrals = {asked!r} is not allowed for this scene: {lacks}."
                 )
             asked, name = cost.costs(part)[0][1], asked
+            check_type("integrals", asked, Integral)
         else:
-            name = getattr(asked, "name", "")
-        check_type("integrals", asked, Integral)
-        check_cost(asked, scene)
+            check_type("integrals", asked, Integral)
+            check_cost(asked, scene)
+            name = asked.name
         integrals[each if named else name] = asked
     own = WalkIntegrals(tuple(integrals), tuple(integrals.values()))
-    return StepIntegrals(own.rates, own.at_strike)
+    return StepIntegrals(own.rates, own.at_strike, own.at_reset)

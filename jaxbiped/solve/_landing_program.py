@@ -185,6 +185,7 @@ class LandingSolve(AbstractSolve):
             coefficients=coefficients,
             end=lambda: system.completed(solve.scene, tried.end()),
             strikes=after.arrived,
+            changes=None if after.modes is None else after.modes.changed,
             continues=before.landing > 0,
         )
 

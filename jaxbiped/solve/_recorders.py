@@ -134,9 +134,7 @@ class AbstractSolve(abc.ABC):
         gained = self.integrals.over(solve.scene, course.evaluate, last.t, step.t1, nothing)
         # Only where steps land on strikes is the state just before one known.
         if self.resets and step.strikes is not None and step.end is not None:
-            struck = step.strikes
-            terms = self.integrals.at_strike(solve.scene, step.end())
-            gained = jtu.tree_map(lambda a, b: a + jnp.where(struck, b, 0.0), gained, terms)
+            gained = jtu.tree_map(jnp.add, gained, self.integrals.at_end(solve.scene, step))
         totals = jtu.tree_map(
             lambda total, more: total + jnp.where(last.noted, more, 0.0), before.totals, gained
         )

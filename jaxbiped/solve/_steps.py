@@ -32,6 +32,7 @@ class Step(NamedTuple):
             state within it is made (False).
         end: gives the state at its end before a reset; None where there are no resets.
         strikes: whether a footstep ends it; None where footsteps are not counted.
+        changes: whether a change of mode ends it; None where there is only one.
         continues: whether it only tells the end of the step before; None: it never does.
         grazes: number of steps so far in which a switch was grazed; None where no step ends on one.
     """
@@ -44,6 +45,7 @@ class Step(NamedTuple):
     coefficients: Callable[[bool], tuple[PyTree, ...]]
     end: Callable[[], PyTree] | None = None
     strikes: Scalar | None = None
+    changes: Scalar | None = None
     continues: Scalar | None = None
     grazes: Scalar | None = None
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+import jaxbiped as jb
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.optimise._cycle_costs import cost_functionals
-from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
 from jaxbiped.optimise._design_gaits import GaitSettings, ensemble_of, evaluate_ensemble
 from jaxbiped.optimise._design_problem import DesignProblem, start_of, variables_of
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
@@ -27,10 +27,11 @@ def evaluated_over_members(scene, gait, names, criterion, larger):
     return ensemble.factors, evaluate_ensemble(ensemble, scene, nominal, wanted, GaitSettings())
 
 
-def integrals_of(scene, state, **how):
-    """What is summed over the cycle from a state."""
-    found = np.asarray(cycle_functionals(scene, state, **how).values)
-    return dict(zip(integral_names(scene), found.tolist(), strict=True))
+def named_costs_of(scene, state, names, **how):
+    """Costs of the cycle from a state, by name."""
+    costs = [cost for name in names for _, cost in jb.optimise.NAMED_COSTS[name].costs(None)]
+    values = np.asarray(cost_functionals(scene, state, tuple(costs), **how).values)
+    return dict(zip(names, values.tolist(), strict=True))
 
 
 def of_return_jacobian(scene, state, names, **how):

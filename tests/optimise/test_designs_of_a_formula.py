@@ -16,9 +16,16 @@ from jaxbiped.dynamics._actuation import hip_torques
 from jaxbiped.dynamics._stance import of_stance
 from jaxbiped.dynamics._stance_motion import hip_motion_of
 from jaxbiped.gait import Search
+from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.optimise import Evaluation, Outcome, _certificate
-from jaxbiped.optimise._augmented_system import integrals_of
-from jaxbiped.optimise._cycle_functionals import Functional, _totals, with_errors
+from jaxbiped.optimise._cycle_costs import CostedCycle
+from jaxbiped.optimise._cycle_functionals import (
+    Functional,
+    Functionals,
+    total_of_peak,
+    totals_of_advance,
+    with_errors,
+)
 from jaxbiped.optimise._design_gaits import (
     Ensemble,
     _by_nominal,
@@ -29,7 +36,8 @@ from jaxbiped.optimise._design_gaits import (
 from jaxbiped.optimise._design_problem import scale_of
 from jaxbiped.optimise._jacobian_functionals import entry_weights, leading_multipliers
 from jaxbiped.optimise._local_model import Local
-from jaxbiped.optimise._objective_values import Evaluations, _cost_of_transport, _root_of_squares
+from jaxbiped.optimise._objective_values import Evaluations, _root_of_squares, with_costs
+from jaxbiped.optimise._objectives import measures_named
 from jaxbiped.optimise._optimality import optimality_of
 from jaxbiped.optimise._optimisers import _damped_update, run_trust_constr
 from tests.optimise.drawn_designs import (
@@ -167,16 +175,27 @@ def test_the_cost_of_transport_moves_with_all_that_it_is_made_of():
             slopes[names.index(name)] = difference(moved)
         return Functional(function(base), error, slopes, 0.0 * slopes)
 
-    rows = {"motor_work": as_row(work, 1e-3), "step_length": as_row(length, 2e-3)}
-    found = _cost_of_transport(scene, rows)
+    measures = measures_named(["cost_of_transport"])
+
+    def cost_of(scene, costs):
+        kept = [names.index(name) for name in jb.parameter_names(scene)]
+        row = as_row(length, 2e-3)
+        row = row._replace(slopes=row.slopes[kept], slope_errors=row.slope_errors[kept])
+        rows = {"period": row, "step_length": row}
+        for name in ("weight", "slope"):
+            rows[name] = Functional(*jb.optimise.OBJECTIVES[name].measured(scene, None))
+        return with_costs(measures, rows, costs, scene)["cost_of_transport"]
+
+    found = cost_of(scene, Functionals(*map(np.stack, zip(as_row(work, 1e-3))), np.zeros(())))
     expected = as_row(lambda p: motors(p) + np.sin(p["slope"]), 0.0)
     assert found.value == pytest.approx(expected.value)
     np.testing.assert_allclose(found.slopes, expected.slopes, rtol=1e-6, atol=1e-9)
     assert found.error == pytest.approx(motors(base) * (1e-3 / work(base) + 2e-3 / length(base)))
-    passive = _cost_of_transport(scene, {"step_length": rows["step_length"]})
-    assert (passive.value, passive.error) == (np.sin(0.02), 0.0)
-    alone = {names[k]: slope for k, slope in enumerate(passive.slopes) if slope}
-    assert alone == {"slope": np.cos(0.02)}
+    passive = cost_of(jb.RigidScene(scene.walker, scene.ground), None)
+    assert (passive.value, passive.error) == (pytest.approx(np.sin(0.02), rel=1e-15), 0.0)
+    slopes = dict(zip(jb.parameter_names(scene)[:-1], passive.slopes, strict=True))
+    alone = {name: slope for name, slope in slopes.items() if slope}
+    assert alone == {"slope": pytest.approx(np.cos(0.02), rel=1e-15)}
 
 
 def test_a_root_of_squares_has_the_slopes_of_one():
@@ -302,9 +321,11 @@ def test_totals_are_those_of_the_fixed_point():
         peak_row=jnp.array([0.1, 0.2]),
         grazes=jnp.asarray(0),
     )
-    values, slopes = _totals(once, jnp.array([x]))
-    np.testing.assert_allclose(values, [6.0, 5.0, -0.2])
-    np.testing.assert_allclose(slopes[:, 0], [1.0 + 3.0 * 0.5, 0.0, -(0.2 + 0.1 * 0.5)])
+    values, slopes = totals_of_advance(once, jnp.array([x]))
+    np.testing.assert_allclose(values, [6.0, 5.0])
+    np.testing.assert_allclose(slopes[:, 0], [1.0 + 3.0 * 0.5, 0.0])
+    peak, slope = total_of_peak(once, jnp.array([x]))
+    np.testing.assert_allclose([peak, slope[0]], [0.2, 0.2 + 0.1 * 0.5])
 
 
 def test_functionals_of_a_jacobian_and_their_weights():
@@ -337,30 +358,39 @@ def test_functionals_of_a_jacobian_and_their_weights():
         assert slope == pytest.approx(expected[1], rel=1e-6, abs=1e-9), name
 
 
+def integral_named(name):
+    """A named cost of the whole walker, an integral."""
+    ((_, integral),) = jb.optimise.NAMED_COSTS[name].costs(None)
+    return integral
+
+
 def test_integrals_of_a_cycle_gain_what_their_powers_say():
     scene = jb.seed_scene()
-    system = integrals_of(scene)
+    names = ("slip_distance", "friction_loss", "impact_loss")
+    rate_of = {name: integral_named(name).rate for name in names}
     state = jb.seed_state()._replace(hip_z=jnp.asarray(0.3948), hip_vx=jnp.asarray(-0.4))
 
     @jax.jit
     def fields(y):
-        rates = system.vector_field(0.0, system.begin(y), scene)
+        motion = jb.dynamics.WalkerMotion(scene, y)
+        rates = {name: rate(motion) for name, rate in rate_of.items()}
         return rates, jb.dynamics.powers(scene, y), jb.dynamics.feet(scene, y)
 
     rates, power, both = fields(state)
     touching = float(both[1].penetration) > 0.0 and bool(both[1].admitted)
     assert touching
     assert float(both[1].slip_speed) < 0.0
-    assert float(rates.slip_distance) == pytest.approx(-float(both[1].slip_speed))
-    assert float(rates.friction_loss) == pytest.approx(float(power.friction))
-    assert float(rates.friction_loss) > 0.0
-    assert float(rates.impact_loss) == pytest.approx(float(power.indentation))
+    assert float(rates["slip_distance"]) == pytest.approx(-float(both[1].slip_speed))
+    assert float(rates["friction_loss"]) == pytest.approx(float(power.friction))
+    assert float(rates["friction_loss"]) > 0.0
+    assert float(rates["impact_loss"]) == pytest.approx(float(power.indentation))
 
 
 def test_an_impact_loses_the_energy_that_is_missing_after_it_and_the_push_off():
     push, spring = jb.actuation.PushOff(0.2), jb.actuation.HipSpring(1.0)
     scene = jb.RigidScene(HEAVY_HIP, jb.Ground(0.02), (push, spring))
-    system, walker = integrals_of(scene), rigid_walker(scene)
+    integrals = tuple(map(integral_named, ("impact_loss", "motor_work")))
+    system, walker = CostedCycle.of(system_of(scene), integrals), rigid_walker(scene)
     state = jb.dynamics.RigidState(*map(jnp.asarray, (0.0, 0.3, -0.3, -1.0, -1.8)))
     after = jax.jit(lambda y: system.reset_map(scene, system.begin(y)))(state)
     energies = []
@@ -370,20 +400,20 @@ def test_an_impact_loses_the_energy_that_is_missing_after_it_and_the_push_off():
         energies.append(0.5 * np.einsum("ni,nij,nj", rates, walker.mass_matrix(y), rates))
     given = float(push_off_work(scene, state))
     assert given > 0.0
-    assert float(after.impact_loss) == pytest.approx(energies[0] + given - energies[1])
-    assert float(after.motor_work) == pytest.approx(given)
+    assert float(after.integral_0) == pytest.approx(energies[0] + given - energies[1])
+    assert float(after.integral_1) == pytest.approx(given)
 
 
 def test_motors_work_where_they_drive_and_not_where_they_brake():
     pulse = jb.actuation.HipPulse(2.0, phase=0.0, width=0.5)
     scene = jb.RigidScene(HEAVY_HIP, jb.Ground(0.02), pulse)
-    system = integrals_of(scene)
+    rate = integral_named("motor_work").rate
 
     @jax.jit
     def told(state):
         motors = powers(scene, state).motors
         hip = of_stance(scene, state, hip_motion_of)
-        work = system.vector_field(0.0, system.begin(state), scene).motor_work
+        work = rate(jb.dynamics.WalkerMotion(scene, state))
         return work, motors, hip_torques(scene, hip)
 
     signs = set()

@@ -13,7 +13,9 @@ import jaxbiped as jb
 from jaxbiped.compiler import host_jit
 from jaxbiped.gait._poincare_map import linearised_return, recurring_components, seed_directions
 from jaxbiped.hybrid._sections import section_of
-from jaxbiped.optimise._augmented_system import MotionSection, integrals_of
+from jaxbiped.hybrid._walker_systems import system_of
+from jaxbiped.optimise._augmented_system import MotionSection
+from jaxbiped.optimise._cycle_costs import CostedCycle
 from jaxbiped.optimise._cycle_functionals import cycle_spec
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.solve._accuracy import precision_of
@@ -37,7 +39,9 @@ NORMS = {
 @host_jit()
 def cycle(scene, state):
     """The state after a cycle; its length, its time, and how high the swinging foot passed."""
-    system, section = integrals_of(scene), MotionSection(section_of(scene, None))
+    ((_, clearance),) = jb.optimise.NAMED_COSTS["foot_clearance"].costs(None)
+    system = CostedCycle.of(system_of(scene), (), clearance)
+    section = MotionSection(section_of(scene, None))
     y = system.begin(state._replace(hip_x=jnp.zeros(())))
     seeds, _ = seed_directions(scene, (), len(recurring_components(system, y)))
     spec = cycle_spec(scene, system, section, 1, "lanes")

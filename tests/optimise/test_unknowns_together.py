@@ -227,13 +227,24 @@ def test_five_links_walk_from_zero_torque_and_their_knees_bend_one_way():
         assert best.measures[f"knee_{i}_highest"] <= 0.0
 
 
+def test_the_cost_of_transport_is_an_integral_like_any_other():
+    """Its optimum is certified, and its value is that of a walk's measure."""
+    best = jb.optimise_gait(
+        PD, vary=GAINS, minimise="cost_of_transport", subject_to=STEP, formulation="together"
+    )
+    assert best.outcome is jb.optimise.Outcome.CONVERGED
+    walk = jb.rigid_walk(best.scene, best.gait.measures.state, footsteps=2, max_arrivals=2)
+    cost = jb.measure.cost_of_transport(best.scene, walk).cost
+    assert best.objective == pytest.approx(float(cost[-1]), rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("how", "words"),
     [
         (dict(formulation="all at once"), "formulation = 'all at once' is not"),
         (dict(segments=0), "segments = 0 is not allowed"),
         (dict(minimise="spectral_radius"), "spectral_radius, which is no integral along the cycle"),
-        (dict(subject_to="motor_work<1"), "motor_work, which is no integral along the cycle"),
+        (dict(subject_to="radius_bound<1"), "radius_bound, which is no integral along the cycle"),
         (dict(minimise="peak_torque"), "peak_torque, an extreme, except as the upper bound"),
         (dict(subject_to="peak_torque>3"), "peak_torque, an extreme, except as the upper bound"),
         (dict(subject_to="joint_range[leg_1]<1"), r"joint_range\[leg_1\], an extreme"),
