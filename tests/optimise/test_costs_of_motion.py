@@ -276,3 +276,16 @@ def test_a_store_belongs_to_the_functions_of_its_costs(tmp_path):
     assert first.objective == again.objective
     with pytest.raises(jb.ArgumentError, match="belongs to another problem"):
         jb.optimise_gait(DRIVEN, minimise=costs[1], **how)
+
+
+def test_losses_along_a_walk_are_those_of_the_ledger():
+    """Of a walker whose knees strike their stops, over two footsteps of its gait."""
+    scene = jb.models.hsu_chen()
+    gait = jb.find_gait(scene, parameters=(), accuracy="tight")
+    start = gait.measures.state
+    walk = jb.simulate(scene, start, footsteps=2, integrals="impact_loss", accuracy="tight")
+    once = jb.rigid_walk(scene, start, footsteps=2, max_arrivals=2, accuracy="tight")
+    books = jb.measure.rigid_ledger(scene, once)
+    (strike,), (stops,) = books.impact_loss, books.stop_loss
+    assert stops > 0.01
+    assert float(walk.integrals["impact_loss"]) == pytest.approx(2.0 * (strike + stops), rel=1e-8)
