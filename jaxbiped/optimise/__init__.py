@@ -23,3 +23,4 @@ from jaxbiped.optimise._optimisers import OPTIMISERS as OPTIMISERS
 from jaxbiped.optimise._optimum import Iteration as Iteration
 from jaxbiped.optimise._optimum import Optimum as Optimum
 from jaxbiped.optimise._optimum import Outcome as Outcome
+from jaxbiped.optimise._optimum_sensitivities import Sensitivities as Sensitivities

@@ -26,6 +26,7 @@ from jaxbiped.optimise._optimality import (
 )
 from jaxbiped.optimise._optimisers import BY_NAME, RunEnding, run_optax, run_trust_region
 from jaxbiped.optimise._optimum import Iteration, Optimum, Outcome
+from jaxbiped.optimise._optimum_sensitivities import sensitivities_of
 
 if TYPE_CHECKING:
     import optax
@@ -175,6 +176,8 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     if outcome in (Outcome.CONVERGED, Outcome.FLAT):
         doubt = doubt_of_gait(gait.outcome, gait.critical)
         outcome = Outcome.CORNER if doubt else outcome
+    unknown = f"The search ended as {outcome!s}, so derivatives of an optimum are not known."
+    unknown = "" if outcome is Outcome.CONVERGED else unknown
     return Optimum(
         outcome=outcome,
         message=_message(problem, best, runs.ended, doubt),
@@ -186,6 +189,7 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
         error=found.error + sum(abs(held.multiplier) * held.error for held in known.requirements),
         known=best.known,
         curvature=curvature_of(problem, best) if outcome is Outcome.CONVERGED else None,
+        sensitivities=sensitivities_of(problem, best, named, unknown),
         quantities={name: objectives[name].quantity for name in named},
         optimality=known,
         history=runs.history,
