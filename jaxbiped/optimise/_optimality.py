@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # its submodules are imported where they are first used
 
+from jaxbiped.optimise._cycle_functionals import Functional
 from jaxbiped.optimise._design_functions import AnyRow, Row, cluster_rows, rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem, scale_of
 
@@ -95,6 +96,18 @@ class Balance(NamedTuple):
     multipliers: np.ndarray
     spreads: np.ndarray
     normals: np.ndarray
+
+    @property
+    def holds(self) -> np.ndarray:
+        """Which of the multipliers surely hold the design (booleans), shape (q,)."""
+        holds = np.abs(self.multipliers) > self.spreads
+        holds[: len(self.active)] |= np.array([row.equality for row, _ in self.active], bool)
+        return holds
+
+    @property
+    def open_directions(self) -> np.ndarray:
+        """Orthonormal directions in u that nothing holds, shape (k, d)."""
+        return np.asarray(scipy.linalg.null_space(self.normals[:, self.holds].T))
 
 
 def _smooth_gradient(problem: DesignProblem, design: Design) -> np.ndarray:
@@ -189,7 +202,6 @@ class SecondDerivatives(NamedTuple):
 
     Attributes:
         balance: the Lagrangian's multipliers.
-        holds: which of them hold the design (booleans), shape (q,).
         directions: orthonormal directions in u, shape (k, d).
         slopes: derivatives along them of its derivatives with respect to u, and behind these of
             those with respect to all parameters, shape (d, k + p); NaN where designs beside this
@@ -198,7 +210,6 @@ class SecondDerivatives(NamedTuple):
     """
 
     balance: Balance
-    holds: np.ndarray
     directions: np.ndarray
     slopes: np.ndarray
     errors: np.ndarray
@@ -233,9 +244,7 @@ def second_derivatives_of(problem: DesignProblem, design: Design) -> SecondDeriv
     is_smooth = len(balance.left) == len(design.u)
     if not is_smooth or not all(isinstance(row, Row) for row, _ in balance.active):
         return None
-    holds = np.abs(balance.multipliers) > balance.spreads
-    holds[: len(balance.active)] |= np.array([row.equality for row, _ in balance.active], bool)
-    directions = scipy.linalg.null_space(balance.normals[:, holds].T)
+    directions = balance.open_directions
 
     def rows_at(there: Design) -> np.ndarray:
         """Derivatives with respect to u and all parameters, and their errors, (2, k + p)."""
@@ -253,7 +262,7 @@ def second_derivatives_of(problem: DesignProblem, design: Design) -> SecondDeriv
             (first, second), length = map(rows_at, sides), (one.u - other.u) @ direction
             row[:] = (first[0] - second[0]) / length
             bars[:] = (np.abs(first[1]) + np.abs(second[1])) / abs(length)
-    return SecondDerivatives(balance, holds, directions, slopes, errors)
+    return SecondDerivatives(balance, directions, slopes, errors)
 
 
 def curvature_of(problem: DesignProblem, design: Design) -> Curvature:
@@ -302,6 +311,11 @@ def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
         requirements=tuple(requirements),
         bounds=tuple(bounds),
     )
+
+
+def objective_error(total: Functional, known: Optimality) -> float:
+    """The objective's error: what holds it is known to an error, too, by which it would gain."""
+    return total.error + sum(abs(held.multiplier) * held.error for held in known.requirements)
 
 
 def doubt_of(problem: DesignProblem, design: Design) -> str:

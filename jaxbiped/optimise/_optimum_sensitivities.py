@@ -76,7 +76,7 @@ def optimality_equations(
     """The equations of a design without a doubt, see `doubt_of_derivatives`."""
     balance, (u, known), others = second.balance, design, fixed_places(problem)
     (d, both), k, n, q = second.slopes.shape, len(u), len(others), len(balance.active)
-    held = np.flatnonzero(second.holds[:q])
+    held = np.flatnonzero(balance.holds[:q])
     rows, r = [balance.active[place][0] for place in held], len(held)
     none = np.zeros((0, both - k))
     slopes = np.vstack([none, *(row.slopes(known) for row in rows)])
@@ -100,7 +100,7 @@ def optimality_equations(
     return OptimalityEquations(
         (*(names[place] for place in others), *(f"bound of {row.name}" for row in rows)),
         values,
-        np.vstack([second.slopes[:, :k], balance.normals[:, second.holds].T]),
+        np.vstack([second.slopes[:, :k], balance.normals[:, balance.holds].T]),
         variable_errors,
         by_fixed,
         fixed_errors,
@@ -154,7 +154,7 @@ def doubt_of_derivatives(second: SecondDerivatives | None) -> str:
     """Why an optimum has no derivatives; empty where it has."""
     if second is None:
         return "Multipliers of the gait hold the optimum, beside which it is not smooth."
-    rows, holds = second.balance.active, second.holds
+    rows, holds = second.balance.active, second.balance.holds
     names = [row.name for row, _ in rows] + ["a variable's bound"] * (len(holds) - len(rows))
     for name, is_held in zip(names, holds, strict=True):
         if not is_held:

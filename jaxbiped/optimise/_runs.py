@@ -22,6 +22,7 @@ from jaxbiped.optimise._optimality import (
     doubt_of,
     is_flat,
     is_near,
+    objective_error,
     optimality_of,
 )
 from jaxbiped.optimise._optimisers import BY_NAME, RunEnding, run_optax, run_trust_region
@@ -185,8 +186,7 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
         gait=gait,
         variables=problem.variables.by_name(best.u),
         objective=problem.sense * found.value,
-        # What holds it is known to an error, too, which the objective would gain by.
-        error=found.error + sum(abs(held.multiplier) * held.error for held in known.requirements),
+        error=objective_error(found, known),
         known=best.known,
         curvature=curvature_of(problem, best) if outcome is Outcome.CONVERGED else None,
         sensitivities=sensitivities_of(problem, best, named, unknown),
