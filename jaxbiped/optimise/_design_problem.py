@@ -4,6 +4,7 @@ A gait is sought from where the last one's derivatives point; where that fails, 
 branch, it is followed there in smaller steps. Every design is evaluated once and kept.
 """
 
+import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -183,7 +184,7 @@ class DesignProblem:
         how = self.wanted, self.settings, evaluations
         return DesignProblem(scene, self.variables, told, self.sense, requirements, *how)
 
-    @property
+    @functools.cached_property
     def has_cluster(self) -> bool:
         """Whether functionals of multipliers are of one gait, not means over an ensemble."""
         of_one = self.ensemble is None or self.ensemble.criterion != "mean"
