@@ -57,6 +57,7 @@ class Variables(NamedTuple):
         low, high: their bounds, shape (k,).
         logarithmic: where u is linear in the logarithm (booleans): where both bounds are positive.
         places: of the variables among all parameters of the scene, shape (k,).
+        fixed: names of the parameters that are not varied.
     """
 
     names: tuple[str, ...]
@@ -64,6 +65,13 @@ class Variables(NamedTuple):
     high: np.ndarray
     logarithmic: np.ndarray
     places: np.ndarray
+    fixed: tuple[str, ...]
+
+    @property
+    def fixed_places(self) -> np.ndarray:
+        """Places of the parameters that are not varied, in the order of `fixed`."""
+        every = np.arange(len(self.names) + len(self.fixed))
+        return np.setdiff1d(every, self.places)
 
     def values(self, u: np.ndarray) -> np.ndarray:
         """Parameters at u, shape (…, k); at 0 and 1 the bounds exactly."""
@@ -123,6 +131,7 @@ def variables_of(scene: Any, vary: Mapping[str, tuple[float, float]]) -> Variabl
         high=highs,
         logarithmic=lows > 0.0,
         places=np.asarray([names.index(name) for name in vary]),
+        fixed=tuple(name for name in names if name not in vary),
     )
 
 

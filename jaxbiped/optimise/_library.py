@@ -16,7 +16,7 @@ from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._design_problem import variables_of as design_variables
 from jaxbiped.optimise._objective_values import Evaluations, functional_names
-from jaxbiped.optimise._objectives import check_objective, with_parts
+from jaxbiped.optimise._objectives import OBJECTIVES, check_objective, with_parts
 from jaxbiped.optimise._optimality import objective_error, optimality_of, scale_at
 from jaxbiped.optimise._optimise_gait import Goal, goal_of, optimise_gait
 from jaxbiped.optimise._optimum import Outcome
@@ -155,7 +155,9 @@ def _dataset(grid: OptimumGrid, missing: int) -> "xarray.Dataset":
     import xarray
 
     base, dims = grid.base, tuple(grid.axes)
-    measures, units = with_parts(base.wanted), parameter_quantities(base.scene)
+    units, measures = parameter_quantities(base.scene), with_parts(base.wanted)
+    known = next(iter(grid.points.values())).design.known
+    measures |= {n: objective for n, objective in OBJECTIVES.items() if n in known.values}
     [objective, *others] = base.weights
     alone = not others and base.weights[objective] == base.sense
     quantity = measures[objective].quantity if alone else Quantity("objective", unit="SI")
@@ -218,7 +220,7 @@ def _row_of(grid: OptimumGrid, point: GridPoint) -> dict[str, float]:
             error = scale * float(point.equations.objective_errors[at])
         row |= {f"slope_{name}": slope, f"slope_{name}_error": error}
     row |= {f"design_{name}": value for name, value in problem.variables.by_name(u).items()}
-    for name in with_parts(problem.wanted):
-        row |= {f"measure_{name}": known.values[name], f"measure_{name}_error": known.errors[name]}
+    for name, value in known.values.items():
+        row |= {f"measure_{name}": value, f"measure_{name}_error": known.errors[name]}
     names = recurring_names(problem.scene.state_type)
     return row | {f"state_{n}": float(x) for n, x in zip(names, known.state, strict=True)}

@@ -35,7 +35,7 @@ from jaxbiped.optimise._optimum_sensitivities import (
 )
 from jaxbiped.optimise._requirements import Requirement
 from jaxbiped.optimise._runs import Runs, doubt_of_gait
-from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
+from jaxbiped.scene._parameter_access import with_parameters
 
 _BATCH = 16
 """Gaits that are sought at once: the number is a part of the compiled program."""
@@ -79,14 +79,17 @@ class OptimumGrid:
 
     Attributes:
         base: the problem without what the grid asks for.
-        axes: values by parameter or measure; `parameters` are the names of parameters among them.
+        axes: values by parameter or measure; `parameters` are the names of parameters among them,
+            and `places` where these are among all parameters.
         points: optima so far, by place.
         tried: places that were tried from optima so far away.
     """
 
     def __init__(self, base: DesignProblem, axes: Mapping[str, np.ndarray]) -> None:
         self.base, self.axes = base, axes
-        self.parameters = [name for name in axes if name in parameter_names(base.scene)]
+        self.parameters = [name for name in axes if name in base.variables.fixed]
+        chosen = [base.variables.fixed.index(name) for name in self.parameters]
+        self.places = base.variables.fixed_places[chosen]
         self.points: dict[Place, GridPoint] = {}
         self.tried: dict[int, set[Place]] = {reach: set() for reach in _REACH}
 
@@ -112,7 +115,7 @@ class OptimumGrid:
         wave = [(place, place) for place in self.points]
         while wave:
             pursuits = [_Pursuit(self, place, origin) for place, origin in wave]
-            for point in pursue(pursuits, self.parameters):
+            for point in pursue(pursuits):
                 now.update(point.place not in self.points)
                 self.points[point.place] = point.certified()
             wave = self._wave()
@@ -166,11 +169,9 @@ class _Pursuit:
             held = {row.name for (row, _), holds in rows if holds}
         pinned = tuple(_pinned(each, held) for each in self.problem.requirements)
         self.pinned = self.problem.variant(self.problem.scene, pinned, self.problem.evaluations)
-        every, slopes = parameter_names(grid.base.scene), self.source.design.known.state_slopes
-        self._change = sum(
-            (slopes[:, every.index(name)] * moves[name] for name in grid.parameters),
-            np.zeros(len(slopes)),
-        )
+        self._fixed = {name: after[name] for name in grid.parameters}
+        changes = np.array([moves[name] for name in grid.parameters])
+        self._change = self.source.design.known.state_slopes[:, grid.places] @ changes
 
     @property
     def design(self) -> Design:
@@ -183,18 +184,19 @@ class _Pursuit:
         return bool(self.step <= _CONVERGED)
 
     def trial(self) -> "_Trial":
-        if self.problem.latest is None:
-            here = self.source.design
-            expected = self.problem.expected_state(here, self.u, self._change)
-            return _Trial(self.problem, self.u, *expected)
-        return _Trial(self.problem, self.u, *self.problem.expected_state(self.design, self.u))
+        here, change = self.problem.latest, np.zeros(len(self._change))
+        if here is None:
+            here, change = self.source.design, self._change
+        expected = self.problem.expected_state(here, self.u, change)
+        return _Trial(self.problem, self._fixed, self.u, *expected)
 
     def trials_beside(self) -> "list[_Trial]":
         """Designs beside the last one, whose gradients second derivatives compare."""
         design, scale = self.design, scale_at(self.problem, self.design)
         lines = balance_of(self.problem, design, scale).open_directions.T
         places = [u for line in lines for u in places_beside(design.u, line)]
-        return [_Trial(self.problem, u, *self.problem.expected_state(design, u)) for u in places]
+        fixed, expected = self._fixed, self.problem.expected_state
+        return [_Trial(self.problem, fixed, u, *expected(design, u)) for u in places]
 
     def advance(self, gait: Gait | None) -> None:
         """Newton's step from the design whose gait was just found, if it was."""
@@ -246,42 +248,39 @@ def _pinned(requirement: Requirement, held: set[str]) -> Requirement:
     return Requirement(name, high if low is None else low, low if high is None else high)
 
 
-def pursue(points: list[_Pursuit], parameters: Sequence[str]) -> list[_Pursuit]:
+def pursue(points: list[_Pursuit]) -> list[_Pursuit]:
     """Newton's method of all points at once; those that have a design."""
     under_way = points
     for _ in range(_STEPS):
-        gaits = _find_gaits([point.trial() for point in under_way], parameters)
+        gaits = _find_gaits([point.trial() for point in under_way])
         for point, gait in zip(under_way, gaits, strict=True):
             point.advance(gait)
         under_way = [point for point in under_way if point.step > _CONVERGED]
     there = [point for point in points if point.has_converged]
-    _find_gaits([trial for point in there for trial in point.trials_beside()], parameters)
+    _find_gaits([trial for point in there for trial in point.trials_beside()])
     return [point for point in points if point.problem.latest is not None]
 
 
 class _Trial(NamedTuple):
-    """A design whose gait is sought near an expected state, which it may miss by so much."""
+    """A design whose gait is sought near an expected state, which it may miss by so much.
+
+    `fixed` are the parameters in which its scene differs from others beside the variables.
+    """
 
     problem: DesignProblem
+    fixed: dict[str, float]
     u: np.ndarray
     state: np.ndarray
     farthest: np.ndarray
 
 
-def _find_gaits(trials: Sequence[_Trial], parameters: Sequence[str]) -> list[Gait | None]:
-    """The gaits of designs in batches, whose evaluations are kept; None where there is none.
-
-    `parameters` are those in which their scenes differ beside the variables.
-    """
+def _find_gaits(trials: Sequence[_Trial]) -> list[Gait | None]:
+    """The gaits of designs in batches, whose evaluations are kept; None where there is none."""
     gaits: list[Gait | None] = []
     for begin in range(0, len(trials), _BATCH):
         chunk = trials[begin : begin + _BATCH]
         filled = [*chunk, *[chunk[0]] * (_BATCH - len(chunk))]
-        rows = []
-        for trial in filled:
-            values = parameter_values(trial.problem.scene)
-            fixed = {name: float(values[name]) for name in parameters}
-            rows.append(fixed | trial.problem.variables.by_name(trial.u))
+        rows = [trial.fixed | trial.problem.variables.by_name(trial.u) for trial in filled]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         base, states = chunk[0].problem, np.array([trial.state for trial in filled])
         batch = gaits_near(base.scene, columns, states, base.settings, base.wanted)

@@ -16,7 +16,10 @@ from jaxbiped.optimise._optimality import (
     scale_at,
     second_derivatives_of,
 )
-from jaxbiped.scene._parameter_access import parameter_names
+
+_SURE, _LEAST = 10.0, 1e-10
+"""Pull of what holds a design in units of the derivatives that are left, and least size of these,
+from which it surely holds."""
 
 
 class Sensitivities(NamedTuple):
@@ -74,7 +77,8 @@ def optimality_equations(
     problem: DesignProblem, design: Design, second: SecondDerivatives
 ) -> OptimalityEquations:
     """The equations of a design without a doubt, see `doubt_of_derivatives`."""
-    balance, (u, known), others = second.balance, design, fixed_places(problem)
+    balance, (u, known), variables = second.balance, design, problem.variables
+    others = variables.fixed_places
     (d, both), k, n, q = second.slopes.shape, len(u), len(others), len(balance.active)
     held = np.flatnonzero(balance.holds[:q])
     rows, r = [balance.active[place][0] for place in held], len(held)
@@ -96,9 +100,8 @@ def optimality_equations(
     total, errors = lagrangian_slopes(problem, balance, scale_at(problem, design), design)
     errors = np.append(errors[others], np.zeros(r))
     errors += balance.spreads[held] @ np.abs(by_fixed[d : d + r])
-    names = parameter_names(problem.scene)
     return OptimalityEquations(
-        (*(names[place] for place in others), *(f"bound of {row.name}" for row in rows)),
+        (*variables.fixed, *(f"bound of {row.name}" for row in rows)),
         values,
         np.vstack([second.slopes[:, :k], balance.normals[:, balance.holds].T]),
         variable_errors,
@@ -107,11 +110,6 @@ def optimality_equations(
         np.append(total[others], -balance.multipliers[held] @ by_bound),
         errors,
     )
-
-
-def fixed_places(problem: DesignProblem) -> np.ndarray:
-    """Places of the parameters that are not varied."""
-    return np.setdiff1d(np.arange(len(parameter_names(problem.scene))), problem.variables.places)
 
 
 def sensitivities_of(
@@ -133,7 +131,7 @@ def sensitivities_of(
     rates, measures, measure_errors = variables.rates(design.u)[:, None], {}, {}
     for name in names:
         slopes, bars = (np.zeros(len(equations.names)) for _ in range(2))
-        others = fixed_places(problem)
+        others = variables.fixed_places
         slopes[: len(others)] = known.slopes[name][others]
         bars[: len(others)] = known.slope_errors[name][others]
         by_u = problem.gradient(design.u, np.array([known.slopes[name], known.slope_errors[name]]))
@@ -142,7 +140,8 @@ def sensitivities_of(
     return Sensitivities(
         equations.names,
         problem.sense * scale * (equations.objective + drift),
-        scale * (equations.objective_errors + np.abs(drift)),
+        scale
+        * (equations.objective_errors + np.abs(drift) + second.balance.errors @ np.abs(moves)),
         dict(zip(variables.names, rates * moves, strict=True)),
         dict(zip(variables.names, rates * spreads, strict=True)),
         measures,
@@ -154,8 +153,12 @@ def doubt_of_derivatives(second: SecondDerivatives | None) -> str:
     """Why an optimum has no derivatives; empty where it has."""
     if second is None:
         return "Multipliers of the gait hold the optimum, beside which it is not smooth."
-    rows, holds = second.balance.active, second.balance.holds
-    names = [row.name for row, _ in rows] + ["a variable's bound"] * (len(holds) - len(rows))
+    balance, rows = second.balance, [row for row, _ in second.balance.active]
+    # Multipliers are no surer than the balance is, and equalities have any.
+    pulls = np.abs(balance.multipliers) * np.linalg.norm(balance.normals, axis=0)
+    holds = balance.holds & (pulls > _SURE * np.max(np.abs(balance.left), initial=_LEAST))
+    holds[: len(rows)] |= np.array([row.equality for row in rows], bool)
+    names = [row.name for row in rows] + ["a variable's bound"] * (len(holds) - len(rows))
     for name, is_held in zip(names, holds, strict=True):
         if not is_held:
             return f"It is not certain that {name} holds the optimum: its derivatives may jump."
@@ -172,8 +175,7 @@ def doubt_of_derivatives(second: SecondDerivatives | None) -> str:
 
 
 def _unknown(problem: DesignProblem, names: tuple[str, ...], message: str) -> Sensitivities:
-    every = parameter_names(problem.scene)
-    parameters = tuple(every[place] for place in fixed_places(problem))
+    parameters = problem.variables.fixed
     none = np.full(len(parameters), np.nan)
     variables, measures = (dict.fromkeys(each, none) for each in (problem.variables.names, names))
     return Sensitivities(parameters, none, none, variables, variables, measures, measures, message)
