@@ -16,11 +16,10 @@ from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._design_problem import variables_of as design_variables
 from jaxbiped.optimise._objective_values import Evaluations, functional_names
-from jaxbiped.optimise._objectives import OBJECTIVES, check_objective, with_parts
-from jaxbiped.optimise._optimality import objective_error, optimality_of, scale_at
+from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimise_gait import Goal, goal_of, optimise_gait
-from jaxbiped.optimise._optimum import Outcome
-from jaxbiped.optimise._optimum_grid import GridPoint, OptimumGrid, grid_point
+from jaxbiped.optimise._optimum import Optimum, Outcome
+from jaxbiped.optimise._optimum_grid import GridPoint, OptimumGrid
 from jaxbiped.optimise._requirements import SubjectTo, add_measure, requirements_of
 from jaxbiped.scene._parameter_access import (
     parameter_names,
@@ -139,88 +138,63 @@ def library(
                 f"from it: {first.sensitivities.message}"
             )
         u = variables.positions(np.array(list(first.variables.values())))
-        point = grid_point(problem, problem.begin(u, first.gait.measures.state), first.outcome, "")
-        grid.points[origin] = point
-        now.update()
-        missing = _LOST
+        design = problem.begin(u, first.gait.measures.state)
+        grid.points[origin], missing = GridPoint(problem, design, first), _LOST
         try:
             grid.follow(now)
         except KeyboardInterrupt:
             missing = _NOT_REACHED
-    return _dataset(grid, missing)
+    return _dataset(grid, first, missing)
 
 
-def _dataset(grid: OptimumGrid, missing: int) -> "xarray.Dataset":
+def _dataset(grid: OptimumGrid, first: Optimum, missing: int) -> "xarray.Dataset":
     """What is known of each point; `missing` is the outcome of those that have no optimum."""
     import xarray
 
-    base, dims = grid.base, tuple(grid.axes)
-    units, measures = parameter_quantities(base.scene), with_parts(base.wanted)
-    known = next(iter(grid.points.values())).design.known
-    measures |= {n: objective for n, objective in OBJECTIVES.items() if n in known.values}
-    [objective, *others] = base.weights
-    alone = not others and base.weights[objective] == base.sense
-    quantity = measures[objective].quantity if alone else Quantity("objective", unit="SI")
-    rows = {place: _row_of(grid, point) for place, point in grid.points.items()}
-
-    def table(name: str) -> np.ndarray:
-        values = np.full(grid.shape, np.nan)
-        for place, row in rows.items():
-            values[place] = row[name]
-        return values
-
-    entries = {
-        "objective": Entry(dims, table("objective"), quantity, table("objective_error")),
-        **{name: Entry(dims, table(name), Quantity(name)) for name in ("residual", "excess")},
-        "curvature": Entry(dims, table("curvature"), Quantity("least curvature")),
-    }
-    for name in dims:
-        slope = Quantity(f"derivative of the objective by {name}", unit="SI")
-        bars = table(f"slope_{name}_error")
-        entries[f"slope_{name}"] = Entry(dims, table(f"slope_{name}"), slope, bars)
-    for name in base.variables.names:
-        entries[f"design_{name}"] = Entry(dims, table(f"design_{name}"), units[name])
-    for name, measure in measures.items():
-        bars = table(f"measure_{name}_error")
-        entry = Entry(dims, table(f"measure_{name}"), measure.quantity, bars)
-        entries[f"measure_{name}"] = entry
-    for name in recurring_names(base.scene.state_type):
-        own = coordinate_quantity(base.scene.state_type, name)
-        entries[f"state_{name}"] = Entry(dims, table(f"state_{name}"), own)
+    dims, units = tuple(grid.axes), parameter_quantities(grid.base.scene)
+    kind, plain = grid.base.scene.state_type, Quantity("")
+    [goal, *others] = grid.base.weights
+    alone = not others and grid.base.weights[goal] == grid.base.sense
+    objective = first.quantities[goal] if alone else Quantity("objective", unit="SI")
+    quantities = {"objective": objective} | {f"measure_{n}": q for n, q in first.quantities.items()}
+    quantities |= {f"design_{name}": units[name] for name in first.variables}
+    quantities |= {f"slope_{axis}": Quantity(f"d objective / d {axis}", unit="SI") for axis in dims}
+    quantities |= {f"state_{n}": coordinate_quantity(kind, n) for n in recurring_names(kind)}
+    quantities |= {name: Quantity(name) for name in ("residual", "excess", "curvature")}
+    values, errors = ({name: np.full(grid.shape, np.nan) for name in quantities} for _ in range(2))
     codes, messages = np.full(grid.shape, missing), np.full(grid.shape, "", object)
     for place, point in grid.points.items():
-        codes[place], messages[place] = int(point.outcome), point.message
+        codes[place], messages[place] = int(point.optimum.outcome), point.optimum.message
+        for name, (value, error) in _numbers_of(grid, point.optimum).items():
+            values[name][place], errors[name][place] = value, error
+    entries = {
+        name: Entry(dims, values[name], quantity, None if np.all(np.isnan(bars)) else bars)
+        for (name, quantity), bars in zip(quantities.items(), errors.values(), strict=True)
+    }
     entries["outcome"] = Entry(dims, codes, Quantity("outcome"), flags=_OUTCOMES)
     axes = {
-        name: (name, values, (units.get(name) or measures[name].quantity).attributes)
-        for name, values in grid.axes.items()
+        name: (name, column, (units.get(name) or first.quantities.get(name, plain)).attributes)
+        for name, column in grid.axes.items()
     }
     return xarray.Dataset({**variables_of(entries), "message": (dims, messages)}, axes)
 
 
-def _row_of(grid: OptimumGrid, point: GridPoint) -> dict[str, float]:
-    """Numbers of a point by the names of the dataset's variables."""
-    problem, (u, known) = point.problem, point.design
-    conditions = optimality_of(problem, point.design)
-    total, scale = problem.objective(known), scale_at(problem, point.design)
-    row = {
-        "objective": problem.sense * total.value,
-        "objective_error": objective_error(total, conditions),
-        "residual": conditions.residual,
-        "excess": conditions.excess,
-        "curvature": np.nan,
+def _numbers_of(grid: OptimumGrid, optimum: Optimum) -> dict[str, tuple[float, float]]:
+    """Numbers of a point and their errors by the names of the dataset's variables."""
+    known, slopes, state = optimum.known, optimum.sensitivities, optimum.gait.measures.state
+    conditions, curvature = optimum.optimality, optimum.curvature
+    least = curvature.values[0] if curvature is not None and len(curvature.values) else np.nan
+    numbers = {
+        "objective": (optimum.objective, optimum.error),
+        "residual": (conditions.residual, conditions.error),
+        "excess": (conditions.excess, np.nan),
+        "curvature": (least, np.nan if curvature is None else curvature.error),
     }
-    if point.second is not None:
-        row["curvature"] = float(np.min(point.second.curvature.values, initial=np.inf))
-    for name in grid.axes:
-        slope = error = np.nan
-        if point.equations is not None:
-            at = point.equations.names.index(grid.fixed_name(name))
-            slope = problem.sense * scale * float(point.equations.objective[at])
-            error = scale * float(point.equations.objective_errors[at])
-        row |= {f"slope_{name}": slope, f"slope_{name}_error": error}
-    row |= {f"design_{name}": value for name, value in problem.variables.by_name(u).items()}
-    for name, value in known.values.items():
-        row |= {f"measure_{name}": value, f"measure_{name}_error": known.errors[name]}
-    names = recurring_names(problem.scene.state_type)
-    return row | {f"state_{n}": float(x) for n, x in zip(names, known.state, strict=True)}
+    for axis in grid.axes:
+        if not slopes.message:
+            at = slopes.parameters.index(grid.fixed_name(axis))
+            numbers[f"slope_{axis}"] = slopes.objective[at], slopes.objective_errors[at]
+    numbers |= {f"measure_{n}": (known.values[n], known.errors[n]) for n in optimum.quantities}
+    numbers |= {f"design_{name}": (value, np.nan) for name, value in optimum.variables.items()}
+    names = recurring_names(type(state))
+    return numbers | {f"state_{name}": (float(getattr(state, name)), np.nan) for name in names}

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # its submodules are imported where they are first used
 
-from jaxbiped.optimise._cycle_functionals import Functional
 from jaxbiped.optimise._design_functions import AnyRow, Row, cluster_rows, rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem, scale_of
 
@@ -201,6 +200,7 @@ class SecondDerivatives(NamedTuple):
     """Second derivatives of a scaled Lagrangian along the d directions that nothing holds.
 
     Attributes:
+        scale: the objective's own size, by which the Lagrangian is divided.
         balance: the Lagrangian's multipliers.
         directions: orthonormal directions in u, shape (k, d).
         slopes: derivatives along them of its derivatives with respect to u, and behind these of
@@ -209,6 +209,7 @@ class SecondDerivatives(NamedTuple):
         errors: estimated errors of the slopes, of the same shape.
     """
 
+    scale: float
     balance: Balance
     directions: np.ndarray
     slopes: np.ndarray
@@ -262,7 +263,7 @@ def second_derivatives_of(problem: DesignProblem, design: Design) -> SecondDeriv
             (first, second), length = map(rows_at, sides), (one.u - other.u) @ direction
             row[:] = (first[0] - second[0]) / length
             bars[:] = (np.abs(first[1]) + np.abs(second[1])) / abs(length)
-    return SecondDerivatives(balance, directions, slopes, errors)
+    return SecondDerivatives(scale, balance, directions, slopes, errors)
 
 
 def curvature_of(problem: DesignProblem, design: Design) -> Curvature:
@@ -311,11 +312,6 @@ def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
         requirements=tuple(requirements),
         bounds=tuple(bounds),
     )
-
-
-def objective_error(total: Functional, known: Optimality) -> float:
-    """The objective's error: what holds it is known to an error, too, by which it would gain."""
-    return total.error + sum(abs(held.multiplier) * held.error for held in known.requirements)
 
 
 def doubt_of(problem: DesignProblem, design: Design) -> str:

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxbiped.optimise._design_functions import rows_of
 from jaxbiped.optimise._design_problem import Design, DesignProblem
 from jaxbiped.optimise._optimality import (
     SecondDerivatives,
     lagrangian_slopes,
-    scale_at,
     second_derivatives_of,
 )
 
@@ -47,114 +47,87 @@ class Sensitivities(NamedTuple):
     message: str = ""
 
 
-class OptimalityEquations(NamedTuple):
-    """The k equations that determine a design, with derivatives by u and n fixed numbers.
-
-    They are the conditions along the directions that nothing holds, requirements that hold the
-    design, and variables at their bounds.
-
-    Attributes:
-        names: of the fixed numbers.
-        values: what is left of the equations, shape (k,).
-        by_variables: derivatives with respect to u, shape (k, k); `variable_errors` their errors.
-        by_fixed: derivatives with respect to the fixed numbers, shape (k, n).
-        fixed_errors: their errors.
-        objective: derivatives of the scaled Lagrangian with respect to these, shape (n,).
-        objective_errors: their errors.
-    """
-
-    names: tuple[str, ...]
-    values: np.ndarray
-    by_variables: np.ndarray
-    variable_errors: np.ndarray
-    by_fixed: np.ndarray
-    fixed_errors: np.ndarray
-    objective: np.ndarray
-    objective_errors: np.ndarray
-
-
-def optimality_equations(
-    problem: DesignProblem, design: Design, second: SecondDerivatives
-) -> OptimalityEquations:
-    """The equations of a design without a doubt, see `doubt_of_derivatives`."""
-    balance, (u, known), variables = second.balance, design, problem.variables
-    others = variables.fixed_places
-    (d, both), k, n, q = second.slopes.shape, len(u), len(others), len(balance.active)
-    held = np.flatnonzero(balance.holds[:q])
-    rows, r = [balance.active[place][0] for place in held], len(held)
-    none = np.zeros((0, both - k))
-    slopes = np.vstack([none, *(row.slopes(known) for row in rows)])
-    bars = np.abs(np.vstack([none, *(row.slope_errors(known) for row in rows)]))
-    by_bound = np.diag([row.by_bound(known) for row in rows])
-    by_fixed, fixed_errors, variable_errors = (np.zeros((k, size)) for size in (n + r, n + r, k))
-    by_fixed[:d, :n], fixed_errors[:d, :n] = (
-        part[:, k:][:, others] for part in (second.slopes, second.errors)
-    )
-    by_fixed[d : d + r] = np.hstack([slopes[:, others], by_bound])
-    fixed_errors[d : d + r, :n] = bars[:, others]
-    variable_errors[:d] = second.errors[:, :k]
-    variable_errors[d : d + r] = problem.gradient(u, bars)
-    values = np.zeros(k)
-    values[:d] = second.directions.T @ balance.left
-    values[d : d + r] = [row.value(known) for row in rows]
-    total, errors = lagrangian_slopes(problem, balance, scale_at(problem, design), design)
-    errors = np.append(errors[others], np.zeros(r))
-    errors += balance.spreads[held] @ np.abs(by_fixed[d : d + r])
-    return OptimalityEquations(
-        (*variables.fixed, *(f"bound of {row.name}" for row in rows)),
-        values,
-        np.vstack([second.slopes[:, :k], balance.normals[:, balance.holds].T]),
-        variable_errors,
-        by_fixed,
-        fixed_errors,
-        np.append(total[others], -balance.multipliers[held] @ by_bound),
-        errors,
-    )
-
-
 def sensitivities_of(
     problem: DesignProblem, design: Design, names: Iterable[str], doubt: str = ""
 ) -> Sensitivities:
     """Sensitivities of a design, and of the measures with these names, unless there is a doubt."""
-    names, variables, known = tuple(names), problem.variables, design.known
+    (u, known), variables, sense = design, problem.variables, problem.sense
     second = None if doubt else second_derivatives_of(problem, design)
-    doubt = doubt or doubt_of_derivatives(second)
+    doubt = doubt or _doubt_of(second)
     if second is None or doubt:
-        return _unknown(problem, names, doubt)
-    equations, scale = optimality_equations(problem, design, second), scale_at(problem, design)
-    inverse = np.linalg.inv(equations.by_variables)
-    moves = -inverse @ equations.by_fixed
-    errors = equations.variable_errors @ np.abs(moves) + equations.fixed_errors
+        none = np.full(len(variables.fixed), np.nan)
+        by_name = [dict.fromkeys(each, none) for each in (variables.names, names)]
+        unknown = by_name[0], by_name[0], by_name[1], by_name[1]
+        return Sensitivities(variables.fixed, none, none, *unknown, doubt)
+    balance, scale = second.balance, second.scale
+    rows, k, d = [row for row, _ in balance.active], len(u), len(second.slopes)
+    r, n = len(rows), len(variables.fixed)
+
+    def fixed(slopes: np.ndarray) -> np.ndarray:
+        """Derivatives with respect to what is fixed, at first none with respect to bounds."""
+        chosen = slopes[..., variables.fixed_places]
+        return np.concatenate([chosen, np.zeros((*chosen.shape[:-1], r))], axis=-1)
+
+    none = np.zeros((k - d, second.slopes.shape[1] - k))  # of variables at their bounds
+    slopes, bars = none.copy(), none.copy()
+    by_bound = np.zeros((k - d, n + r))
+    for i, row in enumerate(rows):
+        slopes[i], bars[i] = row.slopes(known), np.abs(row.slope_errors(known))
+        by_bound[i, n + i] = row.by_bound(known)
+    held_by_fixed = fixed(slopes) + by_bound
+    inverse = np.linalg.inv(np.vstack([second.slopes[:, :k], balance.normals.T]))
+    moves = -inverse @ np.vstack([fixed(second.slopes[:, k:]), held_by_fixed])
+    errors = np.vstack([second.errors[:, :k], problem.gradient(u, bars)]) @ np.abs(moves)
+    errors += np.vstack([fixed(second.errors[:, k:]), fixed(bars)])
     spreads = np.abs(inverse) @ errors
+    total, off = fixed(lagrangian_slopes(problem, balance, scale, design))
     # To first order the optimum lies where the derivatives that are left vanish.
-    drift = second.balance.left @ moves
-    rates, measures, measure_errors = variables.rates(design.u)[:, None], {}, {}
+    drift = balance.left @ moves
+    total = total - balance.multipliers @ by_bound + drift
+    off = off + balance.spreads @ np.abs(held_by_fixed)
+    off += np.abs(drift) + balance.errors @ np.abs(moves)
+    measures, measure_errors = {}, {}
     for name in names:
-        slopes, bars = (np.zeros(len(equations.names)) for _ in range(2))
-        others = variables.fixed_places
-        slopes[: len(others)] = known.slopes[name][others]
-        bars[: len(others)] = known.slope_errors[name][others]
-        by_u = problem.gradient(design.u, np.array([known.slopes[name], known.slope_errors[name]]))
-        measures[name] = slopes + by_u[0] @ moves
-        measure_errors[name] = bars + np.abs(by_u[0]) @ spreads + np.abs(by_u[1]) @ np.abs(moves)
+        both = np.array([known.slopes[name], known.slope_errors[name]])
+        (by_u, by_u_error), (own, own_error) = problem.gradient(u, both), fixed(both)
+        measures[name] = own + by_u @ moves
+        measure_errors[name] = own_error + np.abs(by_u) @ spreads + by_u_error @ np.abs(moves)
+    rates = variables.rates(u)[:, None]
+    by_variable, variable_errors = (
+        dict(zip(variables.names, rates * each, strict=True)) for each in (moves, spreads)
+    )
+    parameters = (*variables.fixed, *(f"bound of {row.name}" for row in rows))
+    objective = sense * scale * total, scale * off
     return Sensitivities(
-        equations.names,
-        problem.sense * scale * (equations.objective + drift),
-        scale
-        * (equations.objective_errors + np.abs(drift) + second.balance.errors @ np.abs(moves)),
-        dict(zip(variables.names, rates * moves, strict=True)),
-        dict(zip(variables.names, rates * spreads, strict=True)),
-        measures,
-        measure_errors,
+        parameters, *objective, by_variable, variable_errors, measures, measure_errors
     )
 
 
-def doubt_of_derivatives(second: SecondDerivatives | None) -> str:
+def newton_step(problem: DesignProblem, design: Design, second: SecondDerivatives) -> np.ndarray:
+    """The step in u to where the conditions of optimality hold, by second derivatives of another.
+
+    What holds the other optimum is to hold this one, too.
+    """
+    (u, known), balance, k = design, second.balance, len(design.u)
+    names = [(row.name, row.sign) for row, _ in balance.active]
+    rows = [row for row in rows_of(problem) if (row.name, row.sign) in names]
+    slopes = [problem.gradient(u, row.slopes(known)) for row in rows]
+    normals = np.vstack([*slopes, balance.normals[:, len(names) :].T])
+    gradient = problem.gradient(u, problem.objective(known).slopes) / second.scale
+    left = gradient - normals.T @ np.linalg.lstsq(normals.T, gradient)[0]
+    missed = np.zeros(len(normals))
+    missed[: len(rows)] = [row.value(known) for row in rows]
+    matrix = np.vstack([second.slopes[:, :k], normals])
+    values = np.concatenate([second.directions.T @ left, missed])
+    return -np.linalg.lstsq(matrix, values)[0]
+
+
+def _doubt_of(second: SecondDerivatives | None) -> str:
     """Why an optimum has no derivatives; empty where it has."""
     if second is None:
         return "Multipliers of the gait hold the optimum, beside which it is not smooth."
     balance, rows = second.balance, [row for row, _ in second.balance.active]
-    # Multipliers are no surer than the balance is, and equalities have any.
+    # Multipliers are no surer than the balance is; equalities may have any.
     pulls = np.abs(balance.multipliers) * np.linalg.norm(balance.normals, axis=0)
     holds = balance.holds & (pulls > _SURE * np.max(np.abs(balance.left), initial=_LEAST))
     holds[: len(rows)] |= np.array([row.equality for row in rows], bool)
@@ -172,10 +145,3 @@ def doubt_of_derivatives(second: SecondDerivatives | None) -> str:
         least = f"{values[0]:.1e} ± {error:.1e}"
         return f"The objective's least curvature, {least}, does not determine the optimum."
     return ""
-
-
-def _unknown(problem: DesignProblem, names: tuple[str, ...], message: str) -> Sensitivities:
-    parameters = problem.variables.fixed
-    none = np.full(len(parameters), np.nan)
-    variables, measures = (dict.fromkeys(each, none) for each in (problem.variables.names, names))
-    return Sensitivities(parameters, none, none, variables, variables, measures, measures, message)
