@@ -86,7 +86,7 @@ def gaits_near(
     scenes = with_parameters(scene, {name: jnp.asarray(each) for name, each in values.items()})
     scenes = jtu.tree_map(lambda leaf: jnp.broadcast_to(jnp.asarray(leaf), (count,)), scenes)
     starts = state_of_recurring(scene.state_type, map(jnp.asarray, points.T), jnp.zeros(count))
-    return scenes, *jax.device_get(_find_each(scenes, starts, dict(wanted), settings))
+    return jax.device_get((scenes, *_find_each(scenes, starts, dict(wanted), settings)))
 
 
 @cached_jit

@@ -4,6 +4,7 @@ A gait is sought from where the last one's derivatives point; where that fails, 
 branch, it is followed there in smaller steps. Every design is evaluated once and kept.
 """
 
+import functools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -24,6 +25,7 @@ from jaxbiped.optimise._design_gaits import (
 )
 from jaxbiped.optimise._jacobian_functionals import CLUSTER
 from jaxbiped.optimise._objective_values import (
+    AllFunctionals,
     Evaluation,
     Evaluations,
     evaluate,
@@ -55,6 +57,7 @@ class Variables(NamedTuple):
         low, high: their bounds, shape (k,).
         logarithmic: where u is linear in the logarithm (booleans): where both bounds are positive.
         places: of the variables among all parameters of the scene, shape (k,).
+        fixed: names of the parameters that are not varied.
     """
 
     names: tuple[str, ...]
@@ -62,6 +65,13 @@ class Variables(NamedTuple):
     high: np.ndarray
     logarithmic: np.ndarray
     places: np.ndarray
+    fixed: tuple[str, ...]
+
+    @property
+    def fixed_places(self) -> np.ndarray:
+        """Places of the parameters that are not varied, in the order of `fixed`."""
+        every = np.arange(len(self.names) + len(self.fixed))
+        return np.setdiff1d(every, self.places)
 
     def values(self, u: np.ndarray) -> np.ndarray:
         """Parameters at u, shape (…, k); at 0 and 1 the bounds exactly."""
@@ -121,6 +131,7 @@ def variables_of(scene: Any, vary: Mapping[str, tuple[float, float]]) -> Variabl
         high=highs,
         logarithmic=lows > 0.0,
         places=np.asarray([names.index(name) for name in vary]),
+        fixed=tuple(name for name in names if name not in vary),
     )
 
 
@@ -174,7 +185,15 @@ class DesignProblem:
         self.asked: list[Design] = []
         self.lost = self.unmeasured = 0
 
-    @property
+    def variant(
+        self, scene: Any, requirements: tuple[Requirement, ...], evaluations: Evaluations
+    ) -> "DesignProblem":
+        """The same question of another scene with other requirements, for one design each."""
+        told = {name: self.sense * weight for name, weight in self.weights.items()}
+        how = self.wanted, self.settings, evaluations
+        return DesignProblem(scene, self.variables, told, self.sense, requirements, *how)
+
+    @functools.cached_property
     def has_cluster(self) -> bool:
         """Whether functionals of multipliers are of one gait, not means over an ensemble."""
         of_one = self.ensemble is None or self.ensemble.criterion != "mean"
@@ -304,19 +323,39 @@ class DesignProblem:
             scene = self.scene_at(u)
         except ArgumentError:  # parameters that do not go together
             return None
-        gait = self.settings.find_near(scene, guess)
+        return self.keep(u, scene, self.settings.find_near(scene, guess), guess, farthest)
+
+    def keep(
+        self,
+        u: np.ndarray,
+        scene: WalkerScene,
+        gait: Gait,
+        guess: np.ndarray,
+        farthest: np.ndarray | float = np.inf,
+        functionals: AllFunctionals | None = None,
+    ) -> Evaluation | None:
+        """What is known of a design whose gait was sought near a guess; None if it has none there.
+
+        `functionals` are those of its measures, where they are known.
+        """
         if not are_walks(gait):
             return None
-        found = np.stack(recurring_leaves(gait.measures.state))
-        return None if np.any(np.abs(found - guess) > farthest) else self._keep(u, scene, gait)
+        away = np.abs(np.stack(recurring_leaves(gait.measures.state)) - guess)
+        return None if np.any(away > farthest) else self._keep(u, scene, gait, functionals)
 
     def scene_at(self, u: np.ndarray) -> WalkerScene:
         """The scene of a design; raises `ArgumentError` where parameters do not go together."""
         return with_parameters(self.scene, self.variables.by_name(u))
 
-    def _keep(self, u: np.ndarray, scene: WalkerScene, gait: Gait) -> Evaluation | None:
+    def _keep(
+        self,
+        u: np.ndarray,
+        scene: WalkerScene,
+        gait: Gait,
+        functionals: AllFunctionals | None = None,
+    ) -> Evaluation | None:
         if self.ensemble is None:
-            known = evaluate(scene, gait, self.wanted, self.settings.accuracy)
+            known = evaluate(scene, gait, self.wanted, self.settings.accuracy, functionals)
         else:
             nominal = evaluate(scene, gait, {}, self.settings.accuracy)
             members = evaluate_ensemble(self.ensemble, scene, nominal, self.wanted, self.settings)
@@ -349,11 +388,20 @@ class DesignProblem:
 
     def _next(self, here: Design, u: np.ndarray) -> Evaluation | None:
         """The gait of a design near one whose gait is known, on the same branch."""
+        return self.from_guess(u, *self.expected_state(here, u))
+
+    def expected_state(
+        self, here: Design, u: np.ndarray, move: np.ndarray | float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The state of a design's gait near another's, and how far it may lie aside, shape (m,).
+
+        `move` is the state's change with what differs beside the variables.
+        """
         before, after = (self.variables.values(each) for each in (here.u, u))
-        move = here.known.state_slopes[:, self.variables.places] @ (after - before)
+        move = move + here.known.state_slopes[:, self.variables.places] @ (after - before)
         sizes = _FLOOR + np.abs(here.known.state)
         length = np.max(np.abs(move) / sizes)
-        return self.from_guess(u, here.known.state + move, (_ASIDE * length + _NEAR) * sizes)
+        return here.known.state + move, (_ASIDE * length + _NEAR) * sizes
 
 
 def scale_of(bound: float) -> float:

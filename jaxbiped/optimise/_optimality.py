@@ -78,7 +78,7 @@ def smooth_weights(problem: DesignProblem) -> tuple[dict[str, float], float]:
     return weights, 0.0
 
 
-class _Balance(NamedTuple):
+class Balance(NamedTuple):
     """The gradient of the sum, and multipliers of what holds it (q,), in the least-squares sense.
 
     Attributes:
@@ -96,6 +96,18 @@ class _Balance(NamedTuple):
     spreads: np.ndarray
     normals: np.ndarray
 
+    @property
+    def holds(self) -> np.ndarray:
+        """Which of the multipliers surely hold the design (booleans), shape (q,)."""
+        holds = np.abs(self.multipliers) > self.spreads
+        holds[: len(self.active)] |= np.array([row.equality for row, _ in self.active], bool)
+        return holds
+
+    @property
+    def open_directions(self) -> np.ndarray:
+        """Orthonormal directions in u that nothing holds, shape (k, d)."""
+        return np.asarray(scipy.linalg.null_space(self.normals[:, self.holds].T))
+
 
 def _smooth_gradient(problem: DesignProblem, design: Design) -> np.ndarray:
     """Of the sum but for the spectral radius's part."""
@@ -103,7 +115,7 @@ def _smooth_gradient(problem: DesignProblem, design: Design) -> np.ndarray:
     return problem.gradient(design.u, problem.objective(design.known, weights).slopes)
 
 
-def _balance(problem: DesignProblem, design: Design, scale: float) -> _Balance:
+def balance_of(problem: DesignProblem, design: Design, scale: float) -> Balance:
     u, known = design
     weights, of_radius = smooth_weights(problem)
     total, more = problem.objective(known, weights), int(of_radius > 0.0)
@@ -138,27 +150,35 @@ def _balance(problem: DesignProblem, design: Design, scale: float) -> _Balance:
     across = np.eye(len(gradient)) - sure @ np.linalg.pinv(sure)
     with np.errstate(invalid="ignore"):  # of errors without bound
         errors = np.abs(across) @ errors
-    return _Balance(gradient - matrix @ multipliers, errors, rows, multipliers, spreads, matrix)
+    return Balance(gradient - matrix @ multipliers, errors, rows, multipliers, spreads, matrix)
 
 
 def lagrangian_change(
     problem: DesignProblem, here: Design, there: Design, scale: float
 ) -> np.ndarray:
     """How the gradient of the scaled Lagrangian changes, with the multipliers of `there`."""
-    gradient = functools.partial(
-        _lagrangian_gradient, problem, _balance(problem, there, scale), scale
-    )
-    return gradient(there) - gradient(here)
+    slopes = functools.partial(lagrangian_slopes, problem, balance_of(problem, there, scale), scale)
+    one, other = (problem.gradient(design.u, slopes(design)[0]) for design in (here, there))
+    return other - one
 
 
-def _lagrangian_gradient(
-    problem: DesignProblem, balance: _Balance, scale: float, design: Design
+def lagrangian_slopes(
+    problem: DesignProblem, balance: Balance, scale: float, design: Design
 ) -> np.ndarray:
-    """The gradient of the scaled Lagrangian with these multipliers, but for the radius's part."""
-    total = _smooth_gradient(problem, design) / scale
+    """Derivatives of the scaled Lagrangian with respect to all p parameters, and their errors.
+
+    The multipliers are given, and the radius's part of the sum is left out.
+
+    Returns:
+        Shape (2, p).
+    """
+    weights, _ = smooth_weights(problem)
+    total = problem.objective(design.known, weights)
+    slopes, errors = total.slopes / scale, total.slope_errors / scale
     for (row, _), multiplier in zip(balance.active, balance.multipliers, strict=False):
-        total = total - multiplier * problem.gradient(design.u, row.slopes(design.known))
-    return total
+        slopes = slopes - multiplier * row.slopes(design.known)
+        errors = errors + abs(multiplier) * row.slope_errors(design.known)
+    return np.stack([slopes, errors])
 
 
 class Curvature(NamedTuple):
@@ -176,33 +196,80 @@ class Curvature(NamedTuple):
     error: float
 
 
-def curvature_of(problem: DesignProblem, design: Design) -> Curvature:
-    """The reduced Hessian by differences of gradients of designs beside it."""
-    scale = max(abs(problem.objective(design.known).value), 1e-300)
-    balance = _balance(problem, design, scale)
+class SecondDerivatives(NamedTuple):
+    """Second derivatives of a scaled Lagrangian along the d directions that nothing holds.
+
+    Attributes:
+        scale: the objective's own size, by which the Lagrangian is divided.
+        balance: the Lagrangian's multipliers.
+        directions: orthonormal directions in u, shape (k, d).
+        slopes: derivatives along them of its derivatives with respect to u, and behind these of
+            those with respect to all parameters, shape (d, k + p); NaN where designs beside this
+            one have no gait.
+        errors: estimated errors of the slopes, of the same shape.
+    """
+
+    scale: float
+    balance: Balance
+    directions: np.ndarray
+    slopes: np.ndarray
+    errors: np.ndarray
+
+    @property
+    def curvature(self) -> Curvature:
+        """The reduced Hessian."""
+        k, d = self.directions.shape
+        hessian, errors = self.slopes[:, :k] @ self.directions, self.errors[:, :k]
+        if not np.all(np.isfinite(hessian)):
+            return Curvature(np.full(d, np.nan), np.inf)
+        error = np.max(np.sum(errors, axis=1), initial=0.0)
+        error += np.max(np.abs(hessian - hessian.T), initial=0.0)
+        return Curvature(np.linalg.eigvalsh(0.5 * (hessian + hessian.T)), float(error))
+
+
+def scale_at(problem: DesignProblem, design: Design) -> float:
+    """The objective's own size at a design."""
+    return max(abs(problem.objective(design.known).value), 1e-300)
+
+
+def places_beside(u: np.ndarray, direction: np.ndarray) -> list[np.ndarray]:
+    """Where within the bounds gradients are compared for the curvature along a direction."""
+    ends = [u + side * _ASIDE * direction for side in (1.0, -1.0)]
+    return [end for end in ends if np.all((end >= 0.0) & (end <= 1.0))]
+
+
+def second_derivatives_of(problem: DesignProblem, design: Design) -> SecondDerivatives | None:
+    """Differences of gradients beside a design; None where multipliers of the gait play a part."""
+    scale = scale_at(problem, design)
+    balance = balance_of(problem, design, scale)
     is_smooth = len(balance.left) == len(design.u)
     if not is_smooth or not all(isinstance(row, Row) for row, _ in balance.active):
-        return Curvature(np.zeros(0), 0.0)
-    holds = np.abs(balance.multipliers) > balance.spreads
-    holds[: len(balance.active)] |= np.array([row.equality for row, _ in balance.active], bool)
-    directions = scipy.linalg.null_space(balance.normals[:, holds].T)
-    gradient = functools.partial(_lagrangian_gradient, problem, balance, scale)
-    total, error = np.zeros((directions.shape[1],) * 2), 0.0
-    for k, direction in enumerate(directions.T):
-        ends = [design.u + side * _ASIDE * direction for side in (1.0, -1.0)]
-        within = [u for u in ends if np.all((u >= 0.0) & (u <= 1.0))]
-        both = [(u, problem.beside(u)) for u in within]
-        sides = [Design(u, known) for u, known in both if known is not None]
+        return None
+    directions = balance.open_directions
+
+    def rows_at(there: Design) -> np.ndarray:
+        """Derivatives with respect to u and all parameters, and their errors, (2, k + p)."""
+        rows = lagrangian_slopes(problem, balance, scale, there)
+        return np.hstack([problem.gradient(there.u, rows), rows])
+
+    here = rows_at(design)
+    slopes, errors = np.full((2, directions.shape[1], here.shape[1]), np.nan)
+    for row, bars, direction in zip(slopes, errors, directions.T, strict=True):
+        known = [(u, problem.beside(u)) for u in places_beside(design.u, direction)]
+        sides = [Design(u, each) for u, each in known if each is not None]
         sides = sides if len(sides) == 2 else [*sides, design][:2]
-        if len(sides) < 2:
-            return Curvature(np.full(len(total), np.nan), np.inf)
-        one, other = sides
-        length = (one.u - other.u) @ direction
-        total[k] = directions.T @ (gradient(one) - gradient(other)) / length
-        bars = (problem.gradient(design.u, problem.objective(d.known).slope_errors) for d in sides)
-        error = max(error, float(np.sum(np.abs(list(bars))) / scale / abs(length)))
-    error += float(np.max(np.abs(total - total.T), initial=0.0))
-    return Curvature(np.linalg.eigvalsh(0.5 * (total + total.T)), error)
+        if len(sides) == 2:
+            one, other = sides
+            (first, second), length = map(rows_at, sides), (one.u - other.u) @ direction
+            row[:] = (first[0] - second[0]) / length
+            bars[:] = (np.abs(first[1]) + np.abs(second[1])) / abs(length)
+    return SecondDerivatives(scale, balance, directions, slopes, errors)
+
+
+def curvature_of(problem: DesignProblem, design: Design) -> Curvature:
+    """The reduced Hessian by differences of gradients of designs beside it."""
+    second = second_derivatives_of(problem, design)
+    return Curvature(np.zeros(0), 0.0) if second is None else second.curvature
 
 
 def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
@@ -213,8 +280,8 @@ def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
     multipliers of a requirement or a bound are those of moving it upwards, in its units.
     """
     (u, known), variables, sense = design, problem.variables, problem.sense
-    scale = max(abs(problem.objective(known).value), 1e-300)
-    balance = _balance(problem, design, scale)
+    scale = scale_at(problem, design)
+    balance = balance_of(problem, design, scale)
     count = len(balance.active)
     held: dict[tuple[str, float, float], tuple[float, float]] = {}
     for (row, in_sum), multiplier, error in zip(

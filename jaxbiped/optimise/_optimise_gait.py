@@ -1,10 +1,9 @@
-"""Optimisation of a gait: the best design within bounds, and fronts of such designs."""
+"""Optimisation of a gait: the best design within bounds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
-import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import (
@@ -146,7 +145,7 @@ def optimise_gait(
     scene = check_scene(scene, *MINIMAL_SCENES)
     section = chosen_section(scene, section)
     variables = variables_of(scene, vary)
-    told, sense, measures = _goal(scene, maximise, minimise)
+    told, sense, measures = goal_of(scene, maximise, minimise)
     held = requirements_of(scene, subject_to)
     requirements = held.each
     for name, objective in held.measures.items():
@@ -219,7 +218,7 @@ def optimise_gait(
     return optimum_of(problem, runs)
 
 
-def _goal(
+def goal_of(
     scene: Any, maximise: Goal, minimise: Goal
 ) -> tuple[dict[str, float], float, dict[str, Objective]]:
     """Weights by name, 1 to minimise their sum or −1 to maximise it, and the measures by name."""
@@ -267,71 +266,3 @@ def _problem_settings(
         "ensemble": None if ensemble is None else ensemble._asdict(),
         "writer": {name: writer[name] for name in DECISIVE},
     }
-
-
-class ParetoFront(NamedTuple):
-    """Best values of one measure under n bounds on another.
-
-    Attributes:
-        bounds: bounds on the other measure, in the given order, shape (n,).
-        optima: the optimum for each bound.
-    """
-
-    bounds: np.ndarray
-    optima: tuple[Optimum, ...]
-
-    def values(self, name: str) -> np.ndarray:
-        """Values of a measure along the front, shape (n,)."""
-        return np.asarray([each.known.values[name] for each in self.optima])
-
-
-def pareto_front(
-    scene: AbstractScene,
-    *,
-    vary: Mapping[str, tuple[float, float]],
-    against: str | Measure,
-    bounds: Sequence[float] | np.ndarray,
-    upper: bool = True,
-    maximise: Goal = None,
-    minimise: Goal = None,
-    subject_to: SubjectTo = None,
-    **options: Any,
-) -> ParetoFront:
-    """The trade-off between two measures: the best of one under several bounds on the other.
-
-    Each search begins at the previous optimum, so give the bounds in order.
-
-    Args:
-        scene: the walker to begin from.
-        vary: as for `optimise_gait`.
-        against: the other measure.
-        bounds: bounds on the other measure, shape (n,).
-        upper: whether they are upper bounds.
-        maximise, minimise: as for `optimise_gait`.
-        subject_to: further requirements.
-        options: other options of `optimise_gait`; a `store` keeps the evaluations of all points.
-
-    Returns:
-        The front.
-
-    Raises:
-        ArgumentError: an argument is not allowed.
-    """
-    name, _ = check_objective(against, scene, "against")
-    values = np.asarray(bounds, dtype=float)
-    if values.ndim != 1 or not values.size:
-        raise ArgumentError(f"bounds has the shape {values.shape}: it must be (n,), n at least 1.")
-    more = requirements_of(scene, subject_to)
-    if name in more.measures:
-        raise ArgumentError(f"subject_to has {name!r} already: the front bounds it itself.")
-    others = {more.given[each.name]: (each.low, each.high) for each in more.each}
-    optima: list[Optimum] = []
-    for bound in values.tolist():
-        held = {**others, against: (None, bound) if upper else (bound, None)}
-        begin = optima[-1].scene if optima else scene
-        optima.append(
-            optimise_gait(
-                begin, vary=vary, maximise=maximise, minimise=minimise, subject_to=held, **options
-            )
-        )
-    return ParetoFront(values, tuple(optima))

@@ -11,6 +11,7 @@ from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._objective_values import Evaluation
 from jaxbiped.optimise._optimality import Curvature, Optimality
+from jaxbiped.optimise._optimum_sensitivities import Sensitivities
 from jaxbiped.scene._parameter_access import parameter_quantities
 from jaxbiped.scene._scene import WalkerScene
 
@@ -81,6 +82,7 @@ class Optimum(Tabular):
         quantities: words, symbol and unit of these by name, of those that have some.
         optimality: the optimality conditions.
         curvature: the reduced Hessian of an optimum that converged; None of others.
+        sensitivities: derivatives of the optimum with respect to all that is fixed.
         history: every iterate, of all runs one after the other.
         evaluations: number of designs whose gait was found.
         lost: number of evaluations in which no gait was found or a measure of the gait was not
@@ -100,6 +102,7 @@ class Optimum(Tabular):
     quantities: dict[str, Quantity]
     optimality: Optimality
     curvature: Curvature | None
+    sensitivities: Sensitivities
     history: list[Iteration]
     evaluations: int
     lost: int
@@ -122,8 +125,10 @@ class Optimum(Tabular):
 
         Returns:
             The best design's parameters along `variable`; the measures with their errors along
-            `measure`; and every iterate along `iteration`: the objective, the largest violation of
-            a requirement (`excess`), the design (`design_…`) and its measures (`measure_…`).
+            `measure`; the derivatives of all these with respect to what is fixed along `parameter`
+            (`sensitivity_…`); and every iterate along `iteration`: the objective, the largest
+            violation of a requirement (`excess`), the design (`design_…`) and its measures
+            (`measure_…`).
             `gait.to_dataset()` has the gait.
         """
         import xarray
@@ -141,6 +146,18 @@ class Optimum(Tabular):
             "objective": Entry(at, [each.objective for each in self.history], value),
             "excess": Entry(at, [each.excess for each in self.history], Quantity("excess")),
         }
+        slopes, along = self.sensitivities, ("parameter",)
+        of_values, value_errors = (
+            [part[name] for name in names] for part in (slopes.variables, slopes.variable_errors)
+        )
+        of_measures, measure_errors = (
+            [part[name] for name in measures] for part in (slopes.measures, slopes.measure_errors)
+        )
+        entries |= {
+            "sensitivity_objective": Entry(along, slopes.objective, value, slopes.objective_errors),
+            "sensitivity_value": Entry(("variable", *along), of_values, value, value_errors),
+            "sensitivity_measured": Entry(("measure", *along), of_measures, value, measure_errors),
+        }
         for name in names:
             column = [each.variables[name] for each in self.history]
             entries[f"design_{name}"] = Entry(at, column, units[name])
@@ -150,6 +167,7 @@ class Optimum(Tabular):
         coordinates = {
             "variable": np.array(names, object),
             "unit": ("variable", np.array([units[name].unit for name in names], object)),
+            "parameter": np.array(slopes.parameters, object),
             "measure": np.array(measures, object),
             "measure_unit": ("measure", np.array([each.unit for each in quantities], object)),
         }

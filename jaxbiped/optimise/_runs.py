@@ -11,6 +11,7 @@ from jaxbiped._progress import Stage
 from jaxbiped.continuation._critical_values import allows, range_of
 from jaxbiped.dynamics._state import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.optimise._design_functions import Functions, restored
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
@@ -26,6 +27,7 @@ from jaxbiped.optimise._optimality import (
 )
 from jaxbiped.optimise._optimisers import BY_NAME, RunEnding, run_optax, run_trust_region
 from jaxbiped.optimise._optimum import Iteration, Optimum, Outcome
+from jaxbiped.optimise._optimum_sensitivities import sensitivities_of
 
 if TYPE_CHECKING:
     import optax
@@ -163,11 +165,14 @@ def doubt_of_gait(search: Search, critical: Bifurcation) -> str:
     return ""
 
 
-def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
-    """The best of the designs that runs came to."""
-    best = restored(problem, runs.best)
+def optimum_of(
+    problem: DesignProblem, runs: Runs, best: Design | None = None, gait: Gait | None = None
+) -> Optimum:
+    """The best of the designs that runs came to, or a given one, whose gait may be known."""
+    best = restored(problem, runs.best) if best is None else best
     found, scene = problem.objective(best.known), problem.scene_at(best.u)
-    gait, outcome = problem.settings.find_near(scene, best.known.state), runs.outcome(best)
+    gait = problem.settings.find_near(scene, best.known.state) if gait is None else gait
+    outcome = runs.outcome(best)
     known = optimality_of(problem, best)
     objectives = {**OBJECTIVES, **with_parts(problem.wanted)}
     named = [name for name in best.known.values if name in objectives]
@@ -175,6 +180,8 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     if outcome in (Outcome.CONVERGED, Outcome.FLAT):
         doubt = doubt_of_gait(gait.outcome, gait.critical)
         outcome = Outcome.CORNER if doubt else outcome
+    unknown = f"The search ended as {outcome!s}, so derivatives of an optimum are not known."
+    unknown = "" if outcome is Outcome.CONVERGED else unknown
     return Optimum(
         outcome=outcome,
         message=_message(problem, best, runs.ended, doubt),
@@ -186,6 +193,7 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
         error=found.error + sum(abs(held.multiplier) * held.error for held in known.requirements),
         known=best.known,
         curvature=curvature_of(problem, best) if outcome is Outcome.CONVERGED else None,
+        sensitivities=sensitivities_of(problem, best, named, unknown),
         quantities={name: objectives[name].quantity for name in named},
         optimality=known,
         history=runs.history,

@@ -52,14 +52,14 @@ class Drawn(DesignProblem):
         self.evaluations.add(u, known)
         return known
 
-    def _keep(self, u, scene, gait):
+    def _keep(self, u, scene, gait, functionals=None):
         return self._follow(u)
 
 
-def drawn(function, vary, told, sense=1.0, subject_to=None, *, begin=0.4, errors=0.0):
+def drawn(function, vary, told, sense=1.0, subject_to=None, *, begin=0.4, errors=0.0, kind=Drawn):
     """A problem of a function of the parameters by name and of u, begun at equal u."""
     held = requirements_of(SCENE, subject_to)
-    made = Drawn(
+    made = kind(
         jb.with_parameters(SCENE, {"slope": 0.02}), variables_of(SCENE, vary), told, sense,
         held.each, {**measures_named(told), **held.measures}, GaitSettings(), Evaluations(),
     )  # fmt: skip

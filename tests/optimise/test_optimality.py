@@ -8,7 +8,7 @@ from jaxbiped.gait import Bifurcation, Search
 from jaxbiped.optimise import Outcome
 from jaxbiped.optimise._design_functions import restored
 from jaxbiped.optimise._design_problem import Design, variables_of
-from jaxbiped.optimise._optimality import OPTIMAL, _balance, curvature_of, doubt_of, optimality_of
+from jaxbiped.optimise._optimality import OPTIMAL, balance_of, curvature_of, doubt_of, optimality_of
 from jaxbiped.optimise._runs import doubt_of_gait
 from tests.optimise.drawn_designs import (
     BOTH,
@@ -271,7 +271,7 @@ def test_a_slope_that_is_badly_known_leaves_its_own_variable_open_beside_the_rad
         }
 
     made = drawn(function, BOTH, {"speed": 1.0, "spectral_radius": 1.0})
-    errors = _balance(made, made.latest, 2.0).errors
+    errors = balance_of(made, made.latest, 2.0).errors
     np.testing.assert_allclose(errors, [0.005, 0.0, 0.0], atol=1e-12)
 
 

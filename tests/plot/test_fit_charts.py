@@ -143,6 +143,7 @@ def _optimum(history=5, excess=(0.1, 0.0, 0.0, 0.0, 0.0), bound=0.19, scene=None
         quantities={name: jb.optimise.OBJECTIVES[name].quantity for name in last},
         optimality=Optimality(0.0, 0.0, 0.0, (held,), (free,)),
         curvature=None,
+        sensitivities=None,
         history=iterates,
         evaluations=history,
         lost=0,
