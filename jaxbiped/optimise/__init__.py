@@ -23,3 +23,7 @@ from jaxbiped.optimise._optimisers import OPTIMISERS as OPTIMISERS
 from jaxbiped.optimise._optimum import Iteration as Iteration
 from jaxbiped.optimise._optimum import Optimum as Optimum
 from jaxbiped.optimise._optimum import Outcome as Outcome
+from jaxbiped.optimise._refinement import Refinement as Refinement
+from jaxbiped.optimise._refinement import refine as refine
+from jaxbiped.optimise._torque_gap import TorqueGap as TorqueGap
+from jaxbiped.optimise._torque_gap import torque_gap as torque_gap

@@ -4,7 +4,7 @@ A gait is sought from where the last one's derivatives point; where that fails, 
 branch, it is followed there in smaller steps. Every design is evaluated once and kept.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -173,6 +173,22 @@ class DesignProblem:
         self.latest: Design | None = None
         self.asked: list[Design] = []
         self.lost = self.unmeasured = 0
+
+    def of_scene(
+        self, scene: Any, variables: Variables, without: Collection[str] = ()
+    ) -> "DesignProblem":
+        """The same problem for another scene, `without` some measures, nothing evaluated yet."""
+        return DesignProblem(
+            scene,
+            variables,
+            {name: self.sense * w for name, w in self.weights.items() if name not in without},
+            self.sense,
+            tuple(each for each in self.requirements if each.name not in without),
+            {name: each for name, each in self.wanted.items() if name not in without},
+            self.settings,
+            Evaluations(),
+            self.ensemble,
+        )
 
     @property
     def has_cluster(self) -> bool:

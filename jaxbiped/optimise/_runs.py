@@ -192,6 +192,7 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
         evaluations=problem.evaluations.count,
         lost=problem.lost,
         unmeasured=problem.unmeasured,
+        problem=problem,
     )
 
 

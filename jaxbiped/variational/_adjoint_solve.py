@@ -346,12 +346,13 @@ def carry_tangents(
         room=nodes.ends.room,
         stream=nodes.ends,
         quick=True,
-        keeps_records=True,
+        keeps_records=isinstance(nodes.ends, Recording),
         reads_once=True,
     )
     found = engine.run(request)
-    assert found.recording is not None
-    return found.outputs, found.recording
+    steps = found.records if found.recording is None else found.recording
+    assert steps is not None
+    return found.outputs, steps
 
 
 def pull_back(

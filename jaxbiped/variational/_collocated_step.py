@@ -216,8 +216,6 @@ class Rows:
 
     def forced(self, y: Scalar, weights: Scalar) -> Scalar:
         """Derivatives of a sum of the kept rates with respect to the parameters, (p,)."""
-        if not self.parameters:
-            return jnp.zeros(0)
 
         def total(parameters: list[Scalar]) -> Scalar:
             return weights @ jnp.stack(self._kept(list(y), parameters))

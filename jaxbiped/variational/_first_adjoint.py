@@ -59,28 +59,8 @@ class Arriving(NamedTuple):
     by_time: Scalar
 
 
-class Backwards(NamedTuple):
-    """A scalar's derivatives along a motion.
-
-    Attributes:
-        start: where the motion starts.
-        along: at the starts of its steps, the last one first: time [s], state and the derivatives
-            with respect to it, rows of shape (1 + 2 c,).
-    """
-
-    start: Row
-    along: Recorded | None
-
-
 class _Given(NamedTuple):
-    """Inputs.
-
-    Attributes:
-        args: parameters.
-        arrival: time and state where the motion ends, (1 + c,).
-        first: what `carry_tangents` gave.
-        behind: the scalar there.
-    """
+    """Inputs: parameters, time and state at the end, `carry_tangents`' outputs, the row there."""
 
     args: PyTree
     arrival: Scalar
@@ -89,17 +69,21 @@ class _Given(NamedTuple):
 
 
 class _Now(NamedTuple):
-    """What is carried: time and state where a step starts, the row there, and steps so far."""
+    """What is carried: time, state and row where a step starts, and steps so far.
+
+    `forced` are derivatives of the row times the rates there with respect to the parameters.
+    """
 
     t: Scalar
     state: Scalar
     row: Row
+    forced: Scalar
     steps: Scalar
 
 
 def pull_back_row(
     engine: AbstractEngine, flow: Flow, nodes: Nodes, behind: Row | Arriving
-) -> Backwards:
+) -> tuple[Row, Recorded]:
     """Derivatives of a scalar at the start of a motion, from those at its end.
 
     Motions that follow each other, such as footsteps, are taken one by one, the last one first.
@@ -109,6 +93,11 @@ def pull_back_row(
         flow: what moves, and with respect to which parameters it is differentiated.
         nodes: of the motion.
         behind: the scalar, of the state at a fixed time or of an arrival on the section.
+
+    Returns:
+        The row where the motion starts; and records of the starts of its steps, the last step
+        first: time [s], state and row, and derivatives with respect to the parameters of the row
+        times the rates, 1 + 2 c + p numbers.
     """
     none = jnp.zeros((0, flow.structure.num_leaves))
     first, steps = carry_tangents(engine, flow, nodes, none)
@@ -116,7 +105,8 @@ def pull_back_row(
     program = _program(FlowKind.of(flow))
     request = Request(program, given, room=nodes.ends.room, stream=steps, quick=True)
     found = engine.run(request)
-    return Backwards(found.outputs, found.records)
+    assert found.records is not None
+    return found.outputs, found.records
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
@@ -144,7 +134,8 @@ class _Solve:
         flow, row = self.flow(given), given.behind
         if isinstance(row, Arriving):
             row = _before_arrival(flow, given.arrival, row)
-        return _Now(given.arrival[0], given.first.state, row, jnp.zeros(()))
+        none = jnp.zeros_like(row.parameters)
+        return _Now(given.arrival[0], given.first.state, row, none, jnp.zeros(()))
 
     def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
         flow, step = self.flow(given), self.read(row)
@@ -157,21 +148,21 @@ class _Solve:
         )
         stages = Stages.of(order, step.share, jax.lax.map(rows.by_state, step.points))
         nowhere = jnp.zeros(len(order.every))
-        state, forcing = stages.pulled(
-            jnp.stack([nowhere, nowhere, order.sorted(behind.state)])
-        )
-        forced = jax.lax.map(lambda each: rows.forced(*each), (step.points, forcing))
-        before = Row(order.restored(state), behind.parameters + jnp.sum(forced, axis=0))
-        steps = now.steps + 1.0
-        time = now.t - RADAU[2] @ step.share
-        return _Now(time, step.before, before, steps), steps >= given.first.steps
+        state, forcing = stages.pulled(jnp.stack([nowhere, nowhere, order.sorted(behind.state)]))
+        points = jnp.concatenate([step.points, step.before[None]])
+        weights = jnp.concatenate([forcing, state[None, order.direct :]])
+        *forced, at_start = jax.lax.map(lambda each: rows.forced(*each), (points, weights))
+        before = Row(order.restored(state), sum(forced, behind.parameters))
+        steps, time = now.steps + 1.0, now.t - RADAU[2] @ step.share
+        after = _Now(time, step.before, before, at_start, steps)
+        return after, steps >= given.first.steps
 
     def finish(self, given: _Given, now: _Now) -> Row:
         return now.row
 
     def record(self, given: _Given, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-        """Time, state and row where a step starts."""
-        return jnp.asarray(True), [now.t, now.state, now.row.state]
+        """Time, state and row where a step starts, and what the row makes of the parameters."""
+        return jnp.asarray(True), [now.t, now.state, now.row.state, now.forced]
 
 
 def _before_arrival(flow: Flow, arrival: Scalar, behind: Arriving) -> Row:
@@ -192,9 +183,7 @@ def _before_arrival(flow: Flow, arrival: Scalar, behind: Arriving) -> Row:
     return Row(row[:c], row[c:])
 
 
-def _before_switch(
-    flow: Flow, step: Step, begun: Scalar, parameters: Scalar, behind: Row
-) -> Row:
+def _before_switch(flow: Flow, step: Step, begun: Scalar, parameters: Scalar, behind: Row) -> Row:
     """The row before the switch on which a step ends, and behind which the motion has `begun`."""
     landed, c = step.points[2], len(begun)
     z, after = (jnp.concatenate([y, parameters]) for y in (landed, begun))
