@@ -4,7 +4,6 @@ import itertools
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type
@@ -14,8 +13,7 @@ from jaxbiped.optimise._objectives import is_sum_of_parameters
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.optimise._runs import Runs, optimum_of
 from jaxbiped.optimise._simultaneous import begin_together, check_simultaneous
-from jaxbiped.optimise._torque_gap import TorqueGap, time_splines, torque_gap
-from jaxbiped.scene._parameter_access import parameter_names, select_parameters
+from jaxbiped.optimise._torque_gap import TorqueGap, coefficient_names, time_splines, torque_gap
 from jaxbiped.scene.actuation._time_laws import TimeSpline
 
 _SEGMENTS, _ITERATIONS = 7, 200
@@ -94,7 +92,7 @@ def refined_laws(best: Optimum) -> tuple[Any, Variables]:
     """
     names, low, high, *_ = best.problem.variables
     vary = dict(zip(names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
-    splines, coefficients = time_splines(best.scene), _coefficients(best.scene)
+    splines, coefficients = time_splines(best.scene), coefficient_names(best.scene, time_splines)
     if not splines or not set(names).issuperset(*coefficients):
         raise ArgumentError(
             "refine is not allowed for an optimum without a TimeSpline, or with one of which not "
@@ -103,19 +101,10 @@ def refined_laws(best: Optimum) -> tuple[Any, Variables]:
     if any(map(is_sum_of_parameters, best.problem.wanted.values())):
         raise ArgumentError("refine is not allowed with Linear sums of parameters: leave them out.")
     scene = eqx.tree_at(time_splines, best.scene, [*map(with_halved_intervals, splines)])
-    for old, new in zip(coefficients, _coefficients(scene), strict=True):
+    for old, new in zip(coefficients, coefficient_names(scene, time_splines), strict=True):
         bounds = np.array([vary.pop(name) for name in old])
         vary |= dict.fromkeys(new, (bounds.min(), bounds.max()))
     return scene, variables_of(scene, vary)
-
-
-def _coefficients(scene: Any) -> list[list[str]]:
-    """Names of the coefficients of each spline in time."""
-    names = parameter_names(scene)
-    by_place = dict(zip(select_parameters(scene, names)[1], names, strict=True))
-    leaves, structure = jtu.tree_flatten(scene.minimal)
-    numbered = time_splines(jtu.tree_unflatten(structure, range(len(leaves))))
-    return [[by_place[place] for place in spline.torque] for spline in numbered]
 
 
 def with_halved_intervals(spline: TimeSpline) -> TimeSpline:

@@ -303,7 +303,7 @@ class Simultaneous:
         """
         starts, period, u = self.parts(z)
         note_code(self._spec, self._scene)
-        scene, cycle = self.problem.scene_at(u).minimal, (starts, period / self.count)
+        scene, cycle = self.problem.scene_at(u).minimal, cast(Any, (starts, period / self.count))
         weights = self.weights(z, of_equal, of_spare)
         how = self._active, self._path, self._precision, steps
         states, slopes = pull_back_segments(self._spec, scene, self._like, cycle, weights, *how)

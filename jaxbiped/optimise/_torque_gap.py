@@ -10,6 +10,8 @@ Bryson and Ho, Applied Optimal Control (1975), chapter 6.
 """
 
 import functools
+import itertools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -29,7 +31,8 @@ from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.optimise._sequential_programming import Conditions, best_step, run_newton
 from jaxbiped.optimise._simultaneous import Simultaneous, reason_against
 from jaxbiped.scene._joint_parts import Motor
-from jaxbiped.scene._parameter_access import parameter_names
+from jaxbiped.scene._mechanism import Mechanism
+from jaxbiped.scene._parameter_access import parameter_names, select_parameters
 from jaxbiped.scene._state_types import CLOCK
 from jaxbiped.scene.actuation._actuators import AbstractStanceTorque, spline_between
 from jaxbiped.scene.actuation._time_laws import TimeSpline
@@ -105,6 +108,15 @@ def time_splines(scene: Any) -> list[TimeSpline]:
     return [part for part in leaves if isinstance(part, TimeSpline)]
 
 
+def coefficient_names(scene: Any, splines: Callable[[Any], list[TimeSpline]]) -> list[list[str]]:
+    """Names of the coefficients of each of the `splines` of a scene."""
+    names = parameter_names(scene)
+    by_place = dict(zip(select_parameters(scene, names)[1], names, strict=True))
+    leaves, structure = jtu.tree_flatten(scene.minimal)
+    numbered = splines(jtu.tree_unflatten(structure, range(len(leaves))))
+    return [[by_place[place] for place in spline.torque] for spline in numbered]
+
+
 class _AddedTorque(AbstractStanceTorque):
     """A law plus a torque that is a function of time.
 
@@ -174,9 +186,10 @@ class _FreeTorques:
                 'must be strictly convex in the torque of every motor, as "torque_squared" is.'
             )
         size = float(scene.mechanism.total_mass * scene.ground.g * scene.mechanism.height)
-        names = [name for name in parameter_names(scene) if "added.torque_" in name]
+        added = coefficient_names(scene, lambda scene: [law.added for _, law in _laws(scene)])
         # Sums of parameters stay as they are, and have other names here.
         sums = [name for name, each in problem.wanted.items() if is_sum_of_parameters(each)]
+        names = itertools.chain(*added)
         variables = variables_of(scene, dict.fromkeys(names, (-size, size)))
         free = problem.of_scene(scene, variables, without=sums)
         if reason := reason_against(free):
@@ -255,8 +268,9 @@ class _FreeTorques:
         second = self.convexity(dict(zip(self.whole.integrals, gains, strict=True)), states)
         if np.min(np.linalg.eigvalsh(second)) <= 0.0:
             return np.inf
-        each, step = tuple(np.eye(self.count)[:, :, None]), self.times[1]
-        basis = np.asarray(spline_between(each, 0.0, self.period, self.times + 0.5 * step))
+        step, units = self.times[1], tuple(jnp.eye(self.count)[:, :, None])
+        middles, end = jnp.asarray(self.times + 0.5 * step), jnp.asarray(self.period)
+        basis = np.asarray(spline_between(units, jnp.zeros(()), end, middles))
         gram = step * np.einsum("tab,it,kt->aibk", second, basis, basis)
         rates = self.whole.problem.variables.rates(np.full(j * self.count, 0.5))
         gram = gram.reshape(len(rates), -1) * np.outer(rates, rates)
@@ -271,7 +285,8 @@ class _FreeTorques:
 
 def _laws(scene: Any) -> list[tuple[str, Any]]:
     """Laws of motors at the joints and torques at the hip, with the motors' names."""
-    motors = [part for part in scene.mechanism.joints if isinstance(part, Motor)]
+    joints = scene.walker.joints if isinstance(scene.walker, Mechanism) else ()
+    motors = [part for part in joints if isinstance(part, Motor)]
     hip = [part for part in scene.actuation or () if isinstance(part, AbstractStanceTorque)]
     at_joints = [(motor.name or motor.kind, motor.law) for motor in motors]
     return at_joints + [(part.name or type(part).__name__, part) for part in hip]
@@ -280,7 +295,7 @@ def _laws(scene: Any) -> list[tuple[str, Any]]:
 def _with_added(scene: Any, span: float, coefficients: Any) -> Any:
     """The scene with a spline in time added to the law of each motor."""
     laws = [
-        _AddedTorque(law, TimeSpline(tuple(row), span))
+        _AddedTorque(law=law, added=TimeSpline(torque=tuple(row), span=span))  # type: ignore[call-arg]
         for (_, law), row in zip(_laws(scene), coefficients, strict=True)
     ]
     return eqx.tree_at(lambda scene: [law for _, law in _laws(scene)], scene, laws)
