@@ -25,3 +25,7 @@ from jaxbiped.optimise._optimum import Outcome as Outcome
 from jaxbiped.optimise._optimum_sensitivities import Sensitivities as Sensitivities
 from jaxbiped.optimise._pareto_front import ParetoFront as ParetoFront
 from jaxbiped.optimise._pareto_front import pareto_front as pareto_front
+from jaxbiped.optimise._refinement import Refinement as Refinement
+from jaxbiped.optimise._refinement import refine as refine
+from jaxbiped.optimise._torque_gap import TorqueGap as TorqueGap
+from jaxbiped.optimise._torque_gap import torque_gap as torque_gap

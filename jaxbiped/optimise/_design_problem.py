@@ -5,7 +5,7 @@ branch, it is followed there in smaller steps. Every design is evaluated once an
 """
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -186,12 +186,26 @@ class DesignProblem:
         self.lost = self.unmeasured = 0
 
     def variant(
-        self, scene: Any, requirements: tuple[Requirement, ...], evaluations: Evaluations
+        self,
+        scene: Any,
+        *,
+        variables: Variables | None = None,
+        requirements: tuple[Requirement, ...] | None = None,
+        without: Collection[str] = (),
     ) -> "DesignProblem":
-        """The same question of another scene with other requirements, for one design each."""
-        told = {name: self.sense * weight for name, weight in self.weights.items()}
-        how = self.wanted, self.settings, evaluations
-        return DesignProblem(scene, self.variables, told, self.sense, requirements, *how)
+        """The same problem for another scene, `without` some measures, nothing evaluated yet."""
+        held = self.requirements if requirements is None else requirements
+        return DesignProblem(
+            scene,
+            self.variables if variables is None else variables,
+            {name: self.sense * w for name, w in self.weights.items() if name not in without},
+            self.sense,
+            tuple(each for each in held if each.name not in without),
+            {name: each for name, each in self.wanted.items() if name not in without},
+            self.settings,
+            Evaluations(),
+            self.ensemble,
+        )
 
     @functools.cached_property
     def has_cluster(self) -> bool:

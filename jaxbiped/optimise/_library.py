@@ -15,7 +15,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._design_problem import variables_of as design_variables
-from jaxbiped.optimise._objective_values import Evaluations, functional_names
+from jaxbiped.optimise._objective_values import Evaluations, jacobian_names
 from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimise_gait import Goal, goal_of, optimise_gait
 from jaxbiped.optimise._optimum import Optimum, Outcome
@@ -114,7 +114,7 @@ def library(
             add_measure(measures, *check_objective(name, scene, "over"))
     for name in {"scatter", "store"} & options.keys():
         raise ArgumentError(f"{name} is not an option of a library.")
-    radius = "spectral_radius" in measures and not functional_names(scene, measures)[0]
+    radius = "spectral_radius" in measures and not jacobian_names(scene, measures)
     settings = GaitSettings(footsteps, accuracy, engine, options.get("section"), radius)
     variables = design_variables(scene, vary)
     base = DesignProblem(

@@ -355,3 +355,9 @@ Measure: TypeAlias = Cost | FunctionOf | Linear
 def _linear(weights: tuple[tuple[str, float], ...], scene: Any) -> Any:
     values = parameter_values(scene)
     return sum(weight * values[name] for name, weight in weights)
+
+
+def is_sum_of_parameters(objective: Objective) -> bool:
+    """Whether a measure is one that `Linear` describes, by names of parameters."""
+    function = getattr(objective.measured, "function", None)
+    return getattr(function, "func", None) is _linear

@@ -9,6 +9,7 @@ from jaxbiped._ending import NamedCode
 from jaxbiped._quantity import Quantity
 from jaxbiped._tables import Entry, Tabular, variables_of
 from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._objective_values import Evaluation
 from jaxbiped.optimise._optimality import Curvature, Optimality
 from jaxbiped.optimise._optimum_sensitivities import Sensitivities
@@ -88,6 +89,7 @@ class Optimum(Tabular):
         lost: number of evaluations in which no gait was found or a measure of the gait was not
             finite.
         unmeasured: number of gaits with a measure that was not finite.
+        problem: what was optimised, for `torque_gap` and `refine`.
     """
 
     rows: ClassVar[str] = "variable"
@@ -107,6 +109,7 @@ class Optimum(Tabular):
     evaluations: int
     lost: int
     unmeasured: int
+    problem: DesignProblem
 
     @property
     def measures(self) -> dict[str, float]:

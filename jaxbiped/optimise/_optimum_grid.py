@@ -17,7 +17,6 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_functions import restored
 from jaxbiped.optimise._design_gaits import gaits_near
 from jaxbiped.optimise._design_problem import Design, DesignProblem
-from jaxbiped.optimise._objective_values import Evaluations
 from jaxbiped.optimise._optimality import (
     balance_of,
     places_beside,
@@ -79,7 +78,7 @@ class OptimumGrid:
         values = self.values_at(place)
         scene = with_parameters(self.base.scene, {name: values[name] for name in self.parameters})
         bounds = (Requirement(n, x, x) for n, x in values.items() if n not in self.parameters)
-        return self.base.variant(scene, (*self.base.requirements, *bounds), Evaluations())
+        return self.base.variant(scene, requirements=(*self.base.requirements, *bounds))
 
     def follow(self, now: Stage) -> None:
         """Improves the optima that are known, and goes on from them to all other points."""

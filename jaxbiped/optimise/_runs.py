@@ -200,6 +200,7 @@ def optimum_of(
         evaluations=problem.evaluations.count,
         lost=problem.lost,
         unmeasured=problem.unmeasured,
+        problem=problem,
     )
 
 

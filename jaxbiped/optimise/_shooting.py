@@ -14,7 +14,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import host_jit
+from jaxbiped.compiler import XLA, Recorded, host_jit
 from jaxbiped.dynamics._walker_motion import WalkerMotion
 from jaxbiped.gait._poincare_map import recurring_indices, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
@@ -22,6 +22,9 @@ from jaxbiped.hybrid._motion_costs import Extreme
 from jaxbiped.optimise._augmented_system import motion_of
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._watch import Watch
+from jaxbiped.variational._first_adjoint import Row, pull_back_row
+from jaxbiped.variational._flow import Flow
+from jaxbiped.variational._solve_to_section import Nodes
 from jaxbiped.variational._tangents import (
     SectionSolve,
     Seeded,
@@ -29,7 +32,11 @@ from jaxbiped.variational._tangents import (
     along_columns,
     with_active,
 )
-from jaxbiped.variational._variational_solve import seeded_directions, tangents_after
+from jaxbiped.variational._variational_solve import (
+    seeded_directions,
+    tangents_after,
+    tangents_at_times,
+)
 
 
 class Linearised(NamedTuple):
@@ -61,6 +68,20 @@ class Segments(NamedTuple):
     gains: Linearised
     arrival: Linearised
     path: Linearised
+
+
+class SegmentWeights(NamedTuple):
+    """Derivatives of a function of the segments of one cycle with respect to `Segments`' values.
+
+    Attributes:
+        ends, arrival, path: of the same shapes, without that of b cycles.
+        gains: the same for every segment, shape (d,).
+    """
+
+    ends: Any
+    gains: Any
+    arrival: Any
+    path: Any
 
 
 @host_jit(runs_by_lanes)
@@ -113,7 +134,7 @@ def linearise_segments(
         whole = jax.vmap(functools.partial(linearise, _components))(ends)
         behind = linearise(lambda y, a: _components(system.reset_map(a, y), a), last)
         whole = jtu.tree_map(lambda every, one: every.at[-1].set(one), whole, behind)
-        arrival = linearise(lambda y, a: system.arrival(spec.section, a, y)[0][None], last)
+        arrival = linearise(functools.partial(_arrival, spec), last)
         nodes = jtu.tree_map(lambda e, one: jnp.concatenate([e, one[None]]), begins, last)
         along = jax.vmap(functools.partial(linearise, functools.partial(_along, path)))(nodes)
         return Segments(
@@ -123,10 +144,74 @@ def linearise_segments(
     return jax.vmap(one)(*cycles)
 
 
+@host_jit(runs_by_lanes)
+def pull_back_segments(
+    spec: ReturnMapSpec,
+    scene: PyTree,
+    like: PyTree,
+    cycle: tuple[Scalar, Scalar],
+    weights: SegmentWeights,
+    active: tuple[int, ...],
+    path: tuple[Extreme, ...],
+    precision: Precision,
+    steps: int,
+) -> tuple[Scalar, Scalar]:
+    """Carries derivatives of a function of segments backwards in time along each of them.
+
+    Args:
+        spec, scene, like, active, path, precision: as of `linearise_segments`.
+        cycle: starts, shape (n, m), and the duration of the segments [s].
+        weights: the function's derivatives.
+        steps: how many equal parts of each segment there are.
+
+    Returns:
+        States where these begin, shape (n, steps, c); and derivatives of the Hamiltonian, the
+        costate times the rates, with respect to the k parameters there, shape (n, steps, k).
+    """
+    system, (starts, duration) = spec.system, cycle
+    structure, c = jtu.tree_structure(like), len(jtu.tree_leaves(like))
+    where = jnp.asarray([*recurring_indices(system, like), *system.cyclic_coordinates])
+    watch = Watch.of(system, resets=False)
+    how = SectionSolve(watch, spec.solver, precision, duration, spec.max_solver_steps)
+    still = Seeded(scene, jnp.zeros((0, 0)), jnp.zeros(0), ())
+    section = functools.partial(system.arrival, spec.section)
+    seeded = Seeded(scene, jnp.zeros((0, 0)), jnp.zeros(0), active)
+    flow = Flow(system, section, system.vector_field, seeded, structure)
+    times = duration * jnp.arange(1, steps + 1) / steps
+
+    def function_of_end(y: PyTree, ends: Scalar, is_last: Scalar) -> Scalar:
+        row = jnp.concatenate([ends, weights.gains])
+        arrived = row @ _components(system.reset_map(scene, y), scene)[where]
+        arrived += weights.arrival @ _arrival(spec, y, scene)
+        arrived += weights.path[-1] @ _along(path, y, scene)
+        return jnp.where(is_last, arrived, row @ _components(y, scene)[where])
+
+    def follow(start: Scalar, ends: Scalar, is_last: Scalar) -> tuple[Scalar, Scalar]:
+        state = state_with(system, like, start)
+        at = Tangents(state, jnp.zeros((c, 0)))
+        states = tangents_at_times(how, at, still, times, spec.programs).state
+        rows, count = jnp.stack([times, *jtu.tree_leaves(states)], axis=-1), jnp.asarray(steps)
+        end = jtu.tree_map(lambda leaf: leaf[-1], states)
+        row = _components(jax.grad(function_of_end)(end, ends, is_last), scene)
+        first = jnp.concatenate([jnp.zeros(1), _components(state, scene)])
+        nodes = Nodes(first, Recorded(rows, count), rows[-1], count)  # type: ignore[arg-type]
+        behind = Row(row, jnp.zeros(len(active)))
+        _, along = pull_back_row(spec.programs or XLA, flow, nodes, behind)
+        known = jnp.asarray(along.values)[::-1]
+        return known[:, 1 : 1 + c], known[:, 1 + 2 * c :]
+
+    return jax.vmap(follow)(starts, weights.ends, jnp.arange(len(starts)) == len(starts) - 1)
+
+
 def _with_duration(at: Tangents, rate: Scalar, m: int) -> Tangents:
     """The same with a column for the duration behind the first m."""
     first, others = at.columns[:, :m], at.columns[:, m:]
     return Tangents(at.state, jnp.concatenate([first, rate[:, None], others], axis=1))
+
+
+def _arrival(spec: ReturnMapSpec, y: PyTree, args: PyTree) -> Scalar:
+    """The section's value."""
+    return spec.system.arrival(spec.section, args, y)[0][None]
 
 
 def _components(y: PyTree, _: PyTree) -> Scalar:

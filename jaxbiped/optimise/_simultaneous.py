@@ -27,7 +27,7 @@ from jaxbiped.hybrid._motion_costs import Extreme, Integral, has_motion_costs
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.hybrid._sections import section_of
 from jaxbiped.hybrid._walker_systems import system_of
-from jaxbiped.optimise._augmented_system import MotionSection
+from jaxbiped.optimise._augmented_system import MotionSection, motion_of
 from jaxbiped.optimise._cycle_costs import CostedCycle
 from jaxbiped.optimise._cycle_functionals import (
     Functional,
@@ -41,7 +41,13 @@ from jaxbiped.optimise._objective_values import Evaluation, with_costs
 from jaxbiped.optimise._objectives import ParameterFunction, costs_of, with_parts
 from jaxbiped.optimise._optimisers import RunEnding
 from jaxbiped.optimise._sequential_programming import Conditions, run_newton
-from jaxbiped.optimise._shooting import Linearised, Segments, linearise_segments
+from jaxbiped.optimise._shooting import (
+    Linearised,
+    Segments,
+    SegmentWeights,
+    linearise_segments,
+    pull_back_segments,
+)
 from jaxbiped.scene._parameter_access import select_parameters
 
 _LEAST_PERIOD, _PERIOD, _MOST_PERIOD = 0.3, 2.2, 20.0
@@ -82,6 +88,8 @@ class Simultaneous:
     Attributes:
         problem: what is designed.
         count: n.
+        integrals: those that play a part.
+        rtol: relative tolerance of the motion.
         least, most: bounds on z.
         sizes: of the m components of a start, SI units, shape (m,).
     """
@@ -90,15 +98,16 @@ class Simultaneous:
         scene, settings = problem.scene.minimal, problem.settings
         self.problem, self.count = problem, count
         costs = costs_of(with_parts(problem.wanted), scene)
-        self._integrals = tuple(cost for cost in costs if isinstance(cost, Integral))
+        self.integrals = tuple(cost for cost in costs if isinstance(cost, Integral))
         self._path = tuple(cost for cost in costs if isinstance(cost, Extreme))
         self._scene, self._walker = scene, cast(AbstractLandingSystem, system_of(scene))
-        system = CostedCycle.of(self._walker, self._integrals)
+        system = CostedCycle.of(self._walker, self.integrals)
         pose = default_guess(scene)
         self._like = system.begin(pose)
         engine = _spec_of(scene, settings.engine).engine
         self._spec = cycle_spec(scene, system, MotionSection(section_of(scene, None)), 1, engine)
         self._precision = functional_precision(settings.accuracy, scene)
+        self.rtol = float(self._precision.rtol)
         _, self._active = select_parameters(scene, problem.variables.names)
         self.sizes = recurring_sizes(scene, pose)
         self._time, self._height = map(
@@ -257,8 +266,8 @@ class Simultaneous:
                 row[1 : 1 + len(u)] = by_parameter[self.problem.variables.places]
                 rows[name] = Functional(total, 0.0, row, none)
         begin, r = 2 + len(u), len(self._path)
-        d = begin + len(self._integrals)
-        costs: dict[Any, Functional] = dict(zip(self._integrals, parts[begin:d], strict=True))
+        d = begin + len(self.integrals)
+        costs: dict[Any, Functional] = dict(zip(self.integrals, parts[begin:d], strict=True))
         for k, extreme in enumerate(self._path):
             nodes = parts[d + k :: r]
             costs[extreme] = nodes[int(np.argmax([extreme.sign * node.value for node in nodes]))]
@@ -275,6 +284,34 @@ class Simultaneous:
         named: list[Any] = [dict(zip(rows, part, strict=True)) for part in fields]
         return Evaluation(*[*named, none[:1], np.zeros((1, len(sums)))])
 
+    def weights(self, z: np.ndarray, of_equal: np.ndarray, of_spare: np.ndarray) -> SegmentWeights:
+        """What the objective less multipliers times conditions makes of the segments."""
+        place, k = self.count * len(self.sizes), len(z) - self.count * len(self.sizes) - 1
+        objective, by_equal, by_spare = self._known(z).by_sums
+        joints, arrival, required = np.split(of_equal, [place, place + 1])
+        of_sums = objective - required @ by_equal - of_spare @ by_spare
+        gains, path = np.split(of_sums[1 + k :], [1 + len(self.integrals)])
+        ends = -joints.reshape(self.count, -1) / self.sizes
+        return SegmentWeights(ends, gains, -arrival, path.reshape(self.count + 1, -1))
+
+    def pulled_back(
+        self, z: np.ndarray, of_equal: np.ndarray, of_spare: np.ndarray, steps: int
+    ) -> tuple[Any, np.ndarray]:
+        """What `pull_back_segments` makes of the Lagrangian, one row behind the other.
+
+        The walker's states, leaves of shape (l,), and derivatives of the Hamiltonian with respect
+        to the variables' parameters, shape (l, k).
+        """
+        starts, period, u = self.parts(z)
+        note_code(self._spec, self._scene)
+        scene, cycle = self.problem.scene_at(u).minimal, cast(Any, (starts, period / self.count))
+        weights = self.weights(z, of_equal, of_spare)
+        how = self._active, self._path, self._precision, steps
+        states, slopes = pull_back_segments(self._spec, scene, self._like, cycle, weights, *how)
+        rows = list(np.asarray(states).reshape(-1, np.shape(states)[-1]).T)
+        own = motion_of(jtu.tree_unflatten(jtu.tree_structure(self._like), rows))
+        return own, np.asarray(slopes).reshape(len(rows[0]), -1)
+
     def curvature(self, z: np.ndarray, of_equal: np.ndarray, of_spare: np.ndarray) -> np.ndarray:
         """Second derivatives of the objective less multipliers times conditions, shape (n, n).
 
@@ -283,10 +320,7 @@ class Simultaneous:
         """
         starts, period, u = self.parts(z)
         n, m, place = self.count, len(self.sizes), starts.size
-        objective, by_equal, by_spare = self._known(z).by_sums
-        joints, arrival, required = np.split(of_equal, [place, place + 1])
-        of_sums = objective - required @ by_equal - of_spare @ by_spare
-        gains, path = np.split(of_sums[1 + len(u) :], [1 + len(self._integrals)])
+        weights = self.weights(z, of_equal, of_spare)
         steps = _APART * np.vstack([np.zeros(m + 1 + len(u)), np.eye(m + 1 + len(u))])
         steps[:, m + 1 :] *= np.where(u > 0.5, -1.0, 1.0)
         segments = self._segments(
@@ -294,11 +328,10 @@ class Simultaneous:
             period + steps[:, m] * self._time,
             u + steps[:, m + 1 :],
         )
-        joints = joints.reshape(n, m) / self.sizes
-        slopes = np.einsum("d,bndj->bnj", gains, segments.gains.slopes)
-        slopes -= np.einsum("nm,bnmj->bnj", joints, segments.ends.slopes)
-        slopes[:, -1] -= arrival @ segments.arrival.slopes
-        nodes = np.einsum("nr,bnrj->bnj", path.reshape(n + 1, -1), segments.path.slopes)
+        slopes = np.einsum("d,bndj->bnj", weights.gains, segments.gains.slopes)
+        slopes += np.einsum("nm,bnmj->bnj", weights.ends, segments.ends.slopes)
+        slopes[:, -1] += weights.arrival @ segments.arrival.slopes
+        nodes = np.einsum("nr,bnrj->bnj", weights.path, segments.path.slopes)
         slopes += nodes[:, :-1]
         slopes[:, -1] += nodes[:, -1]
         blocks = (slopes[1:] - slopes[0]) / np.sum(steps[1:], axis=1)[:, None, None]
@@ -317,23 +350,25 @@ def _spec_of(scene: Any, engine: str) -> Any:
 
 def check_simultaneous(problem: DesignProblem) -> None:
     """Raises `ArgumentError` for a problem that has no simultaneous search."""
-    scene, settings = problem.scene, problem.settings
-
-    def refuse(what: str) -> ArgumentError:
-        return ArgumentError(
-            f'formulation = "together" is not allowed {what}: choose "gait by gait".'
+    if reason := reason_against(problem):
+        raise ArgumentError(
+            f'formulation = "together" is not allowed {reason}: choose "gait by gait".'
         )
 
+
+def reason_against(problem: DesignProblem) -> str | None:
+    """Why a problem has no simultaneous search, in words; None if it has."""
+    scene, settings = problem.scene, problem.settings
     if not has_motion_costs(scene.minimal):
-        raise refuse(f"for a {type(scene).__name__}, which is no walker")
+        return f"for a {type(scene).__name__}, which is no walker"
     if not system_of(scene.minimal).footsteps_end_on_section:
-        raise refuse("for compliant feet, which press into the ground for a while")
+        return "for compliant feet, which press into the ground for a while"
     if _spec_of(scene.minimal, settings.engine).resets:
-        raise refuse("for a walker whose modes change between strikes")
+        return "for a walker whose modes change between strikes"
     if arrivals_of(scene, settings.footsteps) != 1:
-        raise refuse("for a cycle of several footsteps")
+        return "for a cycle of several footsteps"
     if problem.ensemble is not None:
-        raise refuse("with scatter")
+        return "with scatter"
     every = with_parts(problem.wanted)
     combined = [measure.combined for measure in every.values() if measure.combined]
     parts = {name for combination in combined for name in combination.of}
@@ -345,13 +380,14 @@ def check_simultaneous(problem: DesignProblem) -> None:
             sides = [low if cost.sign > 0.0 else high for _, low, high in bounded]
             is_path = weight == 1.0 and len(objective.costs) == 1 and set(sides) == {None}
             if not is_path or name in (*problem.weights, *parts):
-                raise refuse(
+                return (
                     f"for {name}, an extreme, except as the upper bound of a largest value or the "
                     "lower bound of a smallest one"
                 )
         is_sum = objective.costs or isinstance(objective.measured, ParameterFunction)
         if not (is_sum or objective.combined or name in _OF_CYCLE):
-            raise refuse(f"for {name}, which is no integral along the cycle")
+            return f"for {name}, which is no integral along the cycle"
+    return None
 
 
 def _beginnings(

@@ -15,7 +15,7 @@ at other times.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -202,7 +202,7 @@ class FirstVariationSolve:
         after = _Carried(
             node=node,
             t=end,
-            state=crossing.landed,
+            state=crossing.begun,
             fresh=crossing.crossed,
             switched=jnp.where(crossing.crossed, end, now.switched),
             leading=stages.carried(begun)[:, 2],
@@ -246,7 +246,8 @@ def field_order(flow: Flow) -> tuple[Order, Scalar]:
     """The order of components, and the active parameters."""
     parameters = [jnp.asarray(leaf) for leaf in active_leaves(flow.args)]
     state = [jnp.ones(())] * flow.structure.num_leaves
-    return order_of(flow.rates, state, parameters), jnp.stack(parameters)
+    vector = jnp.stack(parameters) if parameters else jnp.zeros(0)
+    return order_of(flow.rates, state, parameters), vector
 
 
 class Adjoints(NamedTuple):
@@ -340,17 +341,18 @@ def carry_tangents(
     """Leading tangents (v, c) carried along a motion to its arrival; and the steps of that."""
     count = nodes.steps.astype(leading.dtype)
     request = Request(
-        _program(_Kind.of(flow), False),
+        _program(FlowKind.of(flow), False),
         FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, leading, count),
         room=nodes.ends.room,
         stream=nodes.ends,
         quick=True,
-        keeps_records=True,
+        keeps_records=isinstance(nodes.ends, Recording),
         reads_once=True,
     )
     found = engine.run(request)
-    assert found.recording is not None
-    return found.outputs, found.recording
+    steps = found.records if found.recording is None else found.recording
+    assert steps is not None
+    return found.outputs, steps
 
 
 def pull_back(
@@ -371,11 +373,11 @@ def pull_back(
         after: adjoints behind the arrival, of tangents on the section.
     """
     given = _Given(flow.args.args, nodes.arrival, leading, after)
-    program = _program(_Kind.of(flow), True)
+    program = _program(FlowKind.of(flow), True)
     return engine.run(Request(program, given, stream=steps, quick=True)).outputs
 
 
-class _Kind(NamedTuple):
+class FlowKind(NamedTuple):
     """What programs are compiled for."""
 
     system: AbstractSystem
@@ -384,25 +386,30 @@ class _Kind(NamedTuple):
     state: PyTreeDef
 
     @staticmethod
-    def of(flow: Flow) -> "_Kind":
-        return _Kind(flow.system, flow.arrival, flow.args.active, flow.structure)
+    def of(flow: Flow) -> "FlowKind":
+        return FlowKind(flow.system, flow.arrival, flow.args.active, flow.structure)
+
+    @property
+    def flow(self) -> Callable[[Any], Flow]:
+        """What moves, of the inputs of a program."""
+        # Compiled by itself, the field is traced once, not at each of its many uses.
+        field = jax.jit(self.system.vector_field)
+
+        def flow(given: Any) -> Flow:
+            no_columns = jnp.zeros((0, 0))
+            seeded = Seeded(given.args, no_columns, no_columns, self.active)
+            return Flow(self.system, self.arrival, field, seeded, self.state)
+
+        return flow
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def _program(kind: _Kind, backwards: bool) -> Program:
+def _program(kind: FlowKind, backwards: bool) -> Program:
     """The program that carries leading tangents, or that of adjoints."""
-    # Compiled by itself, the field is traced once, not at each of its many uses.
-    field = jax.jit(kind.system.vector_field)
-
-    def flow(given: FirstVariationInputs | _Given) -> Flow:
-        no_columns = jnp.zeros((0, 0))
-        seeded = Seeded(given.args, no_columns, no_columns, kind.active)
-        return Flow(kind.system, kind.arrival, field, seeded, kind.state)
-
     c = kind.state.num_leaves
     if not backwards:
-        return FirstVariationSolve(flow, 1 + c).program()
-    return _AdjointSolve(flow, Step.zero(c, COUNT)).program()
+        return FirstVariationSolve(kind.flow, 1 + c).program()
+    return _AdjointSolve(kind.flow, Step.zero(c, COUNT)).program()
 
 
 class _AdjointSolve:

@@ -151,7 +151,7 @@ class Stages(NamedTuple):
         """Tangents at the points, (v, 3, c), of those where the step starts, (v, c)."""
         unforced = jnp.zeros((3, len(self.order.kept)))
         every = [self.solve(jnp.stack([start] * 3), unforced) for start in tangents]
-        return jnp.stack(every)
+        return jnp.stack(every) if every else jnp.zeros((0, 3, len(self.order.every)))
 
     def pulled(self, u: Scalar) -> tuple[Scalar, Scalar]:
         """Derivatives of a sum of u with respect to r, one vector for all points, and to b.
@@ -213,6 +213,14 @@ class Rows:
             return [sum(parts[1:], parts[0])]
 
         return self._by_all(directional_derivative, list(y))[0]
+
+    def forced(self, y: Scalar, weights: Scalar) -> Scalar:
+        """Derivatives of a sum of the kept rates with respect to the parameters, (p,)."""
+
+        def total(parameters: list[Scalar]) -> Scalar:
+            return weights @ jnp.stack(self._kept(list(y), parameters))
+
+        return jnp.stack(jax.grad(total)(self.parameters))
 
     def _kept(self, y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
         every = self.field(y, q)

@@ -15,7 +15,7 @@ from jaxtyping import PyTree, PyTreeDef
 from jaxbiped._types import Scalar, VectorField
 from jaxbiped.hybrid._guards import Switch
 from jaxbiped.hybrid._system import AbstractSystem
-from jaxbiped.solve.controllers._switch_locator import MARGIN
+from jaxbiped.solve.controllers._switch_locator import MARGIN, NEAR
 from jaxbiped.variational._tangents import Seeded, with_active
 
 Arrival = Callable[[PyTree, PyTree], tuple[Scalar, Scalar]]
@@ -26,6 +26,9 @@ bound, and from which size, in units of the largest entry, such a change is no r
 SIDES = tuple(1e-11 * side for side in (1.0, 4.0, 16.0, -1.0, -4.0, -16.0))
 """When the two sides of a switch are looked at [s]: first the new one. Nearer, penetrations are all
 rounding."""
+_SOON = 4.0
+"""Time to a switch that resets the state, in units of the longest step that crosses one, within
+which a motion is about to."""
 _NEARER = 0.1
 """Part of that at a corner of friction. There the slope goes as the square of time over the time in
 which slip changes by v0, and only the speed must tell the sides apart."""
@@ -71,6 +74,12 @@ class Flow(eqx.Module):
         state, scene = self._parts(z)
         return jnp.stack(jtu.tree_leaves(self.system.reset_map(scene, state)))
 
+    def switched(self, z: Scalar, which: Scalar) -> Scalar:
+        """The components after the switch of a number, from 1 on, which may reset them, (c,)."""
+        state, scene = self._parts(z)
+        after = self.system.reset_at_switch(scene, state, which)
+        return jnp.stack(jtu.tree_leaves(after))
+
     def section(self, z: Scalar) -> Scalar:
         """The section's value."""
         state, scene = self._parts(z)
@@ -99,11 +108,13 @@ class Crossing(NamedTuple):
         which: its number, counted from one; 0 where there is none.
         past: time from the switch to the step's end [s]; 0 where there is none.
         landed: the state on the switch, or the step's end where there is none, shape (c,).
+        begun: the state behind the switch, shape (c,): another one where the switch resets it.
     """
 
     which: Scalar
     past: Scalar
     landed: Scalar
+    begun: Scalar
 
     @property
     def crossed(self) -> Scalar:
@@ -124,7 +135,15 @@ def crossing_of(flow: Flow, before: Scalar, after: Scalar, parameters: Scalar) -
 
     velocity = rate(new)
     beyond, slopes = jax.jvp(values, (new,), (velocity,))
-    changed = [(a > 0.0) != (b > 0.0) for a, b in zip(values(old), beyond, strict=True)]
+    resets = [surface.resets for surface in flow.surfaces(new)]
+    towards = rate(old) if any(resets) else velocity
+    near, falls = jax.jvp(values, (old,), (towards,)) if any(resets) else (values(old), beyond)
+    soon = _SOON * NEAR * flow.system.time_unit
+    changed = [
+        # A step to a reset starts next to the switch and ends behind the reset.
+        (a > 0.0) & (a + soon * fall <= 0.0) if is_reset else (a > 0.0) != (b > 0.0)
+        for a, b, fall, is_reset in zip(near, beyond, falls, resets, strict=True)
+    ]
     which = jnp.asarray(0)
     for number, (change, was, is_) in enumerate(zip(changed, live(old), live(new), strict=True)):
         which = jnp.where(change & (was | is_) & (which == 0), 1 + number, which)
@@ -140,7 +159,14 @@ def crossing_of(flow: Flow, before: Scalar, after: Scalar, parameters: Scalar) -
         return past, back(past)
 
     past, z = jax.lax.cond(which > 0, crossed, lambda: (jnp.zeros(()), new))
-    return Crossing(which, past, z[: after.shape[0]])
+    landed = begun = z[: after.shape[0]]
+    if any(resets):
+        is_reset = _pick(which, list(map(jnp.asarray, resets)), jnp.asarray(False))
+        ahead = -_pick(which, near, 0.0) / _pick(which, falls, 1.0)
+        on = (old + ahead * towards)[: after.shape[0]]
+        past = jnp.where(is_reset, 0.0, past)
+        landed, begun = jnp.where(is_reset, on, landed), jnp.where(is_reset, after, begun)
+    return Crossing(which, past, landed, begun)
 
 
 def earlier_at(flow: Flow, landed: Scalar, which: Scalar, parameters: Scalar) -> Scalar:

@@ -115,8 +115,12 @@ class LaneEngine(AbstractEngine):
         Raises:
             UnknownPrimitiveError: the program holds an operation that lanes do not have.
         """
-        compiled, inputs = self.compile(request), request.inputs
-        how: Any = dict(stream=request.stream, room=request.room, quick=request.quick)
+        compiled, inputs, stream = self.compile(request), request.inputs, request.stream
+        if isinstance(stream, Recorded):
+            # Rows that are read backwards end with the array.
+            empty = stream.room - stream.counts if request.program.backwards else 0
+            stream = jnp.roll(jnp.asarray(stream.values), empty, axis=0)
+        how: Any = dict(stream=stream, room=request.room, quick=request.quick)
         if request.batch:
             return Result(*compiled.run(inputs, schedule=request.times, **how))
         schedule = None if request.times is None else Schedule(request.times)
