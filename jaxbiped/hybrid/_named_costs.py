@@ -13,6 +13,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.dynamics._energy import is_driven
+from jaxbiped.dynamics._surfaces import clearance_rate
 from jaxbiped.dynamics._walker_motion import Drive, WalkerMotion
 from jaxbiped.hybrid._motion_costs import Cost, Extreme, Integral
 from jaxbiped.hybrid._walker_systems import system_of
@@ -116,6 +117,16 @@ def _push_off_squared(part: str | None) -> tuple[tuple[float, Cost], ...]:
     return ((1.0, Integral(_nothing, quantity, at_strike=_half_square_of_push_off)),)
 
 
+def _landing_speed_of(motion: WalkerMotion) -> Scalar:
+    return -clearance_rate(motion.scene, motion.state)
+
+
+@bounded_cache(_PARTS)
+def _landing_speed(part: str | None) -> tuple[tuple[float, Cost], ...]:
+    quantity = Quantity("landing speed", "$v_n$", "m/s")
+    return ((1.0, Integral(_nothing, quantity, at_strike=_landing_speed_of)),)
+
+
 @bounded_cache(_PARTS)
 def _jerk(part: str | None) -> tuple[tuple[float, Cost], ...]:
     return ((1.0, Integral(_square_of_jerk, Quantity("jerk", "$j$", "rad^2/s^5"))),)
@@ -148,6 +159,10 @@ def _of_push_off(scene: Any) -> str | None:
     return None if any(isinstance(part, PushOff) for part in parts) else "it has no push-off"
 
 
+def _of_strikes(scene: Any) -> str | None:
+    return "its feet are compliant" if scene.compliant else None
+
+
 def _of_all(scene: Any) -> str | None:
     return None
 
@@ -168,6 +183,12 @@ NAMED_COSTS = {
         "",
         _of_push_off,
     ),
+    "landing_speed": NamedCost(
+        Quantity("speed at which the feet come down", "$v_n$", "m/s"),
+        _landing_speed,
+        "",
+        _of_strikes,
+    ),
     "jerk": NamedCost(
         Quantity("integral of the squared angular jerk", "$j$", "rad^2/s^5"), _jerk, "", _of_all
     ),
@@ -186,6 +207,8 @@ NAMED_COSTS = {
 - torque squared: Σ ∫ u² over all torques of motors, see `WalkerMotion.motors`.
 - absolute work: Σ ∫ of the size of u φ̇, work of braking too.
 - push off squared: ½ P² of each push-off's impulse P.
+- landing speed: of the swing foot towards the ground just before the strike; a sum over the strikes
+  of a cycle. On rigid feet alone. A gait has a positive one.
 - jerk: Σ ∫ (dα/dt)² over the angular accelerations of all free angles.
 - peak torque, peak power: the largest size of u and of u φ̇ of any motor along the cycle.
 - joint range: largest minus smallest value of an angle, `joint_range[knee_1]`.

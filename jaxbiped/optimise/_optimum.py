@@ -86,6 +86,7 @@ class Optimum(Tabular):
         lost: number of evaluations in which no gait was found or a measure of the gait was not
             finite.
         unmeasured: number of gaits with a measure that was not finite.
+        formulation: the one in use, "gait by gait" or "together".
     """
 
     rows: ClassVar[str] = "variable"
@@ -104,6 +105,7 @@ class Optimum(Tabular):
     evaluations: int
     lost: int
     unmeasured: int
+    formulation: str
 
     @property
     def measures(self) -> dict[str, float]:
@@ -159,5 +161,6 @@ class Optimum(Tabular):
             "objective_error": self.error,
             "message": self.message,
             "evaluations": self.evaluations,
+            "formulation": self.formulation,
         }
         return xarray.Dataset(variables_of(entries), coordinates, attributes)

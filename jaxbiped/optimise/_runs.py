@@ -44,6 +44,7 @@ class Runs:
     Attributes:
         problem, iterations, optimiser: of each run.
         now: counts iterates.
+        formulation: that brought the first design.
         history: iterates of all runs.
         best: the best design of all.
         ended: how the run ended that came to it; `interrupted` by Ctrl-C.
@@ -53,6 +54,7 @@ class Runs:
     iterations: int
     optimiser: "str | optax.GradientTransformation"
     now: Stage
+    formulation: str = "gait by gait"
     history: list[Iteration] = dataclasses.field(default_factory=list)
     ended: RunEnding = _NOT_ENDED
     interrupted: bool = False
@@ -192,6 +194,7 @@ def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
         evaluations=problem.evaluations.count,
         lost=problem.lost,
         unmeasured=problem.unmeasured,
+        formulation=runs.formulation,
     )
 
 

@@ -52,7 +52,7 @@ class Segments(NamedTuple):
         ends: recurring components where each segment ends, shape (n, m); the last ones behind the
             reset.
         gains: what the d cyclic coordinates gained until then, shape (n, d).
-        arrival: the section's value at the end of the last segment, shape (1,).
+        arrival: the section's value at the end of the last segment, and its rate [1/s], shape (2,).
         path: functions along the cycle, of the start of each segment itself and of the end of the
             last just before the reset, shape (n + 1, r).
     """
@@ -113,7 +113,7 @@ def linearise_segments(
         whole = jax.vmap(functools.partial(linearise, _components))(ends)
         behind = linearise(lambda y, a: _components(system.reset_map(a, y), a), last)
         whole = jtu.tree_map(lambda every, one: every.at[-1].set(one), whole, behind)
-        arrival = linearise(lambda y, a: system.arrival(spec.section, a, y)[0][None], last)
+        arrival = linearise(functools.partial(_arrival, spec), last)
         nodes = jtu.tree_map(lambda e, one: jnp.concatenate([e, one[None]]), begins, last)
         along = jax.vmap(functools.partial(linearise, functools.partial(_along, path)))(nodes)
         return Segments(
@@ -127,6 +127,16 @@ def _with_duration(at: Tangents, rate: Scalar, m: int) -> Tangents:
     """The same with a column for the duration behind the first m."""
     first, others = at.columns[:, :m], at.columns[:, m:]
     return Tangents(at.state, jnp.concatenate([first, rate[:, None], others], axis=1))
+
+
+def _arrival(spec: ReturnMapSpec, y: PyTree, args: PyTree) -> Scalar:
+    """The section's value and its rate."""
+
+    def surface(y: PyTree) -> Scalar:
+        return spec.system.arrival(spec.section, args, y)[0]
+
+    rates = spec.system.vector_field(jnp.zeros(()), y, args)
+    return jnp.stack(jax.jvp(surface, (y,), (rates,)))
 
 
 def _components(y: PyTree, _: PyTree) -> Scalar:

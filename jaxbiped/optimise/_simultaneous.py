@@ -20,6 +20,7 @@ from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.dynamics._equivalent_states import exchange_legs
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._poincare_map import recurring_components
+from jaxbiped.gait._return_map import return_map
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
 from jaxbiped.hybrid._landing_system import AbstractLandingSystem
@@ -52,6 +53,8 @@ _APART = 1e-4
 """Distance of points whose first derivatives tell second ones, in units of the unknowns."""
 _FROM_CYCLE = 1e-3
 """Largest relative distance of the gait that is found near a cycle that solves all equations."""
+_GRAZING = 1e-4
+"""Rate at which the section is met, in units of the scene, below which no foot comes down."""
 _MORE = 5
 """Further searches from drawn poses and designs while none has come to a gait."""
 _NO_GAIT = cast(Gait, None)
@@ -157,6 +160,21 @@ class Simultaneous:
     def at(self, z: np.ndarray) -> Conditions:
         return self._known(z).conditions
 
+    def why_no_gait(self, z: np.ndarray) -> str:
+        """Why a cycle that solves all equations is none that a walker walks, in words."""
+        starts, period, u = self.parts(z)
+        scene = self.problem.scene_at(u)
+        speed = float(
+            self._segments(starts[None], np.array([period]), u[None]).arrival.values[0, 1]
+        )
+        if speed * self._time <= _GRAZING:
+            return "the foot does not come down at the end but grazes the ground"
+        state = self.problem.settings.state_of(scene, starts[0])
+        time = float(return_map(scene, state).time)
+        if not time < (1.0 - _FROM_CYCLE) * period:
+            return "no gait was found near it"
+        return f"a foot comes down before its end, after {time:.4g} s of {period:.4g} s"
+
     def _known(self, z: np.ndarray) -> _Known:
         if self._last is None or self._last[0] != z.tobytes():
             starts, period, u = self.parts(z)
@@ -221,19 +239,20 @@ class Simultaneous:
             )
             for equality in (True, False)
         )
+        by_arrival = by_unknowns(segments.arrival.slopes, n - 1)
         conditions = Conditions(
             total.value,
             total.slopes @ chain,
-            np.concatenate([gaps.ravel(), segments.arrival.values, equal]),
+            np.concatenate([gaps.ravel(), segments.arrival.values[:1], equal]),
             np.vstack(
                 [
                     joints.reshape(-1, len(z)),
-                    by_unknowns(segments.arrival.slopes, n - 1),
+                    by_arrival[:1],
                     by_equal @ chain,
                 ]
             ),
-            spare,
-            by_spare @ chain,
+            np.append(spare, self._time * segments.arrival.values[1]),
+            np.vstack([by_spare @ chain, self._time * by_arrival[1:]]),
         )
         return _Known(conditions, (total.slopes, by_equal, by_spare))
 
@@ -284,7 +303,8 @@ class Simultaneous:
         n, m, place = self.count, len(self.sizes), starts.size
         objective, by_equal, by_spare = self._known(z).by_sums
         joints, arrival, required = np.split(of_equal, [place, place + 1])
-        of_sums = objective - required @ by_equal - of_spare @ by_spare
+        of_sums = objective - required @ by_equal - of_spare[:-1] @ by_spare
+        of_arrival = np.append(arrival, self._time * of_spare[-1])
         gains, path = np.split(of_sums[1 + len(u) :], [1 + len(self._integrals)])
         steps = _APART * np.vstack([np.zeros(m + 1 + len(u)), np.eye(m + 1 + len(u))])
         steps[:, m + 1 :] *= np.where(u > 0.5, -1.0, 1.0)
@@ -296,7 +316,7 @@ class Simultaneous:
         joints = joints.reshape(n, m) / self.sizes
         slopes = np.einsum("d,bndj->bnj", gains, segments.gains.slopes)
         slopes -= np.einsum("nm,bnmj->bnj", joints, segments.ends.slopes)
-        slopes[:, -1] -= arrival @ segments.arrival.slopes
+        slopes[:, -1] -= of_arrival @ segments.arrival.slopes
         nodes = np.einsum("nr,bnrj->bnj", path.reshape(n + 1, -1), segments.path.slopes)
         slopes += nodes[:, :-1]
         slopes[:, -1] += nodes[:, -1]
@@ -316,23 +336,25 @@ def _spec_of(scene: Any, engine: str) -> Any:
 
 def check_simultaneous(problem: DesignProblem) -> None:
     """Raises `ArgumentError` for a problem that has no simultaneous search."""
-    scene, settings = problem.scene, problem.settings
-
-    def refuse(what: str) -> ArgumentError:
-        return ArgumentError(
-            f'formulation = "together" is not allowed {what}: choose "gait by gait".'
+    if reason := reason_against(problem):
+        raise ArgumentError(
+            f'formulation = "together" is not allowed {reason}: choose "gait by gait".'
         )
 
+
+def reason_against(problem: DesignProblem) -> str | None:
+    """Why a problem has no simultaneous search, in words; None if it has."""
+    scene, settings = problem.scene, problem.settings
     if integrals_of(scene.minimal) is None:
-        raise refuse(f"for a {type(scene).__name__}, which is no walker")
+        return f"for a {type(scene).__name__}, which is no walker"
     if not system_of(scene.minimal).footsteps_end_on_section:
-        raise refuse("for compliant feet, which press into the ground for a while")
+        return "for compliant feet, which press into the ground for a while"
     if _spec_of(scene.minimal, settings.engine).resets:
-        raise refuse("for a walker whose modes change between strikes")
+        return "for a walker whose modes change between strikes"
     if arrivals_of(scene, settings.footsteps) != 1:
-        raise refuse("for a cycle of several footsteps")
+        return "for a cycle of several footsteps"
     if problem.ensemble is not None:
-        raise refuse("with scatter")
+        return "with scatter"
     every = with_parts(problem.wanted)
     combined = [measure.combined for measure in every.values() if measure.combined]
     parts = {name for combination in combined for name in combination.of}
@@ -344,27 +366,25 @@ def check_simultaneous(problem: DesignProblem) -> None:
             sides = [low if cost.sign > 0.0 else high for _, low, high in bounded]
             is_path = weight == 1.0 and len(objective.costs) == 1 and set(sides) == {None}
             if not is_path or name in (*problem.weights, *parts):
-                raise refuse(
+                return (
                     f"for {name}, an extreme, except as the upper bound of a largest value or the "
                     "lower bound of a smallest one"
                 )
         is_sum = objective.costs or is_sum_of_parameters(objective)
         if not (is_sum or objective.combined or name in _OF_CYCLE):
-            raise refuse(f"for {name}, which is no integral along the cycle")
+            return f"for {name}, which is no integral along the cycle"
+    return None
 
 
 def _beginnings(
-    whole: Simultaneous, guess: Any, pose: Any, more: int, seed: int
+    whole: Simultaneous, pose: Any, period: float | None, more: int, seed: int
 ) -> Iterator[np.ndarray]:
     """Points from which searches begin: the scene's own design, then drawn designs and poses."""
     from scipy.stats import qmc
 
     scene = whole.problem.scene
     u = start_of(scene, whole.problem.variables)
-    if isinstance(guess, Gait):
-        yield whole.followed_cycle(u, pose, float(guess.measures.period))
-    else:
-        yield whole.rough_cycle(u, pose)
+    yield whole.rough_cycle(u, pose) if period is None else whole.followed_cycle(u, pose, period)
     poses = rolling_starts(scene.minimal, more + 1, seed=seed)
     designs = qmc.Sobol(len(u), seed=seed).random_base2(more.bit_length())
     for k in range(1, more + 1):
@@ -373,8 +393,8 @@ def _beginnings(
 
 def begin_together(
     problem: DesignProblem,
-    guess: Any,
     near: Any,
+    period: float | None,
     segments: int,
     iterations: int,
     drawn: tuple[int, int],
@@ -384,8 +404,8 @@ def begin_together(
 
     Args:
         problem: what is designed.
-        guess, near: a gait from which the first search begins, or None; and its state, or that of a
-            rough pose, or None for the default one.
+        near, period: the state of a gait and its period [s], from which the first search begins; or
+            a rough pose, None for the default one, and None.
         segments, iterations: of each search.
         drawn: how many further searches begin at drawn poses and designs, and the seed.
         now: counts iterates.
@@ -408,8 +428,9 @@ def begin_together(
         return None if problem.from_guess(there, starts[0], sizes) is None else there
 
     best: tuple[float, np.ndarray, RunEnding] | None = None
+    no_gaits: list[tuple[float, np.ndarray]] = []
     others: list[tuple[float, np.ndarray, RunEnding]] = []
-    for k, point in enumerate(_beginnings(whole, guess, pose, count + _MORE, seed)):
+    for k, point in enumerate(_beginnings(whole, pose, period, count + _MORE, seed)):
         if k > count and best is not None:
             break
         z, ended = run_newton(whole, point, iterations, report)
@@ -418,14 +439,21 @@ def begin_together(
             others.append((here.violation, z, ended))
         elif best is None or here.objective < best[0]:
             there = gait_of(z, _FROM_CYCLE)
-            best = best if there is None else (here.objective, there, ended)
+            if there is None:
+                no_gaits.append((here.objective, z))
+            else:
+                best = here.objective, there, ended
     if best is not None:
         return problem.begin(best[1]), best[2]
     for _, z, ended in sorted(others, key=lambda other: other[0]):
         there = gait_of(z, np.inf)
         if there is not None:
             return problem.begin(there), ended
+    what = "no cycle was found"
+    if no_gaits:
+        value, z = min(no_gaits, key=lambda cycle: cycle[0])
+        what = f"of the best cycle, of {problem.sense * value:.6g}, {whole.why_no_gait(z)}"
     raise ArgumentError(
-        'formulation = "together" came to no gait: no cycle was found, or in each a foot comes '
-        "down before its end; give another guess, further requirements or restarts."
+        f'formulation = "together" came to no gait: {what}; give another guess, further '
+        'requirements, such as "landing_speed>0.05", or restarts.'
     )
