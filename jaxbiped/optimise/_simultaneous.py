@@ -43,7 +43,7 @@ from jaxbiped.optimise._objectives import costs_of, is_sum_of_parameters, with_p
 from jaxbiped.optimise._optimisers import RunEnding
 from jaxbiped.optimise._sequential_programming import Conditions, run_newton
 from jaxbiped.optimise._shooting import Linearised, Segments, linearise_segments
-from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.scene._parameter_access import parameter_quantities, select_parameters
 
 _LEAST_PERIOD, _PERIOD, _MOST_PERIOD = 0.3, 2.2, 20.0
 """Periods of a footstep in units of √(l/g): the least, the first that is tried, the largest."""
@@ -378,17 +378,27 @@ def reason_against(problem: DesignProblem) -> str | None:
 
 def _beginnings(
     whole: Simultaneous, pose: Any, period: float | None, more: int, seed: int
-) -> Iterator[np.ndarray]:
-    """Points from which searches begin: the scene's own design, then drawn designs and poses."""
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Points from which searches begin: two in any case, number 0, then drawn designs and poses.
+
+    They are the scene's own design, and that with the least torques, which is often near the
+    cheaper of several optima.
+    """
     from scipy.stats import qmc
 
-    scene = whole.problem.scene
-    u = start_of(scene, whole.problem.variables)
-    yield whole.rough_cycle(u, pose) if period is None else whole.followed_cycle(u, pose, period)
+    scene, variables = whole.problem.scene, whole.problem.variables
+    u = start_of(scene, variables)
+    rough = period is None
+    yield 0, whole.rough_cycle(u, pose) if rough else whole.followed_cycle(u, pose, period)
+    quantities = parameter_quantities(scene)
+    is_torque = [quantities[name].unit.startswith("N m") for name in variables.names]
+    slack = np.where(is_torque, variables.positions(np.zeros(len(u))), u)
+    if np.any(slack != u):
+        yield 0, whole.rough_cycle(slack, pose)
     poses = rolling_starts(scene.minimal, more + 1, seed=seed)
     designs = qmc.Sobol(len(u), seed=seed).random_base2(more.bit_length())
     for k in range(1, more + 1):
-        yield whole.rough_cycle(designs[k], jtu.tree_map(operator.itemgetter(k), poses))
+        yield k, whole.rough_cycle(designs[k], jtu.tree_map(operator.itemgetter(k), poses))
 
 
 def begin_together(
@@ -430,7 +440,7 @@ def begin_together(
     best: tuple[float, np.ndarray, RunEnding] | None = None
     no_gaits: list[tuple[float, np.ndarray]] = []
     others: list[tuple[float, np.ndarray, RunEnding]] = []
-    for k, point in enumerate(_beginnings(whole, pose, period, count + _MORE, seed)):
+    for k, point in _beginnings(whole, pose, period, count + _MORE, seed):
         if k > count and best is not None:
             break
         z, ended = run_newton(whole, point, iterations, report)
