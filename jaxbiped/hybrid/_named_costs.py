@@ -16,6 +16,7 @@ from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._energy import energies, is_driven, powers
 from jaxbiped.dynamics._footfalls import touches
 from jaxbiped.dynamics._impact import push_off_work
+from jaxbiped.dynamics._surfaces import clearance_rate
 from jaxbiped.dynamics._walker_motion import Drive, WalkerMotion
 from jaxbiped.hybrid._guards import Switch
 from jaxbiped.hybrid._motion_costs import Cost, Extreme, Integral
@@ -170,6 +171,10 @@ def _power_of_impacts(_: str | None, motion: WalkerMotion) -> Scalar:
     return powers(motion.scene, motion.state).indentation
 
 
+def _landing_speed(motion: WalkerMotion) -> Scalar:
+    return -clearance_rate(motion.scene, motion.state)
+
+
 def _kinetic_energy(motion: WalkerMotion) -> Scalar:
     return energies(motion.scene, motion.state).kinetic
 
@@ -214,6 +219,10 @@ def _of_motors(scene: Any) -> str | None:
 def _of_push_off(scene: Any) -> str | None:
     parts = getattr(scene, "actuation", None) or ()
     return None if any(isinstance(part, PushOff) for part in parts) else "it has no push-off"
+
+
+def _of_strikes(scene: Any) -> str | None:
+    return "its feet are compliant" if scene.compliant else None
 
 
 def _of_all(scene: Any) -> str | None:
@@ -263,6 +272,12 @@ NAMED_COSTS = {
         _integral(_nothing, at_strike=_half_square_of_push_off),
         "",
         _of_push_off,
+    ),
+    "landing_speed": NamedCost(
+        Quantity("speed at which the feet come down", "$v_n$", "m/s"),
+        _integral(_nothing, at_strike=_landing_speed),
+        "",
+        _of_strikes,
     ),
     "impact_loss": NamedCost(
         Quantity("energy lost in impacts", "$E_i$", "J"),
@@ -318,6 +333,8 @@ footsteps.
 - absolute work: Σ ∫ of the size of u φ̇, work of braking too.
 - motor work: of each motor where its power is positive, added up, and the push-off's.
 - push off squared: ½ P² of each push-off's impulse P.
+- landing speed: of the swing foot towards the ground just before the strike; a sum over the strikes
+  of a cycle. On rigid feet alone. A gait has a positive one.
 - impact loss: work of the normal reactions, and what springs, stops and latches lose; a rigid
   walker's kinetic energy lost in its impacts, after its push-off, and what its joints lose.
 - friction loss: work against friction.

@@ -14,9 +14,9 @@ OPTIMAL = 1e-3
 _NEAR, _BEND = (1e-5, 2e-2), 0.1
 """Distances in u of designs whose differences the derivatives must explain, and what of the change
 of the derivatives between them these may miss."""
-_NEARER = 0.05
-"""Share of the way to another design at which derivatives must explain the difference that did not
-explain the whole one."""
+_NEARER = (0.05, 0.0025)
+"""Shares of the way to another design at one of which derivatives must explain the difference that
+did not explain the whole one."""
 _AT_BOUND = 1e-6
 """Distance in u at which a variable is at its bound."""
 _ASIDE = 1e-3
@@ -372,12 +372,15 @@ def _explains_nearer(problem: DesignProblem, design: Design, other: Design) -> b
 
     There the share of the difference itself counts: near an optimum all differences are small.
     """
-    u = design.u + _NEARER * (other.u - design.u)
-    known = problem.beside(u)
-    if known is None:
-        return False
-    missed = _missed(problem, design, Design(u, known))
-    return bool(missed.off <= OPTIMAL * abs(missed.difference) + missed.bar)
+    for share in _NEARER:
+        u = design.u + share * (other.u - design.u)
+        known = problem.beside(u)
+        if known is None:
+            continue
+        missed = _missed(problem, design, Design(u, known))
+        if missed.off <= OPTIMAL * abs(missed.difference) + missed.bar:
+            return True
+    return False
 
 
 def is_untried(u: np.ndarray, begin: np.ndarray) -> bool:

@@ -23,7 +23,8 @@ from jaxbiped.gait._search_starts import state_of_guess
 from jaxbiped.hybrid._hybrid_system import MINIMAL_SCENES
 from jaxbiped.hybrid._sections import AbstractSection, chosen_section
 from jaxbiped.optimise._design_gaits import CRITERIA, Ensemble, GaitSettings, ensemble_of
-from jaxbiped.optimise._design_problem import DesignProblem, start_of, variables_of
+from jaxbiped.optimise._design_problem import DesignProblem, variables_of
+from jaxbiped.optimise._formulation import FORMULATIONS, first_design
 from jaxbiped.optimise._objective_values import Evaluations, jacobian_names
 from jaxbiped.optimise._objectives import (
     Measure,
@@ -41,7 +42,7 @@ from jaxbiped.optimise._requirements import (
     requirements_of,
 )
 from jaxbiped.optimise._runs import Runs, optimum_of, scattered_designs
-from jaxbiped.optimise._simultaneous import begin_together, check_simultaneous
+from jaxbiped.optimise._simultaneous import check_simultaneous
 from jaxbiped.scene._parameter_access import scene_identity
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._scene_checks import check_scene
@@ -51,7 +52,6 @@ from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 if TYPE_CHECKING:
     import optax
 
-FORMULATIONS = ("gait by gait", "together")
 _ROUNDS = 3
 """Searches for worse members than an ensemble has, each with another run, at most."""
 Goal: TypeAlias = str | Measure | Mapping[str | Measure, float] | None
@@ -75,7 +75,7 @@ def optimise_gait(
     criterion: str = "mean",
     seed: int = 0,
     footsteps: int | None = None,
-    formulation: str = "gait by gait",
+    formulation: str = "auto",
     segments: int = 7,
     accuracy: str = "balanced",
     engine: str = "auto",
@@ -119,6 +119,9 @@ def optimise_gait(
         formulation: "gait by gait" finds the gait of each design; "together" seeks the cycle, its
             period and the design as unknowns of one problem, for rigid feet of one mode. That needs
             no gait to begin with, only a rough pose (`guess`), and ends with a certified gait, too.
+            "auto" chooses "together", where it is possible and the optimiser is the default one,
+            for laws of time and where the first design has no gait, or one with a multiplier
+            beyond 3 or a fold within a step.
         segments: number of segments of the cycle that are sought "together".
         accuracy: "balanced" or "tight".
         engine: as for `find_gait`.
@@ -191,12 +194,9 @@ def optimise_gait(
     if formulation == "together":
         check_simultaneous(problem)
     with stage("optimising the gait", unit="iterations", show=progress) as now:
-        ended, runs = None, Runs(problem, iterations, optimiser, now)
-        if formulation == "together":
-            drawn = int(restarts), int(seed)
-            begin, ended = begin_together(problem, guess, near, segments, iterations, drawn, now)
-        else:
-            begin = problem.begin(start_of(scene, variables), near)
+        search = guess, near, segments, iterations, (int(restarts), int(seed)), now
+        begin, ended, formulation = first_design(problem, formulation, optimiser, *search)
+        runs = Runs(problem, iterations, optimiser, now, formulation)
         try:
             runs.run(begin, ended)
             if restarts and formulation != "together":

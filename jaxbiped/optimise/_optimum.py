@@ -90,6 +90,7 @@ class Optimum(Tabular):
             finite.
         unmeasured: number of gaits with a measure that was not finite.
         problem: what was optimised, for `torque_gap` and `refine`.
+        formulation: the one in use, "gait by gait" or "together".
     """
 
     rows: ClassVar[str] = "variable"
@@ -110,6 +111,7 @@ class Optimum(Tabular):
     lost: int
     unmeasured: int
     problem: DesignProblem
+    formulation: str
 
     @property
     def measures(self) -> dict[str, float]:
@@ -180,5 +182,6 @@ class Optimum(Tabular):
             "objective_error": self.error,
             "message": self.message,
             "evaluations": self.evaluations,
+            "formulation": self.formulation,
         }
         return xarray.Dataset(variables_of(entries), coordinates, attributes)

@@ -78,9 +78,11 @@ def _sought(best: Optimum, now: Stage) -> Optimum:
     scene, variables = refined_laws(best)
     problem = best.problem.variant(scene, variables=variables)
     check_simultaneous(problem)
-    search = best.gait, best.gait.measures.state, _SEGMENTS, _ITERATIONS, (0, 0), now
-    begin, ended = begin_together(problem, *search)
-    runs = Runs(problem, _ITERATIONS, "trust-region", now)
+    known = best.gait.measures
+    begin, ended = begin_together(
+        problem, known.state, float(known.period), _SEGMENTS, _ITERATIONS, (0, 0), now
+    )
+    runs = Runs(problem, _ITERATIONS, "trust-region", now, "together")
     runs.run(begin, ended)
     return optimum_of(problem, runs)
 

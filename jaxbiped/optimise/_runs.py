@@ -46,6 +46,7 @@ class Runs:
     Attributes:
         problem, iterations, optimiser: of each run.
         now: counts iterates.
+        formulation: that brought the first design.
         history: iterates of all runs.
         best: the best design of all.
         ended: how the run ended that came to it; `interrupted` by Ctrl-C.
@@ -55,6 +56,7 @@ class Runs:
     iterations: int
     optimiser: "str | optax.GradientTransformation"
     now: Stage
+    formulation: str = "gait by gait"
     history: list[Iteration] = dataclasses.field(default_factory=list)
     ended: RunEnding = _NOT_ENDED
     interrupted: bool = False
@@ -201,6 +203,7 @@ def optimum_of(
         lost=problem.lost,
         unmeasured=problem.unmeasured,
         problem=problem,
+        formulation=runs.formulation,
     )
 
 

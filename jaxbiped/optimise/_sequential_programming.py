@@ -30,6 +30,8 @@ _KEPT, _GAIN, _NOISE = 1e-9, 1e-10, 1e-7
 counts as best, and one that may be lost in errors of the motion."""
 _VANISHING = 1e-6
 """Share of the largest objective so far below which one counts as of that size."""
+_AT_BOUND = 1e-11
+"""Distance of a bound that counts as none."""
 _MOVED = 1e-9
 """Norm of a row that no step along the equations moves, and what is left where rows contradict."""
 
@@ -82,7 +84,7 @@ def run_newton(
     program: Program, z: np.ndarray, iterations: int, report: Callable[[np.ndarray], None]
 ) -> tuple[np.ndarray, RunEnding]:
     """Steps from a point until none is expected to be better."""
-    z = np.clip(z, program.least, program.most)
+    z = within(program, z)
     here, passed = program.at(z), list[tuple[float, float]]()
     if not np.isfinite(here.violation):
         return z, RunEnding(False, "The motion is lost within a segment of the first cycle.")
@@ -141,6 +143,12 @@ def best_step(program: Program, z: np.ndarray, here: Conditions, curvature: np.n
     return Step(step, of_equal, multipliers[: len(here.spare)], gain)
 
 
+def within(program: Program, z: np.ndarray) -> np.ndarray:
+    """The point moved into the bounds, and onto those that it misses by rounding."""
+    inside = np.where(z - program.least < _AT_BOUND, program.least, z)
+    return np.where(program.most - z < _AT_BOUND, program.most, inside)
+
+
 def least_distance(matrix: np.ndarray, right: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
     """The shortest x with matrix x ≥ right, None for none, and the multipliers of the rows.
 
@@ -173,14 +181,14 @@ def _along(
     """A point along a step that the filter accepts, which may grow by this one; None for none."""
     slope, share = float(here.gradient @ step), 1.0
     while share >= _SHORTEST:
-        there = np.clip(z + share * step, program.least, program.most)
+        there = within(program, z + share * step)
         point = program.at(there)
         if _accepts(here, point, share * slope, passed):
             return there, point
         if share == 1.0 and np.isfinite(point.violation):
             # Equations bend: once more onto them, with the same derivatives.
             back = np.linalg.lstsq(here.equal_slopes, -point.equal)[0]
-            there = np.clip(there + back, program.least, program.most)
+            there = within(program, there + back)
             point = program.at(there)
             if _accepts(here, point, slope, passed):
                 return there, point

@@ -59,7 +59,7 @@ class Segments(NamedTuple):
         ends: recurring components where each segment ends, shape (n, m); the last ones behind the
             reset.
         gains: what the d cyclic coordinates gained until then, shape (n, d).
-        arrival: the section's value at the end of the last segment, shape (1,).
+        arrival: the section's value at the end of the last segment, and its rate [1/s], shape (2,).
         path: functions along the cycle, of the start of each segment itself and of the end of the
             last just before the reset, shape (n + 1, r).
     """
@@ -210,8 +210,13 @@ def _with_duration(at: Tangents, rate: Scalar, m: int) -> Tangents:
 
 
 def _arrival(spec: ReturnMapSpec, y: PyTree, args: PyTree) -> Scalar:
-    """The section's value."""
-    return spec.system.arrival(spec.section, args, y)[0][None]
+    """The section's value and its rate."""
+
+    def surface(y: PyTree) -> Scalar:
+        return spec.system.arrival(spec.section, args, y)[0]
+
+    rates = spec.system.vector_field(jnp.zeros(()), y, args)
+    return jnp.stack(jax.jvp(surface, (y,), (rates,)))
 
 
 def _components(y: PyTree, _: PyTree) -> Scalar:

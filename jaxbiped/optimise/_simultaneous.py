@@ -20,6 +20,7 @@ from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.dynamics._equivalent_states import exchange_legs
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._poincare_map import recurring_components
+from jaxbiped.gait._return_map import return_map
 from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
 from jaxbiped.gait._search_starts import default_guess, rolling_starts
 from jaxbiped.hybrid._landing_system import AbstractLandingSystem
@@ -48,7 +49,7 @@ from jaxbiped.optimise._shooting import (
     linearise_segments,
     pull_back_segments,
 )
-from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.scene._parameter_access import parameter_quantities, select_parameters
 
 _LEAST_PERIOD, _PERIOD, _MOST_PERIOD = 0.3, 2.2, 20.0
 """Periods of a footstep in units of √(l/g): the least, the first that is tried, the largest."""
@@ -58,6 +59,8 @@ _APART = 1e-4
 """Distance of points whose first derivatives tell second ones, in units of the unknowns."""
 _FROM_CYCLE = 1e-3
 """Largest relative distance of the gait that is found near a cycle that solves all equations."""
+_GRAZING = 1e-4
+"""Rate at which the section is met, in units of the scene, below which no foot comes down."""
 _MORE = 5
 """Further searches from drawn poses and designs while none has come to a gait."""
 _NO_GAIT = cast(Gait, None)
@@ -166,6 +169,21 @@ class Simultaneous:
     def at(self, z: np.ndarray) -> Conditions:
         return self._known(z).conditions
 
+    def why_no_gait(self, z: np.ndarray) -> str:
+        """Why a cycle that solves all equations is none that a walker walks, in words."""
+        starts, period, u = self.parts(z)
+        scene = self.problem.scene_at(u)
+        speed = float(
+            self._segments(starts[None], np.array([period]), u[None]).arrival.values[0, 1]
+        )
+        if speed * self._time <= _GRAZING:
+            return "the foot does not come down at the end but grazes the ground"
+        state = self.problem.settings.state_of(scene, starts[0])
+        time = float(return_map(scene, state).time)
+        if not time < (1.0 - _FROM_CYCLE) * period:
+            return "no gait was found near it"
+        return f"a foot comes down before its end, after {time:.4g} s of {period:.4g} s"
+
     def _known(self, z: np.ndarray) -> _Known:
         if self._last is None or self._last[0] != z.tobytes():
             starts, period, u = self.parts(z)
@@ -230,19 +248,20 @@ class Simultaneous:
             )
             for equality in (True, False)
         )
+        by_arrival = by_unknowns(segments.arrival.slopes, n - 1)
         conditions = Conditions(
             total.value,
             total.slopes @ chain,
-            np.concatenate([gaps.ravel(), segments.arrival.values, equal]),
+            np.concatenate([gaps.ravel(), segments.arrival.values[:1], equal]),
             np.vstack(
                 [
                     joints.reshape(-1, len(z)),
-                    by_unknowns(segments.arrival.slopes, n - 1),
+                    by_arrival[:1],
                     by_equal @ chain,
                 ]
             ),
-            spare,
-            by_spare @ chain,
+            np.append(spare, self._time * segments.arrival.values[1]),
+            np.vstack([by_spare @ chain, self._time * by_arrival[1:]]),
         )
         return _Known(conditions, (total.slopes, by_equal, by_spare))
 
@@ -289,10 +308,11 @@ class Simultaneous:
         place, k = self.count * len(self.sizes), len(z) - self.count * len(self.sizes) - 1
         objective, by_equal, by_spare = self._known(z).by_sums
         joints, arrival, required = np.split(of_equal, [place, place + 1])
-        of_sums = objective - required @ by_equal - of_spare @ by_spare
+        of_sums = objective - required @ by_equal - of_spare[:-1] @ by_spare
         gains, path = np.split(of_sums[1 + k :], [1 + len(self.integrals)])
         ends = -joints.reshape(self.count, -1) / self.sizes
-        return SegmentWeights(ends, gains, -arrival, path.reshape(self.count + 1, -1))
+        of_arrival = -np.append(arrival, self._time * of_spare[-1])
+        return SegmentWeights(ends, gains, of_arrival, path.reshape(self.count + 1, -1))
 
     def pulled_back(
         self, z: np.ndarray, of_equal: np.ndarray, of_spare: np.ndarray, steps: int
@@ -391,27 +411,36 @@ def reason_against(problem: DesignProblem) -> str | None:
 
 
 def _beginnings(
-    whole: Simultaneous, guess: Any, pose: Any, more: int, seed: int
-) -> Iterator[np.ndarray]:
-    """Points from which searches begin: the scene's own design, then drawn designs and poses."""
+    whole: Simultaneous, pose: Any, period: float | None, more: int, seed: int
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Points from which searches begin: two in any case, number 0, then drawn designs and poses.
+
+    They are the scene's own design, and that with the least torques, which is often near the
+    cheaper of several optima.
+    """
     from scipy.stats import qmc
 
-    scene = whole.problem.scene
-    u = start_of(scene, whole.problem.variables)
-    if isinstance(guess, Gait):
-        yield whole.followed_cycle(u, pose, float(guess.measures.period))
-    else:
-        yield whole.rough_cycle(u, pose)
+    scene, variables = whole.problem.scene, whole.problem.variables
+    u = start_of(scene, variables)
+    yield (
+        0,
+        whole.rough_cycle(u, pose) if period is None else whole.followed_cycle(u, pose, period),
+    )
+    quantities = parameter_quantities(scene)
+    is_torque = [quantities[name].unit.startswith("N m") for name in variables.names]
+    slack = np.where(is_torque, variables.positions(np.zeros(len(u))), u)
+    if np.any(slack != u):
+        yield 0, whole.rough_cycle(slack, pose)
     poses = rolling_starts(scene.minimal, more + 1, seed=seed)
     designs = qmc.Sobol(len(u), seed=seed).random_base2(more.bit_length())
     for k in range(1, more + 1):
-        yield whole.rough_cycle(designs[k], jtu.tree_map(operator.itemgetter(k), poses))
+        yield k, whole.rough_cycle(designs[k], jtu.tree_map(operator.itemgetter(k), poses))
 
 
 def begin_together(
     problem: DesignProblem,
-    guess: Any,
     near: Any,
+    period: float | None,
     segments: int,
     iterations: int,
     drawn: tuple[int, int],
@@ -421,8 +450,8 @@ def begin_together(
 
     Args:
         problem: what is designed.
-        guess, near: a gait from which the first search begins, or None; and its state, or that of a
-            rough pose, or None for the default one.
+        near, period: the state of a gait and its period [s], from which the first search begins; or
+            a rough pose, None for the default one, and None.
         segments, iterations: of each search.
         drawn: how many further searches begin at drawn poses and designs, and the seed.
         now: counts iterates.
@@ -445,8 +474,9 @@ def begin_together(
         return None if problem.from_guess(there, starts[0], sizes) is None else there
 
     best: tuple[float, np.ndarray, RunEnding] | None = None
+    no_gaits: list[tuple[float, np.ndarray]] = []
     others: list[tuple[float, np.ndarray, RunEnding]] = []
-    for k, point in enumerate(_beginnings(whole, guess, pose, count + _MORE, seed)):
+    for k, point in _beginnings(whole, pose, period, count + _MORE, seed):
         if k > count and best is not None:
             break
         z, ended = run_newton(whole, point, iterations, report)
@@ -455,14 +485,21 @@ def begin_together(
             others.append((here.violation, z, ended))
         elif best is None or here.objective < best[0]:
             there = gait_of(z, _FROM_CYCLE)
-            best = best if there is None else (here.objective, there, ended)
+            if there is None:
+                no_gaits.append((here.objective, z))
+            else:
+                best = here.objective, there, ended
     if best is not None:
         return problem.begin(best[1]), best[2]
     for _, z, ended in sorted(others, key=lambda other: other[0]):
         there = gait_of(z, np.inf)
         if there is not None:
             return problem.begin(there), ended
+    what = "no cycle was found"
+    if no_gaits:
+        value, z = min(no_gaits, key=lambda cycle: cycle[0])
+        what = f"of the best cycle, of {problem.sense * value:.6g}, {whole.why_no_gait(z)}"
     raise ArgumentError(
-        'formulation = "together" came to no gait: no cycle was found, or in each a foot comes '
-        "down before its end; give another guess, further requirements or restarts."
+        f'formulation = "together" came to no gait: {what}; give another guess, further '
+        'requirements, such as "landing_speed>0.05", or restarts.'
     )
