@@ -422,10 +422,10 @@ def _beginnings(
 
     scene, variables = whole.problem.scene, whole.problem.variables
     u = start_of(scene, variables)
-    yield (
-        0,
-        whole.rough_cycle(u, pose) if period is None else whole.followed_cycle(u, pose, period),
-    )
+    if period is None:
+        yield 0, whole.rough_cycle(u, pose)
+    else:
+        yield 0, whole.followed_cycle(u, pose, period)
     quantities = parameter_quantities(scene)
     is_torque = [quantities[name].unit.startswith("N m") for name in variables.names]
     slack = np.where(is_torque, variables.positions(np.zeros(len(u))), u)

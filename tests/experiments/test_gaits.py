@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.drawn import labels_of, points_of
-from tests.experiments.quick import drawn_run
+from tests.experiments.quick import drawn_run, quick_run
 
 pytestmark = pytest.mark.nightly
 
@@ -107,6 +107,15 @@ def test_costs_of_a_driven_step_fall_towards_the_free_torques(tmp_path):
     assert one["above_free"] > cubic["above_free"] > spline["above_free"] > 0.0
     shown = points_of(figures["driven_compass.png"].axes[1], "spline in time")[0]
     np.testing.assert_array_equal(shown, [[6, spline["above_free"]]])
+
+
+def test_another_discretisation_has_the_same_optimum(tmp_path):
+    numbers, _ = quick_run("driven_collocation", tmp_path)
+    (row,) = numbers["rows"]
+    assert row["outcome"] == "converged"
+    assert row["is_minimum"]
+    assert max(row["missed"], row["collocation_missed"]) < 1e-9
+    assert abs(row["difference"]) < 1e-9
 
 
 def test_footsteps_stay_on_the_gait_and_repeat(tmp_path):

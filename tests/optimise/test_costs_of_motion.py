@@ -117,6 +117,20 @@ def test_half_of_a_push_offs_square_is_known():
     np.testing.assert_allclose(known.slopes["push_off_squared"], slopes, atol=1e-6)
 
 
+def test_the_landing_speed_is_the_foots_towards_the_ground(gait):
+    """By angles just before the strike, which are those behind it with the legs exchanged."""
+    known = evaluated(DRIVEN, gait, ("landing_speed",))
+    last = jb.simulate(
+        DRIVEN, gait.measures.state, duration=float(gait.measures.period) - 1e-7, rtol=1e-12
+    ).state
+    theta_1, theta_2, omega_1, omega_2 = (float(leaf[-1]) for leaf in last[1:])
+    speed = np.sin(theta_2) * omega_2 - np.sin(theta_1) * omega_1
+    assert known.values["landing_speed"] == pytest.approx(speed, abs=1e-5)
+    assert speed > 0.1
+    with pytest.raises(jb.ArgumentError, match="its feet are compliant"):
+        jb.optimise_gait(jb.seed_scene(), vary={"slope": (0.02, 0.04)}, minimise="landing_speed")
+
+
 @pytest.mark.slow
 def test_a_motor_of_compliant_feet_drives_and_brakes():
     """Absolute work is twice the positive one less what the motor gives in all."""

@@ -11,6 +11,11 @@ A = jb.actuation
 STEP = ("step_length==0.4", "period==0.7")
 CUBIC = compass(A.TimePolynomial((0.0,) * 4, 0.7))
 PD = compass(A.PD(20.0, 1.0, 0.4))
+NEAR = jb.with_parameters(
+    PD, {"leg.hip.kp": 40.6634, "leg.hip.kd": 2.18539, "leg.hip.target": 0.738931}
+)
+"""Near the best gains."""
+COST_OF_SIX = 35.4354149
 GAINS = {"leg.hip.kp": (1.0, 200.0), "leg.hip.kd": (0.01, 20.0), "leg.hip.target": (0.05, 1.0)}
 FREE = 203.6052460122
 """The least ∫u² of any torque in a step of .4 m in .7 s, by collocation [N²·m²·s]."""
@@ -61,12 +66,15 @@ def test_laws_of_time_are_optimal_from_zero_torque(scene, count, least):
 def test_gains_are_those_that_are_found_gait_by_gait(kp):
     """From gains that walk nowhere near the step that is asked for."""
     found = together(jb.with_parameters(PD, {"leg.hip.kp": kp}), GAINS)
-    near = jb.with_parameters(
-        PD, {"leg.hip.kp": 40.6634, "leg.hip.kd": 2.18539, "leg.hip.target": 0.738931}
-    )
     single = jb.optimise_gait(
-        near, vary=GAINS, minimise="torque_squared", subject_to=list(STEP), guess=START
+        NEAR,
+        vary=GAINS,
+        minimise="torque_squared",
+        subject_to=list(STEP),
+        guess=START,
+        formulation="gait by gait",
     )
+    assert (found.formulation, single.formulation) == ("together", "gait by gait")
     assert found.outcome is jb.optimise.Outcome.CONVERGED
     assert found.objective == pytest.approx(single.objective, rel=1e-7)
     for name in GAINS:
@@ -89,7 +97,7 @@ def test_a_path_is_bounded_and_parameters_are_tied():
     assert tight.outcome is jb.optimise.Outcome.CONVERGED
     assert tight.measures["swing_highest"] == pytest.approx(0.6, rel=1e-6)
     assert tight.objective == pytest.approx(254.254212, rel=1e-6)
-    with pytest.raises(jb.ArgumentError, match="a foot comes down before its end"):
+    with pytest.raises(jb.ArgumentError, match="no cycle was found"):
         together(CUBIC, coefficients(4), (*STEP, jb.optimise.Along(swing, high=0.5)))
 
 
@@ -143,28 +151,49 @@ def test_derivatives_of_the_conditions_are_differences():
     np.testing.assert_allclose(whole[chosen], bends[chosen], atol=1e-4 * size)
 
 
-@pytest.mark.nightly
-def test_further_starts_find_better_gains_of_three_links():
-    """Of several local optima, with gaits of multipliers that the search does not mind."""
-    scene = three_links()
-    vary = {
-        "torso.lean.kp": (0.0, 400.0),
-        "torso.lean.kd": (0.0, 40.0),
-        "torso.lean.target": (-0.5, 0.5),
-        "leg.swing.kp": (0.0, 200.0),
-        "leg.swing.kd": (-10.0, 20.0),
-        "leg.swing.target": (-0.2, 1.0),
-    }
-    one, best = (together(scene, vary, restarts=count) for count in (0, 6))
-    assert one.objective == pytest.approx(55.0716314, rel=1e-6)
-    assert best.objective == pytest.approx(34.0915362, rel=1e-6)
+def of_gains(scene, kp, kd, target):
+    """Bounds of all gains and targets of a scene's motors."""
+    bounds = {"kp": kp, "kd": kd, "target": target}
+    names = [name for name in jb.parameter_names(scene) if name.rsplit(".")[-1] in bounds]
+    return {name: bounds[name.rsplit(".")[-1]] for name in names}
 
 
-def three_links():
-    """The compass with a torso, which is held against the leg that stands."""
-    legs = ("leg_1", "leg_2")
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "gains",
+    [
+        (50.0, 5.0, 0.05, 20.0, 1.0, 0.4),
+        (340.0, 56.0, -0.3, 146.0, 8.4, 0.1),
+        (88.0, 45.0, -0.6, 19.0, 49.0, -0.8),
+        (374.0, 38.0, 0.9, 84.0, 33.0, 0.6),
+    ],
+)
+def test_six_gains_of_three_links_are_found_from_poor_ones(gains):
+    """Three links with a motor between torso and each leg; collocation has the same cost."""
+    scene = three_links(A.PD(*gains[:3]), A.PD(*gains[3:]))
+    vary = of_gains(scene, (0.0, 400.0), (0.0, 60.0), (-1.0, 1.0))
+    assert len(vary) == 6
+    best = jb.optimise_gait(scene, vary=vary, minimise="torque_squared", subject_to=list(STEP))
+    assert best.outcome is jb.optimise.Outcome.CONVERGED
+    assert best.formulation == "together"
+    assert best.objective == pytest.approx(COST_OF_SIX, rel=1e-8)
+    assert abs(best.gait.multipliers[0]) > 30.0
+    at_bounds = {bound.name for bound in best.optimality.bounds}
+    assert at_bounds == {name for name in vary if not name.endswith("kp")}
+
+
+@pytest.mark.slow
+def test_a_search_from_the_least_torques_finds_the_cheaper_optimum():
+    """The torso is held against the vertical; near the gains given there is another optimum."""
     lean = A.PD(50.0, 5.0, 0.05, of={"torso": 1.0, "vertical": -1.0})
-    swing = A.PD(20.0, 1.0, 0.4, of={"leg_1": 1.0, "leg_2": -1.0})
+    scene = three_links(lean, A.PD(20.0, 1.0, 0.4, of={"leg_1": 1.0, "leg_2": -1.0}))
+    best = together(scene, of_gains(scene, (1.0, 400.0), (0.1, 60.0), (-1.0, 1.0)))
+    assert best.objective == pytest.approx(37.470464, rel=1e-6)
+
+
+def three_links(stance, swing):
+    """The compass with a torso, and a motor between it and each leg."""
+    legs = ("leg_1", "leg_2")
     mechanism = jb.Mechanism(
         root="hip",
         root_mass=15.0,
@@ -175,11 +204,49 @@ def three_links():
         feet=tuple(jb.Foot(leg, centre=1.0) for leg in legs),
         mirror=(legs,),
         joints=(
-            jb.Motor({"torso": 1.0, "leg_2": -1.0}, lean, name="lean"),
-            jb.Motor({"leg_1": 1.0, "torso": -1.0}, swing, name="swing"),
+            jb.Motor({"torso": 1.0, "leg_2": -1.0}, stance, name="hip_stance"),
+            jb.Motor({"leg_1": 1.0, "torso": -1.0}, swing, name="hip_swing"),
         ),
     )
     return jb.RigidScene(mechanism, jb.Ground(slope=0.0, g=9.81))
+
+
+@pytest.mark.slow
+def test_a_step_ends_as_the_foot_comes_down():
+    """Of 0.5 m in 0.8 s the cheapest cycle ends as the foot leaves the ground upwards."""
+    scene, vary, step = spline(6, 0.8), coefficients(6), ("step_length==0.5", "period==0.8")
+    with pytest.raises(
+        jb.ArgumentError, match=r"486\.09\d*, the foot does not come down at the end"
+    ):
+        together(scene, vary, step)
+    best = together(scene, vary, (*step, "landing_speed>0.05"))
+    assert best.outcome is jb.optimise.Outcome.CONVERGED
+    assert best.measures["landing_speed"] == pytest.approx(0.05, rel=1e-6)
+    assert best.objective == pytest.approx(486.348738, rel=1e-7)
+
+
+def test_a_cycle_that_is_no_gait_is_told_why():
+    """A gait that is followed beyond its strike has one before its end."""
+    whole, z = simultaneous_problem(NEAR, GAINS, list(STEP))
+    gait = jb.find_gait(NEAR, START, parameters=())
+    u, period = z[-len(GAINS) :], float(gait.measures.period)
+    z = whole.followed_cycle(u, gait.measures.state, 1.2 * period)
+    told = rf"before its end, after {period:.4g} s of {1.2 * period:.4g} s"
+    assert told in whole.why_no_gait(z)
+
+
+def test_a_formulation_is_chosen():
+    how = dict(vary=GAINS, minimise="torque_squared", subject_to=list(STEP), iterations=2)
+    for optimiser, scene, formulation in (
+        ("trust-region", PD, "gait by gait"),
+        ("slsqp", PD, "gait by gait"),
+        # A step of its gains may move the state as far as a fold.
+        ("trust-region", NEAR, "together"),
+    ):
+        best = jb.optimise_gait(scene, optimiser=optimiser, **how)
+        assert best.formulation == best.to_dataset().attrs["formulation"] == formulation
+    best = jb.optimise_gait(CUBIC, **how | {"vary": coefficients(4)})
+    assert best.formulation == "together"
 
 
 def five_links():
