@@ -96,7 +96,7 @@ def refined_laws(best: Optimum) -> tuple[Any, Variables]:
     names, low, high, *_ = best.problem.variables
     vary = dict(zip(names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
     splines, coefficients = time_splines(best.scene), coefficient_names(best.scene, time_splines)
-    if not splines or not set(names).issuperset(*coefficients):
+    if not splines or not set(names).issuperset(itertools.chain(*coefficients)):
         raise ArgumentError(
             "refine is not allowed for an optimum without a TimeSpline, or with one of which not "
             "all coefficients are varied: give such laws, and bounds of each coefficient in vary."

@@ -28,7 +28,7 @@ from jaxbiped.hybrid._motion_costs import Integral
 from jaxbiped.optimise._design_problem import variables_of
 from jaxbiped.optimise._objectives import costs_of, is_sum_of_parameters, with_parts
 from jaxbiped.optimise._optimum import Optimum
-from jaxbiped.optimise._sequential_programming import Conditions, best_step, run_newton
+from jaxbiped.optimise._sequential_programming import best_step, run_newton
 from jaxbiped.optimise._simultaneous import Simultaneous, reason_against
 from jaxbiped.scene._joint_parts import Motor
 from jaxbiped.scene._mechanism import Mechanism
@@ -140,24 +140,6 @@ class _AddedTorque(AbstractStanceTorque):
         return eqx.tree_at(lambda law: law.added, self, self.added.idle())
 
 
-class _Point(NamedTuple):
-    """A cycle near the optimum, with added torques.
-
-    Attributes:
-        z: the point of the problem; `here` its conditions.
-        of_equal, of_spare: multipliers of what holds.
-        curvature: second derivatives of the Lagrangian, shape (n, n).
-        gain: what the best step by these would save.
-    """
-
-    z: np.ndarray
-    here: Conditions
-    of_equal: np.ndarray
-    of_spare: np.ndarray
-    curvature: np.ndarray
-    gain: float
-
-
 class _FreeTorques:
     """The problem whose unknowns are the cycle and torques that are added to each motor's law.
 
@@ -202,12 +184,16 @@ class _FreeTorques:
     def gap(self) -> tuple[TorqueGap, float]:
         """The gap, and the part of its bound that lies beyond the added splines."""
         none = np.full(len(self.motors) * self.count, 0.5)
-        here = self._point(self.whole.followed_cycle(none, self.start, self.period))
-        z, ended = run_newton(self.whole, here.z, _ITERATIONS, lambda z: None)
-        there = self._point(z)
-        saved, error = self._saved(here, there)
-        left = self._left(there) if ended.converged else np.inf
-        _, slopes = self._slopes(here)
+        first = self.whole.followed_cycle(none, self.start, self.period)
+        last, ended = run_newton(self.whole, first, _ITERATIONS, lambda z: None)
+        held = self._multipliers(last)
+        here, there = self.whole.at(first), self.whole.at(last)
+        missed = held[0] @ (here.equal - there.equal)
+        saved = float(here.objective - there.objective - missed)
+        # Both objectives are known to the tolerance of the motion.
+        error = 2.0 * self.whole.rtol * abs(here.objective)
+        left = self._left(last, *held) if ended.converged else np.inf
+        _, slopes = self._slopes(first, *self._multipliers(first))
         switching = dict(zip(self.motors, slopes.T, strict=True))
         bound = saved + error + left
         return TorqueGap(bound, error, self.times, switching, self.intervals), left
@@ -224,9 +210,9 @@ class _FreeTorques:
         many = np.ndim(states[0]) > 0
         return np.asarray((jax.vmap(hessian, (None, 0)) if many else hessian)(none, states))
 
-    def _point(self, z: np.ndarray) -> _Point:
-        """A point with the multipliers with which ∂H/∂u is least and all else is stationary."""
-        whole, here = self.whole, self.whole.at(z)
+    def _multipliers(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Those with which ∂H/∂u is least and the Lagrangian is stationary in all else."""
+        here = self.whole.at(z)
         others, q = len(z) - len(self.motors) * self.count, len(here.equal)
         held = np.flatnonzero(here.spare <= _HELD)
         slopes = np.vstack([here.equal_slopes, here.spare_slopes[held]])
@@ -235,37 +221,20 @@ class _FreeTorques:
         free = scipy.linalg.null_space(by_others)
         left = here.gradient[others:] - by_torques @ one
         multipliers = one + free @ np.linalg.lstsq(by_torques @ free, left)[0]
-        of_equal, of_spare = multipliers[:q], np.zeros(len(here.spare))
+        of_spare = np.zeros(len(here.spare))
         of_spare[held] = np.maximum(multipliers[q:], 0.0)
-        curvature = whole.curvature(z, of_equal, of_spare)
-        gain = best_step(whole, z, here, curvature).gain
-        return _Point(z, here, of_equal, of_spare, curvature, gain)
+        return multipliers[:q], of_spare
 
-    def _slopes(self, point: _Point) -> tuple[Any, np.ndarray]:
+    def _slopes(self, z: np.ndarray, *multipliers: np.ndarray) -> tuple[Any, np.ndarray]:
         """States along the cycle, and ∂H/∂u there, shape (n, j)."""
-        states, slopes = self.whole.pulled_back(*point[:1], *point[2:4], self.steps)
+        states, slopes = self.whole.pulled_back(z, *multipliers, self.steps)
         return states, slopes.reshape(-1, len(self.motors), self.count).sum(axis=-1)
 
-    def _saved(self, here: _Point, there: _Point) -> tuple[float, float]:
-        """What the added splines save, and its error.
-
-        The mean of the Lagrangian's slopes at both ends misses terms of third order, as the best
-        step from one end does. Where these are large, the difference of the objectives is better.
-        """
-        one, other = here.here, there.here
-        slopes = one.gradient - there.of_equal @ one.equal_slopes
-        slopes = slopes - there.of_spare @ one.spare_slopes
-        by_slopes = float(0.5 * slopes @ (here.z - there.z)) + there.gain
-        off, error = abs(by_slopes - here.gain), self.whole.rtol * abs(one.objective)
-        if off <= error:
-            return by_slopes, off + error
-        missed = there.of_equal @ (one.equal - other.equal)
-        return float(one.objective - other.objective - missed), 2.0 * error
-
-    def _left(self, point: _Point) -> float:
-        """The most that torques besides the added splines would save."""
-        j, (states, first) = len(self.motors), self._slopes(point)
-        gains = self.whole.weights(*point[:1], *point[2:4]).gains[1:]
+    def _left(self, z: np.ndarray, of_equal: np.ndarray, of_spare: np.ndarray) -> float:
+        """The most that the best step, and torques besides the added splines, would save."""
+        j, (states, first) = len(self.motors), self._slopes(z, of_equal, of_spare)
+        here, curvature = self.whole.at(z), self.whole.curvature(z, of_equal, of_spare)
+        gains = self.whole.weights(z, of_equal, of_spare).gains[1:]
         second = self.convexity(dict(zip(self.whole.integrals, gains, strict=True)), states)
         if np.min(np.linalg.eigvalsh(second)) <= 0.0:
             return np.inf
@@ -275,13 +244,16 @@ class _FreeTorques:
         gram = step * np.einsum("tab,it,kt->aibk", second, basis, basis)
         rates = self.whole.problem.variables.rates(np.full(j * self.count, 0.5))
         gram = gram.reshape(len(rates), -1) * np.outer(rates, rates)
-        held = np.vstack([point.here.equal_slopes, point.here.spare_slopes[point.of_spare > 0.0]])
+        held = np.vstack([here.equal_slopes, here.spare_slopes[of_spare > 0.0]])
         free = scipy.linalg.null_space(held)
         torques = free[-len(rates) :]
-        bends, size = free.T @ point.curvature @ free, torques.T @ gram @ torques
+        bends, size = free.T @ curvature @ free, torques.T @ gram @ torques
         least = float(scipy.linalg.eigh(bends, size, eigvals_only=True)[0])
+        if not least > 0.0:
+            return np.inf
         solved = np.linalg.solve(second, first[..., None])[..., 0]
-        return 0.5 * step * float(np.sum(first * solved)) / least if least > 0.0 else np.inf
+        beyond = 0.5 * step * float(np.sum(first * solved)) / least
+        return beyond + best_step(self.whole, z, here, curvature).gain
 
 
 def _laws(scene: Any) -> list[tuple[str, Any]]:

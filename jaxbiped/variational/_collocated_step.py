@@ -220,7 +220,8 @@ class Rows:
         def total(parameters: list[Scalar]) -> Scalar:
             return weights @ jnp.stack(self._kept(list(y), parameters))
 
-        return jnp.stack(jax.grad(total)(self.parameters))
+        slopes = jax.grad(total)(self.parameters)
+        return jnp.stack(slopes) if slopes else jnp.zeros(0)
 
     def _kept(self, y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
         every = self.field(y, q)

@@ -147,6 +147,7 @@ def _optimum(history=5, excess=(0.1, 0.0, 0.0, 0.0, 0.0), bound=0.19, scene=None
         history=iterates,
         evaluations=history,
         lost=0,
+        problem=None,
         unmeasured=0,
     )
 
