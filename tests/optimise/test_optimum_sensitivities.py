@@ -18,7 +18,7 @@ HERE = {"l": 0.4, "g": 9.8, "bound": 0.45}
 MEASURES = ("speed", "step_length")
 
 
-def formulas(x, y, l, g):  # noqa: E741
+def formulas(x, y, l, g):
     """Speed, the objective, and step length, by log(d / 0.1) and log(J / 0.008)."""
     a, b = x - 3.0 * (l - 0.4) - 0.1, y + 0.2 * (g - 9.81) * (1.0 + x)
     speed = 3.0 + a**2 + 0.5 * a * b + 2.0 * b**2 + 0.1 * x**3
@@ -26,7 +26,7 @@ def formulas(x, y, l, g):  # noqa: E741
 
 
 @jax.jit
-def by_parameters(d, J, l, g):  # noqa: E741, N803
+def by_parameters(d, J, l, g):
     return formulas(jnp.log(d / 0.1), jnp.log(J / 0.008), l, g)
 
 
@@ -51,7 +51,7 @@ class Formulas(Drawn):
         return known
 
 
-def conditions(z, holds, l, g, bound):  # noqa: E741
+def conditions(z, holds, l, g, bound):
     def lagrangian(xy):
         speed, length = formulas(*xy, l, g)
         return speed - z[2] * (length - bound) * holds
@@ -65,7 +65,7 @@ def newton(z, *fixed):
     return z - jnp.linalg.solve(jax.jacfwd(conditions)(z, *fixed), conditions(z, *fixed))
 
 
-def exact(holds, l, g, bound):  # noqa: E741
+def exact(holds, l, g, bound):
     """Design, speed and step length at the optimum, by Newton's method on the conditions."""
     z = jnp.zeros(3)
     for _ in range(30):
