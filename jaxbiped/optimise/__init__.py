@@ -18,6 +18,7 @@ from jaxbiped.optimise._objectives import Objective as Objective
 from jaxbiped.optimise._optimality import Curvature as Curvature
 from jaxbiped.optimise._optimality import Held as Held
 from jaxbiped.optimise._optimality import Optimality as Optimality
+from jaxbiped.optimise._optimise_gait import FORMULATIONS as FORMULATIONS
 from jaxbiped.optimise._optimisers import OPTIMISERS as OPTIMISERS
 from jaxbiped.optimise._optimum import Iteration as Iteration
 from jaxbiped.optimise._optimum import Optimum as Optimum

@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     import optax
 
 FORMULATIONS = ("gait by gait", "together")
+"""How a design and its gait are sought; see `optimise_gait`."""
 _ROUNDS = 3
 """Searches for worse members than an ensemble has, each with another run, at most."""
 Goal: TypeAlias = str | Measure | Mapping[str | Measure, float] | None
