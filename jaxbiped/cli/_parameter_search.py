@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +15,7 @@ from jaxbiped._files import JsonObject, read_json, read_text
 from jaxbiped.cli import _options as options
 from jaxbiped.cli._declarations import names
 from jaxbiped.cli._gait import gait_figures
-from jaxbiped.cli._named_numbers import numbers_in, units_of
+from jaxbiped.cli._named_numbers import numbers_in, parse_axis, units_of
 from jaxbiped.cli._report import Report, columns, records
 from jaxbiped.cli._scene_options import SceneOptions, minimal
 
@@ -37,6 +37,19 @@ _ESTIMATE = {
     "95 % from": "{0[4][0]:.6g}",
     "to": "{0[4][1]:.6g}",
 }
+_FRONT = {
+    "bound": "{0[bound]:.6g}",
+    "objective": "{0[objective]:.6g}",
+    "error": "{0[error]:.1e}",
+    "slope": "{0[slope]:.4g}",
+    "slope's error": "{0[slope_error]:.1e}",
+    "outcome": "{0[outcome]}",
+}
+_SENSITIVITY = {
+    "fixed number": "{0[parameter]}",
+    "d objective": "{0[objective]:.6g}",
+    "error": "{0[objective_error]:.1e}",
+}
 _REDUNDANT_FIT = 'formulation = "redundant" is not allowed here: it must be "minimal".'
 _IS_MEASURED = options.Check(
     lambda name, path: (read_text if path.suffix.lower() == ".csv" else read_json)(name, path)
@@ -55,6 +68,12 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
     """Measure of the gait to minimise, such as spectral_radius."""
     subject_to: tuple[str, ...] = ()
     """Requirements, such as "spectral_radius<0.4" "step_length>0.2"."""
+    front: str | None = None
+    """Also the best designs under several bounds on a measure: speed>0.4:0.6:5 for five of them."""
+    search: Annotated[str | None, options.one_of("optimise.FORMULATIONS")] = None
+    """How a design and its gait are sought: gait by gait, or together, as one problem."""
+    segments: options.Count
+    """Number of segments of the cycle that are sought together."""
     optimiser: Annotated[str, options.one_of("optimise.OPTIMISERS")]
     """Optimiser: trust-region, slsqp, trust-constr; or, without requirements, optax."""
     iterations: options.Count
@@ -85,6 +104,8 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         for name in _parts(self.bifurcations):
             scene.check_parameter("bifurcations", name)
         goals = {"maximise": (self.maximise,), "minimise": (self.minimise,)}
+        if self.front is not None:
+            goals["front"] = (_front_axis(self.front)[0],)
         for option, texts in (goals | {"subject_to": self.subject_to}).items():
             for measure in (_MEASURE.match(text or "fatal_push") for text in texts):
                 if measure and measure[1] != "fatal_push":  # the search says why it cannot be one
@@ -105,6 +126,8 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         vary = {"vary": _bounds(scene, self.vary), "subject_to": self.subject_to or None}
         how = self.arguments("optimise_gait") | vary
         del how["footsteps"]  # of the certificate's walk
+        if self.search is not None:
+            how["formulation"] = self.search
         optimum = jb.optimise_gait(scene, **how)
         ended = jb.optimise.Outcome
         tests: dict[str, Any] = {"starts": 0, "footsteps": 0, "bifurcations_along": ()}
@@ -118,7 +141,16 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         _print(report, scene, optimum, goal)
         report.say(*_certificate_lines(certificate))
         figures = {"optimisation": lambda: jb.plot.optimisation(optimum)}
-        report.finish(_optimum_numbers(optimum, certificate, goal, sense), optimum.to_csv)
+        numbers = _optimum_numbers(optimum, certificate, goal, sense)
+        if self.front is not None and optimum.outcome is not ended.INTERRUPTED:
+            against, bounds, upper = _front_axis(self.front, _unit_of_measure)
+            front = jb.optimise.pareto_front(
+                optimum.scene, against=against, bounds=bounds, upper=upper, **how
+            )
+            figures["front"] = lambda: jb.plot.pareto_front(front)
+            numbers["front"] = _front_numbers(front)
+            report.say("", columns(_FRONT, numbers["front"]))
+        report.finish(numbers, optimum.to_csv)
         report.wrote(self.output.draw(figures | gait_figures(optimum.gait)))
         if optimum.outcome is ended.INTERRUPTED or "interrupted" in certificate.failed.values():
             raise options.interrupted("the best design so far is what is reported")
@@ -130,6 +162,45 @@ def _parts(text: str) -> dict[str, str]:
     pairs = (part.partition("=") for part in text.split(","))
     bounds = {name.strip(): bounds.strip() for name, _, bounds in pairs}
     return {name: text for name, text in bounds.items() if name not in ("", "none")}
+
+
+def _front_axis(
+    text: str, unit: Callable[[str], str | None] = lambda _: None
+) -> tuple[str, list[float], bool]:
+    """Measure, its bounds, and whether they are upper ones, from speed>0.4:0.6:5."""
+    if not re.search("[<>]", text):
+        raise ArgumentError(
+            f"front = {text!r} is not allowed: write a measure with < or > and first:last:count, "
+            "such as speed>0.4:0.6:5."
+        )
+    name, (first, last, count) = parse_axis(re.sub("[<>]", "=", text, count=1), unit)
+    steps = max(count - 1, 1)
+    return name, [first + k * (last - first) / steps for k in range(count)], "<" in text
+
+
+def _unit_of_measure(name: str) -> str | None:
+    """The unit of a measure; None if only a search knows it."""
+    known = jb.optimise.OBJECTIVES.get(name)
+    return known and known.quantity.unit
+
+
+def _front_numbers(front: "jb.optimise.ParetoFront") -> list[JsonObject]:
+    """What is known of each point of a front in SI units."""
+    named = {
+        "bound": front.bounds,
+        "value": front.values(front.against),
+        "objective": front.objectives[0],
+        "error": front.objectives[1],
+        "slope": front.slopes[0],
+        "slope_error": front.slopes[1],
+        "bound_holds": front.holds,
+        "proven": front.proven,
+        "dominated": front.dominated,
+    }
+    rows = zip(*(column.tolist() for column in named.values()), strict=True)
+    points = [dict(zip(named, row, strict=True)) for row in rows]
+    outcomes = ({"outcome": str(optimum.outcome)} for optimum in front.optima)
+    return [point | outcome for point, outcome in zip(points, outcomes, strict=True)]
 
 
 def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[float, float]]:
@@ -175,12 +246,28 @@ def _optimum_numbers(
             }
             for name, value in optimum.known.values.items()
         },
+        "sensitivities": _sensitivity_numbers(optimum),
         "history": records(optimum.history),
         "evaluations": optimum.evaluations,
         "lost": optimum.lost,
         "unmeasured": optimum.unmeasured,
         "certificate": _certificate_numbers(certificate),
     }
+
+
+def _sensitivity_numbers(optimum: "jb.optimise.Optimum") -> list[JsonObject]:
+    """Derivatives of an optimum with respect to each fixed number, SI units."""
+    known = optimum.sensitivities
+    return [
+        {
+            "parameter": name,
+            "objective": float(known.objective[k]),
+            "objective_error": float(known.objective_errors[k]),
+            "variables": {n: float(row[k]) for n, row in known.variables.items()},
+            "variable_errors": {n: float(row[k]) for n, row in known.variable_errors.items()},
+        }
+        for k, name in enumerate(known.parameters)
+    ]
 
 
 def _certificate_numbers(certificate: "jb.optimise.Certificate") -> JsonObject:
@@ -224,6 +311,10 @@ def _print(
         f"{goal} {optimum.objective:.6g}, {optimum.outcome} after {len(optimum.history)} "
         f"iterations and {optimum.evaluations} gaits ({optimum.message})"
     )
+    if optimum.sensitivities.message:
+        report.say(f"sensitivities: not known. {optimum.sensitivities.message}", "")
+    else:
+        report.say("", columns(_SENSITIVITY, _sensitivity_numbers(optimum)), "")
 
 
 def _measures(optimum: "jb.optimise.Optimum") -> Iterator[tuple[object, ...]]:

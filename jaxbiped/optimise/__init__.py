@@ -9,6 +9,7 @@ from jaxbiped.optimise._bifurcation_distance import Sought as Sought
 from jaxbiped.optimise._bifurcation_distance import bifurcation_distance as bifurcation_distance
 from jaxbiped.optimise._certificate import Certificate as Certificate
 from jaxbiped.optimise._certificate import certify as certify
+from jaxbiped.optimise._formulation import FORMULATIONS as FORMULATIONS
 from jaxbiped.optimise._library import library as library
 from jaxbiped.optimise._objective_values import Evaluation as Evaluation
 from jaxbiped.optimise._objectives import OBJECTIVES as OBJECTIVES

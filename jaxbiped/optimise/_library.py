@@ -17,7 +17,7 @@ from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._design_problem import variables_of as design_variables
 from jaxbiped.optimise._objective_values import Evaluations, jacobian_names
 from jaxbiped.optimise._objectives import check_objective
-from jaxbiped.optimise._optimise_gait import Goal, goal_of, optimise_gait
+from jaxbiped.optimise._optimise_gait import Goal, goal_of, goal_quantity, optimise_gait
 from jaxbiped.optimise._optimum import Optimum, Outcome
 from jaxbiped.optimise._optimum_grid import GridPoint, OptimumGrid
 from jaxbiped.optimise._requirements import SubjectTo, add_measure, requirements_of
@@ -144,19 +144,16 @@ def library(
             grid.follow(now)
         except KeyboardInterrupt:
             missing = _NOT_REACHED
-    return _dataset(grid, first, missing)
+    return _dataset(grid, goal_quantity(told, measures), first, missing)
 
 
-def _dataset(grid: OptimumGrid, first: Optimum, missing: int) -> "xarray.Dataset":
+def _dataset(grid: OptimumGrid, goal: Quantity, first: Optimum, missing: int) -> "xarray.Dataset":
     """What is known of each point; `missing` is the outcome of those that have no optimum."""
     import xarray
 
     dims, units = tuple(grid.axes), parameter_quantities(grid.base.scene)
     kind, plain = grid.base.scene.state_type, Quantity("")
-    [goal, *others] = grid.base.weights
-    alone = not others and grid.base.weights[goal] == grid.base.sense
-    objective = first.quantities[goal] if alone else Quantity("objective", unit="SI")
-    quantities = {"objective": objective} | {f"measure_{n}": q for n, q in first.quantities.items()}
+    quantities = {"objective": goal} | {f"measure_{n}": q for n, q in first.quantities.items()}
     quantities |= {f"design_{name}": units[name] for name in first.variables}
     quantities |= {f"slope_{axis}": Quantity(f"d objective / d {axis}", unit="SI") for axis in dims}
     quantities |= {f"state_{n}": coordinate_quantity(kind, n) for n in recurring_names(kind)}

@@ -16,6 +16,7 @@ from jaxbiped._checks import (
 from jaxbiped._files import user_path
 from jaxbiped._identity import DECISIVE, identity, provenance
 from jaxbiped._progress import stage
+from jaxbiped._quantity import Quantity
 from jaxbiped._types import JsonObject
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._return_map_spec import arrivals_of
@@ -238,6 +239,13 @@ def goal_of(
         add_measure(measures, name, objective)
         weights[name] = float(weight)
     return weights, -1.0 if what == "maximise" else 1.0, measures
+
+
+def goal_quantity(weights: Mapping[str, float], measures: Measures) -> Quantity:
+    """What the sum of measures with these weights is."""
+    [name, *others] = weights
+    alone = not others and weights[name] == 1.0
+    return measures[name].quantity if alone else Quantity("objective", unit="SI")
 
 
 def _problem_settings(

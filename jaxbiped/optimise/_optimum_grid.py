@@ -32,8 +32,9 @@ from jaxbiped.scene._parameter_access import with_parameters
 
 _BATCH = 16
 """Gaits that are sought at once: the number is a part of the compiled program."""
-_STEPS, _CONVERGED, _LONGEST = 8, 3e-7, 0.3
-"""Newton's steps of a point at most, and their lengths in u at the end and at most."""
+_STEPS, _SHORT, _LONG, _KEPT = 8, 3e-7, 0.3, 1e-10
+"""Newton's steps of a point at most; their lengths in u at the end, and at most; and by what part
+of a bound requirements are missed at the end."""
 _ITERATIONS = 60
 """Iterations of the trust region where Newton's method does not end at an optimum."""
 Place: TypeAlias = tuple[int, ...]
@@ -123,12 +124,13 @@ class _Pursuit:
         place, problem: what is sought.
         u: the next design, or the last one where Newton's method has ended.
         gait: of the last design; None where it has none.
-        step: length in u of the last step; NaN if the method cannot go on.
+        has_converged: whether Newton's method has ended at `u`; `is_over` where it cannot go on.
     """
 
     def __init__(self, grid: OptimumGrid, place: Place, origin: Place) -> None:
         problem, (owner, design, optimum) = grid.problem_at(place), grid.points[origin]
-        self.place, self.problem, self.step = place, problem, np.inf
+        self.place, self.problem = place, problem
+        self.has_converged = self.is_over = False
         self.gait: Gait | None = None
         before, after = grid.values_at(origin), grid.values_at(place)
         moves, known = np.array([after[n] - before[n] for n in grid.axes]), optimum.sensitivities
@@ -151,10 +153,6 @@ class _Pursuit:
         assert self.problem.latest is not None
         return self.problem.latest
 
-    @property
-    def has_converged(self) -> bool:
-        return bool(self.step <= _CONVERGED)
-
     def trial(self) -> _Trial:
         """The next design."""
         latest, expected = self.problem.latest, self.problem.expected_state
@@ -171,14 +169,15 @@ class _Pursuit:
 
     def advance(self, gait: Gait | None) -> None:
         """Newton's step from the design whose gait was just found, if it was."""
-        self.gait, self.step = gait, np.nan
+        self.gait, self.is_over = gait, True
         if gait is None or self.problem.at(self.u) is None or self._second is None:
             return
         move = newton_step(self.problem, self.design, self._second)
         length = float(np.max(np.abs(move)))
-        if length <= _LONGEST:
-            self.step = length
-        if _CONVERGED < length <= _LONGEST:
+        is_kept = self.problem.excess(self.design.known) <= _KEPT
+        self.has_converged = is_kept and length <= _SHORT
+        self.is_over = self.has_converged or not length <= _LONG
+        if not self.is_over:
             self.u = np.clip(self.u + move, 0.0, 1.0)
 
     def certified(self) -> GridPoint:
@@ -205,7 +204,7 @@ def pursue(points: list[_Pursuit]) -> list[_Pursuit]:
         gaits = _find_gaits([point.trial() for point in under_way])
         for point, gait in zip(under_way, gaits, strict=True):
             point.advance(gait)
-        under_way = [point for point in under_way if point.step > _CONVERGED]
+        under_way = [point for point in under_way if not point.is_over]
     there = [point for point in points if point.has_converged]
     _find_gaits([trial for point in there for trial in point.trials_beside()])
     return [point for point in points if point.problem.latest is not None]

@@ -40,6 +40,7 @@ from jaxbiped.plot._notebook import walker as walker
 from jaxbiped.plot._parameter_charts import basin_fractions as basin_fractions
 from jaxbiped.plot._parameter_charts import bifurcation_curves as bifurcation_curves
 from jaxbiped.plot._parameter_charts import branch as branch
+from jaxbiped.plot._pareto_front import pareto_front as pareto_front
 from jaxbiped.plot._work_precision import constraint_runs as constraint_runs
 from jaxbiped.plot._work_precision import work_precision as work_precision
 from jaxbiped.plot.viewer._playground import Playground as Playground

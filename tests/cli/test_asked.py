@@ -40,7 +40,14 @@ from tests.cli.commands import asked as asked_by
             "optimise_gait",
             dict(vary={"d": (0.05, 0.2)}, minimise="period", maximise=None,
                  subject_to=("speed>0.1",), optimiser="slsqp", iterations=3, restarts=2, seed=5,
-                 accuracy="balanced", engine="auto", store=None),
+                 segments=7, accuracy="balanced", engine="auto", store=None),
+        ),
+        (
+            "optimise --vary d=0.1:0.2 --minimise torque_squared --search together --segments 5",
+            "optimise_gait",
+            dict(vary={"d": (0.1, 0.2)}, minimise="torque_squared", maximise=None, subject_to=None,
+                 formulation="together", segments=5, optimiser="trust-region", iterations=200,
+                 restarts=0, seed=0, accuracy="balanced", engine="auto", store=None),
         ),
         (
             "basin --accuracy 1e-3 --footsteps 9 --engine lanes",

@@ -48,6 +48,23 @@ def test_numbers_and_tables(capsys, tmp_path):
     assert points_of(speed)[0][:, 1] == pytest.approx(told, rel=1e-12)
 
 
+def test_a_front_and_sensitivities_are_told_and_drawn(capsys, tmp_path):
+    words = ["--vary", "d=0.08:0.12", "--front", "step_length<18.5cm:0.2:2"]
+    outputs = outputs_of(tmp_path, *RIGID, *words, "--bifurcations", "none")
+    printed = capsys.readouterr().out
+    first, last = outputs.numbers["front"]
+    assert [first["bound"], last["bound"]] == pytest.approx([0.185, 0.2])
+    assert first["value"] == pytest.approx(0.185, rel=1e-6)
+    assert first["bound_holds"] is first["proven"] is True
+    assert first["outcome"] == "converged"
+    assert f"{first['objective']:.6g}" in printed
+    assert_is_drawn(outputs.figures["front.png"])
+    known = {row["parameter"]: row for row in outputs.numbers["sensitivities"]}
+    assert f"{known['slope']['objective']:.6g}" in printed
+    assert 0.0 < known["slope"]["objective_error"] < 1e-3 * known["slope"]["objective"]
+    assert set(known["slope"]["variables"]) == {"d"}
+
+
 def test_a_design_without_a_gait_is_refused(capsys):
     assert run(*RIGID, "--vary", "d", "--slope", "-0.1") == 2
     said = capsys.readouterr()

@@ -129,6 +129,10 @@ basin --x theta_swing=-30cm:45deg:3 | axis 'theta_swing=-30cm:45deg:3' | theta_s
 optimise --vary d --maximise speeed | maximise = 'speeed' is not known | perhaps speed is meant
 optimise --vary d --minimise raduis | minimise = 'raduis' is not known
 optimise --vary d --maximise speed --subject-to 'speeed<1' | subject_to = 'speeed' is not known
+optimise --vary d --maximise speed --front 'speeed<1:2:3' | front = 'speeed' is not known
+optimise --vary d --maximise speed --front 'period=1:2:3' | a measure with < or > and first:last
+optimise --vary d --maximise speed --front 'period<2:1:3' | is empty
+optimise --vary d --maximise speed --search alone | search = 'alone' is not known
 optimise --vary d=5cm:2kg --maximise speed | '2kg' is not a number in m, cm, mm
 optimise --vary d --maximise speed --bifurcations slpoe | bifurcations = 'slpoe'
 walk --hip-spring k=abc | hip-spring = 'k=abc' | k must be a number, and 'abc' is not

@@ -33,6 +33,7 @@ from tests.plot.test_parameter_charts import (
     branch_point,
     make_branch,
 )
+from tests.plot.test_pareto_front import make_front, unheld
 from tests.plot.test_work_precision import ROWS
 from tests.plot.test_work_precision import _run as make_run
 
@@ -188,6 +189,8 @@ BY_HAND = {
     "data of a fit in a paper": lambda: _paper(lambda: _fit_data(1)),
     "optimisation": _optimum_of_a_sum,
     "optimisation in a paper": lambda: _paper(lambda: plot.optimisation(make_optimum())),
+    "front": lambda: plot.pareto_front(unheld(make_front(), 1)),
+    "front in a paper": lambda: _paper(lambda: plot.pareto_front(make_front())),
     "elasticities": lambda: plot.elasticities(make_gait(), ("period", "peak_normal")),
     "elasticities, long names in a paper": lambda: _paper(
         lambda: plot.elasticities(_long_names(), ("period", "speed", "step_length")), columns=2

@@ -7,7 +7,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped import plot
-from jaxbiped.optimise import Evaluation, Held, Iteration, Optimality
+from jaxbiped.optimise import Evaluation, Held, Iteration, Optimality, Sensitivities
 from tests.drawn import assert_is_drawn, assert_ticks_apart, points_of
 from tests.plot.test_figure_style import assert_fits
 from tests.plot.test_parameter_charts import branch_point, make_branch
@@ -131,6 +131,10 @@ def _optimum(history=5, excess=(0.1, 0.0, 0.0, 0.0, 0.0), bound=0.19, scene=None
     errors = {"speed": 1e-3, "step_length": 1e-4}
     held = Held("step_length", bound, bound, 0.0, True, 0.3, 0.0)
     free = Held("d", 0.3, 0.12, 0.0, False, 0.0, 0.0)
+
+    def two(one, other):
+        return np.array([one, other]), np.array([1e-3 * one, 1e-5])
+
     return jb.optimise.Optimum(
         outcome=jb.optimise.Outcome.CONVERGED,
         message="",
@@ -143,7 +147,13 @@ def _optimum(history=5, excess=(0.1, 0.0, 0.0, 0.0, 0.0), bound=0.19, scene=None
         quantities={name: jb.optimise.OBJECTIVES[name].quantity for name in last},
         optimality=Optimality(0.0, 0.0, 0.0, (held,), (free,)),
         curvature=None,
-        sensitivities=None,
+        sensitivities=Sensitivities(
+            ("slope", "bound of step_length"),
+            *two(6.9, 0.3),
+            {"d": np.array([0.15, -0.2])},
+            {"d": np.array([1e-4, 1e-6])},
+            *(dict.fromkeys(last, row) for row in two(0.1, 1.0)),
+        ),
         history=iterates,
         evaluations=history,
         lost=0,
