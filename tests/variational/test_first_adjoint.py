@@ -16,7 +16,7 @@ from jaxbiped.gait._poincare_map import linearised_return, recurring_indices, se
 from jaxbiped.hybrid._sections import section_of
 from jaxbiped.hybrid._walker_systems import system_of
 from jaxbiped.optimise._augmented_system import MotionSection
-from jaxbiped.optimise._cycle_costs import IntegratedCycle
+from jaxbiped.optimise._cycle_costs import CostedCycle
 from jaxbiped.optimise._cycle_functionals import cycle_spec
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.solve._accuracy import Precision
@@ -45,7 +45,7 @@ def motion(scene, state, steps=1, costs=(), names=None):
     walker, section = system_of(scene), section_of(scene, None)
     if not costs:
         return Motion(scene, walker, section, state, steps, names)
-    system = IntegratedCycle.of(walker, costs)
+    system = CostedCycle.of(walker, costs)
     return Motion(scene, system, MotionSection(section), system.begin(state), steps, names)
 
 
