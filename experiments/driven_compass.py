@@ -1,7 +1,8 @@
 """The compass walker's cheapest step on level ground, by laws with ever more numbers.
 
-Writes driven_compass.png: left the torques over a step, right how far each law's ∫u² lies above
-that of a torque that is free in time. Every law is sought from zero torque, without a guess, with
+Writes driven_compass.png: left the torques over a step, in the middle how the Hamiltonian depends
+on them, right how far each law's ∫u² lies above that of a torque that is free in time, and how far
+the optimum itself promises. Every law is sought from zero torque, without a guess, with
 state, period and numbers of the law as unknowns together; a controller in angles also gait by gait.
 """
 
@@ -62,14 +63,17 @@ def main(options: Options):
         "cubic": (*in_time(jb.actuation.TimePolynomial, 4), ("together",)),
         **{f"spline of {n}": (*in_time(jb.actuation.TimeSpline, n), ("together",)) for n in counts},
     }
-    rows, torques = [], {}
+    rows, torques, gaps = [], {}, {}
     for name, (scene, vary, formulations) in laws.items():
         for formulation in formulations:
             best, row = sought(scene, vary, formulation, options.sized(TURNS, QUICK_TURNS))
+            gaps[name] = gap = jb.optimise.torque_gap(best)
+            row |= {"promised": gap.bound / FREE, "promise_error": gap.error / FREE}
             rows.append({"law": name, "numbers": len(vary), "formulation": formulation, **row})
         if name in ("PD", "cubic", f"spline of {counts[0]}", f"spline of {counts[-1]}"):
             torques[name] = torque_of(best)
-    return {"rows": rows, "picture": draw(options, rows, torques)}
+    switching = {name: gaps[name] for name in ("cubic", f"spline of {counts[0]}")}
+    return {"rows": rows, "picture": draw(options, rows, torques, switching)}
 
 
 def sought(scene, vary, formulation, turns):
@@ -107,18 +111,26 @@ def torque_of(best):
     return times, np.asarray(torque(walk.state))
 
 
-def draw(options, rows, torques):
-    left, right = new_figure(9.6, 4.4).subplots(1, 2)
+def draw(options, rows, torques, switching):
+    left, middle, right = new_figure(13.2, 4.4).subplots(1, 3)
     for (name, (times, torque)), colour in zip(torques.items(), cycle(COLOURS), strict=False):
         left.plot(times, torque, color=colour, label=name, linewidth=1.2)
     dress(left, "Torques of the optima", "time since the strike (s)", "torque of the hip (N m)")
     legend_below(left, columns=3)
+    for (name, gap), colour in zip(switching.items(), COLOURS[1:], strict=False):
+        middle.plot(gap.times, gap.switching["hip"], color=colour, label=name, linewidth=1.2)
+    words = "time since the strike (s)", r"$\partial H/\partial u$ (N m)"
+    dress(middle, "What a free torque would change", *words)
+    legend_below(middle, columns=2)
     kinds = {"spline in time": "spline", "cubic in time": "cubic", "controller": "PD"}
     for (label, kind), colour, marker in zip(kinds.items(), COLOURS, MARKERS, strict=False):
         own = [row for row in rows if row["law"].startswith(kind)]
         look = dict(color=colour, linestyle="-" if kind == "spline" else "none", markersize=5)
         points = [[row["numbers"] for row in own], [row["above_free"] for row in own]]
         right.plot(*points, marker=marker, label=label, **look)
+    points = [[row["numbers"] for row in rows], [row["promised"] for row in rows]]
+    look = dict(color="none", edgecolor="black", linewidth=0.7, zorder=3)
+    right.scatter(*points, s=90, label="promised by torque_gap", **look)
     words = "numbers of the law (–)", "cost above the free torque's (relative)"
     dress(right, "Cost of a law", *words)
     right.set_yscale("log")

@@ -105,7 +105,9 @@ def test_costs_of_a_driven_step_fall_towards_the_free_torques(tmp_path):
     assert abs(one["cost"] - other["cost"]) < one["error"] + other["error"]
     cubic, spline = by_law["cubic", "together"], by_law["spline of 6", "together"]
     assert one["above_free"] > cubic["above_free"] > spline["above_free"] > 0.0
-    shown = points_of(figures["driven_compass.png"].axes[1], "spline in time")[0]
+    for row in by_law.values():
+        assert 1.0 < row["promised"] / row["above_free"] < 1.01
+    shown = points_of(figures["driven_compass.png"].axes[2], "spline in time")[0]
     np.testing.assert_array_equal(shown, [[6, spline["above_free"]]])
 
 

@@ -1,5 +1,7 @@
 """What optimisations evaluate at one gait, by name."""
 
+import dataclasses
+
 import numpy as np
 
 import jaxbiped as jb
@@ -9,7 +11,8 @@ from jaxbiped.optimise._design_gaits import GaitSettings, ensemble_of, evaluate_
 from jaxbiped.optimise._design_problem import DesignProblem, start_of, variables_of
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._objective_values import Evaluations, evaluate
-from jaxbiped.optimise._objectives import measures_named
+from jaxbiped.optimise._objectives import measures_named, objective_of
+from jaxbiped.optimise._refinement import with_halved_intervals
 from jaxbiped.optimise._requirements import requirements_of
 from jaxbiped.optimise._simultaneous import Simultaneous
 
@@ -61,3 +64,20 @@ def simultaneous_problem(scene, vary, subject_to):
     )
     whole = Simultaneous(problem, 7)
     return whole, whole.rough_cycle(start_of(scene, problem.variables), default_guess(scene))
+
+
+def with_other_goal(best, measures):
+    """An optimum as if the sum of these measures had been minimised, without requirements."""
+    wanted = {}
+    for measure in measures:
+        name = measure if isinstance(measure, str) else measure.name
+        wanted[name] = objective_of(measure, best.scene, "minimise")
+    problem = best.problem.of_scene(best.scene, best.problem.variables)
+    problem.wanted, problem.requirements = wanted, ()
+    problem.weights = dict.fromkeys(wanted, 1.0)
+    return dataclasses.replace(best, problem=problem)
+
+
+def finer_spline(law):
+    """A spline in time with twice as many intervals."""
+    return with_halved_intervals(law)

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import jaxbiped as jb
-from jaxbiped.optimise._refinement import with_halved_intervals
+from tests.optimise.evaluations import finer_spline, with_other_goal
 from tests.optimise.test_unknowns_together import (
     CUBIC,
     FREE,
@@ -97,36 +97,24 @@ def test_knots_are_added_until_the_gap_is_small(six):
 
 def test_half_the_intervals_make_the_same_function():
     law = A.TimeSpline(tuple(np.random.default_rng(0).standard_normal(7)), 0.7)
-    finer, times = with_halved_intervals(law), np.linspace(0.0, 0.7, 50)
+    finer, times = finer_spline(law), np.linspace(0.0, 0.7, 50)
     assert len(finer.torque) == 11
     np.testing.assert_allclose(finer.torque_after(times), law.torque_after(times), atol=1e-13)
 
 
 @pytest.mark.slow
 def test_what_has_no_bound_is_refused(six):
-    def with_problem(**changes):
-        problem = six.problem.of_scene(six.scene, six.problem.variables)
-        for name, value in changes.items():
-            setattr(problem, name, value)
-        return dataclasses.replace(six, problem=problem)
-
-    def measures(*names):
-        objectives = jb.optimise._objectives.measures_named(names)
-        return dict(wanted=objectives, weights=dict.fromkeys(names, 1.0))
-
     with pytest.raises(jb.ArgumentError, match="the objective speed: it must be strictly convex"):
-        jb.optimise.torque_gap(with_problem(**measures("speed")))
+        jb.optimise.torque_gap(with_other_goal(six, ["speed"]))
     with pytest.raises(jb.ArgumentError, match="torque_gap is not allowed for peak_torque"):
-        jb.optimise.torque_gap(with_problem(**measures("torque_squared", "peak_torque")))
+        jb.optimise.torque_gap(with_other_goal(six, ["torque_squared", "peak_torque"]))
     passive = dataclasses.replace(six, scene=jb.models.goswami())
     with pytest.raises(jb.ArgumentError, match="a scene without a motor's law"):
         jb.optimise.torque_gap(passive)
     with pytest.raises(jb.ArgumentError, match="without a TimeSpline"):
         jb.optimise.refine(passive)
     tied = jb.optimise.Linear({"leg.hip.torque_1": 1.0})
-    objective = jb.optimise._objectives.objective_of(tied, six.scene, "subject_to")
-    wanted = {**six.problem.wanted, "linear": objective}
     with pytest.raises(jb.ArgumentError, match="Linear sums of parameters"):
-        jb.optimise.refine(with_problem(wanted=wanted))
+        jb.optimise.refine(with_other_goal(six, ["torque_squared", tied]))
     with pytest.raises(jb.ArgumentError, match="gap = 0"):
         jb.optimise.refine(six, gap=0.0)
