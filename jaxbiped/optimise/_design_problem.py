@@ -160,6 +160,7 @@ class DesignProblem:
         evaluations: of all designs so far.
         ensemble: over whose members measures are taken; None for the design alone.
         latest: the last design whose gait was found; `asked` all of them, in order.
+        first_gait: that of the design to start from, if it was not known from a store.
         lost: how often a design had none, or no measure of it.
         unmeasured: gaits that were found and have a measure that is not finite.
     """
@@ -182,6 +183,7 @@ class DesignProblem:
         self.settings, self.evaluations, self.ensemble = settings, evaluations, ensemble
         self.wanted = wanted
         self.latest: Design | None = None
+        self.first_gait: Gait | None = None
         self.asked: list[Design] = []
         self.lost = self.unmeasured = 0
 
@@ -227,7 +229,7 @@ class DesignProblem:
                 raise ArgumentError(
                     f"the design to start from has no gait: {explain_search(scene, gait)}."
                 )
-            known = self._keep(u, scene, gait)
+            known, self.first_gait = self._keep(u, scene, gait), gait
         if known is None:
             raise ArgumentError(
                 "the gait of the design to start from has a measure that is not finite: choose "

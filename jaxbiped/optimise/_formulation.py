@@ -54,7 +54,9 @@ def first_design(
         except ArgumentError as error:
             lost = error
         else:
-            gait = problem.settings.find_near(problem.scene_at(u), known.known.state)
+            gait = problem.first_gait
+            if gait is None:
+                gait = problem.settings.find_near(problem.scene_at(u), known.known.state)
             if not is_hard_to_follow(problem, known, gait):
                 return known, None, FORMULATIONS[1]
             near, period = gait.measures.state, float(gait.measures.period)

@@ -50,6 +50,7 @@ from jaxbiped.optimise._shooting import (
     pull_back_segments,
 )
 from jaxbiped.scene._parameter_access import parameter_quantities, select_parameters
+from jaxbiped.solve._accuracy import Precision
 
 _LEAST_PERIOD, _PERIOD, _MOST_PERIOD = 0.3, 2.2, 20.0
 """Periods of a footstep in units of √(l/g): the least, the first that is tried, the largest."""
@@ -111,6 +112,8 @@ class Simultaneous:
         self._spec = cycle_spec(scene, system, MotionSection(section_of(scene, None)), 1, engine)
         self._precision = functional_precision(settings.accuracy, scene)
         self.rtol = float(self._precision.rtol)
+        # Second derivatives are differences, to which finer solves add nothing.
+        self._rough_precision = functional_precision("draft", scene)
         _, self._active = select_parameters(scene, problem.variables.names)
         self.sizes = recurring_sizes(scene, pose)
         self._time, self._height = map(
@@ -192,13 +195,20 @@ class Simultaneous:
             self._last = z.tobytes(), self._formed(z, only)
         return self._last[1]
 
-    def _segments(self, starts: np.ndarray, periods: np.ndarray, u: np.ndarray) -> Segments:
+    def _segments(
+        self,
+        starts: np.ndarray,
+        periods: np.ndarray,
+        u: np.ndarray,
+        precision: Precision | None = None,
+    ) -> Segments:
         """Segments of b cycles and designs, with derivatives with respect to parts of z."""
         variables = self.problem.variables
         note_code(self._spec, self._scene)
         cycles: Any = starts, periods / self.count, variables.values(u)
+        precision = self._precision if precision is None else precision
         segments = linearise_segments(
-            self._spec, self._scene, self._like, cycles, self._active, self._path, self._precision
+            self._spec, self._scene, self._like, cycles, self._active, self._path, precision
         )
         units = np.append(self.sizes, self._time / self.count)
         scales = np.concatenate([np.tile(units, (len(u), 1)), variables.rates(u)], axis=1)
@@ -347,6 +357,7 @@ class Simultaneous:
             starts + steps[:, None, :m] * self.sizes,
             period + steps[:, m] * self._time,
             u + steps[:, m + 1 :],
+            self._rough_precision,
         )
         slopes = np.einsum("d,bndj->bnj", weights.gains, segments.gains.slopes)
         slopes += np.einsum("nm,bnmj->bnj", weights.ends, segments.ends.slopes)
