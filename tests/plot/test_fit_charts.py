@@ -153,7 +153,7 @@ def _optimum(history=5, excess=(0.1, 0.0, 0.0, 0.0, 0.0), bound=0.19, scene=None
             {"d": np.array([0.15, -0.2])},
             {"d": np.array([1e-4, 1e-6])},
             *(dict.fromkeys(last, row) for row in two(0.1, 1.0)),
-        ),  # fmt: skip
+        ),
         history=iterates,
         evaluations=history,
         lost=0,
