@@ -88,7 +88,7 @@ class OptimumGrid:
             for pursuit in pursue([_Pursuit(self, place, origin) for place, origin in wave]):
                 self.points[pursuit.place] = pursuit.certified()
             self.lost |= {place for place, _ in wave} - self.points.keys()
-            now.update(len(wave))
+            now.update(len(wave), found=f"{len(self.points)} optima")
             wave = self._wave()
 
     def _wave(self) -> list[tuple[Place, Place]]:

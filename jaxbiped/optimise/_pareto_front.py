@@ -20,7 +20,8 @@ class ParetoFront(NamedTuple):
     Attributes:
         bounds: bounds on the other measure, in the given order, shape (n,).
         optima: the optimum for each bound.
-        against: name of the other measure; `upper` whether its bounds are upper ones.
+        against: name of the other measure.
+        upper: whether its bounds are upper ones.
         sense: 1 where the objective is minimised, −1 where it is maximised.
         quantity: words, symbol and unit of the objective.
     """

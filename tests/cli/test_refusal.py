@@ -130,7 +130,7 @@ optimise --vary d --maximise speeed | maximise = 'speeed' is not known | perhaps
 optimise --vary d --minimise raduis | minimise = 'raduis' is not known
 optimise --vary d --maximise speed --subject-to 'speeed<1' | subject_to = 'speeed' is not known
 optimise --vary d --maximise speed --front 'speeed<1:2:3' | front = 'speeed' is not known
-optimise --vary d --maximise speed --front 'period=1:2:3' | a measure with < or > and first:last
+optimise --vary d --maximise speed --front 'period=1:2:3' | a measure with < or >
 optimise --vary d --maximise speed --front 'period<2:1:3' | is empty
 optimise --vary d --maximise speed --search alone | search = 'alone' is not known
 optimise --vary d=5cm:2kg --maximise speed | '2kg' is not a number in m, cm, mm

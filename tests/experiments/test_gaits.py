@@ -120,6 +120,23 @@ def test_another_discretisation_has_the_same_optimum(tmp_path):
     assert abs(row["difference"]) < 1e-9
 
 
+def test_optima_of_a_library_and_of_fronts_are_proven_and_have_their_slopes(tmp_path):
+    numbers, figures = drawn_run("optimal_library", tmp_path)
+    known = numbers["library"]
+    assert known["converged"] == known["gaits"] == 9
+    assert known["without_derivatives"] == 0
+    assert known["largest_residual"] < 1e-5 < known["least_curvature"]
+    assert max(known["slopes_from_differences"].values()) < 1e-3
+    for points in numbers["fronts"].values():
+        assert all(point["proven"] and point["holds"] for point in points)
+        assert not any(point["dominated"] for point in points)
+    first, last = numbers["fronts"]["speed"]
+    between = (last["cost"] - first["cost"]) / (last["bound"] - first["bound"])
+    assert first["slope"] < between < last["slope"]
+    assert numbers["fronts"]["sensitivity_norm"][0]["slope"] < 0.0
+    assert len(figures["optimal_library.png"].axes) == 3
+
+
 def test_footsteps_stay_on_the_gait_and_repeat(tmp_path):
     numbers, _ = drawn_run("long_walks", tmp_path, unitless={"footstep"})
     assert numbers["outcome"] == "walking"

@@ -11,6 +11,7 @@ from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem, variables_of
 from jaxbiped.optimise._objective_values import Evaluations
 from jaxbiped.optimise._objectives import measures_named
+from jaxbiped.optimise._optimum_sensitivities import sensitivities_of as sensitivities_of
 from jaxbiped.optimise._requirements import requirements_of
 from jaxbiped.optimise._runs import Runs
 

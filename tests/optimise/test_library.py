@@ -8,7 +8,7 @@ import xarray
 
 import jaxbiped as jb
 from jaxbiped.optimise import Outcome
-from jaxbiped.optimise._optimum_grid import OptimumGrid
+from tests.cli.commands import interrupt_after
 from tests.optimise.test_costs_of_motion import START, compass
 
 SEED = jb.ladder()["rigid"]
@@ -47,15 +47,7 @@ def test_each_gait_is_an_optimum_and_lost_ones_stop_no_others(tmp_path):
 
 @pytest.mark.slow
 def test_ctrl_c_keeps_the_points_that_are_done(monkeypatch):
-    waves = OptimumGrid._wave
-    count = iter(range(10))
-
-    def interrupted(self):
-        if next(count) == 1:
-            raise KeyboardInterrupt
-        return waves(self)
-
-    monkeypatch.setattr(OptimumGrid, "_wave", interrupted)
+    interrupt_after(monkeypatch, 1, "optima")
     gaits = jb.optimise.library(SEED, over={"slope": [0.02, 0.021, 0.022]}, **SPEED)
     assert gaits.outcome.values.tolist() == [0, 0, 8]
 

@@ -7,8 +7,15 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.optimise import Evaluation, Outcome
-from jaxbiped.optimise._optimum_sensitivities import sensitivities_of
-from tests.optimise.drawn_designs import NAMES, NO_STATE, Drawn, best_of, drawn, solved
+from tests.optimise.drawn_designs import (
+    NAMES,
+    NO_STATE,
+    Drawn,
+    best_of,
+    drawn,
+    sensitivities_of,
+    solved,
+)
 from tests.optimise.test_costs_of_motion import START, compass
 from tests.optimise.test_optimality import form
 

@@ -1,4 +1,4 @@
-"""Pareto fronts: what is known of their points, and how they are drawn."""
+"""Pareto fronts: what is known of their points and drawn of them, against points by hand."""
 
 import dataclasses
 
