@@ -25,6 +25,8 @@ _SUFFICIENT, _MARGIN = 1e-4, 1e-5
 """Share of an expected gain that must come, and of a violation by which a point must be better."""
 _FARTHER, _FARTHEST = 4.0, 0.1
 """Factor by which a step may add to a violation, and violation up to which any step may."""
+_RESTORED = 0.99
+"""Share of a violation that a step onto the equations alone may leave at most."""
 _KEPT, _GAIN, _NOISE = 1e-9, 1e-10, 1e-7
 """Violation that counts as none; expected gain, as a share of the objective, from which a point
 counts as best, and one that may be lost in errors of the motion."""
@@ -101,8 +103,8 @@ def run_newton(
         if better is None and here.violation > _KEPT:
             # Nothing but the equations, and the filter begins again.
             flat, passed = here._replace(gradient=np.zeros_like(z)), []
-            onto = best_step(program, z, flat, np.eye(len(z))).step
-            better = _along(program, z, flat, onto, [(here.violation, -np.inf)])
+            onto = nearest_step(program, z, here)
+            better = _along(program, z, flat, onto, [(_RESTORED * here.violation, -np.inf)])
         if better is None:
             ends = here.violation <= 10.0 * _KEPT and gain <= _NOISE * size
             return z, RunEnding(ends, "No better cycle was found nearby.")
@@ -141,6 +143,16 @@ def best_step(program: Program, z: np.ndarray, here: Conditions, curvature: np.n
     of_equal[order] = scipy.linalg.solve_triangular(triangle, onto.T @ left)
     gain = abs(float(here.gradient @ step + 0.5 * step @ curvature @ step))
     return Step(step, of_equal, multipliers[: len(here.spare)], gain)
+
+
+def nearest_step(program: Program, z: np.ndarray, here: Conditions) -> np.ndarray:
+    """The step within bounds that leaves least of what is missed, in the least-squares sense."""
+    missed = here.spare < 0.0
+    rows = np.vstack([here.equal_slopes, here.spare_slopes[missed]])
+    values = np.concatenate([here.equal, here.spare[missed]])
+    # Bounds must be apart, and the step lie between them.
+    low, high = program.least - z - _AT_BOUND, program.most - z + _AT_BOUND
+    return np.asarray(scipy.optimize.lsq_linear(rows, -values, (low, high)).x)
 
 
 def within(program: Program, z: np.ndarray) -> np.ndarray:

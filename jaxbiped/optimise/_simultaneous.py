@@ -62,6 +62,8 @@ _FROM_CYCLE = 1e-3
 """Largest relative distance of the gait that is found near a cycle that solves all equations."""
 _GRAZING = 1e-4
 """Rate at which the section is met, in units of the scene, below which no foot comes down."""
+_BETTER = 1e-9
+"""Relative difference from which another cycle counts as better."""
 _MORE = 5
 """Further searches from drawn poses and designs while none has come to a gait."""
 _NO_GAIT = cast(Gait, None)
@@ -494,7 +496,7 @@ def begin_together(
         here = whole.at(z)
         if not ended.converged:
             others.append((here.violation, z, ended))
-        elif best is None or here.objective < best[0]:
+        elif best is None or here.objective < best[0] - _BETTER * abs(best[0]):
             there = gait_of(z, _FROM_CYCLE)
             if there is None:
                 no_gaits.append((here.objective, z))
