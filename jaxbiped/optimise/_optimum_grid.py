@@ -5,13 +5,16 @@ conditions of optimality with the second derivatives of the optimum before. The 
 of a wave are found as one batch, and each point is certified as any other optimum is.
 """
 
+import contextlib
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage, stage
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_functions import restored
@@ -86,7 +89,11 @@ class OptimumGrid:
         """Improves the optima that are known, and goes on from them to all other points."""
         wave = [(place, place) for place in self.points]
         while wave:
-            for pursuit in pursue([_Pursuit(self, place, origin) for place, origin in wave]):
+            pursuits = []
+            for place, origin in wave:
+                with contextlib.suppress(ArgumentError):  # parameters that do not go together
+                    pursuits.append(_Pursuit(self, place, origin))
+            for pursuit in pursue(pursuits):
                 self.points[pursuit.place] = pursuit.certified()
             self.lost |= {place for place, _ in wave} - self.points.keys()
             now.update(len(wave), found=f"{len(self.points)} optima")
@@ -220,7 +227,12 @@ def _find_gaits(trials: Sequence[_Trial]) -> list[Gait | None]:
         rows = [trial.fixed | trial.problem.variables.by_name(trial.u) for trial in filled]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         base, states = chunk[0].problem, np.array([trial.state for trial in filled])
-        batch = gaits_near(base.scene, columns, states, base.settings, base.wanted)
+        try:
+            batch = gaits_near(base.scene, columns, states, base.settings, base.wanted)
+        except ArgumentError:  # parameters of one of them do not go together
+            alone = [_find_gaits([trial]) for trial in chunk] if len(chunk) > 1 else [[None]]
+            gaits += itertools.chain.from_iterable(alone)
+            continue
         for k, trial in enumerate(chunk):
             scene, gait, functionals = jtu.tree_map(lambda leaf, k=k: leaf[k], batch)
             near = trial.state, trial.farthest
