@@ -80,7 +80,8 @@ def told_of(gaits):
         inside = {axis: slice(1, -1)}
         difference = gaits.objective.differentiate(axis).isel(inside)
         slope = gaits[f"slope_{axis}"].isel(inside)
-        away[axis] = float(np.abs(difference / slope - 1.0).max())
+        off = np.abs(difference / slope - 1.0)
+        away[axis] = {"median": float(off.median()), "largest": float(off.max())}
     converged = gaits.outcome == int(jb.optimise.Outcome.CONVERGED)
     return {
         "gaits": int(gaits.outcome.size),
