@@ -36,9 +36,9 @@ from jaxbiped.scene._parameter_access import with_parameters
 
 _BATCH = 16
 """Gaits that are sought at once: the number is a part of the compiled program."""
-_STEPS, _SHORT, _LONG, _KEPT = 8, 3e-7, 0.3, 1e-10
-"""Newton's steps of a point at most; their lengths in u at the end, and at most; and by what part
-of a bound requirements are missed at the end."""
+_ROUNDS, _STEPS, _SHORT, _LONG, _KEPT = 3, 4, 3e-7, 0.3, 1e-10
+"""Second derivatives with which Newton's method goes on at most, and steps with each; lengths of
+the steps in u at the end, and at most; and by what part of a bound requirements are missed then."""
 _ITERATIONS = 60
 """Iterations of the trust region where Newton's method does not end at an optimum."""
 Place: TypeAlias = tuple[int, ...]
@@ -188,6 +188,12 @@ class _Pursuit:
         if not self.is_over:
             self.u = np.clip(self.u + move, 0.0, 1.0)
 
+    def renew(self) -> None:
+        """Goes on with second derivatives of the last design, where they are known."""
+        second = second_derivatives_of(self.problem, self.design)
+        if second is not None and np.all(np.isfinite(second.slopes)):
+            self._second = second
+
     def certified(self) -> GridPoint:
         """The optimum that this came to, or that the trust region finds from the last design."""
         problem, design, gait = self.problem, self.design, self.gait
@@ -208,13 +214,17 @@ class _Pursuit:
 def pursue(points: list[_Pursuit]) -> list[_Pursuit]:
     """Newton's method of all points at once; those that have a design."""
     under_way = points
-    for _ in range(_STEPS):
-        gaits = _find_gaits([point.trial() for point in under_way])
-        for point, gait in zip(under_way, gaits, strict=True):
-            point.advance(gait)
-        under_way = [point for point in under_way if not point.is_over]
-    there = [point for point in points if point.has_converged]
-    _find_gaits([trial for point in there for trial in point.trials_beside()])
+    for _ in range(_ROUNDS):
+        before = under_way
+        for _ in range(_STEPS):
+            gaits = _find_gaits([point.trial() for point in under_way])
+            for point, gait in zip(under_way, gaits, strict=True):
+                point.advance(gait)
+            under_way = [point for point in under_way if not point.is_over]
+        left = [point for point in before if point.has_converged or not point.is_over]
+        _find_gaits([trial for point in left for trial in point.trials_beside()])
+        for point in under_way:
+            point.renew()
     return [point for point in points if point.problem.latest is not None]
 
 
