@@ -263,6 +263,9 @@ def second_derivatives_of(problem: DesignProblem, design: Design) -> SecondDeriv
             (first, second), length = map(rows_at, sides), (one.u - other.u) @ direction
             row[:] = (first[0] - second[0]) / length
             bars[:] = (np.abs(first[1]) + np.abs(second[1])) / abs(length)
+            # What differences leave out, where one more derivative is of the size of the last.
+            is_central = other is not design
+            bars += _ASIDE ** (2 if is_central else 1) * np.abs(row)
     return SecondDerivatives(scale, balance, directions, slopes, errors)
 
 

@@ -5,13 +5,16 @@ conditions of optimality with the second derivatives of the optimum before. The 
 of a wave are found as one batch, and each point is certified as any other optimum is.
 """
 
+import contextlib
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import Stage, stage
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_functions import restored
@@ -32,9 +35,9 @@ from jaxbiped.scene._parameter_access import with_parameters
 
 _BATCH = 16
 """Gaits that are sought at once: the number is a part of the compiled program."""
-_STEPS, _SHORT, _LONG, _KEPT = 8, 3e-7, 0.3, 1e-10
-"""Newton's steps of a point at most; their lengths in u at the end, and at most; and by what part
-of a bound requirements are missed at the end."""
+_ROUNDS, _STEPS, _SHORT, _LONG, _KEPT = 3, 4, 3e-7, 0.3, 1e-10
+"""Second derivatives with which Newton's method goes on at most, and steps with each; lengths of
+the steps in u at the end, and at most; and by what part of a bound requirements are missed then."""
 _ITERATIONS = 60
 """Iterations of the trust region where Newton's method does not end at an optimum."""
 Place: TypeAlias = tuple[int, ...]
@@ -85,7 +88,11 @@ class OptimumGrid:
         """Improves the optima that are known, and goes on from them to all other points."""
         wave = [(place, place) for place in self.points]
         while wave:
-            for pursuit in pursue([_Pursuit(self, place, origin) for place, origin in wave]):
+            pursuits = []
+            for place, origin in wave:
+                with contextlib.suppress(ArgumentError):  # parameters that do not go together
+                    pursuits.append(_Pursuit(self, place, origin))
+            for pursuit in pursue(pursuits):
                 self.points[pursuit.place] = pursuit.certified()
             self.lost |= {place for place, _ in wave} - self.points.keys()
             now.update(len(wave), found=f"{len(self.points)} optima")
@@ -180,6 +187,12 @@ class _Pursuit:
         if not self.is_over:
             self.u = np.clip(self.u + move, 0.0, 1.0)
 
+    def renew(self) -> None:
+        """Goes on with second derivatives of the last design, where they are known."""
+        second = second_derivatives_of(self.problem, self.design)
+        if second is not None and np.all(np.isfinite(second.slopes)):
+            self._second = second
+
     def certified(self) -> GridPoint:
         """The optimum that this came to, or that the trust region finds from the last design."""
         problem, design, gait = self.problem, self.design, self.gait
@@ -200,13 +213,17 @@ class _Pursuit:
 def pursue(points: list[_Pursuit]) -> list[_Pursuit]:
     """Newton's method of all points at once; those that have a design."""
     under_way = points
-    for _ in range(_STEPS):
-        gaits = _find_gaits([point.trial() for point in under_way])
-        for point, gait in zip(under_way, gaits, strict=True):
-            point.advance(gait)
-        under_way = [point for point in under_way if not point.is_over]
-    there = [point for point in points if point.has_converged]
-    _find_gaits([trial for point in there for trial in point.trials_beside()])
+    for _ in range(_ROUNDS):
+        before = under_way
+        for _ in range(_STEPS):
+            gaits = _find_gaits([point.trial() for point in under_way])
+            for point, gait in zip(under_way, gaits, strict=True):
+                point.advance(gait)
+            under_way = [point for point in under_way if not point.is_over]
+        left = [point for point in before if point.has_converged or not point.is_over]
+        _find_gaits([trial for point in left for trial in point.trials_beside()])
+        for point in under_way:
+            point.renew()
     return [point for point in points if point.problem.latest is not None]
 
 
@@ -219,7 +236,12 @@ def _find_gaits(trials: Sequence[_Trial]) -> list[Gait | None]:
         rows = [trial.fixed | trial.problem.variables.by_name(trial.u) for trial in filled]
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         base, states = chunk[0].problem, np.array([trial.state for trial in filled])
-        batch = gaits_near(base.scene, columns, states, base.settings, base.wanted)
+        try:
+            batch = gaits_near(base.scene, columns, states, base.settings, base.wanted)
+        except ArgumentError:  # parameters of one of them do not go together
+            alone = [_find_gaits([trial]) for trial in chunk] if len(chunk) > 1 else [[None]]
+            gaits += itertools.chain.from_iterable(alone)
+            continue
         for k, trial in enumerate(chunk):
             scene, gait, functionals = jtu.tree_map(lambda leaf, k=k: leaf[k], batch)
             near = trial.state, trial.farthest

@@ -46,6 +46,19 @@ def test_each_gait_is_an_optimum_and_lost_ones_stop_no_others(tmp_path):
 
 
 @pytest.mark.slow
+def test_parameters_that_do_not_go_together_are_lost_alone():
+    """A foot's radius beyond the leg's length: of a point, and of designs on the way to one."""
+    over = {"l": [0.4, 0.3], "r": [0.08, 0.35]}
+    gaits = jb.optimise.library(SEED, over=over, vary={"d": (0.05, 0.2)}, maximise="speed")
+    assert gaits.outcome.sel(l=0.3, r=0.35) == 7
+    assert gaits.outcome.sel(r=0.08).values.tolist() == [0, 0]
+    over = {"l": [0.4, 0.11], "slope": [0.02, 0.021]}
+    gaits = jb.optimise.library(SEED, over=over, vary={"r": (0.06, 0.12)}, maximise="speed")
+    assert gaits.outcome.values.tolist() == [[0, 0], [7, 7]]
+    np.testing.assert_allclose(gaits.design_r[0], 0.12)
+
+
+@pytest.mark.slow
 def test_ctrl_c_keeps_the_points_that_are_done(monkeypatch):
     interrupt_after(monkeypatch, 1, "optima")
     gaits = jb.optimise.library(SEED, over={"slope": [0.02, 0.021, 0.022]}, **SPEED)
