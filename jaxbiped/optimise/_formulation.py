@@ -9,7 +9,7 @@ from jaxbiped._progress import Stage
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_problem import Design, DesignProblem, start_of
 from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
-from jaxbiped.optimise._simultaneous import begin_together, reason_against
+from jaxbiped.optimise._simultaneous_search import begin_together, reason_against
 
 FORMULATIONS = ("auto", "gait by gait", "together")
 _VIOLENT = 3.0

@@ -43,7 +43,7 @@ from jaxbiped.optimise._requirements import (
     requirements_of,
 )
 from jaxbiped.optimise._runs import Runs, optimum_of, scattered_designs
-from jaxbiped.optimise._simultaneous import check_simultaneous
+from jaxbiped.optimise._simultaneous_search import check_simultaneous
 from jaxbiped.scene._parameter_access import scene_identity
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.scene._scene_checks import check_scene

@@ -12,7 +12,7 @@ from jaxbiped.optimise._design_problem import Variables, variables_of
 from jaxbiped.optimise._objectives import is_sum_of_parameters
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.optimise._runs import Runs, optimum_of
-from jaxbiped.optimise._simultaneous import begin_together, check_simultaneous
+from jaxbiped.optimise._simultaneous_search import begin_together, check_simultaneous
 from jaxbiped.optimise._torque_gap import TorqueGap, coefficient_names, time_splines, torque_gap
 from jaxbiped.scene.actuation._time_laws import TimeSpline
 

@@ -6,25 +6,21 @@ Plitt, A multiple shooting algorithm for direct solution of optimal control prob
 """
 
 import functools
-import operator
-from collections.abc import Iterator
 from typing import Any, NamedTuple, cast
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._checks import ArgumentError
-from jaxbiped._progress import Stage
 from jaxbiped.caching._cached_jit import note_code
 from jaxbiped.dynamics._equivalent_states import exchange_legs
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._return_map import return_map
-from jaxbiped.gait._return_map_spec import arrivals_of, return_map_spec
-from jaxbiped.gait._search_starts import default_guess, rolling_starts
+from jaxbiped.gait._return_map_spec import return_map_spec
+from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.hybrid._landing_system import AbstractLandingSystem
-from jaxbiped.hybrid._motion_costs import Extreme, Integral, has_motion_costs
+from jaxbiped.hybrid._motion_costs import Extreme, Integral
 from jaxbiped.hybrid._scales import recurring_sizes
 from jaxbiped.hybrid._sections import section_of
 from jaxbiped.hybrid._walker_systems import system_of
@@ -37,11 +33,10 @@ from jaxbiped.optimise._cycle_functionals import (
     functional_precision,
 )
 from jaxbiped.optimise._design_functions import AnyRow, rows_of
-from jaxbiped.optimise._design_problem import Design, DesignProblem, start_of
+from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._objective_values import Evaluation, with_costs
-from jaxbiped.optimise._objectives import ParameterFunction, costs_of, with_parts
-from jaxbiped.optimise._optimisers import RunEnding
-from jaxbiped.optimise._sequential_programming import Conditions, run_newton
+from jaxbiped.optimise._objectives import costs_of, with_parts
+from jaxbiped.optimise._sequential_programming import Conditions
 from jaxbiped.optimise._shooting import (
     Linearised,
     Segments,
@@ -49,7 +44,7 @@ from jaxbiped.optimise._shooting import (
     linearise_segments,
     pull_back_segments,
 )
-from jaxbiped.scene._parameter_access import parameter_quantities, select_parameters
+from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.solve._accuracy import Precision
 
 _LEAST_PERIOD, _PERIOD, _MOST_PERIOD = 0.3, 2.2, 20.0
@@ -58,17 +53,13 @@ _LEAST_STEP = 0.02
 """Least step in units of the walker's height: to stand still is a cycle, too."""
 _APART = 1e-4
 """Distance of points whose first derivatives tell second ones, in units of the unknowns."""
-_FROM_CYCLE = 1e-3
+FROM_CYCLE = 1e-3
 """Largest relative distance of the gait that is found near a cycle that solves all equations."""
 _GRAZING = 1e-4
 """Rate at which the section is met, in units of the scene, below which no foot comes down."""
-_BETTER = 1e-9
-"""Relative difference from which another cycle counts as better."""
-_MORE = 5
-"""Further searches from drawn poses and designs while none has come to a gait."""
 _NO_GAIT = cast(Gait, None)
 """What a sum of parameters needs of a gait."""
-_OF_CYCLE = ("period", "step_length", "speed")
+OF_CYCLE = ("period", "step_length", "speed")
 """Measures that a cycle has beside its costs."""
 
 
@@ -110,7 +101,7 @@ class Simultaneous:
         system = CostedCycle.of(self._walker, self.integrals)
         pose = default_guess(scene)
         self._like = system.begin(pose)
-        engine = _spec_of(scene, settings.engine).engine
+        engine = cycle_spec_of(scene, settings.engine).engine
         self._spec = cycle_spec(scene, system, MotionSection(section_of(scene, None)), 1, engine)
         self._precision = functional_precision(settings.accuracy, scene)
         self.rtol = float(self._precision.rtol)
@@ -185,7 +176,7 @@ class Simultaneous:
             return "the foot does not come down at the end but grazes the ground"
         state = self.problem.settings.state_of(scene, starts[0])
         time = float(return_map(scene, state).time)
-        if not time < (1.0 - _FROM_CYCLE) * period:
+        if not time < (1.0 - FROM_CYCLE) * period:
             return "no gait was found near it"
         return f"a foot comes down before its end, after {time:.4g} s of {period:.4g} s"
 
@@ -375,144 +366,7 @@ class Simultaneous:
         return whole
 
 
-def _spec_of(scene: Any, engine: str) -> Any:
+def cycle_spec_of(scene: Any, engine: str) -> Any:
     """The return map of a walker's scene, by an engine that can."""
     start = default_guess(scene)
     return return_map_spec(scene, start, solver=None, engine=engine, max_solver_steps=1)
-
-
-def check_simultaneous(problem: DesignProblem) -> None:
-    """Raises `ArgumentError` for a problem that has no simultaneous search."""
-    if reason := reason_against(problem):
-        raise ArgumentError(
-            f'formulation = "together" is not allowed {reason}: choose "gait by gait".'
-        )
-
-
-def reason_against(problem: DesignProblem) -> str | None:
-    """Why a problem has no simultaneous search, in words; None if it has."""
-    scene, settings = problem.scene, problem.settings
-    if not has_motion_costs(scene.minimal):
-        return f"for a {type(scene).__name__}, which is no walker"
-    if not system_of(scene.minimal).footsteps_end_on_section:
-        return "for compliant feet, which press into the ground for a while"
-    if _spec_of(scene.minimal, settings.engine).resets:
-        return "for a walker whose modes change between strikes"
-    if arrivals_of(scene, settings.footsteps) != 1:
-        return "for a cycle of several footsteps"
-    if problem.ensemble is not None:
-        return "with scatter"
-    every = with_parts(problem.wanted)
-    combined = [measure.combined for measure in every.values() if measure.combined]
-    parts = {name for combination in combined for name in combination.of}
-    for name, objective in every.items():
-        bounded = [requirement for requirement in problem.requirements if requirement.name == name]
-        for weight, cost in objective.costs:
-            if not isinstance(cost, Extreme):
-                continue
-            sides = [low if cost.sign > 0.0 else high for _, low, high in bounded]
-            is_path = weight == 1.0 and len(objective.costs) == 1 and set(sides) == {None}
-            if not is_path or name in (*problem.weights, *parts):
-                return (
-                    f"for {name}, an extreme, except as the upper bound of a largest value or the "
-                    "lower bound of a smallest one"
-                )
-        is_sum = objective.costs or isinstance(objective.measured, ParameterFunction)
-        if not (is_sum or objective.combined or name in _OF_CYCLE):
-            return f"for {name}, which is no integral along the cycle"
-    return None
-
-
-def _beginnings(
-    whole: Simultaneous, pose: Any, period: float | None, more: int, seed: int
-) -> Iterator[tuple[int, np.ndarray]]:
-    """Points from which searches begin: two in any case, number 0, then drawn designs and poses.
-
-    They are the scene's own design, and that with the least torques, which is often near the
-    cheaper of several optima.
-    """
-    from scipy.stats import qmc
-
-    scene, variables = whole.problem.scene, whole.problem.variables
-    u = start_of(scene, variables)
-    if period is None:
-        yield 0, whole.rough_cycle(u, pose)
-    else:
-        yield 0, whole.followed_cycle(u, pose, period)
-    quantities = parameter_quantities(scene)
-    is_torque = [quantities[name].unit.startswith("N m") for name in variables.names]
-    slack = np.where(is_torque, variables.positions(np.zeros(len(u))), u)
-    if np.any(slack != u):
-        yield 0, whole.rough_cycle(slack, pose)
-    poses = rolling_starts(scene.minimal, more + 1, seed=seed)
-    designs = qmc.Sobol(len(u), seed=seed).random_base2(more.bit_length())
-    for k in range(1, more + 1):
-        yield k, whole.rough_cycle(designs[k], jtu.tree_map(operator.itemgetter(k), poses))
-
-
-def begin_together(
-    problem: DesignProblem,
-    near: Any,
-    period: float | None,
-    segments: int,
-    iterations: int,
-    drawn: tuple[int, int],
-    now: Stage,
-) -> tuple[Design, RunEnding]:
-    """The design that simultaneous searches come to, with its gait, and how the best one ended.
-
-    Args:
-        problem: what is designed.
-        near, period: the state of a gait and its period [s], from which the first search begins; or
-            a rough pose, None for the default one, and None.
-        segments, iterations: of each search.
-        drawn: how many further searches begin at drawn poses and designs, and the seed.
-        now: counts iterates.
-
-    Raises:
-        ArgumentError: no search came to a gait.
-    """
-    whole, (count, seed) = Simultaneous(problem, segments), drawn
-    pose = default_guess(problem.scene.minimal) if near is None else near
-
-    def report(z: np.ndarray) -> None:
-        here = whole.at(z)
-        missed = f", conditions missed by {here.violation:.1e}" if here.violation > 0.0 else ""
-        now.update(found=f"objective {problem.sense * here.objective:.6g}{missed}")
-
-    def gait_of(z: np.ndarray, farthest: float) -> np.ndarray | None:
-        """The u of a point with a gait near its cycle."""
-        starts, _, there = whole.parts(z)
-        sizes = farthest * (np.abs(starts[0]) + whole.sizes)
-        return None if problem.from_guess(there, starts[0], sizes) is None else there
-
-    best: tuple[float, np.ndarray, RunEnding] | None = None
-    no_gaits: list[tuple[float, np.ndarray]] = []
-    others: list[tuple[float, np.ndarray, RunEnding]] = []
-    for k, point in _beginnings(whole, pose, period, count + _MORE, seed):
-        if k > count and best is not None:
-            break
-        z, ended = run_newton(whole, point, iterations, report)
-        here = whole.at(z)
-        if not ended.converged:
-            others.append((here.violation, z, ended))
-        elif best is None or here.objective < best[0] - _BETTER * abs(best[0]):
-            there = gait_of(z, _FROM_CYCLE)
-            if there is None:
-                no_gaits.append((here.objective, z))
-            else:
-                best = here.objective, there, ended
-    if best is not None:
-        return problem.begin(best[1]), best[2]
-    for _, z, ended in sorted(others, key=lambda other: other[0]):
-        there = gait_of(z, np.inf)
-        if there is not None:
-            return problem.begin(there), ended
-    what = "no cycle was found"
-    if no_gaits:
-        value, z = min(no_gaits, key=lambda cycle: cycle[0])
-        what = f"of the best cycle, of {problem.sense * value:.6g}, {whole.why_no_gait(z)}"
-    raise ArgumentError(
-        f'formulation = "together" came to no gait: {what}; give another guess, further '
-        'requirements, such as "landing_speed>0.05", or restarts.'
-    )

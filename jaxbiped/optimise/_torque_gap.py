@@ -29,7 +29,8 @@ from jaxbiped.optimise._design_problem import variables_of
 from jaxbiped.optimise._objectives import costs_of, is_sum_of_parameters, with_parts
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.optimise._sequential_programming import best_step, run_newton
-from jaxbiped.optimise._simultaneous import Simultaneous, reason_against
+from jaxbiped.optimise._simultaneous import Simultaneous
+from jaxbiped.optimise._simultaneous_search import reason_against
 from jaxbiped.scene._joint_parts import Motor
 from jaxbiped.scene._mechanism import Mechanism
 from jaxbiped.scene._parameter_access import parameter_names, select_parameters

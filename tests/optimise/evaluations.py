@@ -72,7 +72,7 @@ def with_other_goal(best, measures):
     for measure in measures:
         name = measure if isinstance(measure, str) else measure.name
         wanted[name] = objective_of(measure, best.scene, "minimise")
-    problem = best.problem.of_scene(best.scene, best.problem.variables)
+    problem = best.problem.variant(best.scene)
     problem.wanted, problem.requirements = wanted, ()
     problem.weights = dict.fromkeys(wanted, 1.0)
     return dataclasses.replace(best, problem=problem)

@@ -60,7 +60,7 @@ def test_footsteps_are_whole_cycles():
 
 def test_motors_are_bounded_as_actuators_are():
     motor = jb.Motor({"leg_1": 1, "leg_2": -1}, jb.actuation.Constant(0.01), by="side")
-    with pytest.raises(jb.ArgumentError, match="no actuators"):
+    with pytest.raises(jb.ArgumentError, match="no motors"):
         check_objective("motor_work", scene_of("unequal"))
     driven = jb.Mechanism(**scene_of("unequal").walker.arguments() | {"joints": (motor,)})
     check_objective("motor_work", scene_of("unequal", walker=driven))

@@ -158,6 +158,7 @@ def _optimum(history=5, excess=(0.1, 0.0, 0.0, 0.0, 0.0), bound=0.19, scene=None
         evaluations=history,
         lost=0,
         problem=None,
+        formulation="together",
         unmeasured=0,
     )
 
