@@ -142,6 +142,15 @@ class Optimise(options.Command, of=("optimise.certify", "optimise_gait")):
         report.say(*_certificate_lines(certificate))
         figures = {"optimisation": lambda: jb.plot.optimisation(optimum)}
         numbers = _optimum_numbers(optimum, certificate, goal, sense)
+        if jb.dynamics.WalkerMotion(optimum.scene.minimal, optimum.gait.measures.state).motors():
+            gap = _gap(optimum)
+            figures["torques"] = lambda: jb.plot.motor_torques(optimum, gap)
+            if gap is not None:
+                numbers["torque_gap"] = {name: getattr(gap, name) for name in ("bound", "error")}
+                report.say(
+                    f"torques that are free in time could save at most {gap.bound:.3g} of "
+                    f"{optimum.objective:.6g}"
+                )
         if self.front is not None and optimum.outcome is not ended.INTERRUPTED:
             against, bounds, upper = _front_axis(self.front, _unit_of_measure)
             front = jb.optimise.pareto_front(
@@ -180,8 +189,18 @@ def _front_axis(
 
 def _unit_of_measure(name: str) -> str | None:
     """The unit of a measure; None if only a search knows it."""
-    known = jb.optimise.OBJECTIVES.get(name)
+    known = (jb.optimise.OBJECTIVES | jb.optimise.NAMED_COSTS).get(name)
     return known and known.quantity.unit
+
+
+def _gap(optimum: "jb.optimise.Optimum") -> "jb.optimise.TorqueGap | None":
+    """The gap to torques that are free in time; None where there is none to be told."""
+    if optimum.outcome is not jb.optimise.Outcome.CONVERGED:
+        return None
+    try:
+        return jb.optimise.torque_gap(optimum)
+    except ArgumentError:  # the objective is not convex in torques, or the feet are compliant
+        return None
 
 
 def _front_numbers(front: "jb.optimise.ParetoFront") -> list[JsonObject]:

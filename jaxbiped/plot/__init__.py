@@ -35,6 +35,7 @@ from jaxbiped.plot._motion_pictures import animate as animate
 from jaxbiped.plot._motion_pictures import animation_html as animation_html
 from jaxbiped.plot._motion_pictures import gait_strobe as gait_strobe
 from jaxbiped.plot._motion_pictures import save_animation as save_animation
+from jaxbiped.plot._motor_torques import motor_torques as motor_torques
 from jaxbiped.plot._notebook import notebook_html as notebook_html
 from jaxbiped.plot._notebook import walker as walker
 from jaxbiped.plot._parameter_charts import basin_fractions as basin_fractions
