@@ -146,7 +146,7 @@ class _FreeTorques:
     Attributes:
         motors: their names, j in all.
         count: coefficients of each torque, k.
-        places: times since the strike at which ∂H/∂u is known [s].
+        times: times since the strike at which ∂H/∂u is known [s].
     """
 
     def __init__(self, best: Optimum, intervals: int) -> None:
@@ -224,9 +224,11 @@ class _FreeTorques:
         of_spare[held] = np.maximum(multipliers[q:], 0.0)
         return multipliers[:q], of_spare
 
-    def _slopes(self, z: np.ndarray, *multipliers: np.ndarray) -> tuple[Any, np.ndarray]:
+    def _slopes(
+        self, z: np.ndarray, of_equal: np.ndarray, of_spare: np.ndarray
+    ) -> tuple[Any, np.ndarray]:
         """States along the cycle, and ∂H/∂u there, shape (n, j)."""
-        states, slopes = self.whole.pulled_back(z, *multipliers, self.steps)
+        states, slopes = self.whole.pulled_back(z, of_equal, of_spare, self.steps)
         return states, slopes.reshape(-1, len(self.motors), self.count).sum(axis=-1)
 
     def _left(self, z: np.ndarray, of_equal: np.ndarray, of_spare: np.ndarray) -> float:
