@@ -147,7 +147,7 @@ class _FreeTorques:
     Attributes:
         motors: their names, j in all.
         count: coefficients of each torque, k.
-        places: times since the strike at which ∂H/∂u is known [s].
+        times: times since the strike at which ∂H/∂u is known [s].
     """
 
     def __init__(self, best: Optimum, intervals: int) -> None:
