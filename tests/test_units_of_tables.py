@@ -38,7 +38,7 @@ BY_DIMENSION = {
     "friction_loss": "J", "motor_work": "J", "fold_distance": "rad", "doubling_distance": "rad",
     "weight": "N", "slope": "rad", "torque_squared": "N^2 m^2 s", "absolute_work": "J",
     "push_off_squared": "N^2 s^2", "jerk": "rad^2/s^5", "peak_torque": "N m", "peak_power": "W",
-    "joint_range": "rad",
+    "joint_range": "rad", "landing_speed": "m/s",
 }  # fmt: skip
 
 

@@ -285,11 +285,18 @@ def _closing(
     """The first gait of a branch if the step from the last of its points passes it, else None."""
     if len(passed) + len(points) <= 3:
         return None
-    first, here = passed[0] if passed else begin, points[-1]
+    first = passed[0] if passed else begin
+    if not _closes(first, points[-1], there):
+        return None
+    return correct(curve, first.place, first.tangent).found if passed else begin
+
+
+def _closes(
+    first: CurvePoint | BranchPoint, here: CurvePoint | BranchPoint, there: CurvePoint
+) -> bool:
+    """Whether a branch passes its first gait between two points."""
     step, back = there.place - here.place, first.place - here.place
     share = float(back @ step / (step @ step))
     aside = np.linalg.norm(back - share * step)
     near = 0.0 < share <= 1.0 and aside < 0.1 * np.linalg.norm(step)
-    if not (near and first.tangent @ there.tangent > _SAME_WAY):
-        return None
-    return correct(curve, first.place, first.tangent).found if passed else begin
+    return bool(near and first.tangent @ there.tangent > _SAME_WAY)
