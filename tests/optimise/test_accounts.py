@@ -18,8 +18,8 @@ pytestmark = pytest.mark.slow
 
 A = jb.actuation
 CASES = cases()
-PUSHES = {"unequal legs": 0.05, "kneed with torso": 0.3}
-"""Impulses [N s] by which two mechanisms reach the second heel strike on all grounds."""
+PUSHES = {"unequal legs": 0.05, "kneed": 0.3, "kneed with torso": 0.3, "five links": 0.3}
+"""Impulses [N s] by which some mechanisms reach the second heel strike on all grounds."""
 
 
 def drives_of(name, feet):
